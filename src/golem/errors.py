@@ -1,0 +1,63 @@
+"""The errors a user can cause. Each says in one sentence what is wrong and what would be right."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class GolemError(Exception):
+    """Root of every error that a user, not a programmer, can cause; the CLI prints it and exits with 2."""
+
+
+class ConfigError(GolemError):
+    """A stack file, an option or an argument does not say something this software can do."""
+
+
+class OutputError(GolemError):
+    """A result cannot be written where the user asked."""
+
+
+class MissingExtra(GolemError):
+    """An optional dependency is absent."""
+
+    def __init__(self, package: str, extra: str) -> None:
+        """Name the absent `package` and the `extra` whose installation brings it."""
+        super().__init__(
+            f"The Python package '{package}' is not installed; install it with: "
+            f"pip install 'golem-humanoid[{extra}]'"
+        )
+
+
+class MissingSystemLibrary(GolemError):
+    """A shared library of the operating system is absent."""
+
+
+class ModuleFault(GolemError):
+    """A module of the stack raised, or returned something its contract forbids.
+
+    Attributes:
+        slot: the stack slot of the module, e.g. `"upper_body"`.
+        use: the implementation as the stack file names it.
+    """
+
+    def __init__(self, slot: str, use: str, reason: str) -> None:
+        """Describe which module (`slot`, `use`) broke its contract and how (`reason`)."""
+        super().__init__(f"Module {slot}: {use} failed: {reason}")
+        self.slot = slot
+        self.use = use
+        self.reason = reason
+
+
+def unknown_name(kind: str, name: str, valid: Iterable[str]) -> ConfigError:
+    """Return the error for a name that is not one of `valid`, with the nearest valid name first.
+
+    Args:
+        kind: what the name names, e.g. `"rung"`.
+        name: what the user wrote.
+        valid: every name that would have been accepted.
+    """
+    names = sorted(valid)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    hint = f" Did you mean '{near[0]}'?" if near else ""
+    return ConfigError(f"Unknown {kind} '{name}'; valid: {', '.join(names) or '(none)'}.{hint}")

@@ -1,0 +1,232 @@
+"""The words every layer uses: joint order, states, commands, images, objects.
+
+Units are SI and radians. `T_a_b` is a 4x4 homogeneous matrix that maps the coordinates of a point in frame b
+into frame a. Quaternions are wxyz. Frames follow REP-103 and REP-120: `base_link` is the pelvis link, x forward,
+z up; `odom` is the world-fixed frame that coincides with the levelled base_link at the start of an episode.
+Optical frames have z forward, x right, y down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+"""A float64 array; every docstring that uses it gives the shape."""
+
+Side = Literal["left", "right"]
+SIDES: tuple[Side, Side] = ("left", "right")
+
+NUM_JOINTS = 27
+"""Body motors of the H1-2, in the order of the vendor's SDK."""
+LEGS = slice(0, 12)
+"""Motor indices of the two legs."""
+UPPER = slice(12, 27)
+"""Motor indices of the upper body: torso (1), left arm (7), right arm (7)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Imu:
+    """One sample of the torso IMU, in the frame `imu_link` (on the torso, above the waist joint).
+
+    Attributes:
+        quat: (4,) orientation of imu_link in a gravity-aligned world frame, wxyz.
+        gyro: (3,) angular rate [rad/s].
+        acc: (3,) specific force, +9.81 along up at rest [m/s^2].
+    """
+
+    quat: Array
+    gyro: Array
+    acc: Array
+
+
+@dataclass(frozen=True, slots=True)
+class LowState:
+    """What the 27 body motors and the IMU report, at the servo rate.
+
+    Attributes:
+        t: time stamp [s].
+        q: (27,) joint positions as the encoders report them [rad].
+        dq: (27,) joint velocities [rad/s].
+        tau: (27,) estimated joint torques [N m].
+        imu: the torso IMU.
+    """
+
+    t: float
+    q: Array
+    dq: Array
+    tau: Array
+    imu: Imu
+
+
+@dataclass(frozen=True, slots=True)
+class LowCommand:
+    """What the motors are told: tau_motor = kp (q - q_meas) + kd (dq - dq_meas) + tau.
+
+    Attributes:
+        t: time stamp [s].
+        q, dq, tau, kp, kd: (27,) each [rad], [rad/s], [N m], [N m/rad], [N m s/rad].
+    """
+
+    t: float
+    q: Array
+    dq: Array
+    tau: Array
+    kp: Array
+    kd: Array
+
+
+@dataclass(frozen=True, slots=True)
+class HandState:
+    """What one MAGPIE hand reports.
+
+    Attributes:
+        t: time stamp [s].
+        gap: opening between the two finger pads [m], 0 to 0.108.
+        fingers: (2,) distance of each pad from the hand's centre plane [m]; they sum to `gap`.
+        force: (2,) normal force of each pad as derived from the servo load [N].
+    """
+
+    t: float
+    gap: float
+    fingers: Array
+    force: Array
+
+
+@dataclass(frozen=True, slots=True)
+class HandCommand:
+    """What one MAGPIE hand is told.
+
+    Attributes:
+        t: time stamp [s].
+        gap: opening to move to [m]; 0 closes.
+        force: ceiling on the force of each finger [N], 0.15 to 16.1.
+    """
+
+    t: float
+    gap: float
+    force: float
+
+
+@dataclass(frozen=True, slots=True)
+class CameraInfo:
+    """A pinhole camera.
+
+    Attributes:
+        name: `"head"`, `"left_hand"` or `"right_hand"`.
+        width, height: image size [px].
+        fx, fy, cx, cy: intrinsics [px]; a pixel's centre has integer coordinates.
+        near, far: depth range outside which the sensor returns no depth [m].
+        rate: frames per second [Hz].
+    """
+
+    name: str
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    near: float
+    far: float
+    rate: float
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One RGB-D frame, depth aligned to colour.
+
+    Attributes:
+        t: time of exposure [s].
+        info: the camera.
+        rgb: (height, width, 3) uint8.
+        depth: (height, width) float32 distance along the optical axis [m]; 0 where invalid.
+        T_base_optical: (4, 4) pose of the optical frame in base_link by the nominal calibration and the measured
+            joints: what the robot believes, not where the camera is.
+    """
+
+    t: float
+    info: CameraInfo
+    rgb: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+    T_base_optical: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """One object in one image.
+
+    Attributes:
+        label: class name.
+        score: confidence, 0 to 1.
+        box: (4,) x_min, y_min, x_max, y_max [px].
+        center: (2,) image point of the object's centre, x, y [px].
+    """
+
+    label: str
+    score: float
+    box: Array
+    center: Array
+
+
+@dataclass(frozen=True, slots=True)
+class LocalizedObject:
+    """A detection lifted into space.
+
+    Attributes:
+        detection: where it is in the image.
+        t: time of the frame [s].
+        position: (3,) the object's position in base_link [m]: the surface point seen at its centre.
+        points: (n, 3) its point cloud in base_link [m].
+    """
+
+    detection: Detection
+    t: float
+    position: Array
+    points: Array
+
+    @property
+    def label(self) -> str:
+        """The class name."""
+        return self.detection.label
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """A velocity command in base_link: vx, vy [m/s], wz [rad/s]."""
+
+    vx: float = 0.0
+    vy: float = 0.0
+    wz: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class BaseEstimate:
+    """Where the base is, as far as the robot can tell.
+
+    Attributes:
+        t: time stamp [s].
+        T_odom_base: (4, 4) pose of base_link in odom.
+        velocity: (3,) linear velocity of base_link in odom [m/s].
+    """
+
+    t: float
+    T_odom_base: Array
+    velocity: Array = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True, slots=True)
+class PalmTargets:
+    """Where the two grasp frames shall be.
+
+    Attributes:
+        t: time stamp [s].
+        left, right: (4, 4) pose of that hand's grasp frame in base_link; None leaves the arm where it is.
+    """
+
+    t: float
+    left: Array | None = None
+    right: Array | None = None
