@@ -144,15 +144,15 @@ class Frame:
         info: the camera.
         rgb: (height, width, 3) uint8.
         depth: (height, width) float32 distance along the optical axis [m]; 0 where invalid.
-        T_base_optical: (4, 4) pose of the optical frame in base_link by the nominal calibration and the measured
-            joints: what the robot believes, not where the camera is.
+        T_odom_optical: (4, 4) pose of the optical frame in odom by the nominal calibration, the measured joints and
+            the base estimate: what the robot believes, not where the camera is.
     """
 
     t: float
     info: CameraInfo
     rgb: NDArray[np.uint8]
     depth: NDArray[np.float32]
-    T_base_optical: Array
+    T_odom_optical: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,8 +179,8 @@ class LocalizedObject:
     Attributes:
         detection: where it is in the image.
         t: time of the frame [s].
-        position: (3,) the object's position in base_link [m]: the surface point seen at its centre.
-        points: (n, 3) its point cloud in base_link [m].
+        position: (3,) the object's position in odom [m]: the surface point seen at its centre.
+        points: (n, 3) its point cloud in odom [m].
     """
 
     detection: Detection
@@ -220,11 +220,11 @@ class BaseEstimate:
 
 @dataclass(frozen=True, slots=True)
 class PalmTargets:
-    """Where the two grasp frames shall be.
+    """Where the two grasp frames (`left_gripper`, `right_gripper`: z approach, y closing) shall be.
 
     Attributes:
         t: time stamp [s].
-        left, right: (4, 4) pose of that hand's grasp frame in base_link; None leaves the arm where it is.
+        left, right: (4, 4) pose of that hand's grasp frame in odom; None leaves the arm where it is.
     """
 
     t: float
