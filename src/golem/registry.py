@@ -1,0 +1,157 @@
+"""Which implementation a name stands for, per slot of the stack.
+
+An implementation is named by its registered name (`diff_ik`), by module and class (`my_package.legs:Squat`) or by
+file and class (`my_legs.py:Squat`). Nothing is imported before it is asked for.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import importlib
+import importlib.util
+import inspect
+import sys
+import typing
+from collections.abc import Mapping
+from pathlib import Path
+
+from golem.errors import ConfigError, GolemError, ModuleFault, unknown_name
+
+_IMPLEMENTATIONS: dict[str, dict[str, str]] = {
+    "robot": {"mujoco": "golem.robots.mujoco.engine:MujocoRobot"},
+    "estimator": {"tether": "golem.hardware.estimator.tether:TetherEstimator"},
+    "servo": {"pd_gravity": "golem.hardware.servo.servo:Servo"},
+    "hand": {"magpie": "golem.hardware.hands.magpie:MagpieHand"},
+    "lower_body": {"hold": "golem.capabilities.legs.hold:Hold"},
+    "upper_body": {
+        "diff_ik": "golem.capabilities.arms.diff_ik:DiffIK",
+        "pink_ik": "golem.capabilities.arms.pink_ik:PinkIK",
+    },
+    "localizer": {"onnx": "golem.capabilities.localization.onnx_detector:OnnxDetector"},
+    "grasp_method": {
+        "centroid": "golem.skills.grasping.centroid:Centroid",
+        "visual_servo": "golem.skills.grasping.visual_servo:VisualServo",
+    },
+}
+
+
+def slots() -> tuple[str, ...]:
+    """Return the names of the slots a stack has."""
+    return tuple(_IMPLEMENTATIONS)
+
+
+def names(slot: str) -> tuple[str, ...]:
+    """Return the registered names of one slot."""
+    return tuple(_IMPLEMENTATIONS[slot])
+
+
+def register(slot: str, name: str, target: str) -> None:
+    """Make `target` (`package.module:Class`) selectable as `name` in `slot`.
+
+    Raises:
+        ConfigError: the slot does not exist, or the name is taken by something else.
+    """
+    if slot not in _IMPLEMENTATIONS:
+        raise unknown_name("slot", slot, _IMPLEMENTATIONS)
+    taken = _IMPLEMENTATIONS[slot].setdefault(name, target)
+    if taken != target:
+        raise ConfigError(f"The name '{name}' in slot '{slot}' already stands for {taken}.")
+
+
+def load(slot: str, use: str) -> type:
+    """Return the class that `use` names in `slot`, importing it now.
+
+    Raises:
+        ConfigError: there is no such name, file, module or class.
+        ModuleFault: importing the user's file raised.
+    """
+    target = _IMPLEMENTATIONS[slot].get(use, use)
+    location, colon, class_name = target.rpartition(":")
+    if not colon:
+        raise unknown_name(f"{slot} implementation", use, _IMPLEMENTATIONS[slot])
+    module = _import(slot, use, location)
+    cls = getattr(module, class_name, None)
+    if not inspect.isclass(cls):
+        classes = [k for k, v in vars(module).items() if inspect.isclass(v) and v.__module__ == module.__name__]
+        raise unknown_name(f"class in {location}", class_name, classes)
+    return cls
+
+
+def create(slot: str, use: str, options: Mapping[str, object], **context: object) -> typing.Any:
+    """Build the implementation `use` of `slot`.
+
+    A class whose constructor takes `config` (a dataclass) gets the options as that dataclass; any other class gets
+    them as keyword arguments. `context` is what the stack itself supplies (e.g. `side`): passed where the
+    constructor has a parameter of that name, else left out.
+
+    Raises:
+        ConfigError: an option does not exist, or one without default is missing.
+        ModuleFault: the constructor raised.
+    """
+    cls = load(slot, use)
+    parameters = inspect.signature(cls).parameters
+    supplied = {key: value for key, value in context.items() if key in parameters}
+    config = _config_class(cls)
+    if config is not None:
+        _check(slot, use, options, [f.name for f in dataclasses.fields(config)])
+        arguments = {"config": config(**options), **supplied}
+    else:
+        _check(slot, use, options, [name for name in parameters if name not in supplied])
+        arguments = {**options, **supplied}
+    try:
+        return cls(**arguments)
+    except GolemError:
+        raise
+    except Exception as error:  # a user's constructor may raise anything
+        raise ModuleFault(slot, use, f"its constructor raised {type(error).__name__}: {error}") from error
+
+
+def _config_class(cls: type) -> type | None:
+    """Return the dataclass that the constructor's parameter `config` takes, if there is one."""
+    if dataclasses.is_dataclass(cls) or "config" not in inspect.signature(cls).parameters:
+        return None
+    hint = typing.get_type_hints(cls.__init__).get("config")
+    for candidate in (hint, *typing.get_args(hint)):
+        if inspect.isclass(candidate) and dataclasses.is_dataclass(candidate):
+            return candidate
+    return None
+
+
+def _check(slot: str, use: str, options: Mapping[str, object], valid: list[str]) -> None:
+    for key in options:
+        if key not in valid:
+            raise unknown_name(f"option of {slot}: {use}", key, valid)
+
+
+def _import(slot: str, use: str, location: str) -> typing.Any:
+    try:
+        if not location.endswith(".py"):
+            return importlib.import_module(location)
+        path = Path(location).expanduser().resolve()
+        if not path.is_file():
+            raise ConfigError(f"{slot}: '{use}' names the file {path}, which does not exist.")
+        name = f"golem_user_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
+        if name in sys.modules:
+            return sys.modules[name]
+        spec = importlib.util.spec_from_file_location(name, path)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module  # dataclasses look their own module up while it loads
+        try:
+            spec.loader.exec_module(module)
+        except BaseException:
+            del sys.modules[name]
+            raise
+        return module
+    except GolemError:
+        raise
+    except ModuleNotFoundError as error:
+        if error.name is not None and (location == error.name or location.startswith(error.name + ".")):
+            raise ConfigError(
+                f"{slot}: '{use}' names the module {location}, which cannot be found; "
+                f"registered names: {', '.join(_IMPLEMENTATIONS[slot])}."
+            ) from error
+        raise ModuleFault(slot, use, f"it needs the package '{error.name}', which is not installed") from error
+    except Exception as error:  # a user's file may raise anything
+        raise ModuleFault(slot, use, f"importing it raised {type(error).__name__}: {error}") from error

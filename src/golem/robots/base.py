@@ -1,0 +1,53 @@
+"""The contract of a robot: motor commands in, measurements out."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from golem.types import Array, CameraInfo, HandCommand, HandState, Imu, LowCommand, Side
+
+from numpy.typing import NDArray
+import numpy as np
+
+
+class Robot(Protocol):
+    """One H1-2 with MAGPIE hands and its cameras, real or simulated.
+
+    A robot reports measurements only. Where things really are is not part of the contract.
+
+    Attributes:
+        cameras: the cameras it carries, by name.
+    """
+
+    cameras: dict[str, CameraInfo]
+
+    def advance(self, command: LowCommand, hands: dict[Side, HandCommand], dt: float) -> None:
+        """Let time pass under the given commands.
+
+        Args:
+            command: latched by the motors, which run tau = kp (q - q_meas) + kd (dq - dq_meas) + tau themselves.
+            hands: command of each hand.
+            dt: time to advance [s].
+        """
+        ...
+
+    def joints(self) -> tuple[Array, Array, Array]:
+        """Return q [rad], dq [rad/s] and tau [N m], each (27,), as the motors report them."""
+        ...
+
+    def imu(self) -> Imu:
+        """Return the present sample of the torso IMU."""
+        ...
+
+    def hand(self, side: Side, t: float) -> HandState:
+        """Return what one hand reports, stamped `t` [s]."""
+        ...
+
+    def capture(self, camera: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """Expose one camera now.
+
+        Returns:
+            rgb: (height, width, 3) uint8.
+            depth: (height, width) float32 along the optical axis [m], 0 where invalid.
+        """
+        ...

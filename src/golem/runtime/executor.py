@@ -1,0 +1,100 @@
+"""One clock for everything: lock-step (as fast as the machine allows) or paced by the wall clock.
+
+Both ways execute the same nodes in the same order on the same simulated time; pacing only waits.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from golem.errors import ConfigError
+from golem.middleware.bus import Bus
+
+TICK = 0.002
+"""Period of the clock [s]: one servo period (500 Hz)."""
+
+
+class Node(Protocol):
+    """What the executor drives: connects one module to the bus.
+
+    Attributes:
+        period: time between two steps [s], at least one tick.
+    """
+
+    period: float
+
+    def step(self, t: float) -> None:
+        """Read the bus, run the module once at time `t` [s], publish what it returns."""
+        ...
+
+
+class _Entry:
+    """When one node is due: its k-th step happens at the first tick at or after k periods."""
+
+    __slots__ = ("due", "k", "period", "step")
+
+    def __init__(self, node: Node) -> None:
+        if node.period < TICK - 1e-9:
+            raise ConfigError(
+                f"{type(node).__name__} wants to run at {1.0 / node.period:g} Hz; the clock allows up to {1 / TICK:g} Hz."
+            )
+        self.step = node.step
+        self.period = node.period / TICK
+        self.k = 0
+        self.due = 0
+
+    def advance(self) -> None:
+        self.k += 1
+        self.due = math.ceil(self.k * self.period - 1e-6)
+
+
+class Executor:
+    """Drives nodes in the given order on one clock."""
+
+    def __init__(self, bus: Bus, nodes: Sequence[Node]) -> None:
+        """Schedule `nodes`, which exchange messages over `bus`.
+
+        Raises:
+            ConfigError: a node is faster than the clock.
+        """
+        self._bus = bus
+        self._schedule = [_Entry(node) for node in nodes]
+        self._tick = 0
+
+    @property
+    def t(self) -> float:
+        """Present time [s]."""
+        return self._tick * TICK
+
+    def step(self) -> None:
+        """Advance by one tick: deliver what is due, then step every node whose period has come."""
+        t = self._tick * TICK
+        self._bus.deliver(t)
+        for entry in self._schedule:
+            if self._tick >= entry.due:
+                entry.step(t)
+                entry.advance()
+        self._tick += 1
+
+    def run(self, until: float, stop: Callable[[], bool] = lambda: False, realtime: bool = False) -> None:
+        """Step until time `until` [s] or until `stop()` is true.
+
+        Args:
+            until: simulated time to stop at [s].
+            stop: asked after every tick.
+            realtime: wait after each tick so that simulated time never runs ahead of the wall clock; a machine
+                that is too slow falls behind and does not try to catch up.
+        """
+        end = round(until / TICK)
+        origin = time.perf_counter() - self.t
+        while self._tick < end and not stop():
+            self.step()
+            if realtime:
+                lag = time.perf_counter() - origin - self.t
+                if lag < 0.0:
+                    time.sleep(-lag)
+                else:
+                    origin += lag

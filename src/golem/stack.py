@@ -1,0 +1,119 @@
+"""The stack file: which implementation sits in which slot, and how real the simulation shall be."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from golem import registry
+from golem.errors import ConfigError, unknown_name
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One slot's implementation.
+
+    Attributes:
+        use: registered name, `package.module:Class` or `my_file.py:Class`.
+        options: its options by name.
+    """
+
+    use: str
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Stack:
+    """A whole stack: one choice per slot, the realism profile and the torque limits.
+
+    Attributes:
+        profile: realism profile of a simulated robot: ideal, bench or field.
+        limits: torque limit profile the safety gate enforces: urdf or paper.
+    """
+
+    robot: Choice = Choice("mujoco")
+    estimator: Choice = Choice("tether")
+    servo: Choice = Choice("pd_gravity")
+    hand: Choice = Choice("magpie")
+    lower_body: Choice = Choice("hold")
+    upper_body: Choice = Choice("diff_ik")
+    localizer: Choice = Choice("onnx")
+    grasp_method: Choice = Choice("visual_servo")
+    profile: str = "bench"
+    limits: str = "urdf"
+
+    def choice(self, slot: str) -> Choice:
+        """Return what sits in `slot`."""
+        return getattr(self, slot)
+
+    def with_choice(self, slot: str, use: str) -> Stack:
+        """Return a copy with another implementation in `slot` (and no options for it)."""
+        return replace(self, **{slot: Choice(use)})
+
+    def digest(self) -> str:
+        """Return 12 hex digits that change whenever anything in the stack changes."""
+        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:12]
+
+
+def shipped() -> tuple[str, ...]:
+    """Return the names of the stack files that come with the package."""
+    folder = resources.files("golem") / "stacks"
+    return tuple(sorted(p.name.removesuffix(".yaml") for p in folder.iterdir() if p.name.endswith(".yaml")))
+
+
+def load_stack(source: str | Path) -> Stack:
+    """Read a stack file.
+
+    Args:
+        source: path of a YAML file, or the name of a shipped stack.
+
+    Raises:
+        ConfigError: no such file, not YAML, or a key or value that means nothing; names what would be valid.
+    """
+    if str(source) in shipped():
+        return parse_stack((resources.files("golem") / "stacks" / f"{source}.yaml").read_text(), str(source))
+    path = Path(source)
+    if not path.is_file():
+        raise ConfigError(f"No stack file '{source}'; give a path to a YAML file or one of: {', '.join(shipped())}.")
+    return parse_stack(path.read_text(), str(source))
+
+
+def parse_stack(text: str, name: str) -> Stack:
+    """Parse the YAML `text` of the stack file called `name`; errors as in `load_stack`."""
+    try:
+        data = yaml.safe_load(text) or {}
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f", line {mark.line + 1}" if mark else ""
+        raise ConfigError(f"{name}{where}: not valid YAML ({getattr(error, 'problem', error)}).") from error
+    if not isinstance(data, Mapping):
+        raise ConfigError(f"{name}: a stack file is a mapping such as 'upper_body: {{use: diff_ik}}'.")
+    values: dict[str, Any] = {}
+    valid = [f.name for f in fields(Stack)]
+    for key, value in data.items():
+        if key not in valid:
+            raise unknown_name(f"key in {name}", str(key), valid)
+        values[key] = _choice(name, key, value) if key in registry.slots() else _word(name, key, value)
+    return Stack(**values)
+
+
+def _word(name: str, key: str, value: object) -> str:
+    if not isinstance(value, str):
+        raise ConfigError(f"{name}: '{key}' is one word, e.g. '{key}: {getattr(Stack(), key)}'.")
+    return value
+
+
+def _choice(name: str, slot: str, value: object) -> Choice:
+    if isinstance(value, str):
+        return Choice(value)
+    if not isinstance(value, Mapping) or not isinstance(value.get("use"), str):
+        raise ConfigError(f"{name}: '{slot}' wants '{{use: NAME, option: value, ...}}', with NAME one of "
+                          f"{', '.join(registry.names(slot))}, package.module:Class or file.py:Class.")
+    return Choice(value["use"], {str(k): v for k, v in value.items() if k != "use"})
