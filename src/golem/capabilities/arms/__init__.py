@@ -1,0 +1,1 @@
+"""Upper-body control: palm poses in, joint targets of torso and arms out."""

@@ -1,0 +1,1 @@
+"""Lower-body control: base twists in, joint targets of the legs out."""

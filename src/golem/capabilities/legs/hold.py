@@ -1,0 +1,81 @@
+"""Holds the legs in one posture: the lower body of a robot that hangs in a hoist."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.capabilities.legs.base import LegCommand
+from golem.errors import ConfigError, unknown_name
+from golem.types import LEGS, Array, BaseEstimate, LowState, Twist
+
+STANCES: dict[str, tuple[float, ...]] = {
+    # Per leg: hip yaw, hip pitch, hip roll, knee, ankle pitch, ankle roll [rad].
+    "straight": (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    # Unitree's RL example and the HAMS policies start from this one.
+    "stand": (0.0, -0.16, 0.0, 0.36, -0.2, 0.0),
+    # ALMI's default posture.
+    "crouch": (0.0, -0.4, 0.0, 0.8, -0.4, 0.0),
+}
+"""Named postures of one leg; both legs take the same."""
+
+
+@dataclass(frozen=True, slots=True)
+class HoldConfig:
+    """Options of `Hold`.
+
+    Attributes:
+        stance: a name in `STANCES`.
+        speed: how fast the joints move from where they are to the stance [rad/s].
+        kp: stiffness of hip yaw, hip pitch, hip roll, knee, ankle pitch, ankle roll [N m/rad].
+            These values and those of kd are from correlllab/HAMS walk.yaml.
+        kd: damping of the same six joints [N m s/rad].
+        rate: ticks per second [Hz].
+    """
+
+    stance: str = "stand"
+    speed: float = 0.5
+    kp: tuple[float, ...] = (200.0, 200.0, 200.0, 300.0, 40.0, 40.0)
+    kd: tuple[float, ...] = (2.5, 2.5, 2.5, 4.0, 2.0, 2.0)
+    rate: float = 50.0
+
+
+class Hold:
+    """Moves the legs to a stance and keeps them there, whatever the twist.
+
+    Attributes:
+        rate, latency: see `LowerBody`.
+    """
+
+    def __init__(self, config: HoldConfig | None = None) -> None:
+        """Look up the stance of `config`.
+
+        Raises:
+            ConfigError: the stance is unknown, the gains are not six each, or the speed is not positive.
+        """
+        self.config = config or HoldConfig()
+        if self.config.stance not in STANCES:
+            raise unknown_name("stance", self.config.stance, STANCES)
+        if len(self.config.kp) != 6 or len(self.config.kd) != 6:
+            raise ConfigError(
+                "Hold needs six values of kp and six of kd: hip yaw, pitch, roll, knee, ankle pitch, roll."
+            )
+        if not self.config.speed > 0.0:
+            raise ConfigError(f"Hold needs a positive speed [rad/s], not {self.config.speed}.")
+        self.rate = self.config.rate
+        self.latency = 0.0
+        self._goal: Array = np.tile(np.asarray(STANCES[self.config.stance]), 2)
+        self._kp: Array = np.tile(np.asarray(self.config.kp), 2)
+        self._kd: Array = np.tile(np.asarray(self.config.kd), 2)
+        self._q: Array = self._goal.copy()
+
+    def reset(self, state: LowState) -> None:
+        """Start from the measured leg joints of `state`."""
+        self._q = np.array(state.q[LEGS], dtype=np.float64)
+
+    def step(self, state: LowState, base: BaseEstimate, twist: Twist, dt: float) -> LegCommand:
+        """Move the targets towards the stance by at most `speed * dt`; see `LowerBody.step`."""
+        reach = self.config.speed * dt
+        self._q = self._q + np.clip(self._goal - self._q, -reach, reach)
+        return LegCommand(q=self._q.copy(), kp=self._kp.copy(), kd=self._kd.copy())
