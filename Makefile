@@ -1,0 +1,40 @@
+# `make demo` and `make test` need only Python 3.11-3.13 and a network to the package index.
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: help demo test test-slow lint format docs lock venv clean
+
+help:  ## list the targets
+	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | expand -t 12
+
+demo: venv  ## pull loosened screws from the pack in the twin, tethered
+	$(BIN)/golem demo
+
+test: lint  ## lint, types and the fast tests
+	$(BIN)/pytest -q -n 2 -m "not slow"
+
+test-slow: venv-dev  ## the tests that take more than a few seconds
+	$(BIN)/pytest -q -n 2 -m slow
+
+lint: venv-dev  ## style and types
+	$(BIN)/ruff check src tests
+	$(BIN)/ruff format --check src tests
+	$(BIN)/pyright
+
+format: venv-dev  ## rewrite the sources in the project's style
+	$(BIN)/ruff check --fix src tests
+	$(BIN)/ruff format src tests
+
+docs: venv-docs  ## build the documentation into site/
+	$(BIN)/mkdocs build --strict
+
+lock: venv-dev  ## resolve the requirements again (UPGRADE=--upgrade takes newer releases)
+	scripts/lock.sh $(UPGRADE)
+
+venv: venv-core  ## create .venv with what `golem` needs to run
+
+venv-%:
+	@PYTHON="$(PYTHON)" scripts/bootstrap.sh $*
+
+clean:  ## remove everything the targets above created
+	rm -rf .venv .uv .cache site dist .pytest_cache .ruff_cache .hypothesis

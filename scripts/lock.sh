@@ -1,0 +1,23 @@
+#!/usr/bin/env bash
+# Writes requirements/*.txt: for every group a complete, hashed lock for all platforms and Python versions we support.
+# All groups are resolved together first, so that any two locks can be installed side by side.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+uv() { if [ -x .uv/bin/uv ]; then .uv/bin/uv "$@"; else command uv "$@"; fi; }
+compile() {
+    uv pip compile --quiet --no-config --universal --python-version 3.11 --generate-hashes \
+        --no-annotate --custom-compile-command "make lock" "$@"
+}
+
+together=$(mktemp)
+trap 'rm -f "$together"' EXIT
+cat requirements/*.txt 2>/dev/null | grep -E '^[A-Za-z0-9_.-]+==' | sed 's/ *\\$//' | sort -u > "$together" || true
+compile pyproject.toml --all-extras --no-header --output-file "$together" "$@"
+
+compile pyproject.toml --constraints "$together" --output-file requirements/core.txt "$@"
+compile pyproject.toml --constraints "$together" --extra pink --output-file requirements/pink.txt "$@"
+compile pyproject.toml --constraints "$together" --extra train --output-file requirements/train.txt "$@"
+compile pyproject.toml --constraints "$together" --extra docs --output-file requirements/docs.txt "$@"
+compile pyproject.toml --constraints "$together" --extra dev --extra pink --output-file requirements/dev.txt "$@"
+echo "uv>=0.13,<0.14" | compile - --output-file requirements/uv.txt "$@"

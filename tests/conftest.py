@@ -1,0 +1,29 @@
+"""Fixtures and settings for every test."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+# MuJoCo reads this at its first import, so it must be set before any test module is collected.
+if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+    os.environ.setdefault("MUJOCO_GL", "egl")
+
+# The same examples every run: a failure is repeatable, and a loaded machine is no failure.
+settings.register_profile("golem", derandomize=True, deadline=None)
+settings.load_profile("golem")
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The reference material beside the repository: the vendor's model and the published figures."""
+    path = REPOSITORY.parent / "shared"
+    if not path.is_dir():
+        pytest.skip("needs the reference material in ../shared, which is not part of this repository")
+    return path
