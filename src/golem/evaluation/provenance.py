@@ -1,0 +1,70 @@
+"""Which code, packages and configuration a trial was run with."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import platform
+import subprocess
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import golem
+
+PACKAGES = ("golem-humanoid", "numpy", "scipy", "mujoco", "pin", "daqp", "onnxruntime")
+"""Distributions whose version may change a trial's outcome."""
+
+
+def digest(data: Mapping[str, Any]) -> str:
+    """Return 16 hex digits that identify JSON-like `data`, whatever the order of its keys."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the installed packages of `PACKAGES`."""
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+@functools.cache
+def code_digest() -> str:
+    """Return 16 hex digits that identify the files of the package `golem`, committed or not."""
+    root = _package()
+    total = hashlib.sha256()
+    for path in sorted(root.rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            total.update(path.relative_to(root).as_posix().encode() + b"\0")
+            total.update(hashlib.sha256(path.read_bytes()).digest())
+    return total.hexdigest()[:16]
+
+
+@functools.cache
+def commit() -> str:
+    """Return the git commit of the package, with `-dirty` where its files differ; outside git, its version."""
+    if _git("ls-files", "--error-unmatch", "__init__.py") is None:
+        return versions().get("golem-humanoid", "unknown")
+    head = _git("rev-parse", "--short=12", "HEAD")
+    return f"{head}-dirty" if _git("status", "--porcelain", "--", ".") else f"{head}"
+
+
+def _package() -> Path:
+    return Path(golem.__path__[0])
+
+
+def _git(*arguments: str) -> str | None:
+    """Return what git prints in the package's folder, or None where it fails or is not installed."""
+    command = ["git", "-C", str(_package()), *arguments]
+    try:
+        result = subprocess.run(command, capture_output=True, text=True, check=True, timeout=30)
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return result.stdout.strip()
