@@ -13,21 +13,16 @@ die() {
     exit 2
 }
 
-# system_packages REASON PACKAGE...: installs Debian packages, or says which line does.
-system_packages() {
-    local reason=$1 sudo=""
+# apt REASON PACKAGE...: installs Debian packages where that is allowed, or stops with the line that does.
+apt() {
+    local reason=$1
     shift
-    [ "$(id -u)" = 0 ] || sudo="sudo "
-    if ! command -v apt-get > /dev/null; then
-        die "$reason; install what your system calls these Debian packages, then run make again: $*"
-    fi
-    if [ -n "$sudo" ]; then
-        die "$reason; type this line, then run make again:" "    ${sudo}apt-get update && ${sudo}apt-get install -y $*"
-    fi
+    command -v apt-get > /dev/null || die "$reason; install what your system calls these Debian packages: $*"
+    [ "$(id -u)" = 0 ] || die "$reason; type: sudo apt-get install -y $*"
     echo "golem: $reason; installing $*" >&2
     export DEBIAN_FRONTEND=noninteractive
-    apt-get -qq update && apt-get -qq install -y --no-install-recommends "$@" > /dev/null < /dev/null ||
-        die "apt-get could not install them; type this line to see why: apt-get install -y $*"
+    apt-get -qq update && apt-get -qq install -y --no-install-recommends "$@" > /dev/null 2>&1 < /dev/null ||
+        die "that failed; to see why, type: apt-get update && apt-get install -y $*"
 }
 
 find_python() {
@@ -58,20 +53,21 @@ find_uv() {
     elif "$python" -m pip --version > /dev/null 2>&1; then
         "$python" -m pip install --quiet --require-hashes --target .uv -r requirements/uv.txt
     else
-        system_packages "this Python can neither make a virtual environment nor run pip" python3-venv
+        apt "this Python can neither make a virtual environment nor run pip" python3-venv
         "$python" -m venv .uv
         .uv/bin/python -m pip install --quiet --require-hashes -r requirements/uv.txt
     fi
 }
 
-# Asks golem itself whether MuJoCo can draw; only Linux needs a system library for it.
+# Asks golem itself whether MuJoCo can draw; its answer names what is missing and the line to type.
 see_to_graphics() {
-    local line
-    [ "$(uname -s)" = Linux ] || return 0
-    .venv/bin/python -m golem.doctor --graphics > /dev/null 2>&1 && return
-    system_packages "MuJoCo cannot render without a display here: libEGL and a software driver are missing" \
-        $(.venv/bin/python -m golem.doctor --packages)
-    .venv/bin/python -m golem.doctor --graphics
+    local doctor=".venv/bin/python -m golem.doctor"
+    $doctor 2> /dev/null && return
+    if [ "$(id -u)" = 0 ] && command -v apt-get > /dev/null; then
+        # shellcheck disable=SC2046
+        apt "MuJoCo cannot render" $(.venv/bin/python -c "import golem.doctor as d; print(*d.DEBIAN_PACKAGES)")
+    fi
+    $doctor || exit 2
 }
 
 python=$(find_python)

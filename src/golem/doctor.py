@@ -1,0 +1,216 @@
+"""What this machine lacks to run GOLEM, and the line that brings it."""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.metadata
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from golem.errors import GolemError, MissingSystemLibrary
+
+DEBIAN_PACKAGES = ("libegl1", "libgl1", "libegl-mesa0", "libgl1-mesa-dri")
+"""What MuJoCo needs on Debian and Ubuntu to render without a display: the dispatcher and a software driver."""
+
+DISK_NEEDED = 2e9
+"""Room for the runs of an evaluation with their pictures [bytes]."""
+
+EXTRAS = {"pink": ("pink", "qpsolvers"), "train": ("torch", "onnx"), "docs": ("mkdocs",), "dev": ("pytest",)}
+"""The importable modules of each optional extra."""
+
+_INSTALLERS = {
+    "apt-get": f"apt-get install -y {' '.join(DEBIAN_PACKAGES)}",
+    "dnf": "dnf install -y mesa-libEGL mesa-libGL mesa-dri-drivers",
+    "pacman": "pacman -S --noconfirm libglvnd mesa",
+    "zypper": "zypper install -y libEGL1 libGL1 Mesa-dri",
+    "apk": "apk add mesa-egl mesa-gl mesa-dri-gallium",
+}
+
+_PROBE = """
+import mujoco
+model = mujoco.MjModel.from_xml_string(
+    "<mujoco><worldbody><light pos='0 0 3'/><geom type='plane' size='1 1 1'/></worldbody></mujoco>"
+)
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+with mujoco.Renderer(model, 8, 8) as renderer:
+    renderer.update_scene(data)
+    assert renderer.render().any(), "the picture is black"
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One row of the table.
+
+    Attributes:
+        name: what was looked at.
+        found: what was there.
+        fix: the line to type, or what to do, when it does not suffice; empty when it does.
+        needed: False where GOLEM runs without it.
+    """
+
+    name: str
+    found: str
+    fix: str = ""
+    needed: bool = True
+
+    @property
+    def failed(self) -> bool:
+        """Whether GOLEM cannot run because of this."""
+        return self.needed and bool(self.fix)
+
+
+def check_python() -> Check:
+    """Look at the version of the interpreter."""
+    found = sys.version.split()[0]
+    if (3, 11) <= sys.version_info < (3, 14):
+        return Check("Python", found)
+    return Check(
+        "Python", found, "install Python 3.11, 3.12 or 3.13, then: make PYTHON=/path/to/python3.12 venv"
+    )
+
+
+def check_packages() -> Check:
+    """Look whether every required package is installed in a version that is allowed."""
+    from packaging.requirements import Requirement
+
+    try:
+        lines = importlib.metadata.requires("golem-humanoid") or []
+    except importlib.metadata.PackageNotFoundError:
+        return Check("packages", "golem-humanoid itself is not installed", "make venv")
+    wanted = [Requirement(line) for line in lines if "extra ==" not in line]
+    wrong: list[str] = []
+    for requirement in wanted:
+        try:
+            version = importlib.metadata.version(requirement.name)
+        except importlib.metadata.PackageNotFoundError:
+            wrong.append(f"{requirement.name} is absent")
+            continue
+        if version not in requirement.specifier:
+            wrong.append(f"{requirement.name} is {version}, not {requirement.specifier}")
+    if wrong:
+        return Check("packages", "; ".join(wrong), "pip install --upgrade golem-humanoid")
+    return Check("packages", f"{len(wanted)} of {len(wanted)}")
+
+
+def check_extras() -> list[Check]:
+    """Look which optional extras are there; none is needed."""
+    rows: list[Check] = []
+    for extra, modules in EXTRAS.items():
+        absent = [module for module in modules if importlib.util.find_spec(module) is None]
+        fix = f"pip install 'golem-humanoid[{extra}]'" if absent else ""
+        found = f"without {', '.join(absent)}" if absent else "installed"
+        rows.append(Check(f"extra {extra}", found, fix, needed=False))
+    return rows
+
+
+def check_disk(folder: Path | None = None) -> Check:
+    """Look at the free space of `folder` (default: the working directory) and whether it can be written."""
+    folder = folder or Path.cwd()
+    free = shutil.disk_usage(folder).free
+    found = f"{free / 1e9:.0f} GB free in {folder}"
+    if not os.access(folder, os.W_OK):
+        return Check(
+            "disk", f"{folder} cannot be written", "change to a folder of yours, or pass --out FOLDER"
+        )
+    if free < DISK_NEEDED:
+        return Check("disk", found, f"free {DISK_NEEDED / 1e9:.0f} GB, or pass --out FOLDER on another disk")
+    return Check("disk", found)
+
+
+def check_graphics() -> Check:
+    """Render an 8x8 picture with MuJoCo in a process of its own, since a broken driver may abort it."""
+    environment = dict(os.environ)
+    if sys.platform == "linux":
+        environment.setdefault("MUJOCO_GL", "egl")
+    backend = environment.get("MUJOCO_GL", "the default")
+    if backend == "egl" and not _loads("libEGL.so.1"):
+        return Check("graphics", "libEGL.so.1 is missing", install_line())
+    with tempfile.TemporaryDirectory() as scratch:
+        try:
+            probe = subprocess.run(
+                [sys.executable, "-c", _PROBE],
+                env=environment,
+                cwd=scratch,
+                capture_output=True,
+                text=True,
+                timeout=120,
+            )
+        except subprocess.TimeoutExpired:
+            return Check("graphics", f"MuJoCo hangs with MUJOCO_GL={backend}", install_line())
+    if probe.returncode == 0:
+        return Check("graphics", f"MuJoCo renders with MUJOCO_GL={backend}")
+    said = probe.stderr.strip().splitlines()
+    reason = said[-1] if said else f"exit code {probe.returncode}"
+    if backend not in ("egl", "the default"):
+        return Check("graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {reason}", "export MUJOCO_GL=egl")
+    return Check("graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {reason}", install_line())
+
+
+def require_graphics() -> None:
+    """Make sure that MuJoCo can render.
+
+    Raises:
+        MissingSystemLibrary: it cannot; the sentence names the line that installs what is missing.
+    """
+    check = check_graphics()
+    if check.failed:
+        raise MissingSystemLibrary(f"Cannot render: {check.found}; type: {check.fix}")
+
+
+def install_line() -> str:
+    """Return the line that installs the rendering libraries with this system's package manager."""
+    if sys.platform != "linux":
+        return "unset MUJOCO_GL"
+    sudo = "" if os.geteuid() == 0 else "sudo "
+    for command, line in _INSTALLERS.items():
+        if shutil.which(command):
+            return sudo + line
+    return f"install what your system calls these Debian packages: {' '.join(DEBIAN_PACKAGES)}"
+
+
+def diagnose() -> list[Check]:
+    """Run every check."""
+    single: list[Callable[[], Check]] = [check_python, check_packages, check_graphics, check_disk]
+    return [*(check() for check in single), *check_extras()]
+
+
+def run(console: Console | None = None) -> int:
+    """Print the table.
+
+    Returns:
+        The exit code: 0 when GOLEM can run here, 2 when something needed is missing.
+    """
+    checks = diagnose()
+    table = Table("", "what", "found", "to do")
+    for check in checks:
+        mark = "[red]no[/]" if check.failed else "[dim]-[/]" if check.fix else "[green]ok[/]"
+        table.add_row(mark, check.name, check.found.replace("[", r"\["), check.fix.replace("[", r"\["))
+    (console or Console()).print(table)
+    return 2 if any(check.failed for check in checks) else 0
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
+
+
+if __name__ == "__main__":
+    try:
+        require_graphics()
+    except GolemError as error:
+        sys.exit(f"golem: {error}")
