@@ -1,0 +1,1 @@
+"""The emergency stop: a source of frames that must stay alive."""

@@ -1,0 +1,252 @@
+"""The words of the safety gate: its limits, its states, its reasons, what goes in and what comes out.
+
+The limits are 90 % of the maxima of a named profile, as in the paper ("Hardware Interfaces, Safety"). What the paper
+leaves open is chosen here; `SafetyLimits` names the source of each number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from golem.hardware.estop.base import EstopFrame
+from golem.robots.model.limits import load_limits
+from golem.types import LEGS, NUM_JOINTS, Array, LowCommand, LowState
+
+LIMIT_RATIO = 0.9
+"""Share of the vendor's maxima that is used [paper]."""
+
+
+class GateState(StrEnum):
+    """Where the gate is. Only `ACTIVE` lets a command through."""
+
+    INIT = "init"
+    """Something that must be there is missing; the motors are limp."""
+    ARMED = "armed"
+    """State and emergency stop are sound; the motors damp; waits for the request to activate."""
+    ACTIVE = "active"
+    """Commands pass, limited."""
+    STOP1 = "stop1"
+    """Stopped and latched: the motors damp (kp = 0, kd > 0)."""
+    STOP0 = "stop0"
+    """Stopped and latched: the motors are limp (kp = kd = 0)."""
+
+
+class Reason(StrEnum):
+    """Why the gate is not armed, or why it stopped."""
+
+    CLOCK = "clock_backwards"
+    REQUESTED = "stop_requested"
+    ESTOP_MISSING = "estop_never_seen"
+    ESTOP_STALE = "estop_stale"
+    ESTOP_TIME = "estop_time_invalid"
+    ESTOP_PRESSED = "estop_pressed"
+    STATE_MISSING = "state_never_seen"
+    STATE_STALE = "state_stale"
+    STATE_TIME = "state_time_invalid"
+    STATE_INVALID = "state_not_finite"
+    POSITION = "joint_position"
+    VELOCITY = "joint_velocity"
+    TORQUE = "joint_torque"
+    BRAKING = "joint_braking_distance"
+    TILT = "tilt"
+    COMMAND_MISSING = "command_never_seen"
+    COMMAND_STALE = "command_stale"
+    COMMAND_TIME = "command_time_invalid"
+    COMMAND_INVALID = "command_not_finite"
+
+
+class Request(StrEnum):
+    """What the operator asks for. Only the change to a request counts, so one that is stuck does nothing."""
+
+    NONE = "none"
+    ACTIVATE = "activate"
+    STOP = "stop"
+    RESET = "reset"
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyLimits:
+    """Every number the gate compares with; arrays are (27,) in motor order and read-only.
+
+    Source of each: [profile] `golem.robots.model.limits`; [paper]; [authors] their published safety relay;
+    [board] frame period of the e-stop firmware; [own] chosen here, with the reason.
+
+    Attributes:
+        lower, upper: range of commanded positions [rad]: the middle 90 % of the profile's range [profile, paper].
+        state_lower, state_upper: range of measured positions [rad]: the profile's full range and 0.05 rad [own:
+            a limp joint leans on its mechanical stop, and must not keep the robot from being reset].
+        velocity: measured joint speed that stops the robot [rad/s]: 90 % [profile, paper].
+        torque: measured joint torque that stops the robot [N m]: 90 % [profile, paper].
+        torque_command: bound of the predicted PD torque [N m]: 95 % of `torque` [own: a command at its bound plus
+            the noise of the torque estimate must not stop the robot].
+        slew: bound of the commanded position's rate [rad/s]: `velocity` for the legs, whose policies use distant
+            targets as torques; 3 rad/s for torso and arms, three times what the controllers ask for [own].
+        deceleration: what each joint can surely be braked with [rad/s^2]: legs 40, torso and arms 20 [own: torque
+            left after gravity over the inertia of the stretched limb is 26 at the shoulder].
+        damping: kd of the damping stop [N m s/rad]: at most 5, and at most `torque_command / velocity`, so that
+            damping breaks no torque limit at any legal speed [own].
+        kp_max, kd_max: bounds of the gains [authors].
+        kp_rate, kd_rate: how fast gains may rise, per second; they may fall at once [own: full arm stiffness in 0.2 s].
+        tilt: angle between the torso's and the world's up that stops the robot [rad] [own].
+        estop_age: age of the e-stop frame that counts as pressed [s]: five frames [board].
+        state_age: age of the state that stops the robot [s]: 25 samples at 500 Hz [own].
+        command_age: age of the command that stops the robot [s] [own].
+        future: how far ahead of the clock a stamp may be [s] [own].
+        samples: consecutive bad samples of position, velocity, braking distance or tilt that stop the robot [own].
+        torque_samples: the same for torque, which peaks in every impact [own].
+        gross: multiple of the velocity limit, and violation of the position range [rad], that no sensor noise
+            explains and that one sample of suffices [own].
+        damping_time: how long STOP1 damps before STOP0 [s] [own: arms have sunk after 2 s].
+        longest_tick: time step up to which slewing accumulates [s]; a pause must not allow a leap [own].
+    """
+
+    lower: Array
+    upper: Array
+    state_lower: Array
+    state_upper: Array
+    velocity: Array
+    torque: Array
+    torque_command: Array
+    slew: Array
+    deceleration: Array
+    damping: Array
+    kp_max: float = 500.0
+    kd_max: float = 30.0
+    kp_rate: float = 1000.0
+    kd_rate: float = 100.0
+    tilt: float = 0.6
+    estop_age: float = 0.050
+    state_age: float = 0.050
+    command_age: float = 0.100
+    future: float = 0.005
+    samples: int = 3
+    torque_samples: int = 10
+    gross: float = 3.0
+    damping_time: float = 3.0
+    longest_tick: float = 0.010
+
+    @classmethod
+    def from_profile(cls, profile: str = "urdf", ratio: float = LIMIT_RATIO) -> SafetyLimits:
+        """Return the limits that use the share `ratio` of the limit profile called `profile`.
+
+        Raises:
+            ConfigError: there is no such profile.
+        """
+        limits = load_limits(profile)
+        middle = 0.5 * (limits.lower + limits.upper)
+        half = 0.5 * (limits.upper - limits.lower)
+        velocity = ratio * limits.velocity
+        torque = ratio * limits.torque
+        slew = np.full(NUM_JOINTS, 3.0)
+        slew[LEGS] = velocity[LEGS]
+        deceleration = np.full(NUM_JOINTS, 20.0)
+        deceleration[LEGS] = 40.0
+        torque_command = 0.95 * torque
+        arrays = {
+            "lower": middle - ratio * half,
+            "upper": middle + ratio * half,
+            "state_lower": limits.lower - 0.05,
+            "state_upper": limits.upper + 0.05,
+            "velocity": velocity,
+            "torque": torque,
+            "torque_command": torque_command,
+            "slew": slew,
+            "deceleration": deceleration,
+            "damping": np.minimum(5.0, torque_command / velocity),
+        }
+        for array in arrays.values():
+            array.flags.writeable = False
+        return cls(**arrays)
+
+
+@dataclass(frozen=True, slots=True)
+class GateInputs:
+    """What the gate sees at one tick. Frames may be absent, repeated, late or out of order.
+
+    Attributes:
+        t: present time of the monotonic clock that also stamps the frames [s].
+        state: newest state that arrived, or None.
+        command: newest command that arrived, or None.
+        estop: newest frame of the emergency stop that arrived, or None.
+        request: what the operator asks for.
+    """
+
+    t: float
+    state: LowState | None = None
+    command: LowCommand | None = None
+    estop: EstopFrame | None = None
+    request: Request = Request.NONE
+
+
+@dataclass(frozen=True, slots=True)
+class Counters:
+    """Consecutive bad samples of each check."""
+
+    position: int = 0
+    velocity: int = 0
+    torque: int = 0
+    braking: int = 0
+    tilt: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Outgoing:
+    """What the slew limits refer to: the command that went out last.
+
+    Attributes:
+        q, kp, kd: (27,) each, before any scaling for torque.
+    """
+
+    q: Array
+    kp: Array
+    kd: Array
+
+
+@dataclass(frozen=True, slots=True)
+class GateMemory:
+    """All that the gate remembers from one tick to the next; the default is a gate that has seen nothing.
+
+    Attributes:
+        t: time of the previous tick [s].
+        mode: state of the gate.
+        since: when it entered that state [s].
+        reason, detail: why, for a state that has a reason.
+        state, command, estop: newest frame accepted of each.
+        counters: consecutive bad samples.
+        outgoing: last command, while active.
+        request: request of the previous tick.
+    """
+
+    t: float = -np.inf
+    mode: GateState = GateState.INIT
+    since: float = -np.inf
+    reason: Reason | None = None
+    detail: str = ""
+    state: LowState | None = None
+    command: LowCommand | None = None
+    estop: EstopFrame | None = None
+    counters: Counters = field(default_factory=Counters)
+    outgoing: Outgoing | None = None
+    request: Request = Request.NONE
+
+
+@dataclass(frozen=True, slots=True)
+class GateResult:
+    """What the gate decided at one tick.
+
+    Attributes:
+        command: what the motors are to be told.
+        state: state of the gate.
+        reason: why it is not armed, not activated or stopped; None when all is well.
+        detail: one line that names the joint and the figures behind `reason`; may be empty.
+        memory: to be passed to the next tick.
+    """
+
+    command: LowCommand
+    state: GateState
+    reason: Reason | None
+    detail: str
+    memory: GateMemory
