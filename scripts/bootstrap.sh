@@ -85,7 +85,7 @@ done
 
 find_uv "$python"
 if ! .venv/bin/python -c 'import sys' 2> /dev/null; then
-    "$uv" venv --quiet --python "$python" .venv
+    "$uv" venv --quiet --clear --python "$python" .venv
 fi
 echo "golem: installing the locked packages (${locks[*]}) into .venv" >&2
 for group in "${locks[@]}"; do
