@@ -1,0 +1,1 @@
+"""Scenes the robot can stand in."""

@@ -1,0 +1,83 @@
+"""Floor, lights and backdrop of the workshop, and the materials the parts of the worlds share."""
+
+from __future__ import annotations
+
+import mujoco
+
+from golem.robots.worlds import parts
+
+MATERIALS: dict[str, tuple[tuple[float, float, float, float], float, float, float]] = {
+    # name: rgba, specular, shininess, reflectance
+    "zinc": ((0.80, 0.81, 0.83, 1.0), 0.9, 0.7, 0.0),
+    "steel": ((0.55, 0.56, 0.58, 1.0), 0.8, 0.6, 0.0),
+    "aluminium": ((0.70, 0.72, 0.74, 1.0), 0.5, 0.4, 0.0),
+    "cover_coat": ((0.30, 0.33, 0.37, 1.0), 0.35, 0.35, 0.0),
+    "cover_bead": ((0.34, 0.37, 0.41, 1.0), 0.45, 0.4, 0.0),
+    "dark": ((0.07, 0.07, 0.08, 1.0), 0.1, 0.1, 0.0),
+    "hole_dark": ((0.03, 0.03, 0.035, 1.0), 0.0, 0.0, 0.0),
+    "module_black": ((0.13, 0.14, 0.16, 1.0), 0.3, 0.3, 0.0),
+    "module_cap": ((0.20, 0.22, 0.25, 1.0), 0.3, 0.3, 0.0),
+    "copper": ((0.80, 0.43, 0.22, 1.0), 0.9, 0.6, 0.0),
+    "hv_orange": ((0.96, 0.42, 0.04, 1.0), 0.4, 0.4, 0.0),
+    "stand_blue": ((0.10, 0.28, 0.52, 1.0), 0.4, 0.4, 0.0),
+    "rubber": ((0.06, 0.06, 0.06, 1.0), 0.1, 0.1, 0.0),
+    "tray_teal": ((0.05, 0.55, 0.50, 1.0), 0.3, 0.3, 0.0),
+    "wall_paint": ((0.86, 0.88, 0.90, 1.0), 0.0, 0.0, 0.0),
+    "wall_band": ((0.16, 0.36, 0.58, 1.0), 0.0, 0.0, 0.0),
+    "warning_yellow": ((0.98, 0.80, 0.05, 1.0), 0.2, 0.2, 0.0),
+    "label_white": ((0.93, 0.93, 0.92, 1.0), 0.1, 0.1, 0.0),
+}
+
+_BOX = mujoco.mjtGeom.mjGEOM_BOX
+
+
+def add_materials(spec: mujoco.MjSpec) -> None:
+    """Add the materials that the builders in this folder name."""
+    for name, (rgba, specular, shininess, reflectance) in MATERIALS.items():
+        spec.add_material(
+            name=name, rgba=list(rgba), specular=specular, shininess=shininess, reflectance=reflectance
+        )
+
+
+def add_hall(spec: mujoco.MjSpec) -> None:
+    """Add the floor (collides), walls and sky (seen only) and three lights without shadows.
+
+    Shadows cost five times the rendering time on a CPU; set `model.light_castshadow` for figures.
+    """
+    texture = mujoco.mjtTexture
+    builtin = mujoco.mjtBuiltin
+    spec.add_texture(
+        name="sky", type=texture.mjTEXTURE_SKYBOX, builtin=builtin.mjBUILTIN_GRADIENT,
+        rgb1=[0.93, 0.95, 0.98], rgb2=[0.55, 0.60, 0.68], width=128, height=128,
+    )  # fmt: skip
+    spec.add_texture(
+        name="concrete", type=texture.mjTEXTURE_2D, builtin=builtin.mjBUILTIN_CHECKER,
+        mark=mujoco.mjtMark.mjMARK_RANDOM, random=0.02, markrgb=[0.50, 0.51, 0.52],
+        rgb1=[0.56, 0.57, 0.58], rgb2=[0.575, 0.585, 0.595], width=512, height=512,
+    )  # fmt: skip
+    floor = spec.add_material(
+        name="concrete", specular=0.2, shininess=0.2, reflectance=0.0, texrepeat=[2, 2], texuniform=True
+    )
+    floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "concrete"
+    world = spec.worldbody
+    world.add_geom(
+        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[8, 8, 0.1], material="concrete",
+        contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1, friction=[1.0, 0.01, 0.001],
+    )  # fmt: skip
+    hall = world.add_body(name="hall")
+    for side in (-1, 1):
+        parts.visual(hall, _BOX, (0.05, 2.6, 0.002), (0.95, side * 1.9 + 0.0, 0.001),
+                     material="warning_yellow", quat=(0.70710678, 0, 0, 0.70710678))  # fmt: skip
+    parts.visual(hall, _BOX, (0.05, 6, 2.0), (6.0, 0, 2.0), material="wall_paint")
+    parts.visual(hall, _BOX, (0.06, 6, 0.45), (5.98, 0, 0.45), material="wall_band")
+    for side in (-1, 1):
+        parts.visual(hall, _BOX, (7, 0.05, 2.0), (0, side * 6.0, 2.0), material="wall_paint")
+        parts.visual(hall, _BOX, (7, 0.06, 0.45), (0, side * 5.98, 0.45), material="wall_band")
+    for y in (-4, -2, 0, 2, 4):
+        parts.visual(hall, _BOX, (0.08, 0.08, 2.0), (5.9, y, 2.0), material="aluminium")
+    for x, y, z, level in ((0.2, 1.6, 3.2, 0.42), (0.2, -1.6, 3.2, 0.36), (2.6, 0.0, 3.4, 0.30)):
+        aim = [0.9 - x, -y, 1.0 - z]
+        world.add_light(
+            pos=[x, y, z], dir=aim, diffuse=[level] * 3, specular=[level * 0.6] * 3, ambient=[0.06] * 3,
+            castshadow=False, cutoff=70, exponent=1.0,
+        )  # fmt: skip

@@ -1,0 +1,72 @@
+"""Where everything stands around the battery pack, and the 68 places of the cover's fasteners."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.types import Array
+
+RIM_INSET = 0.022
+"""Distance of the fastener line from the cover's edge [m]."""
+FASTENERS_X = 13
+FASTENERS_Y = 21
+"""Intervals along a short and a long side; 2 (13 + 21) = 68 fasteners, the count of RAPID (arXiv 2603.18520)."""
+HOLE_CELL = 0.007
+"""Half side of the square that a bore or an empty hole takes out of the rim's collision and visual strips [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class PackLayout:
+    """Pose and size of the pack and the tray; x forward from the robot that stands at the origin, z up.
+
+    Attributes:
+        near_edge: x of the cover's edge next to the robot [m].
+        top_z: height of the cover's rim above the floor [m].
+        size_x, size_y: outer size of the cover [m]; the long side runs along y (1.2 x 2.0 m in the paper).
+        thickness: height of cover and tray of the pack together [m].
+        window_x: near and far edge of the opened inspection section, measured from `near_edge` [m].
+        window_y: its right and left edge [m].
+        window_depth: how far the modules lie below the rim [m].
+        empty_holes: fastener indices whose screw is already gone.
+        tray_xy: centre of the parts tray [m].
+        tray_z: height of the tray's underside [m].
+        tray_size: outer size of the tray in x, y and z [m].
+    """
+
+    near_edge: float = 0.30
+    top_z: float = 1.00
+    size_x: float = 1.2
+    size_y: float = 2.0
+    thickness: float = 0.15
+    window_x: tuple[float, float] = (0.13, 0.62)
+    window_y: tuple[float, float] = (-0.34, 0.34)
+    window_depth: float = 0.035
+    empty_holes: tuple[int, ...] = (5, 16, 24, 29, 62)
+    tray_xy: tuple[float, float] = (0.52, -0.52)
+    tray_z: float = 1.00
+    tray_size: tuple[float, float, float] = (0.22, 0.30, 0.05)
+
+    def fasteners(self) -> Array:
+        """Return the (68, 2) x, y of the fasteners in the pack frame (origin: middle of the near edge, on the rim).
+
+        Index 0 is the near right corner (y < 0); the near edge comes first, from right to left, then the left
+        side, the far edge from left to right, and the right side back to the start.
+        """
+        near, far = RIM_INSET, self.size_x - RIM_INSET
+        right, left = -self.size_y / 2 + RIM_INSET, self.size_y / 2 - RIM_INSET
+        y_up = np.linspace(right, left, FASTENERS_Y + 1)
+        x_out = np.linspace(near, far, FASTENERS_X + 1)
+        sides = [
+            np.column_stack([np.full(FASTENERS_Y, near), y_up[:-1]]),
+            np.column_stack([x_out[:-1], np.full(FASTENERS_X, left)]),
+            np.column_stack([np.full(FASTENERS_Y, far), y_up[:0:-1]]),
+            np.column_stack([x_out[:0:-1], np.full(FASTENERS_X, right)]),
+        ]
+        return np.concatenate(sides)
+
+    def reachable(self, reach_y: float = 0.35) -> list[int]:
+        """Return the indices of the near-edge fasteners with |y| <= `reach_y` [m], from right to left."""
+        spots = self.fasteners()
+        return [i for i in range(FASTENERS_Y + 1) if i < len(spots) and abs(spots[i, 1]) <= reach_y]

@@ -1,0 +1,57 @@
+"""The open box that takes the pulled screws."""
+
+from __future__ import annotations
+
+import mujoco
+
+from golem.robots.worlds import parts
+from golem.robots.worlds.layout import PackLayout
+
+WALL = 0.003
+_BOX = mujoco.mjtGeom.mjGEOM_BOX
+
+
+def add_tray(spec: mujoco.MjSpec, layout: PackLayout) -> str:
+    """Add the tray as a static body at its underside's centre, on a pedestal when it stands off the cover.
+
+    Returns:
+        The name of the body.
+    """
+    sx, sy, sz = layout.tray_size
+    body = spec.worldbody.add_body(name="tray", pos=[*layout.tray_xy, layout.tray_z])
+    hx, hy, hz = sx / 2, sy / 2, sz / 2
+    walls = [
+        ((hx, hy, WALL / 2), (0.0, 0.0, WALL / 2)),
+        ((WALL / 2, hy, hz), (hx - WALL / 2, 0.0, hz)),
+        ((WALL / 2, hy, hz), (-hx + WALL / 2, 0.0, hz)),
+        ((hx, WALL / 2, hz), (0.0, hy - WALL / 2, hz)),
+        ((hx, WALL / 2, hz), (0.0, -hy + WALL / 2, hz)),
+    ]
+    for k, (size, pos) in enumerate(walls):
+        parts.collider(body, _BOX, size, pos, friction=0.8)
+        parts.visual(body, _BOX, size, pos, material="tray_teal", name=f"tray_part_{k}")
+    rim = 0.006
+    for k, (size, pos) in enumerate(
+        [
+            ((rim / 2, hy + rim / 2, 0.0015), (hx, 0.0, sz)),
+            ((rim / 2, hy + rim / 2, 0.0015), (-hx, 0.0, sz)),
+            ((hx + rim / 2, rim / 2, 0.0015), (0.0, hy, sz)),
+            ((hx + rim / 2, rim / 2, 0.0015), (0.0, -hy, sz)),
+        ]
+    ):
+        parts.visual(body, _BOX, size, pos, material="tray_teal", name=f"tray_rim_{k}")
+    over_cover = (
+        layout.near_edge < layout.tray_xy[0] < layout.near_edge + layout.size_x
+        and abs(layout.tray_xy[1]) < layout.size_y / 2
+    )
+    foot = layout.top_z if over_cover else 0.0
+    if layout.tray_z - foot > 0.005:
+        post = (layout.tray_z - foot) / 2
+        radius = 0.03
+        parts.visual(
+            body, mujoco.mjtGeom.mjGEOM_CYLINDER, (radius, post), (0, 0, -post), material="stand_blue"
+        )
+        parts.collider(body, mujoco.mjtGeom.mjGEOM_CYLINDER, (radius, post), (0, 0, -post))
+        if not over_cover:
+            parts.visual(body, _BOX, (hx, hy, 0.01), (0, 0, -2 * post + 0.01), material="stand_blue")
+    return "tray"
