@@ -24,13 +24,13 @@ STAGES = (
 
 
 class Fake:
-    """Draws whether a trial succeeds; the method `faulty` breaks its contract, `slow` takes half a second."""
+    """Draws whether a trial succeeds; the method `faulty` breaks its contract, `slow` takes a tenth of a second."""
 
     name = "fake"
     profiles = ("ideal", "field")
 
     def methods(self) -> tuple[str, ...]:
-        return ("poor", "good", "slow", "faulty", "keyless", "buggy", "deadly")
+        return ("poor", "good", "slow", "faulty", "keyless", "buggy", "deadly", "threads", "sure")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         for slot in overrides:
@@ -48,8 +48,12 @@ class Fake:
                 raise KeyError("no such body")
             case "deadly":
                 os._exit(3)
+            case "threads":
+                return TrialOutcome(True, "done", series={"threads": float(os.environ["OMP_NUM_THREADS"])})
+            case "sure":
+                return TrialOutcome(True, "done")
             case "slow":
-                time.sleep(0.3)
+                time.sleep(0.1)
         rng = spec.rng("scene")
         difficulty = rng.random()
         seconds = rng.normal(12, 2) if spec.method == "good" else rng.normal(6, 1)

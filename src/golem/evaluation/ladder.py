@@ -103,17 +103,19 @@ def run_ladder(config: LadderConfig) -> LadderResult:
         records = folder.resume(config.rung, config.profile, config.seed, overrides, provenance)
         held = {record.key for record in records}
         todo = [spec for spec in wanted if (spec.method, spec.index) not in held]
-        progress = tqdm(total=len(wanted), initial=len(wanted) - len(todo), unit="trial", disable=None)
+        kept = len(wanted) - len(todo)
+        progress = tqdm(total=len(wanted), initial=kept, unit="trial", disable=None)
         with progress, contextlib.closing(_finished(target, todo, config.j, folder.path)) as finished:
             try:
                 for spec, result in finished:
                     record = provenance.record(spec, result.outcome)
                     folder.append(record, result)
                     records.append(record)
+                    kept += 1
                     progress.update()
             except KeyboardInterrupt:
                 raise LadderInterrupted(
-                    f"Stopped with {progress.n} of {len(wanted)} trials kept; continue with: {config.command()}"
+                    f"Stopped with {kept} of {len(wanted)} trials kept; continue with: {config.command()}"
                 ) from None
         chosen = {(spec.method, spec.index) for spec in wanted}
         records = [r for r in folder.finish(records, config.method) if r.key in chosen]

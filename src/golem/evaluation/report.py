@@ -99,11 +99,11 @@ def _success(rung: str, summary: Summary) -> str:
             f'<td class="num">{_headline_time(m)}</td></tr>'
         )
     table = (
-        '<div class="scroll"><table><tr><th>method</th><th class="num">success</th>'
-        f'<th class="num">95 % interval</th><th class="plot">{percent_axis()}</th>'
-        f'<th class="num">detection to grasp</th></tr>{"".join(rows)}</table></div>'
+        '<div class="scroll"><table class="rates"><tr><th class="who">method</th><th class="num">success</th>'
+        f'<th class="num">95 %<br>interval</th><th class="plot">{percent_axis()}</th>'
+        f'<th class="num time">detection<br>to grasp</th></tr>{"".join(rows)}</table></div>'
     )
-    note = "Simulated success rates with Wilson 95 % intervals."
+    note = "Simulated success rates with Wilson 95 % intervals; median and quartiles of robot time to the closed grasp."
     if any((rung, m.method) in PAPER for m in summary.methods):
         note += " Grey circles: figures that the GOLEM paper published, not measured here."
     return _card("Success", table, note)
@@ -113,7 +113,7 @@ def _headline_time(m: MethodSummary) -> str:
     time = m.times.get(HEADLINE_TIME)
     if time is None:
         return "-"
-    return f"{time.median:.1f} s<small>{time.q1:.1f} to {time.q3:.1f} (n={time.n})</small>"
+    return f"{time.median:.1f} s<small>{time.q1:.1f} to {time.q3:.1f}</small>"
 
 
 def _comparisons(summary: Summary) -> str:
@@ -137,7 +137,7 @@ def _comparisons(summary: Summary) -> str:
     return _card(
         "Paired comparison",
         f'<div class="scroll"><table>{head}{rows}</table></div>',
-        "Both methods met the same scenes, noise and screws; only the trials on which they disagree decide.",
+        "All methods met the same scenes, noise and screws; only the trials on which two methods disagree decide.",
     )
 
 
@@ -145,7 +145,7 @@ def _says(r: TrialRecord) -> str:
     if r.success:
         return f"trial {r.index}: success"
     blame = f", {r.module}" if r.module else ""
-    return f"trial {r.index}: lost in {r.stage}{blame}{'. ' + r.detail if r.detail else ''}"
+    return f"trial {r.index}: lost in {r.stage}{blame}{': ' + r.detail if r.detail else ''}"
 
 
 def _map(grouped: Mapping[str, Sequence[TrialRecord]]) -> str:
@@ -247,7 +247,8 @@ def _reading(rung: str) -> str:
     return (
         "<h2>How to read this</h2>"
         "<p>Trial <i>i</i> of every method has the same scene, noise stream and screw. A rate is quoted with its "
-        "Wilson interval: with 95 % confidence the true rate of this simulation lies inside, were the seeds drawn anew.</p>"
+        "Wilson interval: over repeated draws of the seeds, 95 % of such intervals hold the true rate of this "
+        "simulation.</p>"
         "<p>Two rates with overlapping intervals may still differ, because the trials are paired. McNemar's exact test "
         "asks only the trials that one method won and the other lost; at least six, all one way, are needed for "
         "p &lt; 0.05. The interval of the difference is Newcombe's for paired rates; Holm's adjustment allows for "

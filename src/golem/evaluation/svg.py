@@ -13,7 +13,7 @@ from golem.evaluation.statistics import Interval
 
 WIDTH = 860
 """Width of a full-width plot in SVG units; the page scales it."""
-GUTTER = 190
+GUTTER = 130
 """Room for row names at the left."""
 
 

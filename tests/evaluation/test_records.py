@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from golem.errors import OutputError
+from golem.evaluation.base import TrialOutcome, TrialSpec
+from golem.evaluation.records import Provenance, RunFolder, TrialRecord, read_records
+from golem.evaluation.trials import Finished
+
+PROVENANCE = Provenance({"a": "c0ffee", "b": "beef"}, "code", "commit", {"numpy": "2"})
+
+
+def trial(method: str, index: int, picture: bytes | None = None) -> tuple[TrialRecord, Finished]:
+    spec = TrialSpec("tether", method, "field", 0, index)
+    outcome = TrialOutcome(
+        False, "reach", "upper_body: diff_ik", "short", {"total": 2.5}, {"x": 1.0}, picture
+    )
+    return PROVENANCE.record(spec, outcome), Finished(outcome, wall=3.0, cpu=2.0)
+
+
+def fill(folder: Path, *keys: tuple[str, int]) -> None:
+    with RunFolder(folder) as run:
+        for key in keys:
+            run.append(*trial(*key))
+
+
+def resume(
+    folder: Path, provenance: Provenance = PROVENANCE, profile: str = "field", seed: int = 0
+) -> list[TrialRecord]:
+    with RunFolder(folder) as run:
+        return run.resume("tether", profile, seed, {}, provenance)
+
+
+def test_a_record_survives_its_line() -> None:
+    record, _ = trial("a", 0)
+    assert TrialRecord.parse(record.line()) == record
+    assert record.line().count("\n") == 1
+
+
+@pytest.mark.parametrize("change", [{"schema": 2}, {"extra": 1}, {"stage": ...}])
+def test_a_line_of_another_schema_is_refused(change: dict[str, object]) -> None:
+    data = {**json.loads(trial("a", 0)[0].line()), **change}
+    line = json.dumps({name: value for name, value in data.items() if value is not ...})
+    with pytest.raises(ValueError, match="record"):
+        TrialRecord.parse(line)
+
+
+def test_a_torn_last_line_is_cut_off_and_the_rest_kept(tmp_path: Path) -> None:
+    fill(tmp_path, ("a", 0), ("b", 0))
+    trials = tmp_path / "trials.jsonl"
+    trials.write_bytes(trials.read_bytes()[:-20])
+    assert [r.key for r in resume(tmp_path)] == [("a", 0)]
+    fill(tmp_path, ("b", 0))
+    assert [r.key for r in read_records(trials)] == [("a", 0), ("b", 0)]
+
+
+def test_a_broken_line_in_the_middle_is_an_error_that_names_it(tmp_path: Path) -> None:
+    fill(tmp_path, ("a", 0))
+    trials = tmp_path / "trials.jsonl"
+    trials.write_bytes(b"nonsense\n" + trials.read_bytes())
+    with pytest.raises(OutputError, match=r"Line 1 of .*trials.jsonl"):
+        resume(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("what", "options"),
+    [
+        ("configuration", {"provenance": replace(PROVENANCE, configs={"a": "other"})}),
+        ("code", {"provenance": replace(PROVENANCE, code="other")}),
+        ("package versions", {"provenance": replace(PROVENANCE, versions={"numpy": "3"})}),
+        ("profile", {"profile": "ideal"}),
+        ("seed", {"seed": 1}),
+    ],
+)
+def test_trials_that_cannot_be_compared_are_not_mixed(
+    tmp_path: Path, what: str, options: dict[str, Any]
+) -> None:
+    fill(tmp_path, ("a", 0))
+    before = (tmp_path / "trials.jsonl").read_bytes()
+    with pytest.raises(OutputError, match=f"another {what} "):
+        resume(tmp_path, **options)
+    assert (tmp_path / "trials.jsonl").read_bytes() == before
+
+
+def test_another_commit_of_the_same_code_continues(tmp_path: Path) -> None:
+    fill(tmp_path, ("a", 0))
+    assert len(resume(tmp_path, replace(PROVENANCE, commit="docs-only"))) == 1
+
+
+def test_finish_orders_by_trial_then_method(tmp_path: Path) -> None:
+    with RunFolder(tmp_path) as run:
+        records = [trial(*key)[0] for key in (("a", 1), ("b", 1), ("a", 0), ("b", 0))]
+        run.finish(records, ("b", "a"))
+    assert [r.key for r in read_records(tmp_path / "trials.jsonl")] == [
+        ("b", 0),
+        ("a", 0),
+        ("b", 1),
+        ("a", 1),
+    ]
+
+
+def test_costs_and_pictures_lie_beside_the_records(tmp_path: Path) -> None:
+    record, finished = trial("a", 0, picture=b"png")
+    with RunFolder(tmp_path) as run:
+        run.append(record, finished)
+    assert record.picture is not None
+    assert (tmp_path / record.picture).read_bytes() == b"png"
+    assert json.loads((tmp_path / "timings.jsonl").read_text()) == {
+        "method": "a",
+        "index": 0,
+        "wall": 3.0,
+        "cpu": 2.0,
+    }
+    assert "wall" not in record.line()
+
+
+def test_a_folder_has_one_writer(tmp_path: Path) -> None:
+    with RunFolder(tmp_path), pytest.raises(OutputError, match="Another run is writing"):
+        RunFolder(tmp_path)
+    RunFolder(tmp_path).__exit__(None, None, None)
+
+
+def test_a_folder_that_stays_empty_is_taken_away_again(tmp_path: Path) -> None:
+    with RunFolder(tmp_path / "run"):
+        assert (tmp_path / "run").is_dir()
+    assert not (tmp_path / "run").exists()
+
+
+def test_an_unwritable_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="Cannot write to --out"):
+        RunFolder(tmp_path / "file" / "run")

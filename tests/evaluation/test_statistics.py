@@ -1,0 +1,109 @@
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import norm
+
+from golem.evaluation.statistics import PairedTable, holm, mcnemar, paired_difference, spread, wilson
+
+
+@pytest.mark.parametrize(
+    ("successes", "n", "low", "high"),
+    [
+        (30, 30, 88.6, 100),
+        (29, 30, 83.3, 99.4),
+        (27, 30, 74.4, 96.5),
+        (26, 30, 70.3, 94.7),
+        (24, 30, 62.7, 90.5),
+        (21, 30, 52.1, 83.3),
+        (19, 30, 45.5, 78.1),
+        (16, 30, 36.1, 69.8),
+        (11, 30, 21.9, 54.5),
+        (8, 30, 14.2, 44.4),
+        (0, 30, 0, 11.4),
+        (19, 20, 76.4, 99.1),
+        (14, 15, 70.2, 98.8),
+    ],
+)
+def test_wilson_reproduces_the_papers_intervals(successes: int, n: int, low: float, high: float) -> None:
+    interval = wilson(successes, n)
+    assert round(100 * interval.low, 1) == low
+    assert round(100 * interval.high, 1) == high
+
+
+@given(st.integers(1, 300).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
+def test_wilson_bounds_solve_the_score_equation(counts: tuple[int, int]) -> None:
+    successes, n = counts
+    z, rate = norm.ppf(0.975), successes / n
+    interval = wilson(successes, n)
+    for bound in (interval.low, interval.high):
+        assert n * (rate - bound) ** 2 == pytest.approx(z * z * bound * (1 - bound), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("only_a", "only_b", "p"),
+    [(0, 0, 1.0), (5, 0, 0.0625), (6, 0, 0.03125), (0, 6, 0.03125), (3, 3, 1.0), (1, 9, 22 / 1024)],
+)
+def test_mcnemar_is_the_exact_sign_test_of_discordant_pairs(only_a: int, only_b: int, p: float) -> None:
+    assert mcnemar(PairedTable(17, only_a, only_b, 4)) == pytest.approx(p)
+
+
+def test_paired_table_counts_each_cell() -> None:
+    a = [True, True, True, False, False, False, True]
+    b = [True, False, True, True, False, False, False]
+    assert PairedTable.count(a, b) == PairedTable(both=2, only_a=2, only_b=1, neither=2)
+
+
+def test_paired_table_refuses_unequal_numbers_of_trials() -> None:
+    with pytest.raises(ValueError):
+        PairedTable.count([True], [True, False])
+
+
+def test_paired_difference_reproduces_newcombes_example() -> None:
+    # Newcombe 1998 (Stat Med 17:2635), table II: a, b, c, d = 36, 12, 2, 0; method 10.
+    interval = paired_difference(PairedTable(36, 12, 2, 0))
+    assert (round(interval.low, 4), round(interval.high, 4)) == (0.0569, 0.3404)
+
+
+@given(st.tuples(*[st.integers(0, 40)] * 4).filter(lambda cells: sum(cells) > 0))
+def test_paired_difference_holds_the_estimate_and_mirrors(cells: tuple[int, int, int, int]) -> None:
+    table = PairedTable(*cells)
+    mirrored = paired_difference(PairedTable(table.both, table.only_b, table.only_a, table.neither))
+    interval = paired_difference(table)
+    estimate = (table.only_a - table.only_b) / table.n
+    assert -1 - 1e-12 <= interval.low <= estimate + 1e-12
+    assert estimate - 1e-12 <= interval.high <= 1 + 1e-12
+    assert (interval.low, interval.high) == pytest.approx((-mirrored.high, -mirrored.low))
+
+
+def test_paired_difference_covers_the_truth_about_as_often_as_it_says() -> None:
+    n, truth = 20, np.array((0.5, 0.3, 0.05, 0.15))
+    covered = 0.0
+    for both, only_a, only_b in itertools.product(range(n + 1), repeat=3):
+        neither = n - both - only_a - only_b
+        if neither < 0:
+            continue
+        cells = (both, only_a, only_b, neither)
+        ways = math.factorial(n) / math.prod(map(math.factorial, cells))
+        interval = paired_difference(PairedTable(*cells))
+        if interval.low <= 0.25 <= interval.high:
+            covered += ways * float(np.prod(truth**cells))
+    assert 0.94 < covered < 0.98
+
+
+def test_holm_steps_down_and_keeps_the_order() -> None:
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.9, 0.8]) == [1.0, 1.0]
+    assert holm([]) == []
+
+
+def test_spread_of_values() -> None:
+    found = spread([4.0, 1.0, 3.0, 2.0, 5.0])
+    assert found is not None
+    assert (found.n, found.q1, found.median, found.q3) == (5, 2.0, 3.0, 4.0)
+    assert spread([]) is None
