@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from golem.types import Side
+from golem.types import LocalizedObject, Side
 
 LOW_STATE = "lowstate"
 """`LowState` at 500 Hz, from the robot."""
@@ -74,3 +74,31 @@ class LookRequest:
     """
 
     labels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Sightings:
+    """What a localizer found in one frame.
+
+    Attributes:
+        t: time of the frame [s].
+        camera: which camera.
+        objects: everything found, in no order.
+    """
+
+    t: float
+    camera: str
+    objects: tuple[LocalizedObject, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HandGoal:
+    """What a skill wants of one hand: open to `gap`, or close with `force`.
+
+    Attributes:
+        gap: opening to move to [m]; None closes.
+        force: force of each finger to close with [N]; used when `gap` is None.
+    """
+
+    gap: float | None
+    force: float = 0.0

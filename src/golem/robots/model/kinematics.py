@@ -1,0 +1,27 @@
+"""Where the frames of the nominal robot are at given joint positions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from golem.robots.model import pinocchio_model
+from golem.types import Array
+
+
+class Kinematics:
+    """Forward kinematics of the nominal model; joints are set once, frames are read as needed."""
+
+    def __init__(self) -> None:
+        """Build the model with hands, fixed at base_link."""
+        self._model = pinocchio_model.build(hands=True)
+        self._data = self._model.createData()
+        self._ids = {frame.name: i for i, frame in enumerate(self._model.frames)}
+
+    def update(self, q: Array) -> None:
+        """Set the joints `q` (27,) [rad]."""
+        pin.forwardKinematics(self._model, self._data, np.asarray(q))
+
+    def pose(self, frame: str) -> Array:
+        """Return the (4, 4) pose of `frame` in base_link at the joints last set."""
+        return pin.updateFramePlacement(self._model, self._data, self._ids[frame]).homogeneous

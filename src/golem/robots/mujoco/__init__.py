@@ -1,0 +1,1 @@
+"""The digital twin on MuJoCo: engine, hoist, cameras."""

@@ -1,0 +1,64 @@
+"""The two finger servos of one MAGPIE hand: position control with a torque ceiling, like an AX-12A."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from golem.robots.model import magpie
+from golem.types import HandCommand, HandState, Side
+
+SERVO_KP = 8.0
+"""Stiffness of a finger servo [N m/rad]: full torque at 5 deg of lag, the order of the AX-12A's compliance slope 32."""
+SERVO_KD = 0.10
+"""Damping of a finger servo [N m s/rad]."""
+
+
+class HandServos:
+    """Drives the cranks of one hand.
+
+    The reference runs ahead at the servo's speed whether or not the finger follows; the torque ceiling is what
+    limits the force.
+    """
+
+    def __init__(self, model: mujoco.MjModel, side: Side) -> None:
+        """Find the cranks and fingers of the hand on `side`."""
+        names = [magpie.finger_names(side, finger) for finger in magpie.FINGERS]
+        cranks = [model.joint(crank) for crank, _, _ in names]
+        self._q = np.array([j.qposadr[0] for j in cranks])
+        self._v = np.array([j.dofadr[0] for j in cranks])
+        self._q_finger = np.array([model.joint(finger).qposadr[0] for _, finger, _ in names])
+        self._u = np.array([model.actuator(crank).id for crank, _, _ in names])
+        # The hinges may be counted in opposite senses; here both cranks count positive when closing.
+        self._sign = np.array([1.0 if j.range.sum() > 0 else -1.0 for j in cranks])
+        self._reference = np.zeros(2)
+        self._force = magpie.MIN_FORCE
+
+    def reset(self, data: mujoco.MjData, gap: float) -> None:
+        """Place both fingers at an opening of `gap` [m]."""
+        self._reference[:] = magpie.crank_from_gap(gap)
+        data.qpos[self._q] = self._sign * self._reference
+        data.qpos[self._q_finger] = -self._sign * self._reference
+
+    def command(self, command: HandCommand, dt: float) -> None:
+        """Let the reference move towards the commanded gap for `dt` [s]."""
+        goal = magpie.crank_from_gap(command.gap)
+        reach = magpie.MAX_SPEED * dt
+        self._reference += np.clip(goal - self._reference, -reach, reach)
+        self._force = min(max(command.force, magpie.MIN_FORCE), magpie.MAX_FORCE)
+
+    def drive(self, data: mujoco.MjData) -> None:
+        """Set the crank torques for one physics step."""
+        theta = self._sign * data.qpos[self._q]
+        rate = self._sign * data.qvel[self._v]
+        ceiling = self._force * magpie.ARM * np.sin(magpie.ANGLE_OPEN + theta)
+        torque = SERVO_KP * (self._reference - theta) - SERVO_KD * rate
+        data.ctrl[self._u] = self._sign * np.minimum(np.maximum(torque, -ceiling), ceiling)
+
+    def read(self, data: mujoco.MjData, t: float) -> HandState:
+        """Return the hand's report at time `t` [s]: the servos' present positions and loads."""
+        theta = self._sign * data.qpos[self._q]
+        fingers = np.asarray(magpie.pad_offset(theta))
+        load = self._sign * data.ctrl[self._u]
+        force = np.maximum(load, 0.0) / (magpie.ARM * np.sin(magpie.ANGLE_OPEN + theta))
+        return HandState(t, float(fingers.sum()), fingers, force)

@@ -1,0 +1,232 @@
+"""One thin node per slot: reads the bus, runs the passive module once, publishes what it returns."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from golem.capabilities.arms.base import ArmCommand, UpperBody
+from golem.capabilities.legs.base import LegCommand, LowerBody
+from golem.capabilities.localization.base import Localizer
+from golem.errors import ModuleFault
+from golem.hardware.estimator.base import BaseEstimator
+from golem.middleware import topics
+from golem.middleware.bus import Bus
+from golem.middleware.topics import LookRequest, Sightings
+from golem.robots.base import Robot
+from golem.robots.model.kinematics import Kinematics
+from golem.runtime.executor import TICK
+from golem.runtime.guard import Guard
+from golem.skills.context import Context
+from golem.skills.runner import SkillRun
+from golem.types import (
+    LEGS,
+    NUM_JOINTS,
+    SIDES,
+    UPPER,
+    BaseEstimate,
+    Frame,
+    HandCommand,
+    LowCommand,
+    LowState,
+    PalmTargets,
+    Side,
+    Twist,
+)
+
+
+class SenseNode:
+    """Publishes what motors, IMU and hands report."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, robot: Robot) -> None:
+        """Read `robot`."""
+        self._bus, self._robot = bus, robot
+
+    def step(self, t: float) -> None:
+        """Publish one sample of everything."""
+        q, dq, tau = self._robot.joints()
+        self._bus.publish(topics.LOW_STATE, LowState(t, q, dq, tau, self._robot.imu()), t)
+        for side in SIDES:
+            self._bus.publish(topics.hand_state(side), self._robot.hand(side, t), t)
+
+
+class ActNode:
+    """Lets time pass under the newest command that left the safety gate."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, robot: Robot) -> None:
+        """Drive `robot`."""
+        self._bus, self._robot = bus, robot
+
+    def step(self, t: float) -> None:
+        """Advance the robot by one tick; motors without a command are limp."""
+        command = self._bus.latest(topics.LOW_CMD, LowCommand) or _limp(t)
+        hands: dict[Side, HandCommand] = {}
+        for side in SIDES:
+            hand = self._bus.latest(topics.hand_command(side), HandCommand)
+            if hand is not None:
+                hands[side] = hand
+        self._robot.advance(command, hands, TICK)
+
+
+class EstimatorNode:
+    """Runs the base estimator on every state."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, estimator: BaseEstimator, guard: Guard) -> None:
+        """Run `estimator`."""
+        self._bus, self._estimator, self._guard = bus, estimator, guard
+        self._started = False
+
+    def step(self, t: float) -> None:
+        """Publish the estimate of the base."""
+        state = self._bus.latest(topics.LOW_STATE, LowState)
+        if state is None:
+            return
+        if not self._started:
+            self._started = True
+            self._guard.call(self._estimator.reset, state)
+        estimate = self._guard.call(self._estimator.step, state, TICK)
+        self._guard.array("T_odom_base", estimate.T_odom_base, (4, 4))
+        self._bus.publish(topics.BASE, estimate, t)
+
+
+class CameraNode:
+    """Exposes one camera at its frame rate while somebody asks for it."""
+
+    def __init__(self, bus: Bus, robot: Robot, name: str, optical_frame: str, latency: float) -> None:
+        """Expose camera `name`, whose nominal frame in the model is `optical_frame`; frames take `latency` [s]."""
+        self._bus, self._robot, self._info = bus, robot, robot.cameras[name]
+        self._optical, self._latency = optical_frame, latency
+        self._kinematics = Kinematics()
+        self.period = 1.0 / self._info.rate
+
+    def step(self, t: float) -> None:
+        """Publish one frame, with the pose the robot believes the camera had."""
+        request = self._bus.latest(topics.look(self._info.name), LookRequest)
+        state = self._bus.latest(topics.LOW_STATE, LowState)
+        base = self._bus.latest(topics.BASE, BaseEstimate)
+        if request is None or not request.labels or state is None or base is None:
+            return
+        rgb, depth = self._robot.capture(self._info.name)
+        self._kinematics.update(state.q)
+        pose = base.T_odom_base @ self._kinematics.pose(self._optical)
+        self._bus.publish(topics.frames(self._info.name), Frame(t, self._info, rgb, depth, pose), t, self._latency)
+
+
+class LocalizerNode:
+    """Runs the localizer on every new frame of one camera."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, localizer: Localizer, camera: str, guard: Guard) -> None:
+        """Run `localizer` on the frames of `camera`."""
+        self._bus, self._localizer, self._camera, self._guard = bus, localizer, camera, guard
+        self._seen = 0
+
+    def step(self, t: float) -> None:
+        """Publish what is in the newest frame, if it is new."""
+        count = self._bus.count(topics.frames(self._camera))
+        if count == self._seen:
+            return
+        self._seen = count
+        frame = self._bus.latest(topics.frames(self._camera), Frame)
+        request = self._bus.latest(topics.look(self._camera), LookRequest)
+        if frame is None or request is None or not request.labels:
+            return
+        objects = tuple(self._guard.call(self._localizer.locate, frame, request.labels))
+        for o in objects:
+            self._guard.array("position", o.position, (3,))
+        message = Sightings(frame.t, self._camera, objects)
+        self._bus.publish(topics.sightings(self._camera), message, t, self._localizer.latency)
+
+
+class LowerBodyNode:
+    """Runs the leg controller at its rate."""
+
+    def __init__(self, bus: Bus, legs: LowerBody, guard: Guard) -> None:
+        """Run `legs`."""
+        self._bus, self._legs, self._guard = bus, legs, guard
+        self.period = 1.0 / legs.rate
+        self._started = False
+
+    def step(self, t: float) -> None:
+        """Publish leg targets."""
+        state = self._bus.latest(topics.LOW_STATE, LowState)
+        base = self._bus.latest(topics.BASE, BaseEstimate)
+        if state is None or base is None:
+            return
+        if not self._started:
+            self._started = True
+            self._guard.call(self._legs.reset, state)
+        twist = self._bus.latest(topics.TWIST, Twist) or Twist()
+        command = self._guard.call(self._legs.step, state, base, twist, self.period)
+        self._guard.array("leg targets", command.q, (12,))
+        self._bus.publish(topics.LEG_COMMAND, command, t, self._legs.latency)
+
+
+class UpperBodyNode:
+    """Runs the upper-body controller at its rate, its targets brought from odom into base_link."""
+
+    def __init__(self, bus: Bus, arms: UpperBody, guard: Guard) -> None:
+        """Run `arms`."""
+        self._bus, self._arms, self._guard = bus, arms, guard
+        self.period = 1.0 / arms.rate
+        self._started = False
+
+    def step(self, t: float) -> None:
+        """Publish upper-body targets."""
+        state = self._bus.latest(topics.LOW_STATE, LowState)
+        base = self._bus.latest(topics.BASE, BaseEstimate)
+        if state is None or base is None:
+            return
+        if not self._started:
+            self._started = True
+            self._guard.call(self._arms.reset, state.q)
+        targets = self._bus.latest(topics.PALM_TARGETS, PalmTargets) or PalmTargets(t)
+        T_base_odom = np.linalg.inv(base.T_odom_base)
+        left, right = (None if T is None else T_base_odom @ T for T in (targets.left, targets.right))
+        command = self._guard.call(self._arms.step, left, right, state.q, self.period)
+        if not isinstance(command, ArmCommand):
+            raise ModuleFault(self._guard.slot, self._guard.use, f"step returned {type(command).__name__}, not ArmCommand")
+        self._guard.array("arm targets", command.q, (UPPER.stop - UPPER.start,))
+        self._bus.publish(topics.ARM_COMMAND, command, t, self._arms.latency)
+
+
+class SkillNode:
+    """Resumes the running skill.
+
+    Attributes:
+        run: the skill in execution, or None.
+    """
+
+    period = 0.01
+
+    def __init__(self, context: Context) -> None:
+        """Serve `context` to the skills."""
+        self._context = context
+        self.run: SkillRun | None = None
+
+    def step(self, t: float) -> None:
+        """Resume the skill until its next await."""
+        self._context.refresh(t)
+        if self.run is not None:
+            self.run.step()
+
+
+def whole_body(legs: LegCommand | None, arms: ArmCommand | None, q: np.ndarray) -> np.ndarray:
+    """Return the (27,) targets of legs and upper body; a half that has not spoken stays at the measured `q` (27,)."""
+    target = np.array(q)
+    if legs is not None:
+        target[LEGS] = legs.q
+    if arms is not None:
+        target[UPPER] = arms.q
+    return target
+
+
+def _limp(t: float) -> LowCommand:
+    zero = np.zeros(NUM_JOINTS)
+    return LowCommand(t, zero, zero, zero, zero, zero)

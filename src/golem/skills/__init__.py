@@ -1,0 +1,1 @@
+"""Layer 4: skills orchestrate capabilities until a goal is reached."""

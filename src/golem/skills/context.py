@@ -1,0 +1,238 @@
+"""What a skill works with: its two arms and hands, its eyes, its clock, a place to speak."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from golem.capabilities.arms.line import Line
+from golem.hardware.hands.base import HandStatus
+from golem.middleware import topics
+from golem.middleware.bus import Bus
+from golem.middleware.topics import HandGoal, LookRequest, Sightings
+from golem.robots.model.kinematics import Kinematics
+from golem.skills.base import Feedback, StageFailed, Tick
+from golem.types import Array, BaseEstimate, LowState, PalmTargets, Side
+
+
+class Hand:
+    """One gripper, as a skill commands and reads it."""
+
+    def __init__(self, context: Context, side: Side) -> None:
+        """Speak for the hand on `side`."""
+        self._context = context
+        self._side: Side = side
+
+    @property
+    def status(self) -> HandStatus:
+        """What the hand's controller reports now.
+
+        Raises:
+            StageFailed: it has not reported yet.
+        """
+        status = self._context.bus.latest(topics.hand_status(self._side), HandStatus)
+        if status is None:
+            raise StageFailed("grasp", "hand", f"The {self._side} hand does not report.")
+        return status
+
+    def open(self, gap: float) -> None:
+        """Move the fingers to an opening of `gap` [m]."""
+        self._context.publish(topics.hand_goal(self._side), HandGoal(gap))
+
+    def close(self, force: float) -> None:
+        """Close until both fingers press with `force` [N]."""
+        self._context.publish(topics.hand_goal(self._side), HandGoal(None, force))
+
+
+class Arm:
+    """One arm: a commanded gripper pose in odom, moved along lines or towards a moving goal."""
+
+    def __init__(self, context: Context, side: Side) -> None:
+        """Speak for the arm on `side`."""
+        self._context = context
+        self._side: Side = side
+        self._commanded: Array | None = None
+        self._velocity: Array = np.zeros(3)
+
+    @property
+    def pose(self) -> Array:
+        """(4, 4) pose of the gripper in odom, by the measured joints and the base estimate."""
+        return self._context.T_odom_base @ self._context.kinematics.pose(f"{self._side}_gripper")
+
+    @property
+    def commanded(self) -> Array:
+        """(4, 4) pose in odom the arm is being sent to."""
+        return self.pose if self._commanded is None else self._commanded
+
+    async def move(
+        self, T_goal: Array, v_max: float, w_max: float = 1.5, stop: Callable[[], bool] = lambda: False
+    ) -> None:
+        """Go straight to `T_goal` (4, 4) in odom; ends early once `stop()` is true.
+
+        Args:
+            T_goal: where to.
+            v_max: speed [m/s].
+            w_max: angular speed [rad/s].
+            stop: asked every tick.
+        """
+        line = Line(self.commanded, T_goal, v_max, w_max)
+        start = self._context.t
+        while not stop():
+            self._send(line.pose(self._context.t - start))
+            if self._context.t - start >= line.duration:
+                break
+            await self._context.tick()
+
+    def approach(self, T_goal: Array, v_max: float, a_max: float = 0.6) -> None:
+        """Go one tick further towards a goal that may move: critically damped, bounded in speed and acceleration.
+
+        Args:
+            T_goal: (4, 4) goal in odom; its orientation is taken over at once, so it should not jump.
+            v_max: speed [m/s].
+            a_max: acceleration [m/s^2].
+        """
+        dt = self._context.period
+        T = self.commanded.copy()
+        error = T_goal[:3, 3] - T[:3, 3]
+        distance = float(np.linalg.norm(error))
+        # Fastest speed from which a_max still stops within the distance left.
+        speed = min(v_max, float(np.sqrt(a_max * distance)), distance / (3.0 * dt))
+        wanted = error * (speed / distance) if distance > 1e-9 else np.zeros(3)
+        change = wanted - self._velocity
+        size = float(np.linalg.norm(change))
+        self._velocity = self._velocity + change * min(1.0, a_max * dt / size) if size > 1e-12 else wanted
+        T[:3, :3] = T_goal[:3, :3]
+        T[:3, 3] += self._velocity * dt
+        self._send(T)
+
+    async def settle(self, tolerance: float, timeout: float) -> float:
+        """Wait until the gripper is within `tolerance` [m] of where it was sent, at most `timeout` [s].
+
+        Returns:
+            The distance that is left [m].
+        """
+        end = self._context.t + timeout
+        while True:
+            left = float(np.linalg.norm(self.pose[:3, 3] - self.commanded[:3, 3]))
+            if left < tolerance or self._context.t >= end:
+                return left
+            await self._context.tick()
+
+    def _send(self, T: Array) -> None:
+        self._commanded = T
+        self._context.send_palms()
+
+
+class Context:
+    """The world as a skill sees it. Holds the bus, never a module.
+
+    Attributes:
+        bus: where everything is read from.
+        kinematics: forward kinematics of the nominal model at the newest measured joints.
+        period: time between two ticks of the skill [s].
+        t: present time [s].
+        arms, hands: by side.
+        skill: name of the running skill, for its feedback.
+    """
+
+    def __init__(self, bus: Bus, kinematics: Kinematics, period: float) -> None:
+        """Work over `bus`, with forward kinematics and the skill period [s] given."""
+        self.bus = bus
+        self.kinematics = kinematics
+        self.period = period
+        self.t = 0.0
+        self.skill = ""
+        self.arms: dict[Side, Arm] = {"left": Arm(self, "left"), "right": Arm(self, "right")}
+        self.hands: dict[Side, Hand] = {"left": Hand(self, "left"), "right": Hand(self, "right")}
+
+    def refresh(self, t: float) -> None:
+        """Take over time and measured joints; the runner calls it before it resumes the skill."""
+        self.t = t
+        state = self.bus.latest(topics.LOW_STATE, LowState)
+        if state is not None:
+            self.kinematics.update(state.q)
+
+    @property
+    def T_odom_base(self) -> Array:
+        """(4, 4) estimated pose of base_link in odom."""
+        base = self.bus.latest(topics.BASE, BaseEstimate)
+        return np.eye(4) if base is None else base.T_odom_base
+
+    def publish(self, topic: str, value: object) -> None:
+        """Send `value` on `topic` now."""
+        self.bus.publish(topic, value, self.t)
+
+    def send_palms(self) -> None:
+        """Publish where both arms are being sent; an arm that was never moved keeps its posture."""
+        left, right = (self.arms[side]._commanded for side in ("left", "right"))
+        self.publish(topics.PALM_TARGETS, PalmTargets(self.t, left, right))
+
+    def say(self, stage: str, text: str, **data: object) -> None:
+        """Give feedback: the stage, one line for a person, and numbers for a viewer."""
+        self.publish(topics.FEEDBACK, Feedback(self.t, self.skill, stage, text, dict(data)))
+
+    async def tick(self) -> None:
+        """Give the tick back until the skill's next period."""
+        await Tick()
+
+    async def sleep(self, seconds: float) -> None:
+        """Let `seconds` of robot time pass."""
+        end = self.t + seconds
+        while self.t < end:
+            await self.tick()
+
+    async def until(self, condition: Callable[[], bool], timeout: float) -> bool:
+        """Wait until `condition()` is true; returns False when `timeout` [s] passed first."""
+        end = self.t + timeout
+        while not condition():
+            if self.t >= end:
+                return False
+            await self.tick()
+        return True
+
+    def watch(self, camera: str, *labels: str) -> Eye:
+        """Let a camera stream what it sees of `labels`, for as long as the returned `Eye` is open."""
+        return Eye(self, camera, labels)
+
+
+class Eye:
+    """A camera that streams sightings while it is open (a context manager)."""
+
+    def __init__(self, context: Context, camera: str, labels: tuple[str, ...]) -> None:
+        """Watch `camera` for `labels`."""
+        self._context = context
+        self._camera = camera
+        self._labels = labels
+        self._seen = 0
+        self._since = 0.0
+
+    def __enter__(self) -> Eye:
+        """Start the stream."""
+        self._seen = self._context.bus.count(topics.sightings(self._camera))
+        self._since = self._context.t
+        self._context.publish(topics.look(self._camera), LookRequest(self._labels))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop the stream, so that nothing is rendered or inferred unasked."""
+        self._context.publish(topics.look(self._camera), LookRequest())
+
+    def fresh(self) -> Sightings | None:
+        """Return the sightings of a frame exposed since the eye opened that was not returned before, or None."""
+        topic = topics.sightings(self._camera)
+        count = self._context.bus.count(topic)
+        if count == self._seen:
+            return None
+        self._seen = count
+        newest = self._context.bus.latest(topic, Sightings)
+        return newest if newest is not None and newest.t >= self._since else None
+
+    async def look(self, timeout: float) -> Sightings | None:
+        """Wait for the next fresh sightings, at most `timeout` [s]; None when no frame came."""
+        end = self._context.t + timeout
+        while True:
+            sightings = self.fresh()
+            if sightings is not None or self._context.t >= end:
+                return sightings
+            await self._context.tick()

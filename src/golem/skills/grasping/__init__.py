@@ -1,0 +1,1 @@
+"""Grasp methods: from an object to where the gripper shall close."""

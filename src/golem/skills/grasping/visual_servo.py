@@ -1,0 +1,181 @@
+"""The paper's `C-VS`: centroid grasp whose target is followed by the palm camera while the hand comes down.
+
+Not look-and-move (their 75 s): every frame updates a Kalman filter on the object's position in odom, and the gripper
+goes to the filtered position at the arm's rate. Errors of the head camera, of its calibration and of the joint
+encoders drop out, because camera and gripper sit on the same hand.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from golem.skills.grasping.base import Grasp, ServoLaw, ServoStatus, ServoStep
+from golem.skills.grasping.centroid import Centroid, CentroidConfig, top_down
+from golem.types import Array, LocalizedObject
+
+
+@dataclass(frozen=True)
+class ServoConfig:
+    """Noise, gates and patience of the loop.
+
+    Attributes:
+        drift: how fast the object may wander in odom, by base sway and encoder error [m/sqrt(s)].
+        sigma_lateral: standard deviation of one sighting across the optical axis [m].
+        sigma_depth: the same along the axis, at close range [m].
+        gate: squared Mahalanobis distance beyond which a sighting is another object (chi2, 3 dof, p = 0.999).
+        first_radius: how far from the head camera's guess the first sighting may be [m].
+        confirm: sightings needed before the hand leaves its stand-off.
+        standoff: height above the grasp at which the hand centres itself [m].
+        slope: metres of height the hand keeps per metre of lateral error beyond `tolerance`.
+        tolerance: lateral error within which the fingers close [m]; half the pad width minus a screw's radius.
+        height_tolerance: error of height within which the fingers close [m].
+        lost_after: time without a sighting until the hand backs off [s].
+        retreat: how far it backs off to see more [m].
+        retreats: how often it may do so.
+        stall_after: time without progress until it gives up [s].
+        progress: what counts as progress [m].
+    """
+
+    drift: float = 0.003
+    sigma_lateral: float = 0.002
+    sigma_depth: float = 0.002
+    gate: float = 16.3
+    first_radius: float = 0.20
+    confirm: int = 3
+    standoff: float = 0.07
+    slope: float = 6.0
+    tolerance: float = 0.003
+    height_tolerance: float = 0.0025
+    lost_after: float = 1.0
+    retreat: float = 0.05
+    retreats: int = 2
+    stall_after: float = 4.0
+    progress: float = 0.001
+
+
+class CentroidServo:
+    """Kalman filter on a resting object, and a funnel that trades height against lateral error."""
+
+    def __init__(self, config: ServoConfig, label: str, guess: Array, depth: float, yaw: float, t: float) -> None:
+        """Start at time `t` [s] from the head camera's `guess` (3,) of the object's surface point in odom.
+
+        Args:
+            config: noise, gates and patience.
+            label: class of the object to follow.
+            guess: (3,) where the head camera saw it.
+            depth: how far below the surface point the fingertips go [m].
+            yaw: heading of the gripper's x axis [rad].
+            t: start time [s].
+        """
+        self.label = label
+        self._config = config
+        self._x = np.array(guess, dtype=float)
+        self._variance: Array = np.full(3, config.first_radius**2)
+        self._depth = depth
+        self._yaw = yaw
+        self._t = t
+        self._seen_at = t
+        self._sightings = 0
+        self._retreats = 0
+        self._lift = 0.0
+        self._best = np.inf
+        self._best_at = t
+
+    def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
+        """Advance; see `ServoLaw`."""
+        c = self._config
+        self._variance = self._variance + c.drift**2 * (t - self._t)
+        self._t = t
+        if sightings is not None:
+            self._update(t, sightings, T_odom_gripper)
+        status = ServoStatus.TRACKING
+        if t - self._seen_at > c.lost_after:
+            self._seen_at = t
+            self._sightings = 0
+            self._retreats += 1
+            self._lift = c.retreat * self._retreats
+            self._variance = np.full(3, c.first_radius**2)
+            if self._retreats > c.retreats:
+                status = ServoStatus.LOST
+
+        grasp = self._x - (0.0, 0.0, self._depth)
+        gripper = T_odom_gripper[:3, 3]
+        lateral = float(np.hypot(*(grasp - gripper)[:2]))
+        height = float(gripper[2] - grasp[2])
+        confirmed = self._sightings >= c.confirm
+        if status is ServoStatus.TRACKING and confirmed:
+            if lateral < c.tolerance and abs(height) < c.height_tolerance:
+                status = ServoStatus.CONVERGED
+            error = lateral + abs(height)
+            if error < self._best - c.progress:
+                self._best, self._best_at = error, t
+            elif t - self._best_at > c.stall_after and status is not ServoStatus.CONVERGED:
+                status = ServoStatus.STALLED
+        else:
+            self._best, self._best_at = np.inf, t
+
+        above = np.clip(c.slope * (lateral - c.tolerance), 0.0, c.standoff) if confirmed else c.standoff + self._lift
+        goal = top_down(grasp + (0.0, 0.0, above), self._yaw)
+        return ServoStep(goal, self._x.copy(), float(np.sqrt(self._variance.max())), status)
+
+    def _update(self, t: float, sightings: list[LocalizedObject], T_odom_gripper: Array) -> None:
+        """Fuse the sighting that belongs to the target, if there is one in this frame."""
+        c = self._config
+        candidates = [s for s in sightings if s.label == self.label]
+        if not candidates:
+            return
+        noise = np.array([c.sigma_lateral**2, c.sigma_lateral**2, c.sigma_depth**2])
+        if self._sightings == 0:
+            # The head camera may be off by more than the pitch of the screws: take what is under the hand.
+            boresight = T_odom_gripper[:2, 3]
+            nearest = min(candidates, key=lambda s: float(np.hypot(*(s.position[:2] - boresight))))
+            if np.hypot(*(nearest.position[:2] - boresight)) > c.first_radius:
+                return
+            self._x, self._variance = nearest.position.copy(), noise
+        else:
+            total = self._variance + noise
+            distances = [float(np.sum((s.position - self._x) ** 2 / total)) for s in candidates]
+            best = int(np.argmin(distances))
+            if distances[best] > c.gate:
+                return
+            gain = self._variance / total
+            self._x = self._x + gain * (candidates[best].position - self._x)
+            self._variance = (1.0 - gain) * self._variance
+        self._sightings += 1
+        self._seen_at = t
+
+
+@dataclass(frozen=True)
+class VisualServoConfig:
+    """Options of `VisualServo`.
+
+    Attributes:
+        centroid: where around the object the fingers close.
+        servo: noise, gates and patience of the loop.
+    """
+
+    centroid: CentroidConfig = field(default_factory=CentroidConfig)
+    servo: ServoConfig = field(default_factory=ServoConfig)
+
+
+class VisualServo:
+    """Centroid grasp, refined by the palm camera at image rate."""
+
+    def __init__(self, config: VisualServoConfig | None = None) -> None:
+        """Take the numbers from `config`."""
+        self.config = config or VisualServoConfig()
+        self._coarse = Centroid(self.config.centroid)
+
+    def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+        """Return the centroid grasp, to start from; see `GraspMethod`."""
+        return self._coarse.propose(target, yaw)
+
+    def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw:
+        """Return the loop that refines `grasp`; see `GraspMethod`."""
+        x_axis = grasp.T_odom_gripper[:3, 0]
+        yaw = float(np.arctan2(x_axis[1], x_axis[0]))
+        return CentroidServo(
+            self.config.servo, target.label, target.position, self.config.centroid.depth, yaw, t
+        )

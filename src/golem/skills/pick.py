@@ -1,0 +1,241 @@
+"""Pick: find an object, bring a hand over it, grasp it, pull it straight out and drop it in a container."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.middleware.topics import Sightings
+from golem.skills.base import SkillCancelled, SkillResult, StageFailed
+from golem.skills.context import Context
+from golem.skills.grasping.base import Grasp, GraspMethod, ServoStatus
+from golem.types import Array, LocalizedObject, Side
+
+
+@dataclass(frozen=True)
+class PickGoal:
+    """What to pick.
+
+    Attributes:
+        label: class of the object.
+        container: class of what it is dropped into.
+        side: which hand.
+    """
+
+    label: str = "screw"
+    container: str = "tray"
+    side: Side = "right"
+
+
+@dataclass(frozen=True)
+class PickConfig:
+    """Distances, speeds and forces.
+
+    Attributes:
+        workspace: x_min, x_max, y_min, y_max, z_min, z_max of the grasp frame in base_link [m], for the right arm
+            (y is mirrored for the left). Inside the paper's box (x <= 0.60, |y| <= 0.45, -0.05 <= z <= 0.60).
+        yaw: heading of the gripper's x axis when it points down [rad], right arm; mirrored for the left.
+        clearance: height of the gripper above the object when it arrives and when it leaves [m].
+        travel_speed: between places [m/s].
+        descend_speed: straight down to an open-loop grasp [m/s].
+        servo_speed: limit of the visual servo [m/s].
+        servo_timeout: time after which the servo is given up [s].
+        force: force of each finger [N].
+        close_timeout: time the fingers may take [s].
+        pull: height of the straight vertical extraction [m]; longer than any screw.
+        pull_speed: how fast [m/s].
+        tolerance: distance from a commanded pose at which the arm counts as arrived [m].
+        drop_height: height of the fingertips above the container's floor when they open [m].
+        look_timeout: time a camera may take to show the object [s].
+    """
+
+    workspace: tuple[float, float, float, float, float, float] = (0.25, 0.60, -0.45, 0.10, -0.05, 0.60)
+    yaw: float = 0.0
+    clearance: float = 0.15
+    travel_speed: float = 0.25
+    descend_speed: float = 0.10
+    servo_speed: float = 0.15
+    servo_timeout: float = 20.0
+    force: float = 12.0
+    close_timeout: float = 2.5
+    pull: float = 0.06
+    pull_speed: float = 0.05
+    tolerance: float = 0.006
+    drop_height: float = 0.10
+    look_timeout: float = 3.0
+
+
+class Pick:
+    """The pick skill, with whatever grasp method the stack chose."""
+
+    name = "pick"
+
+    def __init__(self, method: GraspMethod, config: PickConfig | None = None) -> None:
+        """Grasp with `method`; take distances, speeds and forces from `config`."""
+        self._method = method
+        self._config = config or PickConfig()
+
+    async def run(self, context: Context, goal: PickGoal) -> SkillResult:
+        """Pick one object; see `Skill`."""
+        timings: dict[str, float] = {"start": context.t}
+        context.skill = self.name
+        try:
+            target, container = await self._detect(context, goal)
+            grasp = await self._approach(context, goal, target)
+            grasp = await self._servo(context, goal, target, grasp)
+            await self._grasp(context, goal, grasp)
+            timings["detect_to_grasp"] = context.t - timings["start"]
+            await self._extract(context, goal)
+            await self._place(context, goal, container)
+        except StageFailed as failure:
+            context.say(failure.stage, str(failure))
+            await self._retire(context, goal)
+            timings["total"] = context.t - timings.pop("start")
+            return SkillResult(False, failure.stage, failure.slot, str(failure), timings)
+        except SkillCancelled:
+            # Stay where we are; what is held stays held.
+            context.say("cancelled", "Stopped where it was.")
+            raise
+        timings["total"] = context.t - timings.pop("start")
+        context.say("done", f"The {goal.label} is in the {goal.container}.")
+        return SkillResult(True, "done", None, f"The {goal.label} was dropped in the {goal.container}.", timings)
+
+    async def _detect(self, context: Context, goal: PickGoal) -> tuple[LocalizedObject, LocalizedObject]:
+        """Look once with the head camera: the best reachable object, and the container."""
+        context.say("detect", f"Looking for a {goal.label} and a {goal.container}.")
+        with context.watch("head", goal.label, goal.container) as eye:
+            end = context.t + self._config.look_timeout
+            while True:
+                sightings = await eye.look(end - context.t)
+                if sightings is None:
+                    raise StageFailed("detect", "localizer", "The head camera gave no detections in time.")
+                reachable = self._reachable(context, goal, sightings)
+                containers = [o for o in sightings.objects if o.label == goal.container]
+                if reachable and containers:
+                    break
+                if context.t >= end:
+                    missing = goal.container if reachable else f"reachable {goal.label}"
+                    raise StageFailed("detect", "localizer", f"The head camera shows no {missing}.")
+        target = max(reachable, key=lambda o: o.detection.score)
+        container = max(containers, key=lambda o: o.detection.score)
+        context.say("detect", f"{len(reachable)} {goal.label}s in reach.", target=target.position.tolist())
+        return target, container
+
+    def _reachable(self, context: Context, goal: PickGoal, sightings: Sightings) -> list[LocalizedObject]:
+        x0, x1, y0, y1, z0, z1 = self._config.workspace
+        if goal.side == "left":
+            y0, y1 = -y1, -y0
+        low, high = np.array([x0, y0, z0]), np.array([x1, y1, z1])
+        T_base_odom = np.linalg.inv(context.T_odom_base)
+
+        def inside(o: LocalizedObject) -> bool:
+            p = T_base_odom[:3, :3] @ o.position + T_base_odom[:3, 3]
+            return bool(((p >= low) & (p <= high)).all())
+
+        return [o for o in sightings.objects if o.label == goal.label and inside(o)]
+
+    async def _approach(self, context: Context, goal: PickGoal, target: LocalizedObject) -> Grasp:
+        """Bring the open hand over the object."""
+        yaw = self._config.yaw if goal.side == "right" else -self._config.yaw
+        grasps = self._method.propose(target, yaw)
+        if not grasps:
+            raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {goal.label}.")
+        grasp = grasps[0]
+        context.say("approach", "Bringing the hand over it.", target=grasp.T_odom_gripper[:3, 3].tolist())
+        context.hands[goal.side].open(grasp.gap)
+        await self._travel(context, goal.side, lifted(grasp.T_odom_gripper, self._config.clearance))
+        return grasp
+
+    async def _servo(self, context: Context, goal: PickGoal, target: LocalizedObject, grasp: Grasp) -> Grasp:
+        """Bring the hand down: in closed loop where the method has one, else straight to the proposed grasp."""
+        arm = context.arms[goal.side]
+        law = self._method.servo(target, grasp, context.t)
+        if law is None:
+            context.say("descend", "Straight down to the proposed grasp.")
+            await arm.move(grasp.T_odom_gripper, self._config.descend_speed)
+            left = await arm.settle(self._config.tolerance, 2.0)
+            if left > 2.0 * self._config.tolerance:
+                raise StageFailed("descend", "localizer", f"The hand was stopped {left * 1e3:.0f} mm before the grasp.")
+            return grasp
+        end = context.t + self._config.servo_timeout
+        with context.watch(f"{goal.side}_hand", goal.label) as eye:
+            while context.t < end:
+                fresh = eye.fresh()
+                step = law.step(context.t, None if fresh is None else list(fresh.objects), arm.pose)
+                if fresh is not None:
+                    context.say("servo", f"Servoing, sigma {step.sigma * 1e3:.1f} mm.", target=step.target.tolist())
+                if step.status is ServoStatus.CONVERGED:
+                    return Grasp(step.T_odom_gripper, grasp.gap, grasp.score)
+                if step.status is ServoStatus.LOST:
+                    raise StageFailed("servo", "localizer", f"The palm camera lost the {goal.label}.")
+                if step.status is ServoStatus.STALLED:
+                    raise StageFailed("servo", "upper_body", "The hand makes no progress towards the target.")
+                arm.approach(step.T_odom_gripper, self._config.servo_speed)
+                await context.tick()
+        raise StageFailed("servo", "grasp_method", f"No convergence within {self._config.servo_timeout:g} s.")
+
+    async def _grasp(self, context: Context, goal: PickGoal, grasp: Grasp) -> None:
+        """Close and check that something is between the fingers."""
+        context.say("grasp", f"Closing with {self._config.force:g} N per finger.")
+        hand = context.hands[goal.side]
+        hand.close(self._config.force)
+        if not await context.until(lambda: hand.status.holding, self._config.close_timeout):
+            raise StageFailed("grasp", "grasp_method", f"The fingers closed on nothing (gap {hand.status.gap * 1e3:.0f} mm).")
+
+    async def _extract(self, context: Context, goal: PickGoal) -> None:
+        """Pull straight up along the vertical, then lift; the grip must hold."""
+        context.say("extract", "Pulling straight up.")
+        arm, hand = context.arms[goal.side], context.hands[goal.side]
+        await arm.move(
+            lifted(arm.commanded, self._config.pull), self._config.pull_speed, stop=lambda: not hand.status.holding
+        )
+        await arm.move(
+            lifted(arm.commanded, self._config.clearance - self._config.pull),
+            self._config.travel_speed,
+            stop=lambda: not hand.status.holding,
+        )
+        if not hand.status.holding:
+            raise StageFailed("extract", "grasp_method", f"The {goal.label} slipped out of the fingers.")
+
+    async def _place(self, context: Context, goal: PickGoal, container: LocalizedObject) -> None:
+        """Carry it over the container and let go."""
+        context.say("place", f"Carrying it to the {goal.container}.", target=container.position.tolist())
+        arm, hand = context.arms[goal.side], context.hands[goal.side]
+        T = arm.commanded.copy()
+        T[:3, 3] = container.position + (0.0, 0.0, self._config.drop_height)
+        await self._travel(context, goal.side, T)
+        if not hand.status.holding:
+            raise StageFailed("place", "grasp_method", f"The {goal.label} was lost on the way.")
+        hand.open(0.06)
+        await context.until(lambda: hand.status.gap > 0.04, 2.0)
+        await context.sleep(0.3)
+
+    async def _retire(self, context: Context, goal: PickGoal) -> None:
+        """Leave the object: open, and go up to where the head camera sees past the hand."""
+        context.hands[goal.side].open(0.06)
+        arm = context.arms[goal.side]
+        await arm.move(lifted(arm.commanded, self._config.clearance), self._config.travel_speed)
+
+    async def _travel(self, context: Context, side: Side, T_goal: Array) -> None:
+        """Go to `T_goal` at a height that clears everything: up first or down last, never across below."""
+        arm = context.arms[side]
+        start = arm.commanded
+        height = max(start[2, 3], T_goal[2, 3])
+        for T in (at_height(start, height), at_height(T_goal, height), T_goal):
+            await arm.move(T, self._config.travel_speed)
+        await arm.settle(self._config.tolerance, 1.0)
+
+
+def lifted(T: Array, height: float) -> Array:
+    """Return pose `T` (4, 4) raised by `height` [m] along odom z."""
+    return at_height(T, T[2, 3] + height)
+
+
+def at_height(T: Array, z: float) -> Array:
+    """Return pose `T` (4, 4) with its odom z set to `z` [m]."""
+    raised = T.copy()
+    raised[2, 3] = z
+    return raised
+
+
