@@ -1,0 +1,122 @@
+"""What of the robot can touch the world: a few primitives per link, fitted to the extents of the vendor's meshes.
+
+Who collides with whom (MuJoCo tests `contype` of one geom against `conaffinity` of the other, both ways):
+
+| geom              | contype     | conaffinity   | touches                                  |
+|-------------------|-------------|---------------|------------------------------------------|
+| world and parts   | `WORLD` (1) | any with 1    | each other, the robot                    |
+| body links        | `BODY` (2)  | `WORLD`       | the world; no link, no hand              |
+| hands, pads       | `HAND` (4)  | `WORLD`       | the world; no link, not the other finger |
+
+The robot has no self-collision in the engine: it costs steps, and the arm planner's job is to avoid it. A geom that
+shall touch the hands alone takes contype 0 and conaffinity `HAND`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from mujoco import mjtGeom
+
+from golem.robots.model import magpie
+from golem.robots.model.table import SOLE
+from golem.types import SIDES, Array
+
+WORLD = 1
+BODY = 2
+HAND = 4
+
+FOOT_FRICTION = 0.8
+"""Sliding friction of the rubber sole; chosen: the vendor's model leaves MuJoCo's default of 1."""
+FOOT_SPHERE = 0.01
+"""Radius of the four contact spheres at the corners of each sole [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A collision primitive in its link's frame.
+
+    Attributes:
+        link: the body it belongs to.
+        kind: sphere, capsule, cylinder or box.
+        size: (3,) as in MJCF [m]: radius; radius, half length; half extents.
+        pos: (3,) centre [m].
+        axis: direction of a capsule's or cylinder's length (a box is never turned).
+        friction: sliding.
+    """
+
+    link: str
+    kind: mjtGeom
+    size: Array
+    pos: Array
+    axis: str = "z"
+    friction: float = 0.6
+
+    @property
+    def quat(self) -> tuple[float, float, float, float]:
+        """Orientation, wxyz: the length, z in MuJoCo, along `axis`."""
+        h = float(np.sqrt(0.5))
+        return {"x": (h, 0.0, h, 0.0), "y": (h, -h, 0.0, 0.0), "z": (1.0, 0.0, 0.0, 0.0)}[self.axis]
+
+
+_SPHERE, _CAPSULE = mjtGeom.mjGEOM_SPHERE, mjtGeom.mjGEOM_CAPSULE
+_CYLINDER, _BOX = mjtGeom.mjGEOM_CYLINDER, mjtGeom.mjGEOM_BOX
+
+
+def _shape(
+    link: str,
+    kind: mjtGeom,
+    size: Sequence[float],
+    pos: Sequence[float],
+    axis: str = "z",
+    friction: float = 0.6,
+) -> Shape:
+    padded = np.zeros(3)
+    padded[: len(size)] = size
+    return Shape(link, kind, padded, np.array(pos, dtype=float), axis, friction)
+
+
+def body_shapes() -> list[Shape]:
+    """Return the shapes of the 28 body links."""
+    shapes = [
+        _shape("pelvis", _CAPSULE, [0.055, 0.095], [0, 0, -0.035], "y"),
+        _shape("torso_link", _BOX, [0.073, 0.105, 0.235], [0, 0, 0.245]),
+        _shape("torso_link", _CAPSULE, [0.085, 0.05], [0.02, 0, 0.64]),
+    ]
+    for side in SIDES:
+        s = 1.0 if side == "left" else -1.0
+        shapes += [
+            _shape(f"{side}_hip_yaw_link", _CAPSULE, [0.062, 0.02], [0, 0, 0], "y"),
+            _shape(f"{side}_hip_pitch_link", _CAPSULE, [0.06, 0.01], [0, 0, 0], "y"),
+            _shape(f"{side}_hip_roll_link", _CAPSULE, [0.062, 0.15], [0.003, 0, -0.2]),
+            _shape(f"{side}_knee_link", _CAPSULE, [0.046, 0.15], [0, 0, -0.18]),
+            _shape(f"{side}_shoulder_pitch_link", _CAPSULE, [0.04, 0.03], [0, s * 0.055, -0.006], "y"),
+            _shape(f"{side}_shoulder_roll_link", _CAPSULE, [0.045, 0.05], [-0.034, 0, -0.05]),
+            _shape(f"{side}_shoulder_yaw_link", _CAPSULE, [0.04, 0.08], [0.003, 0, -0.1]),
+            _shape(f"{side}_elbow_link", _CAPSULE, [0.042, 0.055], [0.03, s * -0.03, -0.003], "x"),
+            _shape(f"{side}_wrist_roll_link", _CAPSULE, [0.035, 0.02], [0.05, 0, 0], "x"),
+            _shape(f"{side}_wrist_yaw_link", _CYLINDER, [0.042, 0.028], [0.026, 0, 0], "x"),
+            # The adapter disc between wrist and hand (correlllab/h1_mujoco).
+            _shape(f"{side}_wrist_yaw_link", _CYLINDER, [0.032, 0.0125], [0.0665, 0, 0], "x"),
+        ]
+        for x in SOLE.x:
+            for y in SOLE.y:
+                center = [x, y, SOLE.z + FOOT_SPHERE]
+                shapes.append(
+                    _shape(f"{side}_ankle_roll_link", _SPHERE, [FOOT_SPHERE], center, friction=FOOT_FRICTION)
+                )
+    return shapes
+
+
+def housing_shape(link: str) -> Shape:
+    """Return the hand's housing, in the hand frame."""
+    return _shape(link, _BOX, [0.019, 0.0667, 0.0415], [-0.002, 0, 0.0435])
+
+
+def blade_shape(link: str, finger: magpie.Finger) -> Shape:
+    """Return a finger without its pad, in the finger frame."""
+    return _shape(
+        link, _BOX, [0.008, 0.006, 0.04], magpie.mirror(finger, np.array([0.003, -0.0147, 0.0413])).tolist()
+    )

@@ -1,0 +1,189 @@
+"""The MuJoCo model of the robot, built from the table with MjSpec."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from golem.robots.model import contact, magpie
+from golem.robots.model.contact import Shape
+from golem.robots.model.limits import load_limits
+from golem.robots.model.spatial import Inertial, quat_of
+from golem.robots.model.table import BASE_HEIGHT, BASE_LINK, DOF, FRAMES, JOINTS, LINKS, T_TORSO_HEAD_OPTICAL
+from golem.types import SIDES, Array, Side
+
+COLLISION_GROUP = 3
+"""Geom group of the contact primitives, hidden by default; visual geoms are in group 2."""
+HEAD_FOVY = float(np.degrees(2 * np.arctan(240 / 615)))
+"""Vertical field of view of the head camera [deg]: 480 rows at a focal length of 615 px (D435i)."""
+PALM_FOVY = 58.0
+"""Vertical field of view of the palm cameras [deg] (D405)."""
+_FLIP: Array = np.diag([1.0, -1.0, -1.0])
+"""MuJoCo's camera axes in the optical frame: MuJoCo looks along -z with y up."""
+
+
+def robot_spec(hands: bool = True, torque: str = "urdf") -> mujoco.MjSpec:
+    """Return the robot without floor, light or options.
+
+    Names: bodies as the links; free joint `base`; joints and motors as in the table, the 27 motors first and in motor
+    order; per hand the body `{side}_hand` and per finger `{side}_{a|b}_crank`, `_finger` (body, hinge), `_pad` (geom)
+    and a motor at the crank; cameras `head`, `left_hand`, `right_hand`; sites `imu`, `left_gripper`,
+    `right_gripper`; sensors `imu_quat`, `imu_gyro`, `imu_acc`. Angles of the spec are radians.
+
+    Args:
+        hands: with the MAGPIE hands and their cameras.
+        torque: profile of the torque limits, see `limits.load_limits`.
+
+    Raises:
+        ConfigError: unknown torque profile.
+    """
+    limits = load_limits(torque)
+    spec = mujoco.MjSpec()
+    spec.modelname = "golem_h12"
+    spec.compiler.degree = False
+    base = _add_body(spec.worldbody, BASE_LINK, LINKS[BASE_LINK], np.array([0, 0, BASE_HEIGHT]))
+    base.add_freejoint(name="base")
+    bodies = {BASE_LINK: base}
+    for joint, limit in zip(JOINTS, limits.torque, strict=True):
+        T = joint.T_parent_joint
+        body = _add_body(bodies[joint.parent], joint.child, LINKS[joint.child], T[:3, 3], T[:3, :3])
+        body.add_joint(
+            name=joint.name,
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=joint.axis,
+            range=[joint.lower, joint.upper],
+            limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            damping=[DOF.damping, 0, 0],
+            armature=DOF.armature,
+            frictionloss=DOF.frictionloss,
+        )
+        bodies[joint.child] = body
+        _add_motor(spec, joint.name, float(limit))
+    for shape in contact.body_shapes():
+        _add_shape(bodies[shape.link], shape, contact.BODY)
+    _add_torso_sensors(spec, bodies["torso_link"])
+    if hands:
+        for side in SIDES:
+            _add_hand(spec, bodies[f"{side}_wrist_yaw_link"], side)
+    return spec
+
+
+def _add_body(
+    parent: mujoco.MjsBody, name: str, inertial: Inertial, pos: Array, rotation: Array | None = None
+) -> mujoco.MjsBody:
+    quat = [1.0, 0.0, 0.0, 0.0] if rotation is None else quat_of(rotation)
+    xx, xy, xz, yy, yz, zz = inertial.six()
+    return parent.add_body(
+        name=name,
+        pos=pos,
+        quat=quat,
+        mass=inertial.mass,
+        ipos=inertial.com,
+        fullinertia=[xx, yy, zz, xy, xz, yz],
+        explicitinertial=True,
+    )
+
+
+def _add_motor(spec: mujoco.MjSpec, joint: str, limit: float) -> None:
+    motor = spec.add_actuator(
+        name=joint,
+        target=joint,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        ctrlrange=[-limit, limit],
+    )
+    motor.set_to_motor()
+
+
+def _add_shape(body: mujoco.MjsBody, shape: Shape, contype: int) -> None:
+    body.add_geom(
+        type=shape.kind,
+        size=shape.size,
+        pos=shape.pos,
+        quat=shape.quat,
+        contype=contype,
+        conaffinity=contact.WORLD,
+        friction=[shape.friction, 0.005, 0.0001],
+        group=COLLISION_GROUP,
+        mass=0.0,
+        rgba=[0.2, 0.6, 0.9, 0.5],
+    )
+
+
+def _add_camera(body: mujoco.MjsBody, name: str, T_body_optical: Array, fovy: float) -> None:
+    quat = quat_of(T_body_optical[:3, :3] @ _FLIP)
+    body.add_camera(name=name, pos=T_body_optical[:3, 3], quat=quat, fovy=fovy)
+
+
+def _add_torso_sensors(spec: mujoco.MjSpec, torso: mujoco.MjsBody) -> None:
+    _add_camera(torso, "head", T_TORSO_HEAD_OPTICAL, HEAD_FOVY)
+    T = FRAMES["imu_link"].T_parent_frame
+    torso.add_site(name="imu", pos=T[:3, 3], quat=quat_of(T[:3, :3]), size=[0.01] * 3, group=4)
+    for name, kind in (
+        ("imu_quat", mujoco.mjtSensor.mjSENS_FRAMEQUAT),
+        ("imu_gyro", mujoco.mjtSensor.mjSENS_GYRO),
+        ("imu_acc", mujoco.mjtSensor.mjSENS_ACCELEROMETER),
+    ):
+        spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="imu")
+
+
+def _add_hand(spec: mujoco.MjSpec, wrist: mujoco.MjsBody, side: Side) -> None:
+    T = magpie.T_WRIST_HAND
+    hand = _add_body(wrist, magpie.hand_name(side), magpie.BASE, T[:3, 3], T[:3, :3])
+    _add_shape(hand, contact.housing_shape(magpie.hand_name(side)), contact.HAND)
+    _add_camera(hand, f"{side}_hand", magpie.T_HAND_CAMERA, PALM_FOVY)
+    hand.add_site(name=f"{side}_gripper", pos=magpie.T_HAND_GRIPPER[:3, 3], size=[0.005] * 3, group=4)
+    for finger in magpie.FINGERS:
+        _add_finger(spec, hand, side, finger)
+
+
+def _add_finger(spec: mujoco.MjSpec, hand: mujoco.MjsBody, side: Side, finger: magpie.Finger) -> None:
+    """Add crank and finger; an equality keeps the finger's hinge opposite to the crank's, so that it only translates.
+
+    The rocker is not a body of its own: it turns with the crank, whose inertia includes it.
+    """
+    crank_name, finger_name, pad_name = magpie.finger_names(side, finger)
+    sign = 1.0 if finger == "a" else -1.0
+    inertials = magpie.CRANK, magpie.FINGER
+    if finger == "b":
+        inertials = magpie.CRANK.mirrored(), magpie.FINGER.mirrored()
+    crank = _add_body(hand, crank_name, inertials[0], magpie.mirror(finger, magpie.CRANK_PIVOT))
+    blade = _add_body(crank, finger_name, inertials[1], magpie.mirror(finger, magpie.FINGER_PIVOT))
+    crank.add_joint(
+        name=crank_name,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=[sign, 0, 0],
+        range=[0.0, magpie.CLOSED],
+        limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        damping=[magpie.SERVO_DAMPING, 0, 0],
+        armature=magpie.SERVO_ARMATURE,
+    )
+    blade.add_joint(name=finger_name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[sign, 0, 0])
+    spec.add_equality(
+        name=finger_name,
+        type=mujoco.mjtEq.mjEQ_JOINT,
+        objtype=mujoco.mjtObj.mjOBJ_JOINT,
+        name1=finger_name,
+        name2=crank_name,
+        data=[0, -1] + [0] * 10,
+        solref=[0.004, 1.0],
+        solimp=[0.99, 0.9999, 0.001, 0.5, 2.0],
+    )
+    _add_motor(spec, crank_name, magpie.MAX_TORQUE)
+    _add_shape(blade, contact.blade_shape(finger_name, finger), contact.HAND)
+    blade.add_geom(
+        name=pad_name,
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=magpie.PAD_HALF_SIZE,
+        pos=magpie.mirror(finger, magpie.PAD_CENTER),
+        contype=contact.HAND,
+        conaffinity=contact.WORLD,
+        condim=4,
+        priority=2,
+        friction=[magpie.PAD_FRICTION, 0.01, 0.0001],
+        solref=[0.004, 1.0],
+        solimp=[0.95, 0.99, 0.001, 0.5, 2.0],
+        group=COLLISION_GROUP,
+        mass=0.0,
+        rgba=[0.1, 0.1, 0.1, 1],
+    )

@@ -1,0 +1,107 @@
+"""Rigid transforms, quaternions and inertias: the little algebra that the model builders share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.types import Array
+
+
+def rotation_rpy(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the (3, 3) rotation Rz(yaw) Ry(pitch) Rx(roll), the convention of URDF."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def rpy_of(rotation: Array) -> tuple[float, float, float]:
+    """Return roll, pitch, yaw [rad] of a (3, 3) rotation, pitch within +-pi/2 (URDF convention)."""
+    pitch = float(np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0])))
+    if abs(abs(pitch) - np.pi / 2) < 1e-9:  # roll and yaw turn about one axis: put it all into yaw
+        return 0.0, pitch, float(np.arctan2(-rotation[0, 1], rotation[1, 1]))
+    roll = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
+    return roll, pitch, float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+
+
+def quat_of(rotation: Array) -> Array:
+    """Return the (4,) unit quaternion wxyz, w >= 0, of a (3, 3) rotation."""
+    k = np.array(
+        [
+            [np.trace(rotation), 0.0, 0.0, 0.0],
+            [rotation[2, 1] - rotation[1, 2], 0.0, 0.0, 0.0],
+            [rotation[0, 2] - rotation[2, 0], 0.0, 0.0, 0.0],
+            [rotation[1, 0] - rotation[0, 1], 0.0, 0.0, 0.0],
+        ]
+    )
+    # The eigenvector of the largest eigenvalue of K (Bar-Itzhack 2000) is the quaternion, at any angle.
+    k[1:, 1:] = rotation + rotation.T - np.trace(rotation) * np.eye(3)
+    k[0, 1:] = k[1:, 0]
+    q = np.linalg.eigh(k)[1][:, -1]
+    return q if q[0] >= 0 else -q
+
+
+def transform(xyz: Sequence[float] | Array, rotation: Array | None = None) -> Array:
+    """Return the (4, 4) transform with translation `xyz` [m] and the (3, 3) `rotation` (default: none)."""
+    out = np.eye(4)
+    out[:3, 3] = xyz
+    if rotation is not None:
+        out[:3, :3] = rotation
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Inertial:
+    """Mass properties of a rigid body in some frame.
+
+    Attributes:
+        mass: [kg].
+        com: (3,) centre of mass [m].
+        inertia: (3, 3) inertia about the centre of mass, in the axes of the frame [kg m^2].
+    """
+
+    mass: float
+    com: Array
+    inertia: Array
+
+    @classmethod
+    def of(cls, mass: float, com: Sequence[float], six: Sequence[float]) -> Inertial:
+        """Build one from the six numbers ixx, ixy, ixz, iyy, iyz, izz."""
+        xx, xy, xz, yy, yz, zz = six
+        matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=float)
+        return cls(float(mass), np.array(com, dtype=float), matrix)
+
+    def six(self) -> tuple[float, float, float, float, float, float]:
+        """Return ixx, ixy, ixz, iyy, iyz, izz [kg m^2]."""
+        i = self.inertia
+        return (
+            float(i[0, 0]), float(i[0, 1]), float(i[0, 2]), float(i[1, 1]), float(i[1, 2]), float(i[2, 2])
+        )  # fmt: skip
+
+    def mirrored(self) -> Inertial:
+        """Return the mirror image in the xz plane (left for right)."""
+        m = np.diag([1.0, -1.0, 1.0])
+        return Inertial(self.mass, m @ self.com, m @ self.inertia @ m)
+
+    def moved(self, T_a_b: Array) -> Inertial:
+        """Return the same body, given in frame b, in frame a."""
+        R = T_a_b[:3, :3]
+        return Inertial(self.mass, T_a_b[:3, :3] @ self.com + T_a_b[:3, 3], R @ self.inertia @ R.T)
+
+
+def combined(bodies: Sequence[Inertial]) -> Inertial:
+    """Return the mass properties of bodies, all given in one frame, welded together."""
+    mass = sum(b.mass for b in bodies)
+    com = sum((b.mass * b.com for b in bodies), np.zeros(3)) / mass
+    inertia = np.zeros((3, 3))
+    for b in bodies:
+        r = b.com - com
+        inertia += b.inertia + b.mass * (r @ r * np.eye(3) - np.outer(r, r))
+    return Inertial(mass, com, inertia)
