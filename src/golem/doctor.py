@@ -28,6 +28,8 @@ DISK_NEEDED = 2e9
 EXTRAS = {"pink": ("pink", "qpsolvers"), "train": ("torch", "onnx"), "docs": ("mkdocs",), "dev": ("pytest",)}
 """The importable modules of each optional extra."""
 
+_CHECKOUT = (Path(__file__).parents[2] / "scripts" / "bootstrap.sh").is_file()
+
 _INSTALLERS = {
     "apt-get": f"apt-get install -y {' '.join(DEBIAN_PACKAGES)}",
     "dnf": "dnf install -y mesa-libEGL mesa-libGL mesa-dri-drivers",
@@ -100,7 +102,8 @@ def check_packages() -> Check:
         if version not in requirement.specifier:
             wrong.append(f"{requirement.name} is {version}, not {requirement.specifier}")
     if wrong:
-        return Check("packages", "; ".join(wrong), "pip install --upgrade golem-humanoid")
+        line = "make clean venv" if _CHECKOUT else "pip install --upgrade golem-humanoid"
+        return Check("packages", "; ".join(wrong), line)
     return Check("packages", f"{len(wanted)} of {len(wanted)}")
 
 
@@ -109,9 +112,9 @@ def check_extras() -> list[Check]:
     rows: list[Check] = []
     for extra, modules in EXTRAS.items():
         absent = [module for module in modules if importlib.util.find_spec(module) is None]
-        fix = f"pip install 'golem-humanoid[{extra}]'" if absent else ""
+        line = f"make venv-{extra}" if _CHECKOUT else f"pip install 'golem-humanoid[{extra}]'"
         found = f"without {', '.join(absent)}" if absent else "installed"
-        rows.append(Check(f"extra {extra}", found, fix, needed=False))
+        rows.append(Check(f"extra {extra}", found, line if absent else "", needed=False))
     return rows
 
 
