@@ -82,8 +82,6 @@ class StereoDepth:
         ray = rays(info)
         self._x, self._y = ray[0, :, 0].copy(), ray[:, 0, 1:2].copy()
         self._oblique = np.float32(np.cos(errors.grazing) ** 2) * (ray * ray).sum(axis=2)
-        self._rows = _smoother(info.height, errors.patch)
-        self._cols = _smoother(info.width, errors.patch).T.copy()
 
     def measure(self, depth: Image, specular: NDArray[np.bool_] | None = None) -> Image:
         """Return what the camera reports for one frame.
@@ -139,8 +137,11 @@ class StereoDepth:
 
     def _patches(self) -> Image:
         """Return (height, width) smooth normal noise of unit variance at every pixel."""
-        grid = self._rng.standard_normal((self._rows.shape[1], self._cols.shape[0]), dtype=np.float32)
-        return self._rows @ (grid @ self._cols)
+        height, width, patch = self._info.height, self._info.width, self._errors.patch
+        nodes = (-(-width // patch) + 1, -(-height // patch) + 1)
+        grid = self._rng.standard_normal(nodes, dtype=np.float32)
+        columns = np.ascontiguousarray(_stretch(grid, patch)[:width].T)
+        return _stretch(columns, patch)[:height]
 
     def _lost_patches(self) -> NDArray[np.bool_]:
         """Return (height, width) True on blotches that cover the share `specular_loss`."""
@@ -177,8 +178,10 @@ class StereoDepth:
         return inverse * inverse > square
 
 
-def _smoother(size: int, patch: int) -> Image:
-    """Return (size, nodes) hat weights of unit row norm: they turn white nodes into smooth noise of equal variance."""
-    nodes = np.arange(0, size + patch, patch)
-    weights = np.maximum(0.0, 1 - np.abs(np.arange(size)[:, None] - nodes) / patch)
-    return (weights / np.linalg.norm(weights, axis=1, keepdims=True)).astype(np.float32)
+def _stretch(nodes: Image, patch: int) -> Image:
+    """Interpolate (n, m) independent normal nodes to ((n - 1) patch, m) smooth values of the same variance."""
+    t = ((np.arange(patch) + 0.5) / patch)[None, :, None]
+    norm = np.sqrt(t**2 + (1 - t) ** 2)
+    out = nodes[:-1, None] * ((1 - t) / norm).astype(np.float32)
+    out += nodes[1:, None] * (t / norm).astype(np.float32)
+    return out.reshape(-1, nodes.shape[1])
