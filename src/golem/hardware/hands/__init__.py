@@ -1,0 +1,1 @@
+"""Hands: grip with a bounded force, notice contact."""

@@ -1,0 +1,193 @@
+"""The safety gate: a pure function between every motion command and the motors. Whatever is missing stops it.
+
+    INIT   something is missing; limp           -> ARMED  once state and e-stop are sound
+    ARMED  sound; damps                         -> ACTIVE on request, INIT when no longer sound
+    ACTIVE commands pass, limited               -> STOP1  on any fault
+    STOP1  damps                                -> STOP0  after 3 s, ARMED on reset
+    STOP0  limp                                 -> ARMED  on reset
+
+A stop is latched with its reason. Reset needs everything sound, the button released, and an explicit request; it leads
+to ARMED, never back to motion. A command that is not finite stops the robot; one beyond a limit is limited.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from golem.hardware.estop.base import EstopFrame
+from golem.hardware.safety.base import (
+    Counters,
+    GateInputs,
+    GateMemory,
+    GateResult,
+    GateState,
+    Outgoing,
+    Reason,
+    Request,
+    SafetyLimits,
+)
+from golem.hardware.safety.limiter import limit_command
+from golem.hardware.safety.monitor import Fault, examine, whole, whole_command
+from golem.types import NUM_JOINTS, Array, LowCommand, LowState
+
+
+def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateResult:
+    """Decide what the motors are told at this tick.
+
+    Args:
+        inputs: time, newest frames, request. Frames that repeat or arrive out of order are recognised by their
+            stamps (and sequence) and never refresh an age; a frame that says "pressed" counts however late it is.
+        limits: what to compare with.
+        memory: that of the previous result; `GateMemory()` at the start.
+
+    Returns:
+        The command and the state, with the memory for the next call. Never raises for what frames contain.
+    """
+    running = math.isfinite(inputs.t) and inputs.t >= memory.t
+    t = inputs.t if running else memory.t if math.isfinite(memory.t) else 0.0
+    estop, estop_fault = _estop(inputs.estop, memory.estop, t, limits)
+    state, counters, state_fault = _state(inputs.state, memory, t, limits)
+    command, command_fault = _command(inputs.command, memory.command, t, limits)
+    fault = (None if running else Fault(Reason.CLOCK)) or estop_fault or state_fault
+    edge = inputs.request if inputs.request is not memory.request else Request.NONE
+
+    mode, reason, detail, since = memory.mode, memory.reason, memory.detail, memory.since
+    outgoing = memory.outgoing
+    if mode is GateState.ACTIVE:
+        fault = (
+            fault or command_fault or (Fault(Reason.REQUESTED) if inputs.request is Request.STOP else None)
+        )
+        if fault is not None:
+            mode, (reason, detail), since, outgoing = GateState.STOP1, fault, t, None
+    elif mode in (GateState.STOP1, GateState.STOP0):
+        if edge is Request.RESET and fault is None:
+            mode, reason, detail, since = GateState.ARMED, None, "", t
+        elif mode is GateState.STOP1 and t - since >= limits.damping_time:
+            mode, since = GateState.STOP0, t
+    else:
+        reason, detail = fault or (None, "")
+        new = GateState.ARMED if fault is None else GateState.INIT
+        if new is GateState.ARMED and edge is Request.ACTIVATE:
+            if command_fault is not None:
+                reason, detail = command_fault
+            elif state is not None:
+                new = GateState.ACTIVE
+                outgoing = Outgoing(state.q.astype(np.float64), np.zeros(NUM_JOINTS), limits.damping)
+        if new is not mode:
+            mode, since = new, t
+
+    if mode is GateState.ACTIVE and state is not None and command is not None and outgoing is not None:
+        dt = min(t - memory.t, limits.longest_tick)
+        sent, outgoing = limit_command(t, state, command, limits, outgoing, dt)
+    else:
+        damps = mode in (GateState.ARMED, GateState.STOP1)
+        sent = passive(t, state, limits.damping if damps else np.zeros(NUM_JOINTS))
+    return GateResult(
+        command=sent,
+        state=mode,
+        reason=reason,
+        detail=detail,
+        memory=GateMemory(
+            t=t,
+            mode=mode,
+            since=since,
+            reason=reason,
+            detail=detail,
+            state=state,
+            command=command,
+            estop=estop,
+            counters=counters,
+            outgoing=outgoing,
+            request=inputs.request,
+        ),
+    )
+
+
+def passive(t: float, state: LowState | None, damping: Array) -> LowCommand:
+    """Return the command that only damps with `damping` (27,) [N m s/rad]; with zeros the motors are limp."""
+    zeros = np.zeros((4, NUM_JOINTS))
+    q = zeros[0] if state is None else state.q.astype(np.float64)
+    return LowCommand(t=t, q=q, dq=zeros[1], tau=zeros[2], kp=zeros[3], kd=damping.copy())
+
+
+class Gate:
+    """The gate with its memory, for whoever runs one.
+
+    Attributes:
+        limits: what it compares with.
+        memory: what it remembers; assign `GateMemory()` for a new episode.
+    """
+
+    def __init__(self, limits: SafetyLimits | None = None) -> None:
+        """Start as a gate that has seen nothing, with the default profile's limits if none are given."""
+        self.limits = limits or SafetyLimits.from_profile()
+        self.memory = GateMemory()
+
+    def step(self, inputs: GateInputs) -> GateResult:
+        """Run `check` and keep its memory."""
+        result = check(inputs, self.limits, self.memory)
+        self.memory = result.memory
+        return result
+
+
+def _stamped(t_frame: float, t: float, limits: SafetyLimits) -> bool:
+    return math.isfinite(t_frame) and t_frame <= t + limits.future
+
+
+def _estop(
+    new: EstopFrame | None, old: EstopFrame | None, t: float, limits: SafetyLimits
+) -> tuple[EstopFrame | None, Fault | None]:
+    if new is not None:
+        if new.pressed:
+            return (new if _stamped(new.t, t, limits) else old), Fault(Reason.ESTOP_PRESSED)
+        if not _stamped(new.t, t, limits):
+            return old, Fault(Reason.ESTOP_TIME, f"stamp {new.t} at {t}")
+        if old is None or (new.t > old.t and new.sequence != old.sequence):
+            old = new
+    if old is None:
+        return None, Fault(Reason.ESTOP_MISSING)
+    if old.pressed:
+        return old, Fault(Reason.ESTOP_PRESSED)
+    if t - old.t > limits.estop_age:
+        return old, Fault(Reason.ESTOP_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
+    return old, None
+
+
+def _state(
+    new: LowState | None, memory: GateMemory, t: float, limits: SafetyLimits
+) -> tuple[LowState | None, Counters, Fault | None]:
+    old, counters = memory.state, memory.counters
+    if new is not None:
+        if not _stamped(new.t, t, limits):
+            return old, counters, Fault(Reason.STATE_TIME, f"stamp {new.t} at {t}")
+        if not whole(new):
+            return old, counters, Fault(Reason.STATE_INVALID)
+        if old is None or new.t > old.t:
+            counters, fault = examine(new, limits, counters)
+            if fault is not None:
+                return new, counters, fault
+            old = new
+    if old is None:
+        return None, counters, Fault(Reason.STATE_MISSING)
+    if t - old.t > limits.state_age:
+        return old, counters, Fault(Reason.STATE_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
+    return old, counters, None
+
+
+def _command(
+    new: LowCommand | None, old: LowCommand | None, t: float, limits: SafetyLimits
+) -> tuple[LowCommand | None, Fault | None]:
+    if new is not None:
+        if not _stamped(new.t, t, limits):
+            return old, Fault(Reason.COMMAND_TIME, f"stamp {new.t} at {t}")
+        if not whole_command(new):
+            return old, Fault(Reason.COMMAND_INVALID)
+        if old is None or new.t > old.t:
+            old = new
+    if old is None:
+        return None, Fault(Reason.COMMAND_MISSING)
+    if t - old.t > limits.command_age:
+        return old, Fault(Reason.COMMAND_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
+    return old, None

@@ -1,0 +1,66 @@
+"""Turns a command into the nearest one that keeps every limit.
+
+Limits are kept by clipping, not by stopping: an inverse kinematics that leans on a joint limit, or a leg policy that
+asks for more torque than there is, is ordinary operation, and a stop would drop what the hand holds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from golem.hardware.safety.base import Outgoing, SafetyLimits
+from golem.types import LowCommand, LowState
+
+_LEAST_STIFFNESS = 1e-9
+
+
+def limit_command(
+    t: float, state: LowState, command: LowCommand, limits: SafetyLimits, last: Outgoing, dt: float
+) -> tuple[LowCommand, Outgoing]:
+    """Return the limited command and what the next tick's slew limits refer to.
+
+    In this order:
+
+    1. Gains: 0 <= k <= k_max, rising by at most `k_rate * dt`.
+    2. Position: into the commanded range, then at most `slew * dt` away from the last one. Towards a range's end
+       the rate is at most sqrt(2 a d), d the distance left, so that the joint can follow to a halt.
+    3. Torque, |kp (q_cmd - q) + kd (dq_cmd - dq) + tau| <= L: the damping term alone is kept within L by scaling
+       kd, then `tau` gives way, then the position is pulled towards the measured one. Only this pull may exceed the
+       slew limit, and it can only lower the torque. A position far away is thus never stored as a spring, and the
+       gravity torque survives as long as possible.
+
+    Args:
+        t: stamp of the result [s].
+        state: measured state the torque is predicted at.
+        command: finite command, arrays (27,).
+        limits: the limits.
+        last: what the previous call returned.
+        dt: time since then [s].
+    """
+    least, most = np.minimum, np.maximum
+    bound = limits.torque_command
+
+    kp = least(most(command.kp, 0.0), limits.kp_max)
+    kp = least(kp, last.kp + limits.kp_rate * dt)
+    kd = least(most(command.kd, 0.0), limits.kd_max)
+    kd = least(kd, last.kd + limits.kd_rate * dt)
+
+    twice = 2.0 * limits.deceleration
+    up = least(np.sqrt(twice * most(limits.upper - last.q, 0.0)), limits.slew) * dt
+    down = least(np.sqrt(twice * most(last.q - limits.lower, 0.0)), limits.slew) * dt
+    q = least(most(command.q, limits.lower), limits.upper)
+    q = least(most(q, last.q - down), last.q + up)
+
+    dq = least(most(command.dq, -limits.velocity), limits.velocity)
+    damp = kd * (dq - state.dq)
+    share = bound / most(np.abs(damp), bound)
+    damp *= share
+    tau = least(most(command.tau, -bound), bound)
+    tau = least(most(tau, -bound - damp), bound - damp)
+    rest = damp + tau
+    soft = most(kp, _LEAST_STIFFNESS)
+    q = least(most(q, state.q - (bound + rest) / soft), state.q + (bound - rest) / soft)
+
+    # Copies: whoever receives the command must not be able to reach into the memory.
+    limited = LowCommand(t=t, q=q.copy(), dq=dq, tau=tau, kp=kp.copy(), kd=kd * share)
+    return limited, Outgoing(q=q, kp=kp, kd=kd)

@@ -1,0 +1,1 @@
+"""Motor control: joint targets to motor commands."""
