@@ -35,8 +35,8 @@ class PackLayout:
         tray_size: outer size of the tray in x, y and z [m].
     """
 
-    near_edge: float = 0.30
-    top_z: float = 1.00
+    near_edge: float = 0.41
+    top_z: float = 1.055
     size_x: float = 1.2
     size_y: float = 2.0
     thickness: float = 0.15
@@ -44,9 +44,9 @@ class PackLayout:
     window_y: tuple[float, float] = (-0.34, 0.34)
     window_depth: float = 0.035
     empty_holes: tuple[int, ...] = (5, 16, 24, 29, 62)
-    tray_xy: tuple[float, float] = (0.52, -0.52)
-    tray_z: float = 1.00
-    tray_size: tuple[float, float, float] = (0.22, 0.30, 0.05)
+    tray_xy: tuple[float, float] = (0.48, -0.37)
+    tray_z: float = 1.068
+    tray_size: tuple[float, float, float] = (0.18, 0.24, 0.045)
 
     def fasteners(self) -> Array:
         """Return the (68, 2) x, y of the fasteners in the pack frame (origin: middle of the near edge, on the rim).
