@@ -145,21 +145,23 @@ class SafetyLimits:
         deceleration = np.full(NUM_JOINTS, 20.0)
         deceleration[LEGS] = 40.0
         torque_command = 0.95 * torque
-        arrays = {
-            "lower": middle - ratio * half,
-            "upper": middle + ratio * half,
-            "state_lower": limits.lower - 0.05,
-            "state_upper": limits.upper + 0.05,
-            "velocity": velocity,
-            "torque": torque,
-            "torque_command": torque_command,
-            "slew": slew,
-            "deceleration": deceleration,
-            "damping": np.minimum(5.0, torque_command / velocity),
-        }
-        for array in arrays.values():
-            array.flags.writeable = False
-        return cls(**arrays)
+        new = cls(
+            lower=middle - ratio * half,
+            upper=middle + ratio * half,
+            state_lower=limits.lower - 0.05,
+            state_upper=limits.upper + 0.05,
+            velocity=velocity,
+            torque=torque,
+            torque_command=torque_command,
+            slew=slew,
+            deceleration=deceleration,
+            damping=np.minimum(5.0, torque_command / velocity),
+        )
+        for name in cls.__slots__:
+            value = getattr(new, name)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+        return new
 
 
 @dataclass(frozen=True, slots=True)
