@@ -1,5 +1,5 @@
-# `make demo` and `make test` need only Python 3.11-3.13 and a network to the package index.
-PYTHON ?= python3
+# `make demo` and `make test` need only Python 3.11-3.13 and a network to the package index. Another interpreter than
+# the first suitable one: make PYTHON=/path/to/python3.12 ...
 BIN := .venv/bin
 
 .PHONY: help demo test test-slow lint format docs lock venv clean

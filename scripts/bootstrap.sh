@@ -27,13 +27,13 @@ apt() {
 
 find_python() {
     local candidate
-    for candidate in "${PYTHON:-python3}" python3 python3.13 python3.12 python3.11; do
+    for candidate in ${PYTHON:-python3 python3.13 python3.12 python3.11}; do
         if "$candidate" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2> /dev/null; then
             command -v "$candidate"
             return
         fi
     done
-    die "Python 3.11, 3.12 or 3.13 is needed; install one, or name it: make PYTHON=/path/to/python3.12 ..."
+    die "${PYTHON:-python3} is not Python 3.11, 3.12 or 3.13; name one that is: make PYTHON=/path/to/python3.12 ..."
 }
 
 # Sets `uv` to an installed uv, or to one fetched into .uv/ with whichever of venv and pip this Python has.
