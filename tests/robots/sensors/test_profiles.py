@@ -1,0 +1,102 @@
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from golem.errors import ConfigError
+from golem.robots.model import pinocchio_model
+from golem.robots.sensors.profiles import PROFILES, EpisodeErrors, load_profile, sample_episode
+from golem.robots.sensors.streams import stream
+from golem.types import LEGS, UPPER
+
+
+def episodes(name: str, n: int = 300) -> list[EpisodeErrors]:
+    return [sample_episode(load_profile(name), stream(seed, "episode")) for seed in range(n)]
+
+
+def displacement(T: np.ndarray, ahead: float) -> float:
+    point = np.array([0, 0, ahead, 1.0])
+    return float(np.linalg.norm((T @ point - point)[:3]))
+
+
+def test_unknown_profile_names_the_valid_ones() -> None:
+    with pytest.raises(ConfigError, match=r"'feld'; valid: bench, field, ideal\. Did you mean 'field'"):
+        load_profile("feld")
+
+
+def test_every_profile_knows_its_name() -> None:
+    assert {name: p.name for name, p in PROFILES.items()} == {n: n for n in ("ideal", "bench", "field")}
+
+
+def test_ideal_has_no_errors() -> None:
+    episode = episodes("ideal", 1)[0]
+    for T in episode.T_nominal_actual.values():
+        np.testing.assert_array_equal(T, np.eye(4))
+    assert not episode.joint_offset.any()
+    np.testing.assert_array_equal(episode.imu.tilt, [1, 0, 0, 0])
+    assert not episode.imu.gyro.any()
+    assert not episode.imu.acc.any()
+    assert not episode.hoist_sway.offset(1.0).any()
+
+
+def test_field_head_camera_is_off_by_what_the_paper_reports() -> None:
+    errors = [displacement(e.T_nominal_actual["head"], 1.0) for e in episodes("field")]
+    assert min(errors) >= 0.05
+    assert 0.052 < np.median(errors) < 0.058
+    assert max(errors) < 0.10
+
+
+@pytest.mark.parametrize(("name", "limit"), [("bench", 0.0015), ("field", 0.004)])
+def test_palm_cameras_are_off_by_millimetres_and_independently(name: str, limit: float) -> None:
+    runs = episodes(name)
+    left = [displacement(e.T_nominal_actual["left_hand"], 0.1) for e in runs]
+    right = [displacement(e.T_nominal_actual["right_hand"], 0.1) for e in runs]
+    assert max(left + right) < limit
+    assert abs(np.corrcoef(left, right)[0, 1]) < 0.2
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_extrinsic_errors_are_rigid_motions(name: str) -> None:
+    for T in episodes(name, 5)[3].T_nominal_actual.values():
+        np.testing.assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(T[:3, :3]) == pytest.approx(1)
+        np.testing.assert_array_equal(T[3], [0, 0, 0, 1])
+
+
+@pytest.mark.parametrize("name", ["bench", "field"])
+def test_joint_offsets_spread_as_told(name: str) -> None:
+    offsets = np.array([e.joint_offset for e in episodes(name)])
+    assert offsets[:, UPPER].std() == pytest.approx(load_profile(name).arm_offset, rel=0.05)
+    assert offsets[:, LEGS].std() == pytest.approx(load_profile(name).leg_offset, rel=0.05)
+
+
+def test_one_kind_of_error_does_not_shift_the_draws_of_another() -> None:
+    field, bench = episodes("field", 1)[0], episodes("bench", 1)[0]
+    ratio = load_profile("field").arm_offset / load_profile("bench").arm_offset
+    np.testing.assert_allclose(field.joint_offset[UPPER], ratio * bench.joint_offset[UPPER])
+    np.testing.assert_array_equal(field.hoist_sway.omega, bench.hoist_sway.omega)
+
+
+def test_field_is_nowhere_better_than_bench() -> None:
+    bench, field = load_profile("bench"), load_profile("field")
+    for name in ("arm_offset", "leg_offset", "actuator_delay", "hoist_sway", "stand_sway"):
+        assert getattr(field, name) >= getattr(bench, name) > 0
+
+
+@pytest.mark.parametrize(("name", "reach_error"), [("bench", 0.010), ("field", 0.034)])
+def test_joint_offsets_put_the_hand_off_by_the_reported_reach_error(name: str, reach_error: float) -> None:
+    model = pinocchio_model.build()
+    data, hand, rng = model.createData(), model.getFrameId("left_gripper"), stream(0, "postures")
+    sigma, errors = load_profile(name).arm_offset, []
+    arm = slice(12, 20)
+    while len(errors) < 1000:
+        q = pin.neutral(model)
+        q[arm] = rng.uniform(model.lowerPositionLimit[arm], model.upperPositionLimit[arm])
+        q[12] = rng.uniform(-0.6, 0.6)
+        pin.framesForwardKinematics(model, data, q)
+        palm = data.oMf[hand].translation.copy()
+        if not (np.array([0.25, -0.2, -0.3]) < palm).all() or not (palm < [0.75, 0.6, 0.3]).all():
+            continue
+        q[arm] += sigma * rng.standard_normal(8)
+        pin.framesForwardKinematics(model, data, q)
+        errors.append(np.linalg.norm(data.oMf[hand].translation - palm))
+    assert np.mean(errors) == pytest.approx(reach_error, rel=0.06)
