@@ -6,7 +6,8 @@ import contextlib
 import multiprocessing
 import os
 import shlex
-from collections.abc import Generator, Iterator, Mapping, Sequence
+import signal
+from collections.abc import Generator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -177,9 +178,10 @@ def _finished(
         )
         pending: dict[Future[Finished | Refused], TrialSpec] = {}
         try:
-            for spec in todo:
-                future = pool.submit(run_trial, target, spec, out / "artefacts" / trial_name(spec))
-                pending[future] = spec
+            with _ctrl_c_held():
+                for spec in todo:
+                    future = pool.submit(run_trial, target, spec, out / "artefacts" / trial_name(spec))
+                    pending[future] = spec
             while pending:
                 for future in wait(pending, return_when=FIRST_COMPLETED).done:
                     yield pending.pop(future), _result(future)
@@ -207,7 +209,17 @@ def _result(future: Future[Finished | Refused]) -> Finished:
 
 
 @contextlib.contextmanager
-def _environment(variables: Mapping[str, str]) -> Iterator[None]:
+def _ctrl_c_held() -> Generator[None, None, None]:
+    """Hold Ctrl-C back while workers are started: they inherit the mask, so that only the parent ever hears it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _environment(variables: Mapping[str, str]) -> Generator[None, None, None]:
     """Set environment variables for the processes started meanwhile: BLAS reads them before an initialiser runs."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)

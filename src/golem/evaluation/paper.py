@@ -12,7 +12,7 @@ class PaperFigure:
     Attributes:
         label: task and environment, e.g. `"screw, real robot"`.
         successes, n: trials.
-        time: published time from detection to grasp in words, where there is one.
+        time: published time in words, where there is one.
     """
 
     label: str
@@ -25,7 +25,7 @@ PAPER: dict[tuple[str, str], tuple[PaperFigure, ...]] = {
     ("tether", "centroid"): (PaperFigure("screw, simulation", 30), PaperFigure("screw, real robot", 0)),
     ("tether", "visual_servo"): (
         PaperFigure("screw, simulation", 30),
-        PaperFigure("screw, real robot", 29, time="75 ± 16 s over all its real trials"),
+        PaperFigure("screw, real robot", 29, time="75 ± 16 s from detection to grasp"),
     ),
 }
 """(rung, method) -> published figures."""

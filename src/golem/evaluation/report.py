@@ -195,7 +195,7 @@ def _times(grouped: Mapping[str, Sequence[TrialRecord]]) -> str:
             ]
             for method, rows in grouped.items()
         }
-        parts.append(f"<h3>{escape(name.replace('_', ' '))}</h3>{strips(dots, 'seconds of robot time')}")
+        parts.append(f"<h3>{escape(name.replace('_', ' '))}</h3>{strips(dots, 'seconds')}")
     if not parts:
         return ""
     return _card(

@@ -106,7 +106,7 @@ def stacked(rows: Mapping[str, Mapping[str, int]], totals: Mapping[str, int], na
         names: the causes in the order of the colours.
     """
     parts, pitch = [], 40
-    scale = (WIDTH - GUTTER - 60) / max(totals.values())
+    scale = (WIDTH - GUTTER - 80) / max(totals.values())
     for i, (method, causes) in enumerate(rows.items()):
         y, x = 8 + pitch * i, float(GUTTER)
         parts.append(_text(GUTTER - 12, y + 17, method, "name", "end"))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import multiprocessing
 import os
-import signal
 import threading
 import time
 import traceback
@@ -57,8 +56,7 @@ class Refused:
 
 
 def start_worker() -> None:
-    """Prepare a worker process: Ctrl-C is the parent's business, and the parent's death ends the worker."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Prepare a worker process: the death of its parent ends it."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_follow, args=(parent.sentinel,), daemon=True).start()
