@@ -9,9 +9,14 @@ from golem.capabilities.legs.base import LegCommand, LowerBody
 from golem.capabilities.localization.base import Localizer
 from golem.errors import ModuleFault
 from golem.hardware.estimator.base import BaseEstimator
+from golem.hardware.estop.base import EmergencyStop, EstopFrame
+from golem.hardware.hands.base import HandController
+from golem.hardware.safety.base import GateInputs, GateMemory, GateState, Request, SafetyLimits
+from golem.hardware.safety.gate import check
+from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
 from golem.middleware.bus import Bus
-from golem.middleware.topics import LookRequest, Sightings
+from golem.middleware.topics import HandGoal, LookRequest, Sightings
 from golem.robots.base import Robot
 from golem.robots.model.kinematics import Kinematics
 from golem.runtime.executor import TICK
@@ -26,6 +31,7 @@ from golem.types import (
     BaseEstimate,
     Frame,
     HandCommand,
+    HandState,
     LowCommand,
     LowState,
     PalmTargets,
@@ -196,6 +202,112 @@ class UpperBodyNode:
         self._bus.publish(topics.ARM_COMMAND, command, t, self._arms.latency)
 
 
+class HandNode:
+    """Runs the controller of one hand between the skills and the servos."""
+
+    period = 0.01
+
+    def __init__(self, bus: Bus, hand: HandController, side: Side, guard: Guard) -> None:
+        """Run `hand` on `side`."""
+        self._bus, self._hand, self._side, self._guard = bus, hand, side, guard
+        self._goals = 0
+
+    def step(self, t: float) -> None:
+        """Pass a new goal on, take in the hand's report, publish its command and status."""
+        state = self._bus.latest(topics.hand_state(self._side), HandState)
+        goal = self._bus.latest(topics.hand_goal(self._side), HandGoal)
+        count = self._bus.count(topics.hand_goal(self._side))
+        if goal is not None and count != self._goals:
+            self._goals = count
+            if goal.gap is None:
+                self._guard.call(self._hand.close, goal.force)
+            else:
+                self._guard.call(self._hand.open, goal.gap)
+        if state is None:
+            return
+        command = self._guard.call(self._hand.step, state, t)
+        self._bus.publish(topics.hand_command(self._side), command, t)
+        self._bus.publish(topics.hand_status(self._side), self._guard.call(self._hand.status), t)
+
+
+class ServoNode:
+    """Runs motor control on the newest targets of legs and upper body."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, servo: MotorServo, guard: Guard) -> None:
+        """Run `servo`."""
+        self._bus, self._servo, self._guard = bus, servo, guard
+        self._hold: np.ndarray | None = None
+
+    def step(self, t: float) -> None:
+        """Publish the command that the safety gate shall judge."""
+        state = self._bus.latest(topics.LOW_STATE, LowState)
+        if state is None:
+            return
+        if self._hold is None:
+            self._hold = state.q.copy()
+            self._guard.call(self._servo.reset, state)
+        legs = self._bus.latest(topics.LEG_COMMAND, LegCommand)
+        arms = self._bus.latest(topics.ARM_COMMAND, ArmCommand)
+        # A half that has not spoken yet stays where it was found.
+        q = self._hold.copy()
+        if legs is not None:
+            q[LEGS] = legs.q
+        if arms is not None:
+            q[UPPER] = arms.q
+        gains = None if legs is None else (legs.kp, legs.kd)
+        self._bus.publish(topics.LOW_CMD_REQUEST, self._guard.call(self._servo.step, state, q, TICK, gains), t)
+
+
+class EstopNode:
+    """Publishes the frames of the emergency stop."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, estop: EmergencyStop) -> None:
+        """Publish what `estop` says."""
+        self._bus, self._estop = bus, estop
+
+    def step(self, t: float) -> None:
+        """Publish a frame when there is one."""
+        frame = self._estop.step(t)
+        if frame is not None:
+            self._bus.publish(topics.ESTOP, frame, t)
+
+
+class SafetyNode:
+    """Runs the safety gate; the only writer of the motors' command.
+
+    Attributes:
+        request: what the operator asks for; `ACTIVATE` is taken up as soon as the gate is armed.
+    """
+
+    period = TICK
+
+    def __init__(self, bus: Bus, limits: SafetyLimits) -> None:
+        """Enforce `limits`."""
+        self._bus, self._limits = bus, limits
+        self._memory = GateMemory()
+        self.request = Request.NONE
+
+    def step(self, t: float) -> None:
+        """Let the newest command through, limited, or stop the robot."""
+        # The gate acts on the edge of a request, and an activation before it is armed would be spent for nothing.
+        waiting = self.request is Request.ACTIVATE and self._memory.mode is GateState.INIT
+        inputs = GateInputs(
+            t,
+            self._bus.latest(topics.LOW_STATE, LowState),
+            self._bus.latest(topics.LOW_CMD_REQUEST, LowCommand),
+            self._bus.latest(topics.ESTOP, EstopFrame),
+            Request.NONE if waiting else self.request,
+        )
+        result = check(inputs, self._limits, self._memory)
+        self._memory = result.memory
+        self._bus.publish(topics.LOW_CMD, result.command, t)
+        self._bus.publish(topics.SAFETY, result, t)
+
+
 class SkillNode:
     """Resumes the running skill.
 
@@ -215,16 +327,6 @@ class SkillNode:
         self._context.refresh(t)
         if self.run is not None:
             self.run.step()
-
-
-def whole_body(legs: LegCommand | None, arms: ArmCommand | None, q: np.ndarray) -> np.ndarray:
-    """Return the (27,) targets of legs and upper body; a half that has not spoken stays at the measured `q` (27,)."""
-    target = np.array(q)
-    if legs is not None:
-        target[LEGS] = legs.q
-    if arms is not None:
-        target[UPPER] = arms.q
-    return target
 
 
 def _limp(t: float) -> LowCommand:

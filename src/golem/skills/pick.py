@@ -50,8 +50,8 @@ class PickConfig:
         look_timeout: time a camera may take to show the object [s].
     """
 
-    workspace: tuple[float, float, float, float, float, float] = (0.25, 0.60, -0.45, 0.10, -0.05, 0.60)
-    yaw: float = 0.0
+    workspace: tuple[float, float, float, float, float, float] = (0.30, 0.60, -0.30, 0.10, -0.15, 0.60)
+    yaw: float = -1.5707963267948966
     clearance: float = 0.15
     travel_speed: float = 0.25
     descend_speed: float = 0.10

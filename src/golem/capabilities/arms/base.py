@@ -132,3 +132,13 @@ def check_joints(name: str, q: Array) -> Array:
     if not np.isfinite(values).all():
         raise TargetError(f"{name} contains NaN or infinity; give the joint positions in radians.")
     return values
+
+
+def check_dt(dt: float) -> None:
+    """Refuse a time step that is not a positive, finite number of seconds.
+
+    Raises:
+        TargetError: it is not.
+    """
+    if not 0.0 < dt < float("inf"):
+        raise TargetError(f"dt must be a positive number of seconds, not {dt}.")

@@ -44,7 +44,7 @@ class MujocoConfig:
 
     layout: PackLayout = field(default_factory=PackLayout)
     hoist: HoistConfig = field(default_factory=HoistConfig)
-    reach_y: float = 0.35
+    reach_y: float = 0.15
     torque_profile: str = "urdf"
     near: float = 0.12
 
@@ -135,7 +135,7 @@ class MujocoRobot:
     def capture(self, camera: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Expose one camera now; see `Robot`."""
         if self._rig is None:
-            self._rig = CameraRig(self._model, self.cameras)
+            self._rig = CameraRig(self._model, self.cameras.values())
         rgb, depth = self._rig.render(self.data, camera)
         return rgb, self._depth[camera].measure(depth)
 

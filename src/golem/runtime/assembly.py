@@ -1,0 +1,165 @@
+"""Turns a stack file into a running stack: the composition root."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from golem import registry
+from golem.capabilities.arms.postures import POSTURES
+from golem.capabilities.legs.hold import STANCES
+from golem.errors import ConfigError, GolemError
+from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.safety.base import GateState, Request, SafetyLimits
+from golem.middleware import topics
+from golem.middleware.bus import Bus
+from golem.robots.base import Robot
+from golem.robots.model.kinematics import Kinematics
+from golem.robots.sensors.profiles import load_profile
+from golem.runtime import nodes
+from golem.runtime.executor import Executor, Node
+from golem.runtime.guard import Guard
+from golem.hardware.safety.base import GateResult
+from golem.skills.base import Skill, SkillResult
+from golem.skills.context import Context
+from golem.skills.grasping.base import GraspMethod
+from golem.skills.runner import SkillRun
+from golem.stack import Stack
+from golem.types import LEGS, NUM_JOINTS, SIDES, UPPER, Array
+
+CAMERA_LATENCY = 0.033
+"""Time from exposure to the frame being available [s]: one frame period of a D400 at 30 Hz."""
+OPTICAL_FRAMES = {"head": "head_camera_optical"} | {f"{s}_hand": f"{s}_hand_camera_optical" for s in SIDES}
+"""Frame of the nominal model per camera."""
+
+
+class Running:
+    """A stack in execution.
+
+    Attributes:
+        stack: what it was built from.
+        bus: every stream.
+        executor: the clock.
+        estop: the virtual emergency stop, to be pressed.
+    """
+
+    def __init__(self, stack: Stack, robot: Robot) -> None:
+        """Wire the modules of `stack` to `robot`.
+
+        Raises:
+            ConfigError: a name or an option of the stack is wrong.
+            ModuleFault: a module's constructor raised.
+        """
+        self.stack = stack
+        self.bus = Bus()
+        self.estop = VirtualEstop()
+        self._safety = nodes.SafetyNode(self.bus, SafetyLimits.from_profile(stack.limits))
+        context = Context(self.bus, Kinematics(), nodes.SkillNode.period)
+        self._context = context
+        self._skills = nodes.SkillNode(context)
+        self.executor = Executor(self.bus, self._nodes(stack, robot))
+        self._safety.request = Request.ACTIVATE
+
+    @property
+    def method(self) -> GraspMethod:
+        """The stack's grasp method."""
+        choice = self.stack.grasp_method
+        return registry.create("grasp_method", choice.use, choice.options)
+
+    def _nodes(self, stack: Stack, robot: Robot) -> list[Node]:
+        """Return the nodes in the order of one tick: measure, estimate, perceive, decide, control, protect, act."""
+
+        def make(slot: str, **context: object) -> tuple[Any, Guard]:
+            choice = stack.choice(slot)
+            return registry.create(slot, choice.use, choice.options, **context), Guard(slot, choice.use)
+
+        bus = self.bus
+        localizer, localizer_guard = make("localizer")
+        out: list[Node] = [
+            nodes.SenseNode(bus, robot),
+            nodes.EstimatorNode(bus, *make("estimator")),
+            nodes.EstopNode(bus, self.estop),
+        ]
+        for name in robot.cameras:
+            out.append(nodes.CameraNode(bus, robot, name, OPTICAL_FRAMES[name], CAMERA_LATENCY))
+            out.append(nodes.LocalizerNode(bus, localizer, name, localizer_guard))
+        out.append(self._skills)
+        out.append(nodes.LowerBodyNode(bus, *make("lower_body")))
+        out.append(nodes.UpperBodyNode(bus, *make("upper_body")))
+        for side in SIDES:
+            hand, guard = make("hand", side=side)
+            out.append(nodes.HandNode(bus, hand, side, guard))
+        out.append(nodes.ServoNode(bus, *make("servo")))
+        out.append(self._safety)
+        out.append(nodes.ActNode(bus, robot))
+        return out
+
+    @property
+    def safety(self) -> GateResult | None:
+        """The newest verdict of the safety gate."""
+        return self.bus.latest(topics.SAFETY, GateResult)
+
+    def start(self, skill: Skill[Context, Any], goal: object) -> SkillRun:
+        """Start a skill; it advances with the executor.
+
+        Raises:
+            GolemError: another skill is still running.
+        """
+        if self._skills.run is not None and self._skills.run.result is None:
+            raise GolemError("Another skill is running; cancel it first.")
+        self._skills.run = SkillRun(skill.run(self._context, goal))
+        return self._skills.run
+
+    def execute(self, skill: Skill[Context, Any], goal: object, timeout: float, realtime: bool = False) -> SkillResult:
+        """Run a skill to its end in robot time.
+
+        Args:
+            skill: what to do.
+            goal: its goal.
+            timeout: robot time after which it is given up [s].
+            realtime: pace by the wall clock.
+
+        Returns:
+            The result; a safety stop or a timeout ends the skill with a result that says so.
+        """
+        run = self.start(skill, goal)
+        self.executor.run(self.executor.t + timeout, lambda: run.result is not None or self._stopped(), realtime)
+        if run.result is not None:
+            return run.result
+        run.cancel()
+        safety = self.safety
+        if self._stopped() and safety is not None:
+            return SkillResult(False, "safety", "safety", f"Safety stop: {safety.reason}. {safety.detail}")
+        return SkillResult(False, "timeout", None, f"Not done after {timeout:g} s of robot time.")
+
+    def _stopped(self) -> bool:
+        safety = self.safety
+        return safety is not None and safety.state in (GateState.STOP1, GateState.STOP0)
+
+
+def start_posture() -> Array:
+    """Return the (27,) posture an episode starts in: legs in the stand stance, arms at home [rad]."""
+    q = np.zeros(NUM_JOINTS)
+    q[LEGS] = np.tile(STANCES["stand"], 2)
+    q[UPPER] = POSTURES["home"]
+    return q
+
+
+def build(stack: Stack, seed: int) -> tuple[Running, Any]:
+    """Build the robot of `stack` for episode `seed`, and the stack around it.
+
+    Returns:
+        The running stack, and the robot: for evaluation and viewers, never for modules.
+
+    Raises:
+        ConfigError: a name, an option or the profile is wrong.
+    """
+    load_profile(stack.profile)
+    choice = stack.robot
+    robot = registry.create(
+        "robot", choice.use, choice.options, profile=stack.profile, seed=seed, posture=start_posture()
+    )
+    if not hasattr(robot, "advance"):
+        raise ConfigError(f"robot: {choice.use} does not satisfy the Robot contract (it has no 'advance').")
+    return Running(stack, robot), robot
