@@ -95,7 +95,7 @@ class StereoDepth:
         """
         e = self._errors
         valid = (depth >= self._info.near) & (depth <= self._info.far)
-        inverse = np.float32(1) / np.maximum(depth, np.float32(1e-3))
+        inverse: Image = np.reciprocal(np.maximum(depth, np.float32(1e-3)), dtype=np.float32)
         if e.occlusion:
             valid &= self._seen_by_both(inverse)
         if e.grazing < np.pi / 2:
