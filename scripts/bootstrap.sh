@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Usage: scripts/bootstrap.sh GROUP...     GROUP is the name of a lock in requirements/: core, dev, docs, pink, train
 #
-# Creates .venv with the locked packages of every GROUP and this package itself, and sees to it that MuJoCo can
-# render. Needs Python 3.11-3.13 and a network to the package index; brings everything else: uv goes to .uv/ unless it
-# is installed, and what the operating system lacks is installed where that is allowed (root on Debian or Ubuntu) or
-# named with the line to type. Does nothing when .venv already is what the locks say.
+# Creates .venv with the locked packages of every GROUP and this package itself, and sees to it that they find their
+# system libraries. Needs Python 3.11-3.13 and a network to the package index; brings everything else: uv goes to .uv/
+# unless it is installed, and what the operating system lacks is installed where that is allowed (root on Debian or
+# Ubuntu) or named with the line to type. Does nothing when .venv already is what the locks say.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -59,13 +59,13 @@ find_uv() {
     fi
 }
 
-# Asks golem itself whether MuJoCo can draw; its answer names what is missing and the line to type.
-see_to_graphics() {
+# Asks golem itself whether native code loads and MuJoCo can draw; its answer names the line to type.
+see_to_system() {
     local doctor=".venv/bin/python -m golem.doctor"
     $doctor 2> /dev/null && return
     if [ "$(id -u)" = 0 ] && command -v apt-get > /dev/null; then
         # shellcheck disable=SC2046
-        apt "MuJoCo cannot render" $(.venv/bin/python -c "import golem.doctor as d; print(*d.DEBIAN_PACKAGES)")
+        apt "system libraries are missing" $(.venv/bin/python -c "import golem.doctor as d; print(*d.DEBIAN_PACKAGES)")
     fi
     $doctor || exit 2
 }
@@ -92,7 +92,7 @@ for group in "${locks[@]}"; do
     "$uv" pip install --quiet --python .venv/bin/python --require-hashes -r "requirements/$group.txt"
 done
 "$uv" pip install --quiet --python .venv/bin/python --no-deps --editable .
-see_to_graphics
+see_to_system
 for group in "${locks[@]}"; do
     cat "requirements/$group.txt" pyproject.toml | cksum > ".venv/.golem-$group"
 done

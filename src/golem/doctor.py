@@ -10,7 +10,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,12 +17,16 @@ from rich.console import Console
 from rich.table import Table
 
 from golem.errors import GolemError, MissingSystemLibrary
+from golem.robots.mujoco.gl import LIBRARIES
 
-DEBIAN_PACKAGES = ("libegl1", "libgl1", "libegl-mesa0", "libgl1-mesa-dri")
-"""What MuJoCo needs on Debian and Ubuntu to render without a display: the dispatcher and a software driver."""
+DEBIAN_PACKAGES = ("libgomp1", *LIBRARIES["egl"][1].split())
+"""What a minimal Debian or Ubuntu lacks: OpenMP for Pinocchio, and for MuJoCo EGL with a software driver."""
 
 DISK_NEEDED = 2e9
 """Room for the runs of an evaluation with their pictures [bytes]."""
+
+PROBE_TIMEOUT = 120.0
+"""How long a loaded machine may take to import everything once [s]."""
 
 EXTRAS = {"pink": ("pink", "qpsolvers"), "train": ("torch", "onnx"), "docs": ("mkdocs",), "dev": ("pytest",)}
 """The importable modules of each optional extra."""
@@ -32,13 +35,14 @@ _CHECKOUT = (Path(__file__).parents[2] / "scripts" / "bootstrap.sh").is_file()
 
 _INSTALLERS = {
     "apt-get": f"apt-get install -y {' '.join(DEBIAN_PACKAGES)}",
-    "dnf": "dnf install -y mesa-libEGL mesa-libGL mesa-dri-drivers",
-    "pacman": "pacman -S --noconfirm libglvnd mesa",
-    "zypper": "zypper install -y libEGL1 libGL1 Mesa-dri",
-    "apk": "apk add mesa-egl mesa-gl mesa-dri-gallium",
+    "dnf": "dnf install -y libgomp mesa-libEGL mesa-libGL mesa-dri-drivers",
+    "pacman": "pacman -S --noconfirm gcc-libs libglvnd mesa",
+    "zypper": "zypper install -y libgomp1 libEGL1 libGL1 Mesa-dri",
 }
 
-_PROBE = """
+_LOAD = "import cv2, daqp, mujoco, onnxruntime, pinocchio"
+
+_RENDER = """
 import mujoco
 model = mujoco.MjModel.from_xml_string(
     "<mujoco><worldbody><light pos='0 0 3'/><geom type='plane' size='1 1 1'/></worldbody></mujoco>"
@@ -102,8 +106,7 @@ def check_packages() -> Check:
         if version not in requirement.specifier:
             wrong.append(f"{requirement.name} is {version}, not {requirement.specifier}")
     if wrong:
-        line = "make clean venv" if _CHECKOUT else "pip install --upgrade golem-humanoid"
-        return Check("packages", "; ".join(wrong), line)
+        return Check("packages", "; ".join(wrong), _reinstall_line())
     return Check("packages", f"{len(wanted)} of {len(wanted)}")
 
 
@@ -124,12 +127,19 @@ def check_disk(folder: Path | None = None) -> Check:
     free = shutil.disk_usage(folder).free
     found = f"{free / 1e9:.0f} GB free in {folder}"
     if not os.access(folder, os.W_OK):
-        return Check(
-            "disk", f"{folder} cannot be written", "change to a folder of yours, or pass --out FOLDER"
-        )
+        return Check("disk", f"{folder} cannot be written", "work in a folder of yours, or pass --out FOLDER")
     if free < DISK_NEEDED:
         return Check("disk", found, f"free {DISK_NEEDED / 1e9:.0f} GB, or pass --out FOLDER on another disk")
     return Check("disk", found)
+
+
+def check_libraries() -> Check:
+    """Load every package with native code in a process of its own."""
+    environment = {key: value for key, value in os.environ.items() if key != "MUJOCO_GL"}
+    problem = _problem(_LOAD, environment)
+    if problem:
+        return Check("libraries", problem, install_line() if ".so" in problem else _reinstall_line())
+    return Check("libraries", "native code loads")
 
 
 def check_graphics() -> Check:
@@ -138,42 +148,29 @@ def check_graphics() -> Check:
     if sys.platform == "linux":
         environment.setdefault("MUJOCO_GL", "egl")
     backend = environment.get("MUJOCO_GL", "the default")
-    if backend == "egl" and not _loads("libEGL.so.1"):
-        return Check("graphics", "libEGL.so.1 is missing", install_line())
-    with tempfile.TemporaryDirectory() as scratch:
-        try:
-            probe = subprocess.run(
-                [sys.executable, "-c", _PROBE],
-                env=environment,
-                cwd=scratch,
-                capture_output=True,
-                text=True,
-                timeout=120,
-            )
-        except subprocess.TimeoutExpired:
-            return Check("graphics", f"MuJoCo hangs with MUJOCO_GL={backend}", install_line())
-    if probe.returncode == 0:
+    if backend == "egl" and not _loads(LIBRARIES["egl"][0]):
+        return Check("graphics", f"{LIBRARIES['egl'][0]} is missing", install_line())
+    problem = _problem(_RENDER, environment)
+    if not problem:
         return Check("graphics", f"MuJoCo renders with MUJOCO_GL={backend}")
-    said = probe.stderr.strip().splitlines()
-    reason = said[-1] if said else f"exit code {probe.returncode}"
     if backend not in ("egl", "the default"):
-        return Check("graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {reason}", "export MUJOCO_GL=egl")
-    return Check("graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {reason}", install_line())
+        return Check("graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {problem}", "export MUJOCO_GL=egl")
+    return Check("graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {problem}", install_line())
 
 
-def require_graphics() -> None:
-    """Make sure that MuJoCo can render.
+def require_system() -> None:
+    """Make sure that the native code loads and that MuJoCo can render.
 
     Raises:
-        MissingSystemLibrary: it cannot; the sentence names the line that installs what is missing.
+        MissingSystemLibrary: it does not; the sentence names the line that installs what is missing.
     """
-    check = check_graphics()
-    if check.failed:
-        raise MissingSystemLibrary(f"Cannot render: {check.found}; type: {check.fix}")
+    for check in (check_libraries(), check_graphics()):
+        if check.failed:
+            raise MissingSystemLibrary(f"{check.found}; type: {check.fix}")
 
 
 def install_line() -> str:
-    """Return the line that installs the rendering libraries with this system's package manager."""
+    """Return the line that installs the missing libraries with this system's package manager."""
     if sys.platform != "linux":
         return "unset MUJOCO_GL"
     sudo = "" if os.geteuid() == 0 else "sudo "
@@ -185,8 +182,8 @@ def install_line() -> str:
 
 def diagnose() -> list[Check]:
     """Run every check."""
-    single: list[Callable[[], Check]] = [check_python, check_packages, check_graphics, check_disk]
-    return [*(check() for check in single), *check_extras()]
+    checks = [check_python(), check_packages(), check_libraries(), check_graphics(), check_disk()]
+    return [*checks, *check_extras()]
 
 
 def run(console: Console | None = None) -> int:
@@ -204,6 +201,26 @@ def run(console: Console | None = None) -> int:
     return 2 if any(check.failed for check in checks) else 0
 
 
+def _reinstall_line() -> str:
+    return "make clean venv" if _CHECKOUT else "pip install --force-reinstall golem-humanoid"
+
+
+def _problem(program: str, environment: dict[str, str]) -> str:
+    """Return what goes wrong when a fresh interpreter runs `program`; empty when nothing does."""
+    with tempfile.TemporaryDirectory() as scratch:
+        command = [sys.executable, "-c", program]
+        try:
+            done = subprocess.run(
+                command, env=environment, cwd=scratch, capture_output=True, text=True, timeout=PROBE_TIMEOUT
+            )
+        except subprocess.TimeoutExpired:
+            return f"no answer within {PROBE_TIMEOUT:.0f} s"
+    if done.returncode == 0:
+        return ""
+    said = done.stderr.strip().splitlines()
+    return said[-1] if said else f"exit code {done.returncode}"
+
+
 def _loads(library: str) -> bool:
     try:
         ctypes.CDLL(library)
@@ -214,6 +231,6 @@ def _loads(library: str) -> bool:
 
 if __name__ == "__main__":
     try:
-        require_graphics()
+        require_system()
     except GolemError as error:
         sys.exit(f"golem: {error}")
