@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from golem.robots.model import contact, magpie
+from golem.robots.model import contact, looks, magpie
 from golem.robots.model.contact import Shape
 from golem.robots.model.limits import load_limits
 from golem.robots.model.spatial import Inertial, quat_of
@@ -13,7 +13,7 @@ from golem.robots.model.table import BASE_HEIGHT, BASE_LINK, DOF, FRAMES, JOINTS
 from golem.types import SIDES, Array, Side
 
 COLLISION_GROUP = 3
-"""Geom group of the contact primitives, hidden by default; visual geoms are in group 2."""
+"""Geom group of the contact primitives, hidden by default; see `looks.VISUAL_GROUP` for the others."""
 HEAD_FOVY = float(np.degrees(2 * np.arctan(240 / 615)))
 """Vertical field of view of the head camera [deg]: 480 rows at a focal length of 615 px (D435i)."""
 PALM_FOVY = 58.0
@@ -65,6 +65,7 @@ def robot_spec(hands: bool = True, torque: str = "urdf") -> mujoco.MjSpec:
     if hands:
         for side in SIDES:
             _add_hand(spec, bodies[f"{side}_wrist_yaw_link"], side)
+    looks.add_looks(spec, hands)
     return spec
 
 
