@@ -76,7 +76,7 @@ class Loft:
 def ring(
     half_width: float, half_height: float, tube: float, segments: int = 28
 ) -> tuple[Array, NDArray[np.int32]]:
-    """Return the mesh of an oval ring in the yz plane: its two half axes to the middle of the tube, and the tube [m]."""
+    """Return the mesh of an oval ring in the yz plane: half axes to the middle of the tube, and its radius [m]."""
     sides = 8
     t = np.arange(segments) * 2.0 * np.pi / segments
     p = np.arange(sides) * 2.0 * np.pi / sides

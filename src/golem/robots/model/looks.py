@@ -122,7 +122,7 @@ def _trunk() -> Iterable[Part]:
         (0.553, 0.052, 0, 0.016, 0.022), (0.570, 0.050, 0, 0.034, 0.040), (0.61, 0.045, 0, 0.050, 0.054),
         (0.65, 0.045, 0, 0.057, 0.060), (0.682, 0.050, 0, 0.055, 0.058), (0.695, 0.050, 0, 0.040, 0.045),
     ], power=2.3, segments=24))
-    yield Part(torso, "joint", Solid("box", (0.011, 0.045, 0.0125), (0.100, 0.0, 0.693)))
+    yield Part(torso, "visor", Solid("box", (0.011, 0.045, 0.0125), (0.100, 0.0, 0.693)))
     for y in (-0.0325, 0.0325):
         yield Part(torso, "visor", _disc("x", 0.007, 0.0015, (0.1105, y, 0.693)))
     yield Part(torso, "glow", Solid("ellipsoid", (0.004, 0.030, 0.0035), (0.1005, 0, 0.628)))
@@ -137,7 +137,7 @@ def _leg() -> Iterable[Part]:
     yield Part(yaw, "metal", _disc("y", 0.040, 0.044, (0, -0.010, 0)))
     pitch = "left_hip_pitch_link"
     yield Part(pitch, "joint", Solid("ellipsoid", (0.056, 0.058, 0.060), (0, 0.002, 0)))
-    yield Part(pitch, "metal", _disc("x", 0.036, 0.0575, (0, 0.002, 0)))
+    yield Part(pitch, "graphite", _disc("x", 0.036, 0.0575, (0, 0.002, 0)))
     thigh = "left_hip_roll_link"
     yield Part(thigh, "shell", Loft("z", [
         (-0.442, 0.003, 0.001, 0.028, 0.030), (-0.430, 0.003, 0.001, 0.043, 0.041), (-0.37, 0.002, 0, 0.050, 0.045),
@@ -265,11 +265,14 @@ def _finger() -> Iterable[Part]:
 def parts(hands: bool) -> list[Part]:
     """Return everything to see of the robot, with or without hands."""
     left = [*_leg(), *_arm()]
+    whole = [*_trunk(), *left, *(part.mirrored() for part in left)]
     if hands:
-        closing = list(_finger())
-        other = [Part(p.link.replace("left_a_", "left_b_"), p.material, p.shape.mirrored()) for p in closing]
-        left += [*_hand(), *closing, *other]
-    return [*_trunk(), *left, *(part.mirrored() for part in left)]
+        # The two hands are the same hand twice, not mirror images: only finger b mirrors finger a.
+        a = list(_finger())
+        b = [Part(p.link.replace("_a_", "_b_"), p.material, p.shape.mirrored()) for p in a]
+        hand = [*_hand(), *a, *b]
+        whole += [*hand, *(replace(part, link=part.link.replace("left_", "right_", 1)) for part in hand)]
+    return whole
 
 
 def add_looks(spec: mujoco.MjSpec, hands: bool) -> None:

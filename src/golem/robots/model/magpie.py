@@ -50,7 +50,7 @@ MASS = 0.414
 """Mass of one hand with adapter and palm camera [kg] (paper)."""
 BASE = Inertial.of(0.197752, (-0.0019, 0, 0.0443), (3.64e-4, 0, 2.0e-6, 9.40e-5, 0, 2.82e-4))
 """Housing, in the hand frame. The three inertials split `MASS` in the proportion of the lab's link masses (housing
-0.2041, crank + rocker 0.0252, finger 0.0864 kg at density 1000); the inertias are those of its meshes' volumes, scaled."""
+0.2041, crank + rocker 0.0252, finger 0.0864 kg at density 1000); inertias: its meshes' volumes, scaled."""
 CRANK = Inertial.of(0.024416, (-0.0033, 0.0142, 0.0075), (7.20e-6, 0, 0, 2.03e-6, -2.41e-6, 5.34e-6))
 """Crank of finger a in its own frame, with the rocker, which turns in parallel, welded to it."""
 FINGER = Inertial.of(0.083708, (0.003, -0.0109, 0.029), (5.94e-5, 0, 0, 5.04e-5, 1.36e-5, 1.32e-5))
