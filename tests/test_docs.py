@@ -1,0 +1,48 @@
+"""What the documentation shows a user works when it is typed."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from golem import registry
+from golem.stack import Stack, load_stack, parse_stack
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """Return the code blocks of one language on a page."""
+    return re.findall(rf"^```{language}\n(.*?)^```", (DOCS / page).read_text(encoding="utf-8"), re.S | re.M)
+
+
+def test_the_module_of_write_a_module_loads_and_grasps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module, usage = blocks("write-a-module.md", "python")
+    (tmp_path / "my_grasp.py").write_text(module)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(usage, "write-a-module.md", "exec"), {})
+
+
+def test_the_stack_of_write_a_module_is_valid() -> None:
+    (text,) = blocks("write-a-module.md", "yaml")
+    choice = parse_stack(text, "my_stack.yaml").grasp_method
+    assert choice.options == {"least_score": 0.8}
+
+
+def test_the_quickstart_shows_the_shipped_stack_and_the_defaults() -> None:
+    (text,) = blocks("quickstart.md", "yaml")
+    assert parse_stack(text, "quickstart") == load_stack("tether") == Stack()
+
+
+def test_the_table_of_slots_is_complete() -> None:
+    rows = re.findall(
+        r"^\| `(\w+)` \|.*\| (`.*`) \|$", (DOCS / "concepts.md").read_text(encoding="utf-8"), re.M
+    )
+    shown = {slot: tuple(re.findall(r"`(\w+)`", names)) for slot, names in rows}
+    assert shown == {slot: registry.names(slot) for slot in registry.slots()}
+    assert set(shown) <= {f.name for f in fields(Stack)}
