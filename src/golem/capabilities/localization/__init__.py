@@ -1,0 +1,1 @@
+"""Finding objects: images and query words in, labelled objects with positions out."""

@@ -1,0 +1,1 @@
+"""Everything that is trained; never imported at run time."""

@@ -1,0 +1,1 @@
+"""The part detector: domain-randomised renders, training, evaluation, export."""

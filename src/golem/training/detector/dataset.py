@@ -1,0 +1,117 @@
+"""Renders and stores labelled images: one folder per split, one file per world."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from golem.robots.sensors.streams import stream
+from golem.training.detector import scene
+from golem.training.detector.labels import COLUMNS, label_image
+from golem.types import Array
+
+JPEG_QUALITY = 96
+FANCY_SHARE = 0.25
+"""Share of the images with shadows and smooth edges."""
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A split in memory.
+
+    Attributes:
+        images: encoded images.
+        labels: per image (n, 8), columns as in `labels.COLUMNS`.
+        cameras: per image `"head"` or `"palm"`.
+    """
+
+    images: list[NDArray[np.uint8]]
+    labels: list[Array]
+    cameras: list[str]
+
+    def decode(self, index: int) -> NDArray[np.uint8]:
+        """Return image `index` as (height, width, 3) RGB."""
+        return cv2.cvtColor(cv2.imdecode(self.images[index], cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+
+
+def render(
+    seed: int, world_index: int, split: str, per_camera: int
+) -> Iterator[tuple[NDArray[np.uint8], Array, str]]:
+    """Yield (image RGB, labels, camera) of one world; depends on the arguments only.
+
+    Args:
+        seed: of the dataset.
+        world_index: number of the world in its split.
+        split: `"train"` or `"held_out"`; the two never share a world.
+        per_camera: images of the head camera, and as many of the palm cameras.
+    """
+    rng = stream(seed, f"detector/{split}/{world_index}")
+    world = scene.build_world(rng)
+    plain, fancy = scene.make_rigs(world)
+    with plain, fancy:
+        for k in range(2 * per_camera):
+            scene.randomise_looks(world, rng)
+            scene.randomise_objects(world, rng)
+            info = (scene.place_head if k % 2 == 0 else scene.place_palm)(world, rng)
+            rig = fancy if rng.random() < FANCY_SHARE else plain
+            rgb, _ = rig.render(world.data, info.name)
+            labels = label_image(world, info, plain.segment(world.data, info.name))
+            yield rgb, labels, "head" if info.name == "head" else "palm"
+
+
+def generate(folder: Path, seed: int, split: str, worlds: int, per_camera: int) -> None:
+    """Render a split into `folder/split`; worlds already there are kept.
+
+    Args:
+        folder: where the splits live.
+        seed: see `render`.
+        split: see `render`.
+        worlds: number of compiled worlds.
+        per_camera: see `render`.
+    """
+    target = folder / split
+    target.mkdir(parents=True, exist_ok=True)
+    for index in tqdm(range(worlds), desc=f"render {split}"):
+        path = target / f"world_{index:03d}.npz"
+        if path.exists():
+            continue
+        arrays: dict[str, NDArray[np.generic]] = {}
+        for k, (rgb, labels, camera) in enumerate(render(seed, index, split, per_camera)):
+            ok, code = cv2.imencode(
+                ".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
+            )
+            if not ok:
+                raise RuntimeError("JPEG encoding failed")
+            arrays[f"image_{camera}_{k:04d}"] = code
+            arrays[f"label_{camera}_{k:04d}"] = labels.astype(np.float32)
+        part = path.with_suffix(".part")
+        with part.open("wb") as file:
+            np.savez(file, **arrays)
+        part.rename(path)
+
+
+def load(folder: Path, split: str) -> Dataset:
+    """Read a split.
+
+    Raises:
+        FileNotFoundError: nothing was rendered there.
+    """
+    paths = sorted((folder / split).glob("world_*.npz"))
+    if not paths:
+        raise FileNotFoundError(f"no rendered worlds in {folder / split}")
+    data = Dataset([], [], [])
+    for path in paths:
+        with np.load(path) as file:
+            for key in sorted(k for k in file.files if k.startswith("image_")):
+                data.images.append(file[key])
+                data.labels.append(
+                    file[key.replace("image_", "label_")].reshape(-1, len(COLUMNS)).astype(float)
+                )
+                data.cameras.append(key.split("_")[1])
+    return data

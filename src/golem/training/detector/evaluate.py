@@ -1,0 +1,112 @@
+"""Held-out figures: average precision by centre match and centre error, per class and camera."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.capabilities.localization.classes import CLASSES
+from golem.training.detector.dataset import Dataset
+from golem.types import Array, Detection
+
+MATCH_FLOOR = 4.0
+"""A centre matches within half the shorter side of the true box, or within this [px], whichever is more."""
+THRESHOLD = 0.05
+
+Detector = Callable[[NDArray[np.uint8]], list[Detection]]
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Figures of one class in one camera.
+
+    Attributes:
+        count: labelled parts.
+        ap: average precision (area under the precision-recall curve, all points).
+        recall: share found at a score of 0.3 or more.
+        precision: share of those detections that are right.
+        error: median distance of the matched centres at that score [px].
+        error_p95: 95th percentile of it [px].
+    """
+
+    count: int
+    ap: float
+    recall: float
+    precision: float
+    error: float
+    error_p95: float
+
+
+def evaluate(data: Dataset, detect: Detector, working_score: float = 0.3) -> dict[tuple[str, str], Score]:
+    """Return the figures by (camera, class).
+
+    Args:
+        data: held-out images.
+        detect: image RGB to detections of all classes at scores from `THRESHOLD`.
+        working_score: for recall, precision and error.
+    """
+    hits: dict[tuple[str, str], list[tuple[float, bool, float]]] = {}
+    counts: dict[tuple[str, str], int] = {}
+    for index, camera in enumerate(data.cameras):
+        found = detect(data.decode(index))
+        for kind, label in enumerate(CLASSES):
+            key = (camera, label)
+            truth = data.labels[index][data.labels[index][:, 0] == kind]
+            counts[key] = counts.get(key, 0) + int((truth[:, 7] == 0).sum())
+            hits.setdefault(key, []).extend(_match([d for d in found if d.label == label], truth))
+    return {key: _score(hits[key], counts[key], working_score) for key in sorted(counts)}
+
+
+def _match(found: list[Detection], truth: Array) -> list[tuple[float, bool, float]]:
+    """Assign each detection, best first, to the nearest free label; those on ignored labels do not count."""
+    taken = np.zeros(len(truth), bool)
+    out: list[tuple[float, bool, float]] = []
+    sides = (truth[:, 5:7] - truth[:, 3:5]).min(axis=1) if len(truth) else np.zeros(0)
+    reach = np.maximum(sides / 2, MATCH_FLOOR)
+    for detection in found:
+        distance = np.linalg.norm(truth[:, 1:3] - detection.center, axis=1)
+        near = distance <= reach
+        free = near & ~taken & (truth[:, 7] == 0)
+        if free.any():
+            best = int(np.argmin(np.where(free, distance, np.inf)))
+            taken[best] = True
+            out.append((detection.score, True, float(distance[best])))
+        elif not (near & (truth[:, 7] == 1)).any():
+            out.append((detection.score, False, 0.0))
+    return out
+
+
+def _score(hits: list[tuple[float, bool, float]], count: int, working_score: float) -> Score:
+    hits = sorted(hits, reverse=True)
+    good = np.cumsum([h[1] for h in hits]) if hits else np.zeros(0)
+    precision = good / np.arange(1, len(hits) + 1)
+    envelope = np.maximum.accumulate(precision[::-1])[::-1]
+    steps = np.array([h[1] for h in hits], bool)
+    ap = float(envelope[steps].sum() / max(count, 1)) if hits else 0.0
+    working = [h for h in hits if h[0] >= working_score]
+    right = [h[2] for h in working if h[1]]
+    return Score(
+        count=count,
+        ap=ap,
+        recall=len(right) / max(count, 1),
+        precision=len(right) / max(len(working), 1),
+        error=float(np.median(right)) if right else float("nan"),
+        error_p95=float(np.percentile(right, 95)) if right else float("nan"),
+    )
+
+
+def table(scores: dict[tuple[str, str], Score]) -> str:
+    """Return the figures as a Markdown table."""
+    lines = [
+        "| camera | class | parts | AP | recall | precision | median error px | p95 error px |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for (camera, label), s in scores.items():
+        lines.append(
+            f"| {camera} | {label} | {s.count} | {s.ap:.3f} | {s.recall:.3f} | {s.precision:.3f} "
+            f"| {s.error:.2f} | {s.error_p95:.2f} |"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,114 @@
+"""Labels from geometry: projected parts, and how much of each is seen according to the segmentation image."""
+
+from __future__ import annotations
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.capabilities.localization.classes import CLASSES
+from golem.robots.sensors.cameras import project
+from golem.robots.worlds.pack import Part
+from golem.robots.worlds.screws import screw_name
+from golem.training.detector.scene import World, camera_pose
+from golem.types import Array, CameraInfo
+
+MIN_SIDE = 3.0
+"""A part whose box is narrower is neither asked for nor held against the detector [px]."""
+MIN_VISIBLE = 0.35
+"""Same for a part of which a smaller share is seen."""
+COLUMNS = ("class", "x", "y", "x_min", "y_min", "x_max", "y_max", "ignore")
+
+
+def label_image(world: World, info: CameraInfo, segmentation: NDArray[np.int32]) -> Array:
+    """Return (n, 8) labels, columns as in `COLUMNS`; centres inside the image only, boxes not clipped.
+
+    Args:
+        world: the world at the moment of exposure.
+        info: the camera.
+        segmentation: (height, width) geom ids.
+    """
+    T_optical_world = np.linalg.inv(camera_pose(world, info.name))
+    seen = np.bincount(segmentation[segmentation >= 0], minlength=world.model.ngeom)
+    rows: list[list[float]] = []
+    for part in world.names.parts:
+        if part.label == "screw_hole":
+            rows += _hole(world, info, T_optical_world, part.position, 0.003, segmentation)
+        else:
+            rows += _solid(world, info, T_optical_world, part, seen)
+    for draw, mouth in zip(world.draws, world.names.mouths, strict=True):
+        at = world.data.xpos[world.model.body(screw_name(draw.slot)).id]
+        if np.linalg.norm(at - mouth) > 0.04:
+            rows += _hole(world, info, T_optical_world, mouth, draw.bore_radius, segmentation)
+    return np.array(rows).reshape(-1, len(COLUMNS))
+
+
+def _solid(world: World, info: CameraInfo, T: Array, part: Part, seen: Array) -> list[list[float]]:
+    model, data = world.model, world.data
+    names = [n for n in part.geoms if not n.endswith("_thread")]
+    ids = [model.geom(n).id for n in names]
+    points = np.concatenate([_outline(model, data, g) for g in ids])
+    optical = points @ T[:3, :3].T + T[:3, 3]
+    if optical[:, 2].min() < 0.02:
+        return []
+    pixels = project(info, optical)
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    centre_world, faces = part.position, True
+    if part.label == "screw" and part.body != "pack":
+        body = model.body(part.body).id
+        axis = data.xmat[body].reshape(3, 3)[:, 2]
+        draw = next(d for d in world.draws if screw_name(d.slot) == part.body)
+        faces = bool(axis @ T[2, :3] < -0.5)
+        centre_world = data.xpos[body] + axis * draw.head_height
+    centre = project(info, T[:3, :3] @ centre_world + T[:3, 3]) if faces else (low + high) / 2
+    if not _inside(info, centre):
+        return []
+    hull = cv2.contourArea(cv2.convexHull(np.clip(pixels, 0, (info.width, info.height)).astype(np.float32)))
+    visible = seen[ids].sum() / max(hull, 1.0)
+    if visible <= 0:
+        return []
+    ignore = (high - low).min() < MIN_SIDE or visible < MIN_VISIBLE
+    return [[CLASSES.index(part.label), *centre, *low, *high, float(ignore)]]
+
+
+def _hole(
+    world: World, info: CameraInfo, T: Array, mouth: Array, radius: float, segmentation: NDArray[np.int32]
+) -> list[list[float]]:
+    angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(12)])
+    optical = (np.concatenate([[mouth], mouth + radius * circle, mouth + 1.4 * radius * circle])) @ T[
+        :3, :3
+    ].T
+    optical += T[:3, 3]
+    if optical[:, 2].min() < 0.02:
+        return []
+    pixels = project(info, optical)
+    if not _inside(info, pixels[0]):
+        return []
+    low, high = pixels[1:13].min(axis=0), pixels[1:13].max(axis=0)
+    index = np.clip(np.round(pixels).astype(int), 0, (info.width - 1, info.height - 1))
+    geoms = segmentation[index[:, 1], index[:, 0]]
+    pack = world.model.body("pack").id
+    free = (geoms >= 0) & (world.model.geom_bodyid[geoms] == pack)
+    if free.sum() < 3:
+        return []
+    ignore = (high - low).min() < MIN_SIDE or free.mean() < 0.75 or not free[0]
+    return [[CLASSES.index("screw_hole"), *pixels[0], *low, *high, float(ignore)]]
+
+
+def _inside(info: CameraInfo, pixel: Array) -> bool:
+    return bool(0 <= pixel[0] <= info.width - 1 and 0 <= pixel[1] <= info.height - 1)
+
+
+def _outline(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Array:
+    """Return points in the world whose projection bounds the geom."""
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = model.geom_dataid[geom]
+        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        local = np.asarray(model.mesh_vert[first : first + count], float)
+    else:
+        centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
+        corners = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+        local = centre + corners * half
+    return data.geom_xpos[geom] + local @ data.geom_xmat[geom].reshape(3, 3).T
