@@ -73,7 +73,9 @@ def load(slot: str, use: str) -> type:
     module = _import(slot, use, location)
     cls = getattr(module, class_name, None)
     if not inspect.isclass(cls):
-        classes = [k for k, v in vars(module).items() if inspect.isclass(v) and v.__module__ == module.__name__]
+        classes = [
+            k for k, v in vars(module).items() if inspect.isclass(v) and v.__module__ == module.__name__
+        ]
         raise unknown_name(f"class in {location}", class_name, classes)
     return cls
 
@@ -152,6 +154,8 @@ def _import(slot: str, use: str, location: str) -> typing.Any:
                 f"{slot}: '{use}' names the module {location}, which cannot be found; "
                 f"registered names: {', '.join(_IMPLEMENTATIONS[slot])}."
             ) from error
-        raise ModuleFault(slot, use, f"it needs the package '{error.name}', which is not installed") from error
+        raise ModuleFault(
+            slot, use, f"it needs the package '{error.name}', which is not installed"
+        ) from error
     except Exception as error:  # a user's file may raise anything
         raise ModuleFault(slot, use, f"importing it raised {type(error).__name__}: {error}") from error

@@ -81,7 +81,9 @@ def load_stack(source: str | Path) -> Stack:
         return parse_stack((resources.files("golem") / "stacks" / f"{source}.yaml").read_text(), str(source))
     path = Path(source)
     if not path.is_file():
-        raise ConfigError(f"No stack file '{source}'; give a path to a YAML file or one of: {', '.join(shipped())}.")
+        raise ConfigError(
+            f"No stack file '{source}'; give a path to a YAML file or one of: {', '.join(shipped())}."
+        )
     return parse_stack(path.read_text(), str(source))
 
 
@@ -114,6 +116,8 @@ def _choice(name: str, slot: str, value: object) -> Choice:
     if isinstance(value, str):
         return Choice(value)
     if not isinstance(value, Mapping) or not isinstance(value.get("use"), str):
-        raise ConfigError(f"{name}: '{slot}' wants '{{use: NAME, option: value, ...}}', with NAME one of "
-                          f"{', '.join(registry.names(slot))}, package.module:Class or file.py:Class.")
+        raise ConfigError(
+            f"{name}: '{slot}' wants '{{use: NAME, option: value, ...}}', with NAME one of "
+            f"{', '.join(registry.names(slot))}, package.module:Class or file.py:Class."
+        )
     return Choice(value["use"], {str(k): v for k, v in value.items() if k != "use"})

@@ -11,7 +11,7 @@ from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.legs.hold import STANCES
 from golem.errors import ConfigError, GolemError
 from golem.hardware.estop.virtual import VirtualEstop
-from golem.hardware.safety.base import GateState, Request, SafetyLimits
+from golem.hardware.safety.base import GateResult, GateState, Request, SafetyLimits
 from golem.middleware import topics
 from golem.middleware.bus import Bus
 from golem.robots.base import Robot
@@ -20,7 +20,6 @@ from golem.robots.sensors.profiles import load_profile
 from golem.runtime import nodes
 from golem.runtime.executor import Executor, Node
 from golem.runtime.guard import Guard
-from golem.hardware.safety.base import GateResult
 from golem.skills.base import Skill, SkillResult
 from golem.skills.context import Context
 from golem.skills.grasping.base import GraspMethod
@@ -111,7 +110,9 @@ class Running:
         self._skills.run = SkillRun(skill.run(self._context, goal))
         return self._skills.run
 
-    def execute(self, skill: Skill[Context, Any], goal: object, timeout: float, realtime: bool = False) -> SkillResult:
+    def execute(
+        self, skill: Skill[Context, Any], goal: object, timeout: float, realtime: bool = False
+    ) -> SkillResult:
         """Run a skill to its end in robot time.
 
         Args:
@@ -124,7 +125,9 @@ class Running:
             The result; a safety stop or a timeout ends the skill with a result that says so.
         """
         run = self.start(skill, goal)
-        self.executor.run(self.executor.t + timeout, lambda: run.result is not None or self._stopped(), realtime)
+        self.executor.run(
+            self.executor.t + timeout, lambda: run.result is not None or self._stopped(), realtime
+        )
         if run.result is not None:
             return run.result
         run.cancel()

@@ -49,7 +49,9 @@ class Guard:
         except (TypeError, ValueError) as error:
             raise ModuleFault(self.slot, self.use, f"{name} is not an array of numbers") from error
         if array.shape != shape:
-            raise ModuleFault(self.slot, self.use, f"{name} has shape {array.shape}, the contract asks for {shape}")
+            raise ModuleFault(
+                self.slot, self.use, f"{name} has shape {array.shape}, the contract asks for {shape}"
+            )
         if not np.isfinite(array).all():
             raise ModuleFault(self.slot, self.use, f"{name} contains NaN or infinity")
         return array

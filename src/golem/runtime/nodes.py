@@ -120,7 +120,9 @@ class CameraNode:
         rgb, depth = self._robot.capture(self._info.name)
         self._kinematics.update(state.q)
         pose = base.T_odom_base @ self._kinematics.pose(self._optical)
-        self._bus.publish(topics.frames(self._info.name), Frame(t, self._info, rgb, depth, pose), t, self._latency)
+        self._bus.publish(
+            topics.frames(self._info.name), Frame(t, self._info, rgb, depth, pose), t, self._latency
+        )
 
 
 class LocalizerNode:
@@ -197,7 +199,9 @@ class UpperBodyNode:
         left, right = (None if T is None else T_base_odom @ T for T in (targets.left, targets.right))
         command = self._guard.call(self._arms.step, left, right, state.q, self.period)
         if not isinstance(command, ArmCommand):
-            raise ModuleFault(self._guard.slot, self._guard.use, f"step returned {type(command).__name__}, not ArmCommand")
+            raise ModuleFault(
+                self._guard.slot, self._guard.use, f"step returned {type(command).__name__}, not ArmCommand"
+            )
         self._guard.array("arm targets", command.q, (UPPER.stop - UPPER.start,))
         self._bus.publish(topics.ARM_COMMAND, command, t, self._arms.latency)
 
@@ -257,7 +261,9 @@ class ServoNode:
         if arms is not None:
             q[UPPER] = arms.q
         gains = None if legs is None else (legs.kp, legs.kd)
-        self._bus.publish(topics.LOW_CMD_REQUEST, self._guard.call(self._servo.step, state, q, TICK, gains), t)
+        self._bus.publish(
+            topics.LOW_CMD_REQUEST, self._guard.call(self._servo.step, state, q, TICK, gains), t
+        )
 
 
 class EstopNode:

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from golem.hardware.hands.base import GripState
 from golem.middleware.topics import Sightings
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
-from golem.skills.grasping.base import Grasp, GraspMethod, ServoStatus
+from golem.skills.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus
 from golem.types import Array, LocalizedObject, Side
 
 
@@ -57,7 +58,7 @@ class PickConfig:
     descend_speed: float = 0.10
     servo_speed: float = 0.15
     servo_timeout: float = 20.0
-    force: float = 12.0
+    force: float = 16.0
     close_timeout: float = 2.5
     pull: float = 0.06
     pull_speed: float = 0.05
@@ -83,8 +84,11 @@ class Pick:
         try:
             target, container = await self._detect(context, goal)
             grasp = await self._approach(context, goal, target)
-            grasp = await self._servo(context, goal, target, grasp)
-            await self._grasp(context, goal, grasp)
+            law = self._method.servo(target, grasp, context.t)
+            if law is None:
+                await self._descend(context, goal, grasp)
+            else:
+                await self._servo(context, goal, law)
             timings["detect_to_grasp"] = context.t - timings["start"]
             await self._extract(context, goal)
             await self._place(context, goal, container)
@@ -99,7 +103,9 @@ class Pick:
             raise
         timings["total"] = context.t - timings.pop("start")
         context.say("done", f"The {goal.label} is in the {goal.container}.")
-        return SkillResult(True, "done", None, f"The {goal.label} was dropped in the {goal.container}.", timings)
+        return SkillResult(
+            True, "done", None, f"The {goal.label} was dropped in the {goal.container}.", timings
+        )
 
     async def _detect(self, context: Context, goal: PickGoal) -> tuple[LocalizedObject, LocalizedObject]:
         """Look once with the head camera: the best reachable object, and the container."""
@@ -147,48 +153,72 @@ class Pick:
         await self._travel(context, goal.side, lifted(grasp.T_odom_gripper, self._config.clearance))
         return grasp
 
-    async def _servo(self, context: Context, goal: PickGoal, target: LocalizedObject, grasp: Grasp) -> Grasp:
-        """Bring the hand down: in closed loop where the method has one, else straight to the proposed grasp."""
+    async def _descend(self, context: Context, goal: PickGoal, grasp: Grasp) -> None:
+        """Open loop: go straight down to the grasp as proposed, and close."""
         arm = context.arms[goal.side]
-        law = self._method.servo(target, grasp, context.t)
-        if law is None:
-            context.say("descend", "Straight down to the proposed grasp.")
-            await arm.move(grasp.T_odom_gripper, self._config.descend_speed)
-            left = await arm.settle(self._config.tolerance, 2.0)
-            if left > 2.0 * self._config.tolerance:
-                raise StageFailed("descend", "localizer", f"The hand was stopped {left * 1e3:.0f} mm before the grasp.")
-            return grasp
+        context.say("descend", "Straight down to the proposed grasp.")
+        await arm.move(grasp.T_odom_gripper, self._config.descend_speed)
+        left = await arm.settle(self._config.tolerance, 2.0)
+        if left > 2.0 * self._config.tolerance:
+            raise StageFailed(
+                "descend", "localizer", f"The hand was stopped {left * 1e3:.0f} mm before the grasp."
+            )
+        self._close(context, goal)
+        await context.until(lambda: context.hands[goal.side].status.holding, self._config.close_timeout)
+        self._check_grip(context, goal)
+
+    async def _servo(self, context: Context, goal: PickGoal, law: ServoLaw) -> None:
+        """Closed loop: let the law bring the hand down, and let it follow the object while the fingers close."""
+        arm, hand = context.arms[goal.side], context.hands[goal.side]
         end = context.t + self._config.servo_timeout
+        closing = False
         with context.watch(f"{goal.side}_hand", goal.label) as eye:
-            while context.t < end:
+            while context.t < end and not hand.status.holding:
                 fresh = eye.fresh()
                 step = law.step(context.t, None if fresh is None else list(fresh.objects), arm.pose)
-                if fresh is not None:
-                    context.say("servo", f"Servoing, sigma {step.sigma * 1e3:.1f} mm.", target=step.target.tolist())
-                if step.status is ServoStatus.CONVERGED:
-                    return Grasp(step.T_odom_gripper, grasp.gap, grasp.score)
-                if step.status is ServoStatus.LOST:
-                    raise StageFailed("servo", "localizer", f"The palm camera lost the {goal.label}.")
-                if step.status is ServoStatus.STALLED:
-                    raise StageFailed("servo", "upper_body", "The hand makes no progress towards the target.")
-                arm.approach(step.T_odom_gripper, self._config.servo_speed)
+                if not closing:
+                    if fresh is not None:
+                        text = f"Servoing, sigma {step.sigma * 1e3:.1f} mm."
+                        context.say("servo", text, target=step.target.tolist())
+                    if step.status is ServoStatus.CONVERGED:
+                        closing = True
+                        end = context.t + self._config.close_timeout
+                        self._close(context, goal)
+                    elif step.status is ServoStatus.LOST:
+                        raise StageFailed("servo", "localizer", f"The palm camera lost the {goal.label}.")
+                    elif step.status is ServoStatus.STALLED:
+                        raise StageFailed(
+                            "servo", "upper_body", "The hand makes no progress towards the target."
+                        )
+                if not closing or hand.status.state is GripState.CLOSING:
+                    arm.approach(step.T_odom_gripper, self._config.servo_speed)
                 await context.tick()
-        raise StageFailed("servo", "grasp_method", f"No convergence within {self._config.servo_timeout:g} s.")
+        if not closing:
+            raise StageFailed(
+                "servo", "grasp_method", f"No convergence within {self._config.servo_timeout:g} s."
+            )
+        self._check_grip(context, goal)
 
-    async def _grasp(self, context: Context, goal: PickGoal, grasp: Grasp) -> None:
-        """Close and check that something is between the fingers."""
+    def _close(self, context: Context, goal: PickGoal) -> None:
         context.say("grasp", f"Closing with {self._config.force:g} N per finger.")
-        hand = context.hands[goal.side]
-        hand.close(self._config.force)
-        if not await context.until(lambda: hand.status.holding, self._config.close_timeout):
-            raise StageFailed("grasp", "grasp_method", f"The fingers closed on nothing (gap {hand.status.gap * 1e3:.0f} mm).")
+        context.hands[goal.side].close(self._config.force)
+
+    def _check_grip(self, context: Context, goal: PickGoal) -> None:
+        """Check that something is between the fingers."""
+        status = context.hands[goal.side].status
+        if not status.holding:
+            raise StageFailed(
+                "grasp", "grasp_method", f"The fingers hold nothing (gap {status.gap * 1e3:.0f} mm)."
+            )
 
     async def _extract(self, context: Context, goal: PickGoal) -> None:
         """Pull straight up along the vertical, then lift; the grip must hold."""
         context.say("extract", "Pulling straight up.")
         arm, hand = context.arms[goal.side], context.hands[goal.side]
         await arm.move(
-            lifted(arm.commanded, self._config.pull), self._config.pull_speed, stop=lambda: not hand.status.holding
+            lifted(arm.commanded, self._config.pull),
+            self._config.pull_speed,
+            stop=lambda: not hand.status.holding,
         )
         await arm.move(
             lifted(arm.commanded, self._config.clearance - self._config.pull),
@@ -237,5 +267,3 @@ def at_height(T: Array, z: float) -> Array:
     raised = T.copy()
     raised[2, 3] = z
     return raised
-
-

@@ -37,7 +37,8 @@ class Line:
         """Plan the profile.
 
         Args:
-            T_start, T_goal: (4, 4) poses of the moved frame in one common frame.
+            T_start: (4, 4) pose of the moved frame at the start.
+            T_goal: (4, 4) pose at the end, in the same frame.
             v_max: speed limit [m/s].
             w_max: rate of turn limit [rad/s].
             a_max: acceleration limit [m/s^2].
@@ -107,7 +108,9 @@ class Chain:
 
         Args:
             waypoints: at least two (4, 4) poses of the moved frame in one common frame.
-            v_max, w_max, a_max: limits of every line, as in `Line`.
+            v_max: speed limit of every line [m/s].
+            w_max: rate of turn limit of every line [rad/s].
+            a_max: acceleration limit of every line [m/s^2].
 
         Raises:
             ConfigError: fewer than two waypoints.

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from golem.capabilities.arms.base import NUM_UPPER, TargetError
-from golem.capabilities.arms.diff_ik import DiffIK, DiffIKConfig
+from golem.capabilities.arms.diff_ik import DiffIK
+from golem.capabilities.arms.task_space import TaskSpaceConfig
 from golem.types import NUM_JOINTS, SIDES, UPPER, Array, Side
 
 # Free of speed limits, one tick of dt = 1 s is one Gauss-Newton step of at most 0.5 rad per joint; the soft tasks
 # only break ties.
-_OFFLINE = DiffIKConfig(
+_OFFLINE = TaskSpaceConfig(
     arm_speed=0.5, torso_speed=0.2, posture_weight=1e-8, torso_weight=1e-6, palm_speed=0.2, palm_turn=1.0,
     error_damping=1e-2, limit_margin=0.05,
 )  # fmt: skip
@@ -42,10 +43,12 @@ def solve_posture(
     scales are what a well-placed arm reaches, so that neither buys off the other.
 
     Args:
-        T_left, T_right: (4, 4) poses of the grasp frames in base_link; None leaves that arm as the start has it.
+        T_left: (4, 4) pose of `left_gripper` in base_link; None leaves that arm as the start has it.
+        T_right: (4, 4) pose of `right_gripper` in base_link, or None.
         starts: (n, 15) postures to start from [rad].
         torso_range: how far the torso may turn either way [rad].
-        position_tolerance, rotation_tolerance: what counts as reached [m], [rad].
+        position_tolerance: distance that counts as reached [m].
+        rotation_tolerance: angle that counts as reached [rad].
 
     Returns:
         (15,) joints of torso, left arm, right arm [rad].
@@ -54,7 +57,7 @@ def solve_posture(
         TargetError: none of the starts leads to the targets.
     """
     ik = DiffIK(replace(_OFFLINE, torso_range=torso_range))
-    sides = [side for side, T in zip(SIDES, (T_left, T_right), strict=True) if T is not None]
+    sides: list[Side] = [side for side, T in zip(SIDES, (T_left, T_right), strict=True) if T is not None]
     best: tuple[float, Array] | None = None
     nearest = np.inf
     for start in np.atleast_2d(starts):
@@ -92,7 +95,9 @@ def downward(x: float, y: float, z: float, heading: float) -> Array:
     """Return the (4, 4) pose of a grasp frame that points straight down.
 
     Args:
-        x, y, z: its origin in base_link [m].
+        x: forward position of its origin in base_link [m].
+        y: its position to the left [m].
+        z: its height [m].
         heading: direction of its x axis in the horizontal plane, from base_link's x axis [rad].
     """
     c, s = np.cos(heading), np.sin(heading)

@@ -85,7 +85,7 @@ def pad_offset(theta: _T) -> _T:
 def crank_from_gap(gap: _T) -> _T:
     """Return the crank angle [rad] for an opening [m], clipped to what the hand can do (0 to `MAX_GAP`)."""
     cosine = (np.clip(gap, 0.0, MAX_GAP) / 2.0 + _PAD_FACE - CRANK_PIVOT[1]) / ARM
-    return np.arccos(cosine) - ANGLE_OPEN
+    return np.maximum(np.arccos(cosine) - ANGLE_OPEN, 0.0)  # the arc cosine may round to just below
 
 
 def pad_advance(theta: _T) -> _T:

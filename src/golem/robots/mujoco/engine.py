@@ -23,7 +23,6 @@ from golem.robots.sensors.streams import stream
 from golem.robots.worlds.layout import PackLayout
 from golem.types import NUM_JOINTS, SIDES, Array, HandCommand, HandState, Imu, LowCommand, Side
 
-
 START_GAP = 0.060
 """Opening of the hands at the start of an episode [m]."""
 MOVING = 0.02
@@ -76,7 +75,8 @@ class MujocoRobot:
         for name, T_bias in self._errors.T_nominal_actual.items():
             apply_extrinsics(model, name, T_bias)
         self._depth = {
-            name: StereoDepth(info, self.profile.depth, stream(seed, f"depth/{name}")) for name, info in CAMERAS.items()
+            name: StereoDepth(info, self.profile.depth, stream(seed, f"depth/{name}"))
+            for name, info in CAMERAS.items()
         }
         self._imu_model = ImuModel(self.profile.imu, self._errors.imu, stream(seed, "imu"))
         self._torque_limit = load_limits(self.config.torque_profile).torque

@@ -13,6 +13,10 @@ SERVO_KP = 8.0
 SERVO_KD = 0.10
 """Damping of a finger servo [N m s/rad]."""
 
+OVERTRAVEL = 0.20
+"""How far beyond closed the reference of a closing finger goes [rad]: the crank could turn to 2.05 rad, and with the
+goal beyond the object both servos press with their full torque wherever between the fingers it stands."""
+
 
 class HandServos:
     """Drives the cranks of one hand.
@@ -42,7 +46,7 @@ class HandServos:
 
     def command(self, command: HandCommand, dt: float) -> None:
         """Let the reference move towards the commanded gap for `dt` [s]."""
-        goal = magpie.crank_from_gap(command.gap)
+        goal = magpie.CLOSED + OVERTRAVEL if command.gap <= 0.0 else magpie.crank_from_gap(command.gap)
         reach = magpie.MAX_SPEED * dt
         self._reference += np.clip(goal - self._reference, -reach, reach)
         self._force = min(max(command.force, magpie.MIN_FORCE), magpie.MAX_FORCE)

@@ -44,7 +44,7 @@ class PackLayout:
     window_y: tuple[float, float] = (-0.34, 0.34)
     window_depth: float = 0.035
     empty_holes: tuple[int, ...] = (5, 16, 24, 29, 62)
-    tray_xy: tuple[float, float] = (0.48, -0.37)
+    tray_xy: tuple[float, float] = (0.48, -0.31)
     tray_z: float = 1.068
     tray_size: tuple[float, float, float] = (0.18, 0.24, 0.045)
 

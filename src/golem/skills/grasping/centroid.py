@@ -16,13 +16,16 @@ class CentroidConfig:
     """Where around the object the fingers close.
 
     Attributes:
-        depth: how far below the seen surface point the fingertips go [m]. A flange head is 5-7 mm high, the pads
-            shall cover it and stay clear of the plate.
+        depth: how far below the seen surface point the fingertips go at most [m]: a flange head is 5-7 mm high, and
+            the pads shall cover it.
+        clearance: height of the fingertips above the ground around the object [m]; with the hand tilted by 5 deg
+            the lower finger of a 50 mm opening is 2 mm below the middle.
         gap: opening to arrive with [m]: room for +-20 mm of error, and the fingertips still advance by less than
             2 mm while they close from there (parallelogram linkage).
     """
 
-    depth: float = 0.009
+    depth: float = 0.0115
+    clearance: float = 0.003
     gap: float = 0.050
 
 
@@ -40,6 +43,19 @@ def top_down(position: Array, yaw: float) -> Array:
     return T
 
 
+def grasp_depth(target: LocalizedObject, depth: float, clearance: float) -> float:
+    """Return how far below the top of `target` the fingertips shall go [m].
+
+    That is `depth`, or less where the ground around the object (the lowest tenth of its cloud) is so near that less
+    than `clearance` would be left [m]; never less than a third of `depth`.
+    """
+    if len(target.points) == 0:
+        return depth
+    ground = float(np.quantile(target.points[:, 2], 0.1))
+    height = float(target.position[2]) - ground
+    return float(np.clip(height - clearance, depth / 3.0, depth))
+
+
 class Centroid(OpenLoop):
     """One grasp, straight down on the object's centre."""
 
@@ -49,5 +65,6 @@ class Centroid(OpenLoop):
 
     def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
         """Return the one top-down grasp; see `GraspMethod`."""
-        position = target.position - (0.0, 0.0, self.config.depth)
+        depth = grasp_depth(target, self.config.depth, self.config.clearance)
+        position = target.position - (0.0, 0.0, depth)
         return [Grasp(top_down(position, yaw), self.config.gap, target.detection.score)]

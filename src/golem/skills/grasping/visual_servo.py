@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from golem.skills.grasping.base import Grasp, ServoLaw, ServoStatus, ServoStep
-from golem.skills.grasping.centroid import Centroid, CentroidConfig, top_down
+from golem.skills.grasping.centroid import Centroid, CentroidConfig, grasp_depth, top_down
 from golem.types import Array, LocalizedObject
 
 
@@ -29,8 +29,9 @@ class ServoConfig:
         confirm: sightings needed before the hand leaves its stand-off.
         standoff: height above the grasp at which the hand centres itself [m].
         slope: metres of height the hand keeps per metre of lateral error beyond `tolerance`.
-        tolerance: lateral error within which the fingers close [m]; half the pad width minus a screw's radius.
+        tolerance: lateral error within which the fingers close [m].
         height_tolerance: error of height within which the fingers close [m].
+        dwell: frames in a row within both tolerances before the fingers close.
         lost_after: time without a sighting until the hand backs off [s].
         retreat: how far it backs off to see more [m].
         retreats: how often it may do so.
@@ -48,6 +49,7 @@ class ServoConfig:
     slope: float = 6.0
     tolerance: float = 0.003
     height_tolerance: float = 0.0025
+    dwell: int = 3
     lost_after: float = 1.0
     retreat: float = 0.05
     retreats: int = 2
@@ -58,27 +60,30 @@ class ServoConfig:
 class CentroidServo:
     """Kalman filter on a resting object, and a funnel that trades height against lateral error."""
 
-    def __init__(self, config: ServoConfig, label: str, guess: Array, depth: float, yaw: float, t: float) -> None:
-        """Start at time `t` [s] from the head camera's `guess` (3,) of the object's surface point in odom.
+    def __init__(
+        self, config: ServoConfig, centroid: CentroidConfig, target: LocalizedObject, yaw: float, t: float
+    ) -> None:
+        """Start at time `t` [s] from what the head camera saw.
 
         Args:
             config: noise, gates and patience.
-            label: class of the object to follow.
-            guess: (3,) where the head camera saw it.
-            depth: how far below the surface point the fingertips go [m].
+            centroid: where around the object the fingers close.
+            target: the object as the head camera saw it.
             yaw: heading of the gripper's x axis [rad].
             t: start time [s].
         """
-        self.label = label
+        self.label = target.label
         self._config = config
-        self._x = np.array(guess, dtype=float)
+        self._centroid = centroid
+        self._x = np.array(target.position, dtype=float)
         self._variance: Array = np.full(3, config.first_radius**2)
-        self._depth = depth
+        self._depth = centroid.depth
         self._yaw = yaw
         self._t = t
         self._seen_at = t
         self._sightings = 0
         self._retreats = 0
+        self._inside = 0
         self._lift = 0.0
         self._best = np.inf
         self._best_at = t
@@ -106,7 +111,11 @@ class CentroidServo:
         height = float(gripper[2] - grasp[2])
         confirmed = self._sightings >= c.confirm
         if status is ServoStatus.TRACKING and confirmed:
-            if lateral < c.tolerance and abs(height) < c.height_tolerance:
+            if lateral > c.tolerance or abs(height) > c.height_tolerance:
+                self._inside = 0
+            elif sightings:
+                self._inside += 1
+            if self._inside >= c.dwell:
                 status = ServoStatus.CONVERGED
             error = lateral + abs(height)
             if error < self._best - c.progress:
@@ -116,7 +125,11 @@ class CentroidServo:
         else:
             self._best, self._best_at = np.inf, t
 
-        above = np.clip(c.slope * (lateral - c.tolerance), 0.0, c.standoff) if confirmed else c.standoff + self._lift
+        above = (
+            np.clip(c.slope * (lateral - c.tolerance), 0.0, c.standoff)
+            if confirmed
+            else c.standoff + self._lift
+        )
         goal = top_down(grasp + (0.0, 0.0, above), self._yaw)
         return ServoStep(goal, self._x.copy(), float(np.sqrt(self._variance.max())), status)
 
@@ -134,6 +147,7 @@ class CentroidServo:
             if np.hypot(*(nearest.position[:2] - boresight)) > c.first_radius:
                 return
             self._x, self._variance = nearest.position.copy(), noise
+            self._depth = self._wanted_depth(nearest)
         else:
             total = self._variance + noise
             distances = [float(np.sum((s.position - self._x) ** 2 / total)) for s in candidates]
@@ -143,8 +157,13 @@ class CentroidServo:
             gain = self._variance / total
             self._x = self._x + gain * (candidates[best].position - self._x)
             self._variance = (1.0 - gain) * self._variance
+            # The ground gets clearer as the hand comes closer; the same gain as the height follows it.
+            self._depth += float(gain[2]) * (self._wanted_depth(candidates[best]) - self._depth)
         self._sightings += 1
         self._seen_at = t
+
+    def _wanted_depth(self, sighting: LocalizedObject) -> float:
+        return grasp_depth(sighting, self._centroid.depth, self._centroid.clearance)
 
 
 @dataclass(frozen=True)
@@ -176,6 +195,4 @@ class VisualServo:
         """Return the loop that refines `grasp`; see `GraspMethod`."""
         x_axis = grasp.T_odom_gripper[:3, 0]
         yaw = float(np.arctan2(x_axis[1], x_axis[0]))
-        return CentroidServo(
-            self.config.servo, target.label, target.position, self.config.centroid.depth, yaw, t
-        )
+        return CentroidServo(self.config.servo, self.config.centroid, target, yaw, t)

@@ -67,10 +67,10 @@ def evaluate(data: Path = RUNS / "data", weights: Path | None = None, out: Path 
         weights: ONNX file; the shipped one if absent.
         out: also write the figures there, as JSON.
     """
-    from golem.capabilities.localization.onnx_detector import OnnxDetector
+    from golem.capabilities.localization.onnx_detector import OnnxDetector, OnnxDetectorConfig
     from golem.training.detector.evaluate import THRESHOLD, evaluate, table
 
-    detector = OnnxDetector(weights=weights, threshold=THRESHOLD)
+    detector = OnnxDetector(OnnxDetectorConfig(None if weights is None else str(weights), THRESHOLD))
     scores = evaluate(dataset.load(data, "held_out"), detector.detect)
     print(table(scores))
     if out is not None:
