@@ -94,6 +94,7 @@ class World:
 
     def _wrong_shape(self, inputs: GateInputs, rng: np.random.Generator) -> GateInputs:
         shape = [(26,), (28,), (27, 1), ()][rng.integers(4)]
+        assert inputs.state is not None and inputs.command is not None
         if rng.integers(2):
             return replace(inputs, state=replace(inputs.state, q=np.zeros(shape)))
         return replace(inputs, command=replace(inputs.command, kp=np.zeros(shape)))

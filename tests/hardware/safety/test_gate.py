@@ -146,6 +146,14 @@ def test_short_gaps_and_late_duplicates_do_not_stop(bench: Any, state_at: Make, 
         assert bench.tick(**changes).state is GateState.ACTIVE
 
 
+def test_a_pressed_button_stays_pressed_until_a_frame_says_otherwise(bench: Any) -> None:
+    bench.tick(estop=EstopFrame(bench.t, 999, True))
+    for _ in range(5):
+        result = bench.tick(estop=None)
+        assert (result.state, result.reason) == (GateState.INIT, Reason.ESTOP_PRESSED)
+    assert bench.tick().state is GateState.ARMED
+
+
 def test_a_late_pressed_frame_counts(bench: Any) -> None:
     bench.activate()
     for _ in range(20):
@@ -212,16 +220,14 @@ def test_a_pause_allows_no_leap(bench: Any, command_at: Make, state_at: Make, li
 def test_check_is_pure(bench: Any, limits: SafetyLimits, state_at: Make, command_at: Make) -> None:
     bench.activate()
     memory = bench.gate.memory
-    inputs = GateInputs(
-        bench.t + 0.002, state_at(bench.t, np.full(27, 0.01)), command_at(bench.t, np.full(27, 0.05))
-    )
-    kept = [
-        array.copy() for array in (memory.outgoing.q, memory.outgoing.kp, inputs.command.q, inputs.state.q)
-    ]
+    t = bench.t + 0.002
+    state, command = state_at(t, np.full(27, 0.01)), command_at(t, np.full(27, 0.05))
+    inputs = GateInputs(t, state, command)
+    arrays = (memory.outgoing.q, memory.outgoing.kp, command.q, state.q)
+    kept = [array.copy() for array in arrays]
     a, b = check(inputs, limits, memory), check(inputs, limits, memory)
     np.testing.assert_array_equal(a.command.q, b.command.q)
-    now = (memory.outgoing.q, memory.outgoing.kp, inputs.command.q, inputs.state.q)
-    for was, array in zip(kept, now, strict=True):
+    for was, array in zip(kept, arrays, strict=True):
         np.testing.assert_array_equal(was, array)
     assert memory.t == bench.t
 
