@@ -11,6 +11,7 @@ from typing import Literal
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from golem.robots.model import magpie
 from golem.robots.model.loft import Axis, Loft, ring
@@ -307,7 +308,7 @@ def _turned(along: Sequence[float]) -> Array:
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def _add_mesh(spec: mujoco.MjSpec, name: str, vertices: Array, faces: Array) -> None:
+def _add_mesh(spec: mujoco.MjSpec, name: str, vertices: Array, faces: NDArray[np.int32]) -> None:
     spec.add_mesh(name=name, uservert=vertices.ravel(), userface=faces.ravel())
 
 
