@@ -1,0 +1,237 @@
+"""What differential IK controllers share: weights, limits, checks, and the integration of the command state."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from golem.capabilities.arms.base import (
+    ARM_COLUMNS,
+    NUM_UPPER,
+    ArmCommand,
+    check_dt,
+    check_joints,
+    check_pose,
+)
+from golem.capabilities.arms.kinematics import UpperKinematics
+from golem.capabilities.arms.postures import posture
+from golem.errors import ConfigError
+from golem.types import SIDES, UPPER, Array, Side
+
+
+@dataclass(frozen=True, slots=True)
+class TaskSpaceConfig:
+    """Weights, gains and limits of a differential IK controller.
+
+    Attributes:
+        rate: ticks per second [Hz].
+        latency: declared time to compute a tick [s]; a tick of `diff_ik` takes about 0.1 ms.
+        palm_gain: alpha of the palm tasks, the share of the error one tick removes, in (0, 1].
+        position_weight: weight of a palm's position error [1/m^2].
+        rotation_weight: weight of a palm's rotation error [1/rad^2]; 0.1 makes 1 mm as dear as 3 mrad.
+        posture: name of the posture the redundant joints return to.
+        posture_weight: weight of the arms' posture task [1/rad^2].
+        torso_weight: weight of the torso's posture task [1/rad^2]: the torso carries the head camera and the
+            other arm, so it shall move only where an arm alone does not reach.
+        posture_rate: how fast posture and torso return where the palms leave them free [1/s].
+        damping: lambda, everywhere.
+        error_damping: added to lambda per unit of weighted palm error that the previous tick left over. A
+            target that cannot be reached leaves an error e, and a Gauss-Newton step along a direction the hand can
+            hardly move in overshoots unless lambda exceeds e times half the arm's curvature, about 0.15 here;
+            while targets are tracked nothing is left over and nothing is damped.
+        arm_speed: velocity limit of the arm joints [rad/s]. The paper's code uses 1.0; a hand that moves at
+            0.25 m/s needs up to 1.4 at the far end of the work area (x = 0.54 m), 0.8 within x <= 0.46 m.
+        torso_speed: velocity limit of the torso [rad/s], the paper's code's.
+        torso_range: the torso's own position limit, both ways [rad].
+        limit_margin: distance kept from the position limits [rad].
+        palm_speed: a target further away is approached at this speed [m/s].
+        palm_turn: a target turned further away is approached at this rate [rad/s].
+    """
+
+    rate: float = 100.0
+    latency: float = 0.0005
+    palm_gain: float = 1.0
+    position_weight: float = 1.0
+    rotation_weight: float = 0.1
+    posture: str = "ready"
+    posture_weight: float = 1e-4
+    torso_weight: float = 1e-3
+    posture_rate: float = 1.0
+    damping: float = 1e-6
+    error_damping: float = 0.15
+    arm_speed: float = 1.5
+    torso_speed: float = 0.3
+    torso_range: float = 0.5
+    limit_margin: float = 0.02
+    palm_speed: float = 1.0
+    palm_turn: float = 2.0
+
+    def __post_init__(self) -> None:
+        """Refuse values that have no meaning.
+
+        Raises:
+            ConfigError: a value is out of range; the message names it.
+        """
+        positive = (
+            "rate", "position_weight", "rotation_weight", "damping", "arm_speed", "torso_speed", "torso_range",
+            "palm_speed", "palm_turn",
+        )  # fmt: skip
+        for name in positive:
+            if not getattr(self, name) > 0.0:
+                raise ConfigError(
+                    f"The arm controller's option {name} must be positive, not {getattr(self, name)}."
+                )
+        for name in (
+            "latency",
+            "posture_weight",
+            "torso_weight",
+            "posture_rate",
+            "error_damping",
+            "limit_margin",
+        ):
+            if not getattr(self, name) >= 0.0:
+                raise ConfigError(f"The arm controller's option {name} must not be negative.")
+        if not 0.0 < self.palm_gain <= 1.0:
+            raise ConfigError(
+                f"The arm controller's option palm_gain must lie in (0, 1], not {self.palm_gain}."
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """One palm task of one tick; a goal out of a tick's reach is replaced by the point on the way that is not.
+
+    Attributes:
+        side: which hand.
+        to_frame: the grasp frame as seen from its goal.
+        residual: (6,) twist that leads from the grasp frame to its goal within one unit of time, in the axes of
+            the grasp frame, linear [m] above angular [rad].
+    """
+
+    side: Side
+    to_frame: pin.SE3
+    residual: Array
+
+
+class TaskSpaceController(ABC):
+    """Integrates the joint steps that a subclass solves for; see `UpperBody` for the contract.
+
+    Attributes:
+        rate, latency: see `UpperBody`.
+        config: the options.
+        kinematics: the model, always updated at the command state.
+        lower, upper: (15,) position limits it keeps, margin and torso range included [rad].
+        speed: (15,) velocity limits it keeps [rad/s].
+        rest: (15,) the posture the redundant joints return to [rad].
+        q: (15,) the command state [rad].
+    """
+
+    def __init__(self, config: TaskSpaceConfig | None = None) -> None:
+        """Build the model.
+
+        Raises:
+            ConfigError: the posture is unknown.
+        """
+        self.config = c = config or TaskSpaceConfig()
+        self.rate, self.latency = c.rate, c.latency
+        self.kinematics = UpperKinematics()
+        self.lower: Array = self.kinematics.lower + c.limit_margin
+        self.upper: Array = self.kinematics.upper - c.limit_margin
+        self.lower[0] = max(self.lower[0], -c.torso_range)
+        self.upper[0] = min(self.upper[0], c.torso_range)
+        self.speed: Array = np.full(NUM_UPPER, c.arm_speed)
+        self.speed[0] = c.torso_speed
+        self.rest: Array = np.clip(posture(c.posture), self.lower, self.upper)
+        self.soft: Array = np.full(NUM_UPPER, c.posture_weight)
+        self.soft[0] = c.torso_weight
+        self._left_over = 0.0
+        self._move(self.rest)
+
+    @abstractmethod
+    def solve(
+        self, reaches: Sequence[Reach], lower: Array, upper: Array, damping: float, dt: float
+    ) -> Array | None:
+        """Return the joint step (15,) that serves `reaches` best [rad], or None if the solver finds none.
+
+        Args:
+            reaches: one or two palm tasks.
+            lower: (15,) smallest step that position and velocity limits allow [rad].
+            upper: (15,) largest step that they allow [rad].
+            damping: lambda of this tick.
+            dt: length of the tick [s].
+        """
+
+    def reset(self, q: Array) -> None:
+        """Start from the joints `q` (27,) [rad]; see `UpperBody.reset`."""
+        self._left_over = 0.0
+        self._move(np.clip(check_joints("The posture to start from", q)[UPPER], self.lower, self.upper))
+
+    def step(
+        self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float
+    ) -> ArmCommand:
+        """Solve once and integrate; see `UpperBody.step`."""
+        c = self.config
+        check_joints("q_measured", q_measured)
+        check_dt(dt)
+        goals = (
+            None
+            if targets_left is None
+            else pin.SE3(check_pose("The target of the left hand", targets_left)),
+            None
+            if targets_right is None
+            else pin.SE3(check_pose("The target of the right hand", targets_right)),
+        )
+        room = self.speed * dt
+        reaches: list[Reach] = []
+        damping, limited = c.damping + c.error_damping * self._left_over, False
+        for side, goal in zip(SIDES, goals, strict=True):
+            if goal is None:
+                room[ARM_COLUMNS[side]] = 0.0
+                continue
+            to_frame = goal.actInv(self.kinematics.placement(side))
+            residual = -pin.log6(to_frame).vector
+            distance, angle = _norm(residual[:3]), _norm(residual[3:])
+            reach, turn = c.palm_speed * dt, c.palm_turn * dt
+            share = min(reach / max(distance, reach), turn / max(angle, turn))
+            if share < 1.0:
+                limited = True
+                residual = share * residual
+                to_frame = pin.exp6(-residual)
+            reaches.append(Reach(side, to_frame, residual))
+        if reaches:
+            lower = np.maximum(self.lower - self.q, -room)
+            upper = np.minimum(self.upper - self.q, room)
+            step = self.solve(reaches, lower, upper, damping, dt)
+            if step is None:
+                limited = True
+            else:
+                held = (step <= lower + 1e-9) | (step >= upper - 1e-9)
+                limited |= bool((held & (room > 0.0)).any())
+                step = np.minimum(np.maximum(step, lower), upper)
+                self._move(np.minimum(np.maximum(self.q + step, self.lower), self.upper))
+        position, rotation = self._errors(goals)
+        self._left_over = float(
+            np.sqrt(c.position_weight * (position @ position) + c.rotation_weight * (rotation @ rotation))
+        )
+        return ArmCommand(self.q.copy(), position, rotation, limited)
+
+    def _move(self, q: Array) -> None:
+        self.q: Array = q.copy()
+        self.kinematics.update(self.q)
+
+    def _errors(self, goals: tuple[pin.SE3 | None, pin.SE3 | None]) -> tuple[Array, Array]:
+        position, rotation = np.zeros(2), np.zeros(2)
+        for i, (side, goal) in enumerate(zip(SIDES, goals, strict=True)):
+            if goal is not None:
+                here = self.kinematics.placement(side)
+                position[i] = _norm(goal.translation - here.translation)
+                rotation[i] = _norm(pin.log3(here.rotation.T @ goal.rotation))
+        return position, rotation
+
+
+def _norm(v: Array) -> float:
+    return float(np.sqrt(v @ v))
