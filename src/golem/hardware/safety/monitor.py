@@ -24,37 +24,30 @@ class Fault(NamedTuple):
     detail: str = ""
 
 
-def finite(array: Array) -> bool:
-    """Return whether `array` is (27,) and holds finite numbers of a believable size only."""
-    if getattr(array, "shape", None) != (NUM_JOINTS,):
-        return False
-    return np.count_nonzero(np.abs(array) < _ABSURD) == NUM_JOINTS
+def finite(*arrays: Array) -> bool:
+    """Return whether each array is (27,) and holds finite numbers of a believable size only."""
+    for array in arrays:
+        if getattr(array, "shape", None) != (NUM_JOINTS,):
+            return False
+    joined = np.concatenate(arrays)
+    return np.count_nonzero(np.abs(joined) < _ABSURD) == joined.size
 
 
 def whole(state: LowState) -> bool:
     """Return whether every array of `state` has its shape, every number is finite and the quaternion has length 1."""
     imu = state.imu
-    if not (finite(state.q) and finite(state.dq) and finite(state.tau)):
+    if not finite(state.q, state.dq, state.tau):
         return False
     if imu.quat.shape != (4,) or imu.gyro.shape != (3,) or imu.acc.shape != (3,):
         return False
     w, x, y, z = imu.quat.tolist()
-    return (
-        0.9 < w * w + x * x + y * y + z * z < 1.1
-        and math.isfinite(math.fsum(map(abs, imu.gyro.tolist())))
-        and math.isfinite(math.fsum(map(abs, imu.acc.tolist())))
-    )
+    rates = sum(map(abs, imu.gyro.tolist())) + sum(map(abs, imu.acc.tolist()))
+    return 0.9 < w * w + x * x + y * y + z * z < 1.1 and rates < _ABSURD
 
 
 def whole_command(command: LowCommand) -> bool:
     """Return whether every array of `command` is (27,) and finite."""
-    return (
-        finite(command.q)
-        and finite(command.dq)
-        and finite(command.tau)
-        and finite(command.kp)
-        and finite(command.kd)
-    )
+    return finite(command.q, command.dq, command.tau, command.kp, command.kd)
 
 
 def tilt(quat: Array) -> float:
@@ -79,7 +72,7 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
     q, dq = state.q, state.dq
     speed = np.abs(dq)
     load = np.abs(state.tau)
-    rest = q + dq * speed / (2.0 * limits.deceleration)
+    rest = q + dq * speed / (limits.deceleration + limits.deceleration)
     angle = tilt(state.imu.quat)
     count = np.count_nonzero
     fast = count(speed > limits.velocity)
