@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from types import TracebackType
 
 import mujoco
@@ -29,23 +29,32 @@ class CameraRig:
     Every rig of a process shares one OpenGL context; a spawned worker gets its own with its first rig.
     """
 
-    def __init__(self, model: mujoco.MjModel, infos: Iterable[CameraInfo], *, fancy: bool = False) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        infos: Iterable[CameraInfo],
+        *,
+        fancy: bool = False,
+        views: Mapping[str, mujoco.MjvCamera] | None = None,
+    ) -> None:
         """Prepare to render the cameras `infos` of `model`.
 
         Args:
-            model: has a fixed camera of every info's name; its field of view is not used, the info's intrinsics are.
+            model: has a fixed camera of every info's name that `views` lacks; its field of view is not used, the
+                info's intrinsics are.
             infos: the cameras.
             fancy: for figures and films: shadows, reflections and smooth edges.
+            views: a spectator's cameras, by the name of their info: the model need not have these.
 
         Raises:
-            KeyError: the model has no camera of that name.
+            KeyError: neither the model nor `views` has a camera of that name.
             ConfigError: `MUJOCO_GL` names a backend that cannot render off-screen.
             MissingSystemLibrary: OpenGL or its driver is absent.
         """
         self._model = model
         self._infos = {info.name: info for info in infos}
-        self._views: dict[str, mujoco.MjvCamera] = {}
-        for name in self._infos:
+        self._views: dict[str, mujoco.MjvCamera] = dict(views or {})
+        for name in self._infos.keys() - self._views.keys():
             view = mujoco.MjvCamera()
             view.type = mujoco.mjtCamera.mjCAMERA_FIXED
             view.fixedcamid = model.camera(name).id
