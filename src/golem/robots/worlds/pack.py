@@ -179,6 +179,8 @@ def _add_rim(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, hole
         by_side[side].append((x, y))
         plate = parts.add_mesh(spec, f"hole_plate_{slot:02d}", *parts.holed_plate(HOLE_CELL, radius, 0.022))
         parts.visual_mesh(body, plate, (x, y, 0.0), material="cover_coat", name=f"hole_{slot:02d}")
+        if slot in layout.empty_holes:  # a dropped screw is wider than the hole: it rolls over it
+            parts.collider(body, _BOX, (HOLE_CELL, HOLE_CELL, COVER / 2), (x, y, -COVER / 2 - 0.0005))
         parts.visual(body, _CYLINDER, (radius, 0.0005), (x, y, -0.0215), material="hole_dark")
     # Four bands carry the fasteners, split at the holes; the field inside them surrounds the window.
     _strip(body, (0.0, band), (-hy, hy), by_side["near"], along=1)
