@@ -33,7 +33,7 @@ class ServoConfig:
         steady_error: position error below which a joint's bias integrates [rad]; 0.1 rad is the sag of a shoulder
             under 4 kg at 0.6 m.
         steady_speed: joint speed below which it does [rad/s]. Faster motion would teach the bias the lag of the damping
-            term, and the arm would overshoot when it stops: 2.5 mm with 0.10 against 0.4 mm with 0.04.
+            term, and the arm would overshoot when it stops.
         integral: whether the bias exists at all.
         hands: whether the robot wears the MAGPIE hands.
     """
