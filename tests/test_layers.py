@@ -11,7 +11,7 @@ SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
 
 # From the bottom up. A package may import from its own row and from every row below it.
 LAYERS = (
-    ("__init__", "types", "errors", "registry"),
+    ("__init__", "types", "errors", "options", "registry"),
     ("middleware",),
     ("robots",),
     ("hardware",),
@@ -19,7 +19,7 @@ LAYERS = (
     ("skills",),
     ("stack", "assembly", "runtime"),
     ("evaluation", "training", "dashboard", "doctor"),
-    ("cli", "__main__"),
+    ("run", "cli", "__main__"),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 NOT_AT_RUN_TIME = "training"
