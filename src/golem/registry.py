@@ -15,8 +15,11 @@ import sys
 import typing
 from collections.abc import Mapping
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 from golem.errors import ConfigError, GolemError, ModuleFault, unknown_name
+from golem.options import convert_all, dataclass_in, fill
 
 _IMPLEMENTATIONS: dict[str, dict[str, str]] = {
     "robot": {"mujoco": "golem.robots.mujoco.engine:MujocoRobot"},
@@ -59,7 +62,7 @@ def register(slot: str, name: str, target: str) -> None:
         raise ConfigError(f"The name '{name}' in slot '{slot}' already stands for {taken}.")
 
 
-def load(slot: str, use: str) -> type:
+def load(slot: str, use: str) -> type[Any]:
     """Return the class that `use` names in `slot`, importing it now.
 
     Raises:
@@ -73,60 +76,46 @@ def load(slot: str, use: str) -> type:
     module = _import(slot, use, location)
     cls = getattr(module, class_name, None)
     if not inspect.isclass(cls):
-        classes = [
-            k for k, v in vars(module).items() if inspect.isclass(v) and v.__module__ == module.__name__
-        ]
-        raise unknown_name(f"class in {location}", class_name, classes)
+        own = (v for v in vars(module).values() if inspect.isclass(v) and v.__module__ == module.__name__)
+        raise unknown_name(f"class in {location}", class_name, (v.__name__ for v in own))
     return cls
 
 
-def create(slot: str, use: str, options: Mapping[str, object], **context: object) -> typing.Any:
+def create(slot: str, use: str, options: Mapping[str, object], **context: object) -> Any:
     """Build the implementation `use` of `slot`.
 
-    A class whose constructor takes `config` (a dataclass) gets the options as that dataclass; any other class gets
-    them as keyword arguments. `context` is what the stack itself supplies (e.g. `side`): passed where the
-    constructor has a parameter of that name, else left out.
+    A class whose constructor takes `config` (a dataclass) gets the options as that dataclass, in which further
+    dataclasses are given as mappings; any other class gets them as keyword arguments. `context` is what the stack
+    itself supplies (e.g. `side`): passed where the constructor has a parameter of that name, else left out.
 
     Raises:
-        ConfigError: an option does not exist, or one without default is missing.
+        ConfigError: an option does not exist, has the wrong type, or has no default and is missing.
         ModuleFault: the constructor raised.
     """
     cls = load(slot, use)
+    what = f"option of {slot}: {use}"
     parameters = inspect.signature(cls).parameters
     supplied = {key: value for key, value in context.items() if key in parameters}
-    config = _config_class(cls)
-    if config is not None:
-        _check(slot, use, options, [f.name for f in dataclasses.fields(config)])
-        arguments = {"config": config(**options), **supplied}
-    else:
-        _check(slot, use, options, [name for name in parameters if name not in supplied])
-        arguments = {**options, **supplied}
     try:
-        return cls(**arguments)
+        config = _config_class(cls)
+        arguments = (
+            {"config": fill(what, config, options)} if config else convert_all(what, cls, options, supplied)
+        )
+        return cls(**arguments, **supplied)
     except GolemError:
         raise
     except Exception as error:  # a user's constructor may raise anything
         raise ModuleFault(slot, use, f"its constructor raised {type(error).__name__}: {error}") from error
 
 
-def _config_class(cls: type) -> type | None:
+def _config_class(cls: type[Any]) -> type[Any] | None:
     """Return the dataclass that the constructor's parameter `config` takes, if there is one."""
     if dataclasses.is_dataclass(cls) or "config" not in inspect.signature(cls).parameters:
         return None
-    hint = typing.get_type_hints(cls.__init__).get("config")
-    for candidate in (hint, *typing.get_args(hint)):
-        if inspect.isclass(candidate) and dataclasses.is_dataclass(candidate):
-            return candidate
-    return None
+    return dataclass_in(typing.get_type_hints(cls.__init__).get("config"))
 
 
-def _check(slot: str, use: str, options: Mapping[str, object], valid: list[str]) -> None:
-    for key in options:
-        if key not in valid:
-            raise unknown_name(f"option of {slot}: {use}", key, valid)
-
-
-def _import(slot: str, use: str, location: str) -> typing.Any:
+def _import(slot: str, use: str, location: str) -> ModuleType:
     try:
         if not location.endswith(".py"):
             return importlib.import_module(location)

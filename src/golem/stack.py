@@ -68,33 +68,42 @@ def shipped() -> tuple[str, ...]:
     return tuple(sorted(p.name.removesuffix(".yaml") for p in folder.iterdir() if p.name.endswith(".yaml")))
 
 
-def load_stack(source: str | Path) -> Stack:
+def load_stack(source: str | Path, profile: str | None = None) -> Stack:
     """Read a stack file.
 
     Args:
         source: path of a YAML file, or the name of a shipped stack.
+        profile: replaces the file's realism profile.
 
     Raises:
         ConfigError: no such file, not YAML, or a key or value that means nothing; names what would be valid.
     """
-    if str(source) in shipped():
-        return parse_stack((resources.files("golem") / "stacks" / f"{source}.yaml").read_text(), str(source))
     path = Path(source)
-    if not path.is_file():
-        raise ConfigError(
-            f"No stack file '{source}'; give a path to a YAML file or one of: {', '.join(shipped())}."
-        )
-    return parse_stack(path.read_text(), str(source))
+    try:
+        if str(source) in shipped():
+            text = (resources.files("golem") / "stacks" / f"{source}.yaml").read_text(encoding="utf-8")
+        elif path.is_file():
+            text = path.read_text(encoding="utf-8")
+        else:
+            raise ConfigError(
+                f"No stack file '{source}'; give a path to a YAML file or one of: {', '.join(shipped())}."
+            )
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"The stack file '{source}' cannot be read as text: {error}.") from error
+    stack = parse_stack(text, str(source))
+    return stack if profile is None else replace(stack, profile=profile)
 
 
 def parse_stack(text: str, name: str) -> Stack:
     """Parse the YAML `text` of the stack file called `name`; errors as in `load_stack`."""
     try:
-        data = yaml.safe_load(text) or {}
+        data = yaml.load(text, _Loader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f", line {mark.line + 1}" if mark else ""
         raise ConfigError(f"{name}{where}: not valid YAML ({getattr(error, 'problem', error)}).") from error
+    if data is None:
+        return Stack()
     if not isinstance(data, Mapping):
         raise ConfigError(f"{name}: a stack file is a mapping such as 'upper_body: {{use: diff_ik}}'.")
     values: dict[str, Any] = {}
@@ -120,4 +129,46 @@ def _choice(name: str, slot: str, value: object) -> Choice:
             f"{name}: '{slot}' wants '{{use: NAME, option: value, ...}}', with NAME one of "
             f"{', '.join(registry.names(slot))}, package.module:Class or file.py:Class."
         )
-    return Choice(value["use"], {str(k): v for k, v in value.items() if k != "use"})
+    options = {key: v for key, v in value.items() if key != "use"}
+    _check_options(f"{name}: {slot}", options)
+    return Choice(value["use"], options)
+
+
+def _check_options(where: str, value: object) -> None:
+    """Raise unless `value` is made of words, numbers, truth values, lists and mappings of them by name."""
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            if not isinstance(key, str):
+                raise ConfigError(f"{where}: an option's name is a word, not {key!r}.")
+            _check_options(f"{where}.{key}", inner)
+    elif isinstance(value, list):
+        for inner in value:
+            _check_options(where, inner)
+    elif not isinstance(value, str | int | float | None):
+        raise ConfigError(
+            f"{where}: a value is a word, a number, true, false, a list or a mapping, not a {type(value).__name__}."
+        )
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML whose mappings name each key once, and in which nothing refers to itself."""
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Refuse aliases: a stack file has no use for them, and they can nest without end."""
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark
+            raise yaml.constructor.ConstructorError(
+                None, None, "aliases are not allowed in a stack file", mark
+            )
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Return the mapping of `node`, in which no key may occur twice."""
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if key.value in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"'{key.value}' occurs twice", key.start_mark
+                )
+            seen.add(str(key.value))
+        return super().construct_mapping(node, deep)

@@ -146,7 +146,7 @@ def _check(config: LadderConfig, overrides: Mapping[str, str]) -> tuple[str, Pro
     if not config.method:
         raise ConfigError(f"--method names no method; valid: {', '.join(sorted(rung.methods()))}.")
     for method in config.method:
-        if method not in rung.methods():
+        if method not in rung.methods() and ":" not in method:
             raise unknown_name("method", method, rung.methods())
         if config.method.count(method) > 1:
             raise ConfigError(f"--method names '{method}' more than once.")

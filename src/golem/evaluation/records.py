@@ -11,6 +11,7 @@ import errno
 import fcntl
 import json
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -125,7 +126,8 @@ class Provenance:
 
 def trial_name(spec: TrialSpec) -> str:
     """Return the file name, without suffix, of what belongs to one trial."""
-    return f"{spec.method}-{spec.index:05d}"
+    # A method may be named `folder/file.py:Class`.
+    return f"{re.sub(r'[^A-Za-z0-9_.-]', '_', spec.method)}-{spec.index:05d}"
 
 
 def read_records(path: Path) -> list[TrialRecord]:

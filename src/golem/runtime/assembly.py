@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,12 +21,13 @@ from golem.robots.sensors.profiles import load_profile
 from golem.runtime import nodes
 from golem.runtime.executor import Executor, Node
 from golem.runtime.guard import Guard
+from golem.runtime.guarded import GuardedMethod
 from golem.skills.base import Skill, SkillResult
 from golem.skills.context import Context
 from golem.skills.grasping.base import GraspMethod
 from golem.skills.runner import SkillRun
 from golem.stack import Stack
-from golem.types import LEGS, NUM_JOINTS, SIDES, UPPER, Array
+from golem.types import LEGS, NUM_JOINTS, SIDES, UPPER, Array, Side
 
 CAMERA_LATENCY = 0.033
 """Time from exposure to the frame being available [s]: one frame period of a D400 at 30 Hz."""
@@ -62,9 +64,10 @@ class Running:
 
     @property
     def method(self) -> GraspMethod:
-        """The stack's grasp method."""
+        """The stack's grasp method, new and guarded."""
         choice = self.stack.grasp_method
-        return registry.create("grasp_method", choice.use, choice.options)
+        method = registry.create("grasp_method", choice.use, choice.options)
+        return GuardedMethod(method, Guard("grasp_method", choice.use))
 
     def _nodes(self, stack: Stack, robot: Robot) -> list[Node]:
         """Return the nodes in the order of one tick: measure, estimate, perceive, decide, control, protect, act."""
@@ -120,6 +123,7 @@ class Running:
             goal: its goal.
             timeout: robot time after which it is given up [s].
             realtime: pace by the wall clock.
+            watch: called after every tick, for judges and viewers.
 
         Returns:
             The result; a safety stop or a timeout ends the skill with a result that says so.

@@ -38,6 +38,7 @@ class PickConfig:
             (y is mirrored for the left). Inside the paper's box (x <= 0.60, |y| <= 0.45, -0.05 <= z <= 0.60).
         yaw: heading of the gripper's x axis when it points down [rad], right arm; mirrored for the left.
         clearance: height of the gripper above the object when it arrives and when it leaves [m].
+        travel_height: least height of the gripper when it moves across, in odom [m]; clears the tray's walls.
         travel_speed: between places [m/s].
         descend_speed: straight down to an open-loop grasp [m/s].
         servo_speed: limit of the visual servo [m/s].
@@ -48,12 +49,14 @@ class PickConfig:
         pull_speed: how fast [m/s].
         tolerance: distance from a commanded pose at which the arm counts as arrived [m].
         drop_height: height of the fingertips above the container's floor when they open [m].
+        release_gap: opening that lets go [m].
         look_timeout: time a camera may take to show the object [s].
     """
 
     workspace: tuple[float, float, float, float, float, float] = (0.30, 0.60, -0.30, 0.10, -0.15, 0.60)
     yaw: float = -1.5707963267948966
     clearance: float = 0.15
+    travel_height: float = 0.08
     travel_speed: float = 0.25
     descend_speed: float = 0.10
     servo_speed: float = 0.15
@@ -64,6 +67,7 @@ class PickConfig:
     pull_speed: float = 0.05
     tolerance: float = 0.006
     drop_height: float = 0.10
+    release_gap: float = 0.060
     look_timeout: float = 3.0
 
 
@@ -81,6 +85,7 @@ class Pick:
         """Pick one object; see `Skill`."""
         timings: dict[str, float] = {"start": context.t}
         context.skill = self.name
+        home = context.arms[goal.side].pose
         try:
             target, container = await self._detect(context, goal)
             grasp = await self._approach(context, goal, target)
@@ -93,8 +98,9 @@ class Pick:
             await self._extract(context, goal)
             await self._place(context, goal, container)
         except StageFailed as failure:
-            context.say(failure.stage, str(failure))
-            await self._retire(context, goal)
+            context.say(failure.stage, str(failure), failed=True)
+            context.hands[goal.side].open(self._config.release_gap)
+            await self._travel(context, goal.side, home)
             timings["total"] = context.t - timings.pop("start")
             return SkillResult(False, failure.stage, failure.slot, str(failure), timings)
         except SkillCancelled:
@@ -102,6 +108,7 @@ class Pick:
             context.say("cancelled", "Stopped where it was.")
             raise
         timings["total"] = context.t - timings.pop("start")
+        await self._travel(context, goal.side, home)
         context.say("done", f"The {goal.label} is in the {goal.container}.")
         return SkillResult(
             True, "done", None, f"The {goal.label} was dropped in the {goal.container}.", timings
@@ -237,21 +244,14 @@ class Pick:
         await self._travel(context, goal.side, T)
         if not hand.status.holding:
             raise StageFailed("place", "grasp_method", f"The {goal.label} was lost on the way.")
-        hand.open(0.06)
-        await context.until(lambda: hand.status.gap > 0.04, 2.0)
-        await context.sleep(0.3)
-
-    async def _retire(self, context: Context, goal: PickGoal) -> None:
-        """Leave the object: open, and go up to where the head camera sees past the hand."""
-        context.hands[goal.side].open(0.06)
-        arm = context.arms[goal.side]
-        await arm.move(lifted(arm.commanded, self._config.clearance), self._config.travel_speed)
+        hand.open(self._config.release_gap)
+        await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
 
     async def _travel(self, context: Context, side: Side, T_goal: Array) -> None:
-        """Go to `T_goal` at a height that clears everything: up first or down last, never across below."""
+        """Go to `T_goal` (4, 4) by way of the travel height: up first, down last, never across below it."""
         arm = context.arms[side]
         start = arm.commanded
-        height = max(start[2, 3], T_goal[2, 3])
+        height = max(start[2, 3], T_goal[2, 3], self._config.travel_height)
         for T in (at_height(start, height), at_height(T_goal, height), T_goal):
             await arm.move(T, self._config.travel_speed)
         await arm.settle(self._config.tolerance, 1.0)

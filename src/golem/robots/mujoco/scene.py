@@ -13,11 +13,16 @@ from golem.robots.sensors.streams import stream
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
 from golem.robots.worlds.screws import ScrewDraw, draw_screws
+from golem.types import CameraInfo
 
 COARSE_STEP = 0.002
 """Physics step while nothing delicate is touched [s]."""
 FINE_STEP = 0.0005
 """Physics step while a screw moves or a finger is about to touch one [s]; the bores need it."""
+
+
+ONLOOKER = CameraInfo("onlooker", 640, 480, fx=700.0, fy=700.0, cx=319.5, cy=239.5, near=0.0, far=60.0, rate=15.0)
+"""A camera beside the pack, for pictures of what happened."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,7 @@ def build_scene(layout: PackLayout, profile: RealismProfile, seed: int, reach_y:
     slots = [s for s in layout.reachable(reach_y) if s not in layout.empty_holes]
     draws = draw_screws(stream(seed, "world/screws"), profile.screws, slots)
     names = add_pack(spec, layout, draws)
+    _add_onlooker(spec, layout)
     spec.option.timestep = COARSE_STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     for kind, name in (
@@ -62,17 +68,14 @@ def build_scene(layout: PackLayout, profile: RealismProfile, seed: int, reach_y:
     return Scene(spec.compile(), names, layout, tuple(draws))
 
 
-def settle(scene: Scene, data: mujoco.MjData, seconds: float = 0.2) -> None:
-    """Let the screws come to rest in their bores with the robot held where it is."""
-    model = scene.model
-    qpos = data.qpos.copy()
-    robot_dofs = model.jnt_dofadr[: model.njnt - len(scene.names.screws)]
-    model.opt.timestep = FINE_STEP
-    for _ in range(round(seconds / FINE_STEP)):
-        mujoco.mj_step(model, data)
-        data.qvel[: robot_dofs.max() + 1] = 0.0
-        data.qpos[: len(qpos) - 7 * len(scene.names.screws)] = qpos[: len(qpos) - 7 * len(scene.names.screws)]
-    data.time = 0.0
-
-
-__all__ = ["COARSE_STEP", "FINE_STEP", "Scene", "build_scene", "np", "settle"]
+def _add_onlooker(spec: mujoco.MjSpec, layout: PackLayout) -> None:
+    """Add a fixed camera that watches hands and near edge from the robot's left; no module of a stack sees it."""
+    eye = np.array([layout.near_edge + 0.95, 0.75, layout.top_z + 0.70])
+    target = np.array([layout.near_edge + 0.02, -0.15, layout.top_z + 0.06])
+    back = (eye - target) / np.linalg.norm(eye - target)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    axes = np.concatenate([right, np.cross(back, right)])
+    camera = spec.worldbody.add_camera(name=ONLOOKER.name, pos=eye.tolist())
+    camera.alt.type = mujoco.mjtOrientation.mjORIENTATION_XYAXES
+    camera.alt.xyaxes = axes.tolist()

@@ -1,0 +1,163 @@
+"""The command line: `golem COMMAND [options]`.
+
+Only the chosen command is imported: help answers at once, and spawned workers import this module again.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import tyro
+
+from golem.errors import GolemError, unknown_name
+
+T = TypeVar("T")
+
+BAD_INPUT = 2
+"""Exit code for everything a user can cause."""
+FAILED = 1
+"""Exit code of a command that ran but did not reach its goal."""
+INTERRUPTED = 130
+
+
+def _demo(words: list[str]) -> int:
+    """The robot finds loosened screws, pulls them and drops them in the tray, in front of you."""
+    _prepare_graphics()
+    from golem.demo import DemoConfig, run_demo
+
+    return 0 if run_demo(_parse(DemoConfig, "demo", words)).success else FAILED
+
+
+def _run(words: list[str]) -> int:
+    """Run a stack file once, in lock-step or with the live view."""
+    _prepare_graphics()
+    from golem.run import RunConfig, run_stack
+
+    return 0 if run_stack(_parse(RunConfig, "run", words)).success else FAILED
+
+
+def _ladder(words: list[str]) -> int:
+    """Compare methods on one rung of the capability ladder, on the same seeds."""
+    _prepare_graphics()
+    from golem.evaluation.ladder import LadderConfig, run_ladder
+
+    config = _parse(LadderConfig, "ladder", words)
+    result = run_ladder(config)
+    print(result.summary.text())
+    print(f"Report: {result.report}")
+    if config.json:
+        print(result.summary.json())
+    return 0
+
+
+@dataclass(frozen=True)
+class ExportConfig:
+    """Write the robot model to a file."""
+
+    out: Path
+    """The file to write."""
+    format: str = "mjcf"
+    """urdf or mjcf."""
+    hands: bool = True
+    """With the MAGPIE hands."""
+
+
+def _model(words: list[str]) -> int:
+    """Export the robot model as URDF or MJCF."""
+    if words and words[0] not in ("export", "-h", "--help"):
+        raise unknown_name("model command", words[0], ["export"])
+    config = _parse(ExportConfig, "model export", words[1:] if words[:1] == ["export"] else ["--help"])
+    from golem.robots.model.export import export
+
+    export(config.format, config.hands, config.out)
+    print(f"Wrote {config.out}")
+    return 0
+
+
+def _bench(words: list[str]) -> int:
+    """Print every performance figure beside its reference."""
+    _prepare_graphics()
+    from golem.evaluation.bench import BenchConfig, run_bench
+
+    run_bench(_parse(BenchConfig, "bench", words))
+    return 0
+
+
+def _train(words: list[str]) -> int:
+    """Train a module from scratch: detector."""
+    if not words or words[0] != "detector":
+        raise unknown_name("thing to train", words[0] if words else "", ["detector"])
+    _prepare_graphics()
+    from golem.training.detector.__main__ import main as train_detector
+
+    sys.argv = ["golem train detector", *words[1:]]
+    train_detector()
+    return 0
+
+
+def _doctor(words: list[str]) -> int:
+    """Say what this machine lacks to run GOLEM, and the line that brings it."""
+    _parse(_NoOptions, "doctor", words)
+    from golem.doctor import run
+
+    return run()
+
+
+@dataclass(frozen=True)
+class _NoOptions:
+    """Say what this machine lacks to run GOLEM, and the line that brings it."""
+
+
+COMMANDS: dict[str, Callable[[list[str]], int]] = {
+    "demo": _demo,
+    "run": _run,
+    "ladder": _ladder,
+    "model": _model,
+    "bench": _bench,
+    "train": _train,
+    "doctor": _doctor,
+}
+
+
+def main() -> None:
+    """Run the command line; what a user can cause ends in one sentence and exit code 2."""
+    try:
+        code = _dispatch(sys.argv[1:])
+    except GolemError as error:
+        print(f"golem: {error}", file=sys.stderr)
+        code = BAD_INPUT
+    except KeyboardInterrupt as interrupt:
+        print(f"golem: {interrupt or 'interrupted'}", file=sys.stderr)
+        code = INTERRUPTED
+    sys.exit(code)
+
+
+def _dispatch(words: list[str]) -> int:
+    if not words or words[0] in ("-h", "--help"):
+        print("usage: golem COMMAND [options]     (golem COMMAND --help tells the options)\n")
+        for name, command in COMMANDS.items():
+            print(f"  {name:8s} {command.__doc__}")
+        return 0 if words else BAD_INPUT
+    if words[0] == "--version":
+        from golem import __version__
+
+        print(__version__)
+        return 0
+    if words[0] not in COMMANDS:
+        raise unknown_name("command", words[0], COMMANDS)
+    return COMMANDS[words[0]](words[1:])
+
+
+def _parse(kind: type[T], name: str, words: list[str]) -> T:
+    return tyro.cli(kind, prog=f"golem {name}", args=words)
+
+
+def _prepare_graphics() -> None:
+    """Choose a rendering backend that this machine has, before MuJoCo is imported and chooses another."""
+    from golem.robots.mujoco.gl import choose_backend
+
+    choose_backend()

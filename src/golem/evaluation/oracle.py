@@ -1,0 +1,96 @@
+"""The simulator's truth, for judges: what really happened, and which error was the larger. Stacks cannot reach it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from golem.robots.model import magpie
+from golem.robots.mujoco.camera import CameraRig
+from golem.robots.mujoco.engine import MujocoRobot
+from golem.robots.mujoco.scene import ONLOOKER
+from golem.types import Array, Side
+
+
+@dataclass(frozen=True, slots=True)
+class GraspTruth:
+    """Where hand and screw were when the fingers began to close.
+
+    Attributes:
+        aim: distance across the approach axis from where the hand was sent to the nearest screw [m]: perception.
+        reach: distance between where the hand was sent and where it was [m]: the arm and its calibration.
+        miss: distance across the approach axis between hand and nearest screw [m]: what came of both.
+        depth: height of the screw's head above the fingertips [m], positive when the tips are below it.
+        tilt: angle between approach axis and vertical [rad].
+    """
+
+    aim: float
+    reach: float
+    miss: float
+    depth: float
+    tilt: float
+
+
+class Oracle:
+    """Reads the truth of one twin."""
+
+    def __init__(self, robot: MujocoRobot) -> None:
+        """Look into `robot`."""
+        self._robot = robot
+        self._T_odom_world = np.eye(4)
+        self._T_odom_world[2, 3] = -robot.config.hoist.height
+        self._rig: CameraRig | None = None
+
+    def screws_in_tray(self) -> list[str]:
+        """Return the names of the screws that lie inside the tray's walls."""
+        layout = self._robot.scene.layout
+        half = 0.5 * np.array(layout.tray_size[:2])
+        found = []
+        for name in self._robot.scene.names.screws:
+            x, y, z = self._robot.data.body(name).xpos
+            inside = np.abs(np.array([x, y]) - layout.tray_xy) <= half
+            if inside.all() and layout.tray_z - 0.01 <= z <= layout.tray_z + layout.tray_size[2]:
+                found.append(name)
+        return found
+
+    def gripper(self, side: Side) -> Array:
+        """Return the true (4, 4) pose of a grasp frame in odom."""
+        body = self._robot.data.body(magpie.hand_name(side))
+        T = np.eye(4)
+        T[:3, :3] = body.xmat.reshape(3, 3)
+        T[:3, 3] = body.xpos
+        return self._T_odom_world @ T @ magpie.T_HAND_GRIPPER
+
+    def screw_heads(self) -> Array:
+        """Return the (n, 3) undersides of the loosened screws' heads in odom [m]."""
+        world = np.array([self._robot.data.body(name).xpos for name in self._robot.scene.names.screws])
+        return world + self._T_odom_world[:3, 3]
+
+    def grasp(self, side: Side, T_commanded: Array) -> GraspTruth:
+        """Compare where the hand is, where it was sent (4, 4, in odom), and where the nearest screw is."""
+        T = self.gripper(side)
+        heads = self.screw_heads()
+        offsets = (heads - T[:3, 3]) @ T[:3, :3]
+        nearest = int(np.argmin(np.hypot(offsets[:, 0], offsets[:, 1])))
+        return GraspTruth(
+            aim=float(np.hypot(*(heads[nearest] - T_commanded[:3, 3])[:2])),
+            reach=float(np.linalg.norm(T[:3, 3] - T_commanded[:3, 3])),
+            miss=float(np.hypot(*offsets[nearest, :2])),
+            depth=-float(offsets[nearest, 2]),
+            tilt=float(np.arccos(np.clip(-T[2, 2], -1.0, 1.0))),
+        )
+
+    def picture(self) -> bytes:
+        """Return a PNG of the scene as it is now, from beside the pack."""
+        if self._rig is None:
+            self._rig = CameraRig(self._robot.scene.model, [ONLOOKER])
+        rgb, _ = self._rig.render(self._robot.data, ONLOOKER.name)
+        return cv2.imencode(".png", rgb[:, :, ::-1])[1].tobytes()
+
+    def close(self) -> None:
+        """Release the rendering context."""
+        if self._rig is not None:
+            self._rig.close()
+            self._rig = None

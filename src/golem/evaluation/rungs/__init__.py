@@ -1,0 +1,1 @@
+"""The rungs of the capability ladder, one file each."""

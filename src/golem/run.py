@@ -1,0 +1,77 @@
+"""`golem run`: one stack file, one episode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tyro.conf import Positional
+
+from golem.dashboard.live import LiveView
+from golem.middleware import topics
+from golem.runtime.assembly import Running, build
+from golem.skills.base import Feedback, SkillResult
+from golem.skills.pick import Pick, PickGoal
+from golem.stack import load_stack
+
+TIMEOUT = 90.0
+"""Robot time after which the task is given up [s]."""
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """Run a stack file once: the robot picks one screw, in lock-step or with the live view."""
+
+    stack: Positional[str] = "tether"
+    """Path of a stack file, or the name of a shipped one."""
+    profile: str | None = None
+    """Realism profile: ideal, bench or field; default: the stack file's."""
+    seed: int = 0
+    """Seed of the episode."""
+    view: bool = False
+    """Show it live in the browser, paced by the wall clock."""
+    port: int = 8080
+    """Port of the live view."""
+
+
+def run_stack(config: RunConfig) -> SkillResult:
+    """Run the episode and print what happens.
+
+    Raises:
+        ConfigError: the stack file or an option is wrong.
+        ModuleFault: a module broke its contract.
+    """
+    running, robot = build(load_stack(config.stack, profile=config.profile), config.seed)
+    try:
+        if config.view:
+            with LiveView(running, robot, config.port) as view:
+                print(f"Live view: {view.url}   (Ctrl-C ends it)")
+                return view.run(Pick(running.method), PickGoal())
+        narrator = Narrator(running)
+        result = running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=narrator)
+    finally:
+        robot.close()
+    print(
+        f"{'Done' if result.success else 'Failed'} after {running.executor.t:.1f} s of robot time: {result.reason}"
+    )
+    return result
+
+
+class Narrator:
+    """Prints each new stage of the running skill once."""
+
+    def __init__(self, running: Running) -> None:
+        """Listen to the skill of `running`."""
+        self._running = running
+        self._seen = 0
+        self._stage = ""
+
+    def __call__(self) -> None:
+        """Look for news."""
+        count = self._running.bus.count(topics.FEEDBACK)
+        if count == self._seen:
+            return
+        self._seen = count
+        feedback = self._running.bus.latest(topics.FEEDBACK, Feedback)
+        if feedback is not None and (feedback.stage != self._stage or feedback.data.get("failed")):
+            self._stage = feedback.stage
+            print(f"{feedback.t:7.2f} s  {feedback.stage:9s} {feedback.text}")

@@ -1,0 +1,47 @@
+"""Grasp methods behind a guard: a user's method may raise or return nonsense, and the fault shall carry its name."""
+
+from __future__ import annotations
+
+from golem.errors import ModuleFault
+from golem.runtime.guard import Guard
+from golem.skills.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStep
+from golem.types import Array, LocalizedObject
+
+
+class GuardedMethod:
+    """A `GraspMethod` whose faults name the module."""
+
+    def __init__(self, method: GraspMethod, guard: Guard) -> None:
+        """Watch `method`."""
+        self._method, self._guard = method, guard
+
+    def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+        """Return the method's grasps; see `GraspMethod`."""
+        grasps = list(self._guard.call(self._method.propose, target, yaw))
+        for grasp in grasps:
+            if not isinstance(grasp, Grasp):
+                raise ModuleFault(
+                    self._guard.slot, self._guard.use, f"propose returned {type(grasp).__name__}, not Grasp"
+                )
+            self._guard.array("T_odom_gripper", grasp.T_odom_gripper, (4, 4))
+        return grasps
+
+    def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw | None:
+        """Return the method's law, guarded; see `GraspMethod`."""
+        law = self._guard.call(self._method.servo, target, grasp, t)
+        return None if law is None else GuardedLaw(law, self._guard)
+
+
+class GuardedLaw:
+    """A `ServoLaw` whose faults name the module."""
+
+    def __init__(self, law: ServoLaw, guard: Guard) -> None:
+        """Watch `law`."""
+        self._law, self._guard = law, guard
+        self.label = law.label
+
+    def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
+        """Return the law's step; see `ServoLaw`."""
+        step = self._guard.call(self._law.step, t, sightings, T_odom_gripper)
+        self._guard.array("T_odom_gripper", step.T_odom_gripper, (4, 4))
+        return step
