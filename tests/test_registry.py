@@ -1,0 +1,176 @@
+"""A name in the stack file becomes an instance, or one sentence that says what would have worked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from golem import registry
+from golem.errors import ConfigError, ModuleFault
+from golem.skills.grasping.centroid import Centroid
+from golem.skills.grasping.visual_servo import VisualServo
+
+USER_FILE = """
+from __future__ import annotations
+from dataclasses import dataclass, field
+
+@dataclass(frozen=True)
+class Loop:
+    gain: float = 1.0
+
+@dataclass(frozen=True)
+class Config:
+    depth: float = 0.01
+    loop: Loop = field(default_factory=Loop)
+
+class WithConfig:
+    def __init__(self, config: Config | None = None, side: str = "none") -> None:
+        self.config, self.side = config or Config(), side
+
+class WithKeywords:
+    def __init__(self, gain: float, side: str = "none") -> None:
+        self.gain, self.side = gain, side
+
+class Nothing:
+    pass
+
+class Raises:
+    def __init__(self) -> None:
+        raise OSError("no such weights")
+
+not_a_class = 3
+"""
+
+
+@pytest.fixture
+def user(tmp_path: Path) -> str:
+    """A user's file with modules in it."""
+    path = tmp_path / "mine.py"
+    path.write_text(USER_FILE)
+    return str(path)
+
+
+@pytest.mark.parametrize("slot", registry.slots())
+def test_every_registered_name_is_a_class_with_the_promised_name(slot: str) -> None:
+    for use in registry.names(slot):
+        if use == "pink_ik":
+            pytest.importorskip("pink")
+        assert isinstance(registry.load(slot, use), type)
+
+
+def test_a_registered_name() -> None:
+    assert isinstance(registry.create("grasp_method", "centroid", {}), Centroid)
+
+
+def test_a_class_of_an_installed_package() -> None:
+    use = "golem.skills.grasping.centroid:Centroid"
+    assert isinstance(registry.create("grasp_method", use, {}), Centroid)
+
+
+def test_a_class_of_a_file(user: str) -> None:
+    assert type(registry.create("grasp_method", f"{user}:Nothing", {})).__name__ == "Nothing"
+
+
+def test_a_file_is_loaded_once(user: str) -> None:
+    assert registry.load("hand", f"{user}:Nothing") is registry.load("hand", f"{user}:Nothing")
+
+
+def test_options_of_a_config_dataclass() -> None:
+    method = registry.create("grasp_method", "centroid", {"depth": 0.02})
+    assert (method.config.depth, method.config.gap) == (0.02, Centroid().config.gap)
+
+
+def test_options_of_a_nested_config() -> None:
+    method = registry.create("grasp_method", "visual_servo", {"servo": {"tolerance": 0.002}})
+    assert isinstance(method, VisualServo)
+    assert method.config.servo.tolerance == 0.002
+    assert method.config.centroid == VisualServo().config.centroid
+
+
+def test_a_nested_option_that_does_not_exist() -> None:
+    with pytest.raises(ConfigError, match="grasp_method: visual_servo 'servo'.*Did you mean 'tolerance'"):
+        registry.create("grasp_method", "visual_servo", {"servo": {"tolerence": 0.002}})
+
+
+def test_options_of_a_user_class(user: str) -> None:
+    made = registry.create("hand", f"{user}:WithConfig", {"loop": {"gain": 2}}, side="left")
+    assert (made.config.loop.gain, made.config.depth, made.side) == (2.0, 0.01, "left")
+
+
+def test_keyword_options_of_a_user_class(user: str) -> None:
+    made = registry.create("hand", f"{user}:WithKeywords", {"gain": 2}, side="left", seed=1)
+    assert (made.gain, made.side) == (2.0, "left")
+
+
+def test_what_the_stack_supplies_is_not_an_option(user: str) -> None:
+    with pytest.raises(ConfigError, match=r"'side'; valid: gain\."):
+        registry.create("hand", f"{user}:WithKeywords", {"gain": 1.0, "side": "right"}, side="left")
+
+
+@pytest.mark.parametrize(
+    ("slot", "use", "words"),
+    [
+        ("upper_body", "dif_ik", ["upper_body", "'dif_ik'", "diff_ik, pink_ik", "Did you mean 'diff_ik'?"]),
+        ("upper_body", "", ["upper_body", "diff_ik"]),
+        ("hand", "no_such_file.py:Hand", ["hand", "no_such_file.py", "does not exist"]),
+        ("hand", "no_such_package.hands:Hand", ["no_such_package.hands", "cannot be found", "magpie"]),
+        ("hand", "golem.no_such_module:Hand", ["golem.no_such_module", "cannot be found"]),
+        ("hand", "golem.hardware.hands.magpie:MagpieHnd", ["Did you mean 'MagpieHand'?"]),
+        ("hand", "golem.hardware.hands.magpie:", ["class in golem.hardware.hands.magpie", "MagpieHand"]),
+        ("hand", "golem.hardware.hands.magpie:FORCE_STEP", ["Unknown class", "MagpieHand"]),
+    ],
+)
+def test_a_wrong_name_is_answered_with_what_would_work(slot: str, use: str, words: list[str]) -> None:
+    with pytest.raises(ConfigError) as caught:
+        registry.create(slot, use, {})
+    assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+def test_a_wrong_class_of_a_file_is_answered_with_its_classes(user: str) -> None:
+    with pytest.raises(ConfigError, match=r"'WithConfg'; valid: .*WithKeywords.* Did you mean 'WithConfig'"):
+        registry.create("hand", f"{user}:WithConfg", {})
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("raise RuntimeError('boom')", "importing it raised RuntimeError: boom"),
+        ("def broken(:", "importing it raised SyntaxError"),
+        ("import no_such_package_anywhere", "needs the package 'no_such_package_anywhere'"),
+    ],
+)
+def test_a_file_that_cannot_be_imported_is_the_modules_fault(tmp_path: Path, text: str, reason: str) -> None:
+    path = tmp_path / "broken.py"
+    path.write_text(text + "\n")
+    use = f"{path}:Hand"
+    with pytest.raises(ModuleFault) as caught:
+        registry.create("hand", use, {})
+    assert (caught.value.slot, caught.value.use) == ("hand", use)
+    assert reason in caught.value.reason
+
+
+def test_a_file_that_failed_is_tried_again_once_mended(tmp_path: Path) -> None:
+    path = tmp_path / "mended.py"
+    path.write_text("raise RuntimeError\n")
+    with pytest.raises(ModuleFault):
+        registry.load("hand", f"{path}:Hand")
+    path.write_text("class Hand: ...\n")
+    assert registry.load("hand", f"{path}:Hand").__name__ == "Hand"
+
+
+def test_a_constructor_that_raises_is_the_modules_fault(user: str) -> None:
+    with pytest.raises(ModuleFault, match=r"hand: .*mine\.py:Raises failed: .*OSError: no such weights"):
+        registry.create("hand", f"{user}:Raises", {})
+
+
+def test_a_new_name_may_be_registered_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    table = {slot: dict(names) for slot, names in registry._IMPLEMENTATIONS.items()}
+    monkeypatch.setattr(registry, "_IMPLEMENTATIONS", table)
+    registry.register("grasp_method", "mine", "golem.skills.grasping.centroid:Centroid")
+    registry.register("grasp_method", "mine", "golem.skills.grasping.centroid:Centroid")
+    assert registry.load("grasp_method", "mine") is Centroid
+    with pytest.raises(ConfigError, match="already stands for golem.skills.grasping.centroid:Centroid"):
+        registry.register("grasp_method", "mine", "golem.skills.grasping.visual_servo:VisualServo")
+    with pytest.raises(ConfigError, match=r"Unknown slot 'grasp'.*Did you mean 'grasp_method'"):
+        registry.register("grasp", "mine", "a:B")
