@@ -55,9 +55,13 @@ class OnnxDetector:
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
-        self._session = onnxruntime.InferenceSession(
-            _weights(self.config.weights), options, providers=["CPUExecutionProvider"]
-        )
+        weights = _weights(self.config.weights)
+        try:
+            self._session = onnxruntime.InferenceSession(weights, options, providers=["CPUExecutionProvider"])
+        except Exception as error:  # onnxruntime's errors have no common base
+            raise ConfigError(
+                f"The detector's weights {self.config.weights} are not an ONNX network."
+            ) from error
         facts = self._session.get_modelmeta().custom_metadata_map
         try:
             self.classes: tuple[str, ...] = tuple(json.loads(facts["classes"]))
@@ -83,7 +87,7 @@ class OnnxDetector:
         for label in sorted(wanted - set(self.classes)):
             raise unknown_name("label", label, self.classes)
         x = normalise(image, self._mean, self._std, self._multiple)
-        maps: NDArray[np.float32] = self._session.run(["maps"], {"image": x})[0][0]
+        maps = np.asarray(self._session.run(["maps"], {"image": x})[0])[0]
         return find_peaks(maps, self.classes, wanted, self.config.threshold, (image.shape[1], image.shape[0]))
 
     def locate(self, frame: Frame, labels: Sequence[str]) -> list[LocalizedObject]:

@@ -6,9 +6,12 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from golem.types import Array
 
+Faces = NDArray[np.int64]
+"""(m, 3) vertex indices of triangles."""
 WORLD_CONTACT = 1
 """contype and conaffinity of everything that collides in a world; a robot geom that shall touch it needs bit 0."""
 VISUAL_GROUP = 2
@@ -76,7 +79,7 @@ def collider(
     return geom
 
 
-def add_mesh(spec: mujoco.MjSpec, name: str, vertices: Array, faces: Array) -> str:
+def add_mesh(spec: mujoco.MjSpec, name: str, vertices: Array, faces: Faces) -> str:
     """Add a visual mesh from (n, 3) vertices [m] and (m, 3) triangles; flat shaded. Returns `name`."""
     flat = vertices[faces.ravel()]  # unshared vertices, so that edges stay sharp
     spec.add_mesh(
@@ -88,7 +91,7 @@ def add_mesh(spec: mujoco.MjSpec, name: str, vertices: Array, faces: Array) -> s
     return name
 
 
-def lathe(profile: Sequence[tuple[float, float]], sides: int = 20) -> tuple[Array, Array]:
+def lathe(profile: Sequence[tuple[float, float]], sides: int = 20) -> tuple[Array, Faces]:
     """Revolve (radius, height) points, given from bottom to top, about z; the ends are closed where radius > 0.
 
     Returns:
@@ -111,10 +114,10 @@ def lathe(profile: Sequence[tuple[float, float]], sides: int = 20) -> tuple[Arra
                 faces.append((a, b, c))
             if points[row + 1, 0] > 0:
                 faces.append((a, c, d))
-    return vertices, np.asarray(faces)
+    return vertices, np.asarray(faces, np.int64)
 
 
-def holed_plate(half: float, hole_radius: float, depth: float, sides: int = 24) -> tuple[Array, Array]:
+def holed_plate(half: float, hole_radius: float, depth: float, sides: int = 24) -> tuple[Array, Faces]:
     """Return a square plate face (z = 0) with a round hole and the hole's wall and dark bottom at -`depth`.
 
     Args:
@@ -147,10 +150,10 @@ def holed_plate(half: float, hole_radius: float, depth: float, sides: int = 24) 
     for quadrant in range(4):
         i = sides // 8 + quadrant * sides // 4 - 1
         faces.append((i, 3 * sides + quadrant, i + 1))
-    return vertices, np.asarray(faces)
+    return vertices, np.asarray(faces, np.int64)
 
 
-def hexagon(across_flats: float, height: float, chamfer: float = 0.0006) -> tuple[Array, Array]:
+def hexagon(across_flats: float, height: float, chamfer: float = 0.0006) -> tuple[Array, Faces]:
     """Return a hexagonal prism on z = 0 with a chamfered top. Lengths in metres."""
     radius = across_flats / np.sqrt(3.0)
     return lathe([(radius, 0.0), (radius, height - chamfer), (radius - chamfer * 1.5, height)], sides=6)

@@ -34,13 +34,10 @@ def crop(
     shift = np.array([(w - 1) / 2, (h - 1) / 2]) - scale * middle
     matrix = np.column_stack([np.diag(scale), shift])
     filling = cv2.BORDER_REFLECT_101 if rng.random() < 0.3 else cv2.BORDER_CONSTANT
-    mode = cv2.INTER_AREA if zoom < 0.8 else cv2.INTER_LINEAR
     if zoom < 0.8:
-        image = cv2.GaussianBlur(image, (0, 0), 0.35 / zoom)
-        mode = cv2.INTER_LINEAR
-    piece = cv2.warpAffine(
-        image, matrix, CROP, flags=mode, borderMode=filling, borderValue=rng.uniform(0, 255, 3)
-    )
+        image = np.asarray(cv2.GaussianBlur(image, (0, 0), 0.35 / zoom), np.uint8)
+    shade = tuple(float(v) for v in rng.uniform(0, 255, 3))
+    piece = cv2.warpAffine(image, matrix, CROP, flags=cv2.INTER_LINEAR, borderMode=filling, borderValue=shade)
     if filling == cv2.BORDER_REFLECT_101:
         # Mirrored parts outside the image would be unlabelled: hide them.
         inside = cv2.warpAffine(np.ones((height, width), np.uint8), matrix, CROP, flags=cv2.INTER_NEAREST)
@@ -58,7 +55,7 @@ def crop(
     out[:, 5:7] = np.clip(out[:, 5:7], low, high)
     keep = (out[:, 1:3] >= 0).all(axis=1) & (out[:, 1] <= w - 1) & (out[:, 2] <= h - 1)
     out[:, 7] = np.maximum(out[:, 7], (out[:, 5:7] - out[:, 3:5]).min(axis=1) < 3.0)
-    return piece, out[keep]
+    return np.asarray(piece, np.uint8), out[keep]
 
 
 def corrupt(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.float32]:

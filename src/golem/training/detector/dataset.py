@@ -37,7 +37,10 @@ class Dataset:
 
     def decode(self, index: int) -> NDArray[np.uint8]:
         """Return image `index` as (height, width, 3) RGB."""
-        return cv2.cvtColor(cv2.imdecode(self.images[index], cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+        image = cv2.imdecode(self.images[index], cv2.IMREAD_COLOR)
+        if image is None:
+            raise ValueError(f"image {index} of the data set cannot be decoded")
+        return np.ascontiguousarray(image[..., ::-1], np.uint8)
 
 
 def render(
@@ -81,18 +84,18 @@ def generate(folder: Path, seed: int, split: str, worlds: int, per_camera: int) 
         path = target / f"world_{index:03d}.npz"
         if path.exists():
             continue
-        arrays: dict[str, NDArray[np.generic]] = {}
+        arrays: dict[str, NDArray[np.float32] | NDArray[np.uint8]] = {}
         for k, (rgb, labels, camera) in enumerate(render(seed, index, split, per_camera)):
             ok, code = cv2.imencode(
                 ".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
             )
             if not ok:
                 raise RuntimeError("JPEG encoding failed")
-            arrays[f"image_{camera}_{k:04d}"] = code
+            arrays[f"image_{camera}_{k:04d}"] = np.asarray(code, np.uint8)
             arrays[f"label_{camera}_{k:04d}"] = labels.astype(np.float32)
         part = path.with_suffix(".part")
         with part.open("wb") as file:
-            np.savez(file, **arrays)
+            np.savez(file, allow_pickle=False, **arrays)
         part.rename(path)
 
 

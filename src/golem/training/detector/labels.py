@@ -29,8 +29,8 @@ def label_image(world: World, info: CameraInfo, segmentation: NDArray[np.int32])
         info: the camera.
         segmentation: (height, width) geom ids.
     """
-    T_optical_world = np.linalg.inv(camera_pose(world, info.name))
-    seen = np.bincount(segmentation[segmentation >= 0], minlength=world.model.ngeom)
+    T_optical_world = np.linalg.inv(camera_pose(world, info.name)).astype(np.float64)
+    seen = np.bincount(segmentation[segmentation >= 0], minlength=world.model.ngeom).astype(np.int64)
     rows: list[list[float]] = []
     for part in world.names.parts:
         if part.label == "screw_hole":
@@ -44,7 +44,9 @@ def label_image(world: World, info: CameraInfo, segmentation: NDArray[np.int32])
     return np.array(rows).reshape(-1, len(COLUMNS))
 
 
-def _solid(world: World, info: CameraInfo, T: Array, part: Part, seen: Array) -> list[list[float]]:
+def _solid(
+    world: World, info: CameraInfo, T: Array, part: Part, seen: NDArray[np.int64]
+) -> list[list[float]]:
     model, data = world.model, world.data
     names = [n for n in part.geoms if not n.endswith("_thread")]
     ids = [model.geom(n).id for n in names]

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from golem.robots.model import magpie, mjcf
@@ -50,11 +51,11 @@ class World:
     layout: PackLayout
     names: PackNames
     draws: tuple[ScrewDraw, ...]
-    robot_geoms: Array
+    robot_geoms: NDArray[np.int64]
     distractors: tuple[int, ...]
     plain_robot: bool
     robot_rgba: Array
-    robot_matid: Array
+    robot_matid: NDArray[np.int32]
 
 
 def build_world(rng: np.random.Generator) -> World:
@@ -87,7 +88,7 @@ def build_world(rng: np.random.Generator) -> World:
     model = spec.compile()
     bodies = tuple(model.body(f"distractor_{k}").id for k in range(DISTRACTORS))
     root = model.body(mjcf.BASE_LINK).rootid[0]
-    robot = np.flatnonzero(model.body_rootid[model.geom_bodyid] == root)
+    robot = np.flatnonzero(model.body_rootid[model.geom_bodyid] == root).astype(np.int64)
     colours = model.geom_rgba.copy(), model.geom_matid.copy()
     return World(model, mujoco.MjData(model), layout, names, tuple(draws), robot, bodies, plain, *colours)
 
