@@ -1,0 +1,216 @@
+"""Films the robot at work: a spectator's camera, the robot's own cameras as insets, and what the robot says."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from golem.dashboard.scene import Shot, SpectatorView
+from golem.dashboard.status import Status, Timeline, camera_picture, read_status
+from golem.errors import OutputError
+from golem.hardware.safety.base import GateState
+from golem.robots.mujoco.engine import MujocoRobot
+from golem.runtime.assembly import Running
+
+SHOTS = {
+    "wide": Shot(look_at=(0.36, -0.02, 1.16), azimuth=-152.0, elevation=-17.0, distance=2.35),
+    "close": Shot(look_at=(0.42, -0.14, 1.14), azimuth=-138.0, elevation=-20.0, distance=0.95),
+}
+CLOSE_STAGES = ("descend", "servo", "grasp", "extract")
+"""Stages that are filmed from near; the others are filmed wide."""
+OVERSAMPLING = 4 / 3
+"""Pictures are rendered larger than shown by this: smooth edges at a third of the price of multisampling."""
+GIF_SCALE = 2 / 3
+"""Size of a GIF's pictures, relative to the film's."""
+GIF_FRAMES = 240
+"""A film with more pictures than this drops some in its GIF."""
+MAX_GIF = 8_000_000
+"""Size above which a GIF is written again, smaller [bytes]."""
+PANEL = (16, 20, 27)
+INK, MUTED = (240, 242, 245), (150, 160, 173)
+SAFETY_COLOURS = {
+    GateState.ACTIVE: (63, 160, 110),
+    GateState.ARMED: (224, 160, 50),
+    GateState.INIT: (130, 138, 150),
+    GateState.STOP1: (216, 74, 56),
+    GateState.STOP0: (216, 74, 56),
+}
+
+
+class Film:
+    """Collects pictures of a running stack in robot time.
+
+    Attributes:
+        headline: words at the top of every picture from now on.
+        timeline: the stages seen so far; empty it to begin anew.
+    """
+
+    def __init__(self, robot: MujocoRobot, size: tuple[int, int] = (960, 540), fps: float = 12.5) -> None:
+        """Film `robot`.
+
+        Args:
+            robot: the twin.
+            size: width and height of the film [px].
+            fps: pictures per second of robot time.
+        """
+        self._size, self.fps = size, fps
+        rendered = (round(size[0] * OVERSAMPLING), round(size[1] * OVERSAMPLING))
+        self._view = SpectatorView(robot, SHOTS, rendered)
+        self._frames: list[NDArray[np.uint8]] = []
+        self._fonts = {k: ImageFont.load_default(size=round(k * size[1] / 540)) for k in (13, 15, 19)}
+        self.headline = ""
+        self.timeline = Timeline()
+
+    def __len__(self) -> int:
+        """Return the number of pictures taken."""
+        return len(self._frames)
+
+    def run(self, running: Running, until: float, stop: Callable[[], bool]) -> None:
+        """Drive the stack in lock-step and film it, until time `until` [s] or until `stop()` is true."""
+        while running.executor.t < until and not stop():
+            running.executor.run(min(until, running.executor.t + 1.0 / self.fps), stop)
+            self.frame(running)
+
+    def frame(self, running: Running) -> NDArray[np.uint8]:
+        """Take one picture and keep it; call it every 1 / fps of robot time.
+
+        Returns:
+            (height, width, 3) RGB.
+        """
+        self.timeline.update(running)
+        status = read_status(running)
+        shot = "close" if status.stage in CLOSE_STAGES else "wide"
+        picture = _resized(self._view.picture(shot), self._size)
+        insets = [camera_picture(running, self._view, camera) for camera in ("right_hand", "head")]
+        picture = self._compose(picture, insets, status)
+        packed = cv2.imencode(".png", picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
+        self._frames.append(packed)
+        return picture
+
+    def _compose(
+        self, picture: NDArray[np.uint8], insets: list[NDArray[np.uint8]], status: Status
+    ) -> NDArray[np.uint8]:
+        """Lay insets and words over a picture."""
+        image = Image.fromarray(picture)
+        draw = ImageDraw.Draw(image)
+        width, height = self._size
+        unit = height / 540
+        bar = round(44 * unit)
+        top, edge = height - bar, round(10 * unit)
+        for inset, label in zip(insets, ("palm camera", "head camera"), strict=True):
+            w = round(200 * unit)
+            h = round(w * inset.shape[0] / inset.shape[1])
+            x, y = width - w - edge, top - h - edge
+            draw.rectangle((x - 2, y - 2, x + w + 1, y + h + 1), fill=INK)
+            image.paste(Image.fromarray(_resized(inset, (w, h))), (x, y))
+            draw.rectangle((x, y, x + round(88 * unit), y + round(18 * unit)), fill=PANEL)
+            draw.text((x + 5 * unit, y + 2 * unit), label, fill=INK, font=self._fonts[13])
+            top = y - 2
+        top = height - bar
+        draw.rectangle((0, top, width, height), fill=PANEL)
+        middle = top + bar / 2
+        draw.text((14 * unit, middle), status.stage, fill=(255, 196, 0), font=self._fonts[19], anchor="lm")
+        draw.text((120 * unit, middle), status.text, fill=INK, font=self._fonts[15], anchor="lm")
+        clock = f"{status.t:.1f} s"
+        draw.text((width - 14 * unit, middle), clock, fill=MUTED, font=self._fonts[15], anchor="rm")
+        if self.headline:
+            draw.text((16 * unit, 14 * unit), self.headline, fill=PANEL, font=self._fonts[19])
+        word = f"safety {status.safety}" + (f"  {status.reason}" if status.reason else "")
+        wide = draw.textlength(word, font=self._fonts[13]) + 34 * unit
+        x = width - wide - edge
+        draw.rounded_rectangle((x, edge, width - edge, edge + 24 * unit), radius=12 * unit, fill=PANEL)
+        dot = SAFETY_COLOURS[status.safety]
+        draw.ellipse((x + 9 * unit, edge + 8 * unit, x + 17 * unit, edge + 16 * unit), fill=dot)
+        draw.text((x + 24 * unit, edge + 12 * unit), word, fill=INK, font=self._fonts[13], anchor="lm")
+        return np.asarray(image)
+
+    def save(self, path: Path) -> list[Path]:
+        """Write the film as an animated GIF, and in full beside it as MP4 where this machine can encode that.
+
+        Args:
+            path: the GIF; the other file gets its name with another suffix.
+
+        Returns:
+            The files written, the GIF first. Each appears complete or not at all.
+
+        Raises:
+            OutputError: there is no picture yet, or the file cannot be written.
+        """
+        if not self._frames:
+            raise OutputError(f"No picture was taken for {path}; let the robot run first.")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(dir=path.parent, prefix=".film-") as folder:
+                gif, video = Path(folder) / "film.gif", Path(folder) / "film.mp4"
+                scale = GIF_SCALE
+                self._write_gif(gif, scale)
+                while gif.stat().st_size > MAX_GIF and scale > 0.2:
+                    scale *= min(0.9, 0.97 * float(np.sqrt(MAX_GIF / gif.stat().st_size)))
+                    self._write_gif(gif, scale)
+                os.replace(gif, path)
+                written = [path]
+                if self._write_video(video):
+                    os.replace(video, path.with_suffix(".mp4"))
+                    written.append(path.with_suffix(".mp4"))
+        except OSError as error:
+            raise OutputError(
+                f"Cannot write the film {path}: {error.strerror}; choose another --out."
+            ) from error
+        return written
+
+    def picture(self, index: int, scale: float = 1.0) -> NDArray[np.uint8]:
+        """Return one of the pictures, (height, width, 3) RGB."""
+        picture = cv2.imdecode(self._frames[index], cv2.IMREAD_COLOR)
+        assert picture is not None
+        if scale != 1.0:
+            picture = _resized(picture, (round(self._size[0] * scale), round(self._size[1] * scale)))
+        return np.ascontiguousarray(picture[..., ::-1]).astype(np.uint8, copy=False)
+
+    def _write_gif(self, path: Path, scale: float) -> None:
+        """Write the pictures with one palette: equal pixels stay equal, so that only what moves is stored."""
+        count = len(self._frames)
+        samples = [self.picture(i, 0.25) for i in np.unique(np.linspace(0, count - 1, 24).astype(int))]
+        palette = Image.fromarray(np.concatenate(samples)).quantize(255, method=Image.Quantize.MEDIANCUT)
+        stride = math.ceil(count / GIF_FRAMES)
+
+        def indexed(i: int) -> Image.Image:
+            picture = Image.fromarray(self.picture(i, scale))
+            return picture.quantize(palette=palette, dither=Image.Dither.NONE)
+
+        indexed(0).save(
+            path,
+            format="GIF",
+            save_all=True,
+            append_images=(indexed(i) for i in range(stride, count, stride)),
+            duration=round(1000.0 * stride / self.fps),
+            loop=0,
+            disposal=1,
+            optimize=False,
+        )
+
+    def _write_video(self, path: Path) -> bool:
+        """Write all pictures as VP9, which is free of royalties; returns False where OpenCV cannot encode it."""
+        writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"vp09"), self.fps, self._size)
+        if not writer.isOpened():
+            return False
+        for i in range(len(self._frames)):
+            writer.write(self.picture(i)[..., ::-1])
+        writer.release()
+        return path.is_file() and path.stat().st_size > 0
+
+    def close(self) -> None:
+        """Release the renderer."""
+        self._view.close()
+
+
+def _resized(picture: NDArray[Any], size: tuple[int, int]) -> NDArray[np.uint8]:
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)

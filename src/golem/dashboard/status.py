@@ -1,0 +1,111 @@
+"""What the stack says of itself, read from the bus for people: skill, safety gate, targets, camera pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.dashboard.scene import SpectatorView
+from golem.hardware.safety.base import GateState
+from golem.middleware import topics
+from golem.middleware.topics import Sightings
+from golem.runtime.assembly import Running
+from golem.skills.base import Feedback
+from golem.types import Array, Frame
+
+FRESH = 0.2
+"""Age up to which a frame on the bus is shown [s]: three frame periods."""
+CLASS_COLOURS = {
+    "screw": (255, 196, 0),
+    "screw_hole": (190, 120, 255),
+    "nut": (90, 200, 255),
+    "bus_bar": (255, 120, 40),
+    "tray": (0, 220, 190),
+}
+"""RGB of the boxes around what the detector found."""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """One moment.
+
+    Attributes:
+        t: robot time [s].
+        stage, text: what the skill says; empty before the first.
+        target: (3,) what the skill aims at, in odom [m], or None.
+        safety: state of the safety gate.
+        reason: why the gate does not let commands through; empty when it does.
+    """
+
+    t: float
+    stage: str
+    text: str
+    target: Array | None
+    safety: GateState
+    reason: str
+
+
+def read_status(running: Running) -> Status:
+    """Return the present status of a stack."""
+    feedback = running.bus.latest(topics.FEEDBACK, Feedback)
+    gate = running.safety
+    target = None if feedback is None else feedback.data.get("target")
+    reason = ""
+    if gate is not None and gate.reason is not None:
+        reason = f"{gate.reason}: {gate.detail}" if gate.detail else str(gate.reason)
+    return Status(
+        running.executor.t,
+        "" if feedback is None else feedback.stage,
+        "" if feedback is None else feedback.text,
+        None if target is None else np.asarray(target, dtype=float),
+        GateState.INIT if gate is None else gate.state,
+        reason,
+    )
+
+
+class Timeline:
+    """The stages a skill went through.
+
+    Attributes:
+        stages: name and start [s] of each, in order.
+    """
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self.stages: list[tuple[str, float]] = []
+
+    def update(self, running: Running) -> None:
+        """Take in the newest feedback; call it often enough to miss no stage."""
+        feedback = running.bus.latest(topics.FEEDBACK, Feedback)
+        if feedback is None or (self.stages and feedback.t < self.stages[-1][1]):
+            return
+        if not self.stages or self.stages[-1][0] != feedback.stage:
+            self.stages.append((feedback.stage, feedback.t))
+
+    def durations(self, end: float) -> list[tuple[str, float]]:
+        """Return each stage with how long it took [s]; the last lasts until time `end` [s]."""
+        ends = [start for _, start in self.stages[1:]] + [end]
+        return [
+            (stage, max(0.0, stop - start)) for (stage, start), stop in zip(self.stages, ends, strict=True)
+        ]
+
+
+def camera_picture(running: Running, view: SpectatorView, camera: str) -> NDArray[np.uint8]:
+    """Return what a camera of the robot shows: the frame the robot itself works on, with what it found, or a look now.
+
+    Returns:
+        (height, width, 3) RGB, half the camera's resolution.
+    """
+    frame = running.bus.latest(topics.frames(camera), Frame)
+    if frame is None or running.executor.t - frame.t > FRESH:
+        return view.picture(camera)
+    picture = np.ascontiguousarray(frame.rgb[::2, ::2])
+    sightings = running.bus.latest(topics.sightings(camera), Sightings)
+    if sightings is not None and frame.t - sightings.t <= FRESH:
+        for found in sightings.objects:
+            x0, y0, x1, y1 = (round(float(v) / 2) for v in found.detection.box)
+            cv2.rectangle(picture, (x0, y0), (x1, y1), CLASS_COLOURS.get(found.label, (255, 255, 255)), 1)
+    return picture
