@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from golem.types import Array, CameraInfo, HandCommand, HandState, Imu, LowCommand, Side
-
-from numpy.typing import NDArray
 import numpy as np
+from numpy.typing import NDArray
+
+from golem.types import Array, CameraInfo, HandCommand, HandState, Imu, LowCommand, Side
 
 
 class Robot(Protocol):

@@ -8,11 +8,17 @@ from typing import Any
 import numpy as np
 
 from golem import registry
+from golem.capabilities.arms.base import UpperBody
 from golem.capabilities.arms.postures import POSTURES
+from golem.capabilities.legs.base import LowerBody
 from golem.capabilities.legs.hold import STANCES
-from golem.errors import ConfigError, GolemError
+from golem.capabilities.localization.base import Localizer
+from golem.errors import GolemError
+from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.hands.base import HandController
 from golem.hardware.safety.base import GateResult, GateState, Request, SafetyLimits
+from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
 from golem.middleware.bus import Bus
 from golem.robots.base import Robot
@@ -33,6 +39,15 @@ CAMERA_LATENCY = 0.033
 """Time from exposure to the frame being available [s]: one frame period of a D400 at 30 Hz."""
 OPTICAL_FRAMES = {"head": "head_camera_optical"} | {f"{s}_hand": f"{s}_hand_camera_optical" for s in SIDES}
 """Frame of the nominal model per camera."""
+CONTRACTS: dict[str, type[Any]] = {
+    "estimator": BaseEstimator,
+    "servo": MotorServo,
+    "hand": HandController,
+    "lower_body": LowerBody,
+    "upper_body": UpperBody,
+    "localizer": Localizer,
+}
+"""What the module in a slot must have."""
 
 
 class Running:
@@ -50,7 +65,7 @@ class Running:
 
         Raises:
             ConfigError: a name or an option of the stack is wrong.
-            ModuleFault: a module's constructor raised.
+            ModuleFault: a module's constructor raised, or the module lacks a part of its contract.
         """
         self.stack = stack
         self.bus = Bus()
@@ -67,24 +82,31 @@ class Running:
         """The stack's grasp method, new and guarded."""
         choice = self.stack.grasp_method
         method = registry.create("grasp_method", choice.use, choice.options)
-        return GuardedMethod(method, Guard("grasp_method", choice.use))
+        guard = Guard("grasp_method", choice.use)
+        guard.satisfies(method, GraspMethod)
+        return GuardedMethod(method, guard)
 
     def _nodes(self, stack: Stack, robot: Robot) -> list[Node]:
         """Return the nodes in the order of one tick: measure, estimate, perceive, decide, control, protect, act."""
 
         def make(slot: str, **context: object) -> tuple[Any, Guard]:
             choice = stack.choice(slot)
-            return registry.create(slot, choice.use, choice.options, **context), Guard(slot, choice.use)
+            guard = Guard(slot, choice.use)
+            module = registry.create(slot, choice.use, choice.options, **context)
+            guard.satisfies(module, CONTRACTS[slot])
+            return module, guard
 
         bus = self.bus
+        robot_guard = Guard("robot", stack.robot.use)
         localizer, localizer_guard = make("localizer")
         out: list[Node] = [
-            nodes.SenseNode(bus, robot),
+            nodes.SenseNode(bus, robot, robot_guard),
             nodes.EstimatorNode(bus, *make("estimator")),
             nodes.EstopNode(bus, self.estop),
         ]
         for name in robot.cameras:
-            out.append(nodes.CameraNode(bus, robot, name, OPTICAL_FRAMES[name], CAMERA_LATENCY))
+            optical = OPTICAL_FRAMES[name]
+            out.append(nodes.CameraNode(bus, robot, name, optical, CAMERA_LATENCY, robot_guard))
             out.append(nodes.LocalizerNode(bus, localizer, name, localizer_guard))
         out.append(self._skills)
         out.append(nodes.LowerBodyNode(bus, *make("lower_body")))
@@ -94,7 +116,7 @@ class Running:
             out.append(nodes.HandNode(bus, hand, side, guard))
         out.append(nodes.ServoNode(bus, *make("servo")))
         out.append(self._safety)
-        out.append(nodes.ActNode(bus, robot))
+        out.append(nodes.ActNode(bus, robot, robot_guard))
         return out
 
     @property
@@ -110,11 +132,20 @@ class Running:
         """
         if self._skills.run is not None and self._skills.run.result is None:
             raise GolemError("Another skill is running; cancel it first.")
-        self._skills.run = SkillRun(skill.run(self._context, goal))
+        self._skills.run = SkillRun(skill.name, skill.run(self._context, goal))
         return self._skills.run
 
+    def commanded(self, side: Side) -> Array:
+        """Return the (4, 4) pose in odom that the hand on `side` is being sent to."""
+        return self._context.arms[side].commanded
+
     def execute(
-        self, skill: Skill[Context, Any], goal: object, timeout: float, realtime: bool = False
+        self,
+        skill: Skill[Context, Any],
+        goal: object,
+        timeout: float,
+        realtime: bool = False,
+        watch: Callable[[], None] = lambda: None,
     ) -> SkillResult:
         """Run a skill to its end in robot time.
 
@@ -129,9 +160,12 @@ class Running:
             The result; a safety stop or a timeout ends the skill with a result that says so.
         """
         run = self.start(skill, goal)
-        self.executor.run(
-            self.executor.t + timeout, lambda: run.result is not None or self._stopped(), realtime
-        )
+
+        def over() -> bool:
+            watch()
+            return run.result is not None or self._stopped()
+
+        self.executor.run(self.executor.t + timeout, over, realtime)
         if run.result is not None:
             return run.result
         run.cancel()
@@ -161,12 +195,12 @@ def build(stack: Stack, seed: int) -> tuple[Running, Any]:
 
     Raises:
         ConfigError: a name, an option or the profile is wrong.
+        ModuleFault: a constructor raised, or a module lacks a part of its contract.
     """
     load_profile(stack.profile)
     choice = stack.robot
     robot = registry.create(
         "robot", choice.use, choice.options, profile=stack.profile, seed=seed, posture=start_posture()
     )
-    if not hasattr(robot, "advance"):
-        raise ConfigError(f"robot: {choice.use} does not satisfy the Robot contract (it has no 'advance').")
+    Guard("robot", choice.use).satisfies(robot, Robot)
     return Running(stack, robot), robot

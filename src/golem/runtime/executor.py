@@ -38,8 +38,9 @@ class _Entry:
 
     def __init__(self, node: Node) -> None:
         if node.period < TICK - 1e-9:
+            rate, most = 1.0 / node.period, 1.0 / TICK
             raise ConfigError(
-                f"{type(node).__name__} wants to run at {1.0 / node.period:g} Hz; the clock allows up to {1 / TICK:g} Hz."
+                f"{type(node).__name__} wants to run at {rate:g} Hz; the clock allows up to {most:g} Hz."
             )
         self.step = node.step
         self.period = node.period / TICK

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from golem.errors import ModuleFault
 from golem.runtime.guard import Guard
-from golem.skills.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStep
+from golem.skills.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus, ServoStep
 from golem.types import Array, LocalizedObject
 
 
@@ -17,19 +16,20 @@ class GuardedMethod:
 
     def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
         """Return the method's grasps; see `GraspMethod`."""
-        grasps = list(self._guard.call(self._method.propose, target, yaw))
+        grasps = self._guard.call(lambda: list(self._method.propose(target, yaw)))
         for grasp in grasps:
-            if not isinstance(grasp, Grasp):
-                raise ModuleFault(
-                    self._guard.slot, self._guard.use, f"propose returned {type(grasp).__name__}, not Grasp"
-                )
-            self._guard.array("T_odom_gripper", grasp.T_odom_gripper, (4, 4))
+            self._guard.kind("a proposal", grasp, Grasp)
+            self._guard.array("T_odom_gripper", grasp.T_odom_gripper, 4, 4)
+            self._guard.number("gap", grasp.gap, least=0.0)
         return grasps
 
     def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw | None:
         """Return the method's law, guarded; see `GraspMethod`."""
         law = self._guard.call(self._method.servo, target, grasp, t)
-        return None if law is None else GuardedLaw(law, self._guard)
+        if law is None:
+            return None
+        self._guard.satisfies(law, ServoLaw)
+        return GuardedLaw(law, self._guard)
 
 
 class GuardedLaw:
@@ -43,5 +43,9 @@ class GuardedLaw:
     def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
         """Return the law's step; see `ServoLaw`."""
         step = self._guard.call(self._law.step, t, sightings, T_odom_gripper)
-        self._guard.array("T_odom_gripper", step.T_odom_gripper, (4, 4))
+        self._guard.kind("the servo step", step, ServoStep)
+        self._guard.kind("status", step.status, ServoStatus)
+        self._guard.array("T_odom_gripper", step.T_odom_gripper, 4, 4)
+        self._guard.array("target", step.target, 3)
+        self._guard.number("sigma", step.sigma, least=0.0)
         return step

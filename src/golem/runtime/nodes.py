@@ -7,10 +7,9 @@ import numpy as np
 from golem.capabilities.arms.base import ArmCommand, UpperBody
 from golem.capabilities.legs.base import LegCommand, LowerBody
 from golem.capabilities.localization.base import Localizer
-from golem.errors import ModuleFault
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.base import EmergencyStop, EstopFrame
-from golem.hardware.hands.base import HandController
+from golem.hardware.hands.base import HandController, HandStatus
 from golem.hardware.safety.base import GateInputs, GateMemory, GateState, Request, SafetyLimits
 from golem.hardware.safety.gate import check
 from golem.hardware.servo.base import MotorServo
@@ -32,6 +31,7 @@ from golem.types import (
     Frame,
     HandCommand,
     HandState,
+    LocalizedObject,
     LowCommand,
     LowState,
     PalmTargets,
@@ -39,22 +39,26 @@ from golem.types import (
     Twist,
 )
 
+MIN_RATE = 1.0
+"""Slowest controller that is taken for one [Hz]."""
+
 
 class SenseNode:
     """Publishes what motors, IMU and hands report."""
 
     period = TICK
 
-    def __init__(self, bus: Bus, robot: Robot) -> None:
+    def __init__(self, bus: Bus, robot: Robot, guard: Guard) -> None:
         """Read `robot`."""
-        self._bus, self._robot = bus, robot
+        self._bus, self._robot, self._guard = bus, robot, guard
 
     def step(self, t: float) -> None:
         """Publish one sample of everything."""
-        q, dq, tau = self._robot.joints()
-        self._bus.publish(topics.LOW_STATE, LowState(t, q, dq, tau, self._robot.imu()), t)
+        call = self._guard.call
+        q, dq, tau = call(self._robot.joints)
+        self._bus.publish(topics.LOW_STATE, LowState(t, q, dq, tau, call(self._robot.imu)), t)
         for side in SIDES:
-            self._bus.publish(topics.hand_state(side), self._robot.hand(side, t), t)
+            self._bus.publish(topics.hand_state(side), call(self._robot.hand, side, t), t)
 
 
 class ActNode:
@@ -62,9 +66,9 @@ class ActNode:
 
     period = TICK
 
-    def __init__(self, bus: Bus, robot: Robot) -> None:
+    def __init__(self, bus: Bus, robot: Robot, guard: Guard) -> None:
         """Drive `robot`."""
-        self._bus, self._robot = bus, robot
+        self._bus, self._robot, self._guard = bus, robot, guard
 
     def step(self, t: float) -> None:
         """Advance the robot by one tick; motors without a command are limp."""
@@ -74,7 +78,7 @@ class ActNode:
             hand = self._bus.latest(topics.hand_command(side), HandCommand)
             if hand is not None:
                 hands[side] = hand
-        self._robot.advance(command, hands, TICK)
+        self._guard.call(self._robot.advance, command, hands, TICK)
 
 
 class EstimatorNode:
@@ -96,16 +100,20 @@ class EstimatorNode:
             self._started = True
             self._guard.call(self._estimator.reset, state)
         estimate = self._guard.call(self._estimator.step, state, TICK)
-        self._guard.array("T_odom_base", estimate.T_odom_base, (4, 4))
+        self._guard.kind("the estimate", estimate, BaseEstimate)
+        self._guard.array("T_odom_base", estimate.T_odom_base, 4, 4)
+        self._guard.array("velocity", estimate.velocity, 3)
         self._bus.publish(topics.BASE, estimate, t)
 
 
 class CameraNode:
     """Exposes one camera at its frame rate while somebody asks for it."""
 
-    def __init__(self, bus: Bus, robot: Robot, name: str, optical_frame: str, latency: float) -> None:
+    def __init__(
+        self, bus: Bus, robot: Robot, name: str, optical_frame: str, latency: float, guard: Guard
+    ) -> None:
         """Expose camera `name`, whose nominal frame in the model is `optical_frame`; frames take `latency` [s]."""
-        self._bus, self._robot, self._info = bus, robot, robot.cameras[name]
+        self._bus, self._robot, self._info, self._guard = bus, robot, robot.cameras[name], guard
         self._optical, self._latency = optical_frame, latency
         self._kinematics = Kinematics()
         self.period = 1.0 / self._info.rate
@@ -117,7 +125,7 @@ class CameraNode:
         base = self._bus.latest(topics.BASE, BaseEstimate)
         if request is None or not request.labels or state is None or base is None:
             return
-        rgb, depth = self._robot.capture(self._info.name)
+        rgb, depth = self._guard.call(self._robot.capture, self._info.name)
         self._kinematics.update(state.q)
         pose = base.T_odom_base @ self._kinematics.pose(self._optical)
         self._bus.publish(
@@ -133,6 +141,7 @@ class LocalizerNode:
     def __init__(self, bus: Bus, localizer: Localizer, camera: str, guard: Guard) -> None:
         """Run `localizer` on the frames of `camera`."""
         self._bus, self._localizer, self._camera, self._guard = bus, localizer, camera, guard
+        self._latency = guard.number("latency", localizer.latency, least=0.0)
         self._seen = 0
 
     def step(self, t: float) -> None:
@@ -145,11 +154,14 @@ class LocalizerNode:
         request = self._bus.latest(topics.look(self._camera), LookRequest)
         if frame is None or request is None or not request.labels:
             return
-        objects = tuple(self._guard.call(self._localizer.locate, frame, request.labels))
+        labels = request.labels
+        objects = self._guard.call(lambda: tuple(self._localizer.locate(frame, labels)))
         for o in objects:
-            self._guard.array("position", o.position, (3,))
+            self._guard.kind("a located object", o, LocalizedObject)
+            self._guard.array("position", o.position, 3)
+            self._guard.array("points", o.points, None, 3)
         message = Sightings(frame.t, self._camera, objects)
-        self._bus.publish(topics.sightings(self._camera), message, t, self._localizer.latency)
+        self._bus.publish(topics.sightings(self._camera), message, t, self._latency)
 
 
 class LowerBodyNode:
@@ -158,7 +170,8 @@ class LowerBodyNode:
     def __init__(self, bus: Bus, legs: LowerBody, guard: Guard) -> None:
         """Run `legs`."""
         self._bus, self._legs, self._guard = bus, legs, guard
-        self.period = 1.0 / legs.rate
+        self._latency = guard.number("latency", legs.latency, least=0.0)
+        self.period = 1.0 / guard.number("rate", legs.rate, least=MIN_RATE)
         self._started = False
 
     def step(self, t: float) -> None:
@@ -172,8 +185,10 @@ class LowerBodyNode:
             self._guard.call(self._legs.reset, state)
         twist = self._bus.latest(topics.TWIST, Twist) or Twist()
         command = self._guard.call(self._legs.step, state, base, twist, self.period)
-        self._guard.array("leg targets", command.q, (12,))
-        self._bus.publish(topics.LEG_COMMAND, command, t, self._legs.latency)
+        self._guard.kind("the leg command", command, LegCommand)
+        for name in ("q", "kp", "kd"):
+            self._guard.array(name, getattr(command, name), LEGS.stop - LEGS.start)
+        self._bus.publish(topics.LEG_COMMAND, command, t, self._latency)
 
 
 class UpperBodyNode:
@@ -182,7 +197,8 @@ class UpperBodyNode:
     def __init__(self, bus: Bus, arms: UpperBody, guard: Guard) -> None:
         """Run `arms`."""
         self._bus, self._arms, self._guard = bus, arms, guard
-        self.period = 1.0 / arms.rate
+        self._latency = guard.number("latency", arms.latency, least=0.0)
+        self.period = 1.0 / guard.number("rate", arms.rate, least=MIN_RATE)
         self._started = False
 
     def step(self, t: float) -> None:
@@ -198,12 +214,9 @@ class UpperBodyNode:
         T_base_odom = np.linalg.inv(base.T_odom_base)
         left, right = (None if T is None else T_base_odom @ T for T in (targets.left, targets.right))
         command = self._guard.call(self._arms.step, left, right, state.q, self.period)
-        if not isinstance(command, ArmCommand):
-            raise ModuleFault(
-                self._guard.slot, self._guard.use, f"step returned {type(command).__name__}, not ArmCommand"
-            )
-        self._guard.array("arm targets", command.q, (UPPER.stop - UPPER.start,))
-        self._bus.publish(topics.ARM_COMMAND, command, t, self._arms.latency)
+        self._guard.kind("the arm command", command, ArmCommand)
+        self._guard.array("q", command.q, UPPER.stop - UPPER.start)
+        self._bus.publish(topics.ARM_COMMAND, command, t, self._latency)
 
 
 class HandNode:
@@ -213,7 +226,8 @@ class HandNode:
 
     def __init__(self, bus: Bus, hand: HandController, side: Side, guard: Guard) -> None:
         """Run `hand` on `side`."""
-        self._bus, self._hand, self._side, self._guard = bus, hand, side, guard
+        self._bus, self._hand, self._guard = bus, hand, guard
+        self._side: Side = side
         self._goals = 0
 
     def step(self, t: float) -> None:
@@ -230,8 +244,13 @@ class HandNode:
         if state is None:
             return
         command = self._guard.call(self._hand.step, state, t)
+        self._guard.kind("the hand command", command, HandCommand)
+        self._guard.number("gap", command.gap, least=0.0)
+        self._guard.number("force", command.force, least=0.0)
+        status = self._guard.call(self._hand.status)
+        self._guard.kind("the status", status, HandStatus)
         self._bus.publish(topics.hand_command(self._side), command, t)
-        self._bus.publish(topics.hand_status(self._side), self._guard.call(self._hand.status), t)
+        self._bus.publish(topics.hand_status(self._side), status, t)
 
 
 class ServoNode:
@@ -261,9 +280,11 @@ class ServoNode:
         if arms is not None:
             q[UPPER] = arms.q
         gains = None if legs is None else (legs.kp, legs.kd)
-        self._bus.publish(
-            topics.LOW_CMD_REQUEST, self._guard.call(self._servo.step, state, q, TICK, gains), t
-        )
+        command = self._guard.call(self._servo.step, state, q, TICK, gains)
+        self._guard.kind("the motor command", command, LowCommand)
+        for name in ("q", "dq", "tau", "kp", "kd"):
+            self._guard.array(name, getattr(command, name), NUM_JOINTS)
+        self._bus.publish(topics.LOW_CMD_REQUEST, command, t)
 
 
 class EstopNode:

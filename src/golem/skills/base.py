@@ -32,7 +32,7 @@ class Feedback:
     skill: str
     stage: str
     text: str
-    data: dict[str, Any] = field(default_factory=dict)
+    data: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class SkillResult:
     stage: str
     slot: str | None
     reason: str
-    timings: dict[str, float] = field(default_factory=dict)
+    timings: dict[str, float] = field(default_factory=dict[str, float])
 
 
 class StageFailed(GolemError):

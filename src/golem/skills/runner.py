@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 
-from golem.errors import ModuleFault
-from golem.skills.base import SkillCancelled, SkillResult
+from golem.errors import MissingExtra, MissingSystemLibrary, ModuleFault
+from golem.skills.base import SkillCancelled, SkillResult, StageFailed
+
+FAULT = "fault"
+"""Stage of the result of a skill in which a module, or the skill itself, broke its contract."""
+SLOT = "skill"
+"""Who is held responsible for what a skill raises itself."""
 
 
 class SkillRun:
@@ -15,10 +20,13 @@ class SkillRun:
         result: how it ended; None while it runs.
     """
 
-    def __init__(self, coroutine: Coroutine[None, None, SkillResult]) -> None:
-        """Take over a skill that was called but not yet started."""
+    def __init__(self, name: str, coroutine: Coroutine[None, None, SkillResult]) -> None:
+        """Take over the skill called `name`, whose `run` was called but has not started yet."""
+        self._name = name
         self._coroutine = coroutine
         self.result: SkillResult | None = None
+        if not isinstance(coroutine, Coroutine):
+            self.result = self._fault("its 'run' is not an 'async def'")
 
     def step(self) -> None:
         """Resume the skill until its next await."""
@@ -30,13 +38,25 @@ class SkillRun:
         if self.result is None:
             self._guard(lambda: self._coroutine.throw(SkillCancelled()))
 
-    def _guard(self, resume: object) -> None:
-        assert callable(resume)
+    def _guard(self, resume: Callable[[], object]) -> None:
+        """Resume the skill; whatever ends it becomes its result."""
         try:
             resume()
         except StopIteration as end:
-            self.result = end.value
+            if isinstance(end.value, SkillResult):
+                self.result = end.value
+            else:
+                self.result = self._fault(f"it returned {type(end.value).__name__}, not SkillResult")
         except SkillCancelled:
             self.result = SkillResult(False, "cancelled", None, "The skill was cancelled.")
+        except StageFailed as failure:
+            self.result = SkillResult(False, failure.stage, failure.slot, str(failure))
         except ModuleFault as fault:
-            self.result = SkillResult(False, "fault", fault.slot, str(fault))
+            self.result = SkillResult(False, FAULT, fault.slot, str(fault))
+        except (MissingExtra, MissingSystemLibrary):
+            raise
+        except Exception as error:  # a user's skill may raise anything
+            self.result = self._fault(f"{type(error).__name__}: {error}")
+
+    def _fault(self, reason: str) -> SkillResult:
+        return SkillResult(False, FAULT, SLOT, str(ModuleFault(SLOT, self._name, reason)))
