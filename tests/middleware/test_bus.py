@@ -1,0 +1,95 @@
+"""The bus: newest value, in order, when it is due, of the type the reader expects."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from golem.middleware.bus import Bus, WrongType
+from golem.runtime.executor import TICK
+
+
+def test_a_stream_nobody_wrote_is_none() -> None:
+    bus = Bus()
+    assert bus.latest("x", int) is None
+    assert bus.count("x") == 0
+    assert bus.topics() == {}
+
+
+def test_without_latency_a_value_is_there_at_once() -> None:
+    bus = Bus()
+    bus.publish("x", 1, t=0.0)
+    bus.publish("x", 2, t=0.0)
+    assert (bus.latest("x", int), bus.count("x")) == (2, 2)
+
+
+def test_a_late_value_is_there_when_it_is_due_and_not_before() -> None:
+    bus = Bus()
+    bus.publish("x", 1, t=1.0, latency=0.033)
+    bus.deliver(1.032)
+    assert (bus.latest("x", int), bus.count("x")) == (None, 0)
+    bus.deliver(1.034)
+    assert (bus.latest("x", int), bus.count("x")) == (1, 1)
+    bus.deliver(2.0)
+    assert bus.count("x") == 1
+
+
+def test_a_latency_of_whole_ticks_is_exact_over_an_hour() -> None:
+    bus = Bus()
+    for tick in (0, 1, 3, 1_000, 1_799_999):
+        bus.publish("x", tick, t=tick * TICK, latency=7 * TICK)
+        bus.deliver((tick + 6) * TICK)
+        assert bus.latest("x", int) != tick
+        bus.deliver((tick + 7) * TICK)
+        assert bus.latest("x", int) == tick
+
+
+def test_a_prompt_value_does_not_overtake_a_late_one() -> None:
+    bus = Bus()
+    bus.publish("x", "late", t=0.0, latency=0.1)
+    bus.publish("x", "prompt", t=0.01)
+    assert bus.latest("x", str) is None
+    bus.deliver(0.05)
+    assert bus.latest("x", str) is None
+    bus.deliver(0.1)
+    assert (bus.latest("x", str), bus.count("x")) == ("prompt", 2)
+
+
+@given(st.lists(st.floats(0.0, 0.05), min_size=1, max_size=30))
+def test_values_arrive_in_the_order_they_were_published(latencies: list[float]) -> None:
+    bus = Bus()
+    seen: list[int] = []
+    for tick in range(len(latencies) + 40):
+        t = tick * TICK
+        bus.deliver(t)
+        if tick < len(latencies):
+            bus.publish("x", tick, t, latencies[tick])
+        value = bus.latest("x", int)
+        if value is not None:
+            seen.append(value)
+    assert seen == sorted(seen)
+    assert (seen[-1], bus.count("x")) == (len(latencies) - 1, len(latencies))
+
+
+def test_streams_do_not_wait_for_each_other() -> None:
+    bus = Bus()
+    bus.publish("x", 1, t=0.0, latency=1.0)
+    bus.publish("y", 2, t=0.0)
+    assert (bus.latest("x", int), bus.latest("y", int)) == (None, 2)
+
+
+def test_a_reader_that_expects_another_type_is_told_both() -> None:
+    bus = Bus()
+    bus.publish("x", 1, t=0.0)
+    with pytest.raises(WrongType, match="Topic 'x' carries int, not str"):
+        bus.latest("x", str)
+
+
+def test_topics_name_what_was_delivered_and_its_type() -> None:
+    bus = Bus()
+    bus.publish("b", 1.5, t=0.0)
+    bus.publish("a", "s", t=0.0)
+    bus.publish("c", 1, t=0.0, latency=1.0)
+    assert bus.topics() == {"a": "str", "b": "float"}
+    assert list(bus.topics()) == ["a", "b"]

@@ -1,0 +1,25 @@
+"""Topic names: one stream each."""
+
+from __future__ import annotations
+
+from golem.middleware import topics
+from golem.middleware.topics import HandGoal, LookRequest
+from golem.types import SIDES
+
+
+def test_no_two_streams_share_a_name() -> None:
+    fixed = [value for name, value in vars(topics).items() if name.isupper() and isinstance(value, str)]
+    per_side = (topics.hand_state, topics.hand_command, topics.hand_goal, topics.hand_status)
+    per_camera = (topics.frames, topics.look, topics.sightings)
+    names = (
+        fixed
+        + [topic(side) for topic in per_side for side in SIDES]
+        + [topic(camera) for topic in per_camera for camera in ("head", "left_hand", "right_hand")]
+    )
+    assert len(fixed) >= 10
+    assert len(set(names)) == len(names)
+
+
+def test_the_silent_request_stops_the_stream_and_a_goal_without_gap_closes() -> None:
+    assert LookRequest().labels == ()
+    assert HandGoal(None, 5.0).gap is None
