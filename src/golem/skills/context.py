@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from golem.capabilities.arms.base import check_pose
 from golem.capabilities.arms.line import Line
 from golem.hardware.hands.base import HandStatus
 from golem.middleware import topics
@@ -76,6 +77,7 @@ class Arm:
             w_max: angular speed [rad/s].
             stop: asked every tick.
         """
+        self._velocity = np.zeros(3)
         line = Line(self.commanded, T_goal, v_max, w_max)
         start = self._context.t
         while not stop():
@@ -96,7 +98,8 @@ class Arm:
         T = self.commanded.copy()
         error = T_goal[:3, 3] - T[:3, 3]
         distance = float(np.linalg.norm(error))
-        # Fastest speed from which a_max still stops within the distance left.
+        # Half of a_max stops from sqrt(a_max d) within d; the other half is left to turn towards a moving goal. The
+        # last bound makes the end exponential, with a time constant of three ticks.
         speed = min(v_max, float(np.sqrt(a_max * distance)), distance / (3.0 * dt))
         wanted = error * (speed / distance) if distance > 1e-9 else np.zeros(3)
         change = wanted - self._velocity
@@ -120,7 +123,7 @@ class Arm:
             await self._context.tick()
 
     def _send(self, T: Array) -> None:
-        self._commanded = T
+        self._commanded = check_pose(f"The pose the {self._side} arm is sent to", T)
         self._context.send_palms()
 
 

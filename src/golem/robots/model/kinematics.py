@@ -10,18 +10,22 @@ from golem.types import Array
 
 
 class Kinematics:
-    """Forward kinematics of the nominal model; joints are set once, frames are read as needed."""
+    """Forward kinematics of the nominal model, computed when a frame is asked for."""
 
     def __init__(self) -> None:
         """Build the model with hands, fixed at base_link."""
         self._model = pinocchio_model.build(hands=True)
         self._data = self._model.createData()
         self._ids = {frame.name: i for i, frame in enumerate(self._model.frames)}
+        self._q: Array | None = np.zeros(self._model.nq)
 
     def update(self, q: Array) -> None:
         """Set the joints `q` (27,) [rad]."""
-        pin.forwardKinematics(self._model, self._data, np.asarray(q))
+        self._q = np.array(q, dtype=np.float64)
 
     def pose(self, frame: str) -> Array:
-        """Return the (4, 4) pose of `frame` in base_link at the joints last set."""
+        """Return the (4, 4) pose of `frame` in base_link at the joints last set; at zero before."""
+        if self._q is not None:
+            pin.forwardKinematics(self._model, self._data, self._q)
+            self._q = None
         return pin.updateFramePlacement(self._model, self._data, self._ids[frame]).homogeneous
