@@ -7,9 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.capabilities.localization.classes import CLASSES
-from golem.training.detector.model import MEAN, STD, STRIDE
+from golem.capabilities.localization.peaks import STRIDE
 from golem.types import Array
 
+MEAN = (0.45, 0.45, 0.45)
+STD = (0.25, 0.25, 0.25)
+"""Normalisation of RGB in 0..1."""
 CROP = (320, 256)
 """Width and height of a training crop [px]."""
 ZOOM = (0.6, 1.35)
@@ -109,7 +112,7 @@ def targets(labels: Array) -> tuple[NDArray[np.float32], NDArray[np.float32], ND
             weight[c, max(b, 0) : max(f, 0), max(a, 0) : max(e, 0)] = 0.0
             continue
         gx, gy = (x - middle) / STRIDE, (y - middle) / STRIDE
-        sigma = float(np.clip(min(x1 - x0, y1 - y0) / STRIDE * 0.15, 0.7, 2.5))
+        sigma = float(np.clip(min(x1 - x0, y1 - y0) / STRIDE * 0.13, 0.7, 5.0))
         blob = np.exp(-((columns - gx) ** 2 + (rows - gy) ** 2) / (2 * sigma**2)).astype(np.float32)
         i, j = int(np.clip(np.round(gy), 0, h - 1)), int(np.clip(np.round(gx), 0, w - 1))
         np.maximum(heat[c], blob, out=heat[c])

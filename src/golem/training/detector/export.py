@@ -9,7 +9,9 @@ import onnx
 import torch
 
 from golem.capabilities.localization.classes import CLASSES
-from golem.training.detector.model import MEAN, MULTIPLE, STD, STRIDE, PartNet
+from golem.capabilities.localization.peaks import STRIDE
+from golem.training.detector.augment import MEAN, STD
+from golem.training.detector.model import MULTIPLE, PartNet
 
 OPSET = 17
 

@@ -11,13 +11,8 @@ from torch import Tensor, nn
 
 from golem.capabilities.localization.classes import CLASSES
 
-STRIDE = 4
-"""Pixels per cell of the output; cell (i, j) stands for the pixels STRIDE i .. STRIDE i + 3 and so on."""
 MULTIPLE = 16
 """Image sides must be multiples of this."""
-MEAN = (0.45, 0.45, 0.45)
-STD = (0.25, 0.25, 0.25)
-"""Normalisation of RGB in 0..1."""
 REGRESSION = ("dx", "dy", "left", "top", "right", "bottom")
 """Channels after the heatmaps: the centre's offset from the cell's middle [cells], and the log of the distances from
 the centre to the sides of the box [log px]."""
@@ -44,7 +39,7 @@ class PartNet(nn.Module):
         self.stem = _block(3, 16, 2)
         self.down4 = nn.Sequential(_block(16, 32, 2), _block(32, 32))
         self.down8 = nn.Sequential(_block(32, 40, 2), _block(40, 40))
-        self.down16 = nn.Sequential(_block(40, 48, 2), _block(48, 48, dilation=2), _block(48, 48, dilation=4))
+        self.down16 = nn.Sequential(_block(40, 48, 2), *(_block(48, 48, dilation=d) for d in (2, 4, 8)))
         self.side8 = nn.Conv2d(48, 40, 1)
         self.merge8 = _block(40, 40)
         self.side4 = nn.Conv2d(40, 32, 1)

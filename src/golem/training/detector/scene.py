@@ -225,8 +225,7 @@ def place_head(world: World, rng: np.random.Generator) -> CameraInfo:
     data.qpos[:3] = [rng.uniform(-0.2, 0.15), rng.uniform(-0.4, 0.4), rng.uniform(0.9, 1.15)]
     angles = [rng.normal(0.0, 0.2), rng.normal(0.0, 0.08), rng.normal(0.0, 0.05)]
     data.qpos[3:7] = Rotation.from_euler("ZYX", angles).as_quat(scalar_first=True)
-    mujoco.mj_kinematics(world.model, data)
-    mujoco.mj_camlight(world.model, data)
+    refresh(world)
     return CAMERAS["head"]
 
 
@@ -250,13 +249,12 @@ def place_palm(world: World, rng: np.random.Generator) -> CameraInfo:
     )
     if held is not None:
         _set_gap(world, side, held.head_diameter)
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_camlight(model, data)
+    refresh(world)
     T_base = _pose(data.qpos[:3], Rotation.from_quat(data.qpos[3:7], scalar_first=True).as_matrix())
     T_base = T_world_optical @ np.linalg.inv(camera_pose(world, info.name)) @ T_base
     data.qpos[:3] = T_base[:3, 3]
     data.qpos[3:7] = Rotation.from_matrix(T_base[:3, :3]).as_quat(scalar_first=True)
-    mujoco.mj_kinematics(model, data)
+    refresh(world)
     if held is not None:
         site = model.site(f"{side}_gripper").id
         R_grip = data.site_xmat[site].reshape(3, 3)
@@ -265,8 +263,7 @@ def place_palm(world: World, rng: np.random.Generator) -> CameraInfo:
         data.qpos[at : at + 3] = data.site_xpos[site] - R_grip[:, 2] * rng.uniform(0.0, 0.01)
         upright = R_grip @ T_MUJOCO_OPTICAL[:3, :3] @ tilt
         data.qpos[at + 3 : at + 7] = Rotation.from_matrix(upright).as_quat(scalar_first=True)
-        mujoco.mj_kinematics(model, data)
-    mujoco.mj_camlight(model, data)
+        refresh(world)
     return info
 
 
@@ -283,6 +280,12 @@ def _pose(position: Array, rotation: Array) -> Array:
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = rotation, position
     return T
+
+
+def refresh(world: World) -> None:
+    """Compute where bodies, cameras and lights are for the present joint positions."""
+    mujoco.mj_kinematics(world.model, world.data)
+    mujoco.mj_camlight(world.model, world.data)
 
 
 def camera_pose(world: World, name: str) -> Array:

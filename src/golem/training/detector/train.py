@@ -20,8 +20,9 @@ from golem.capabilities.localization.classes import CLASSES
 from golem.capabilities.localization.peaks import find_peaks, normalise
 from golem.robots.sensors.streams import stream
 from golem.training.detector import augment, dataset
+from golem.training.detector.augment import MEAN, STD
 from golem.training.detector.evaluate import THRESHOLD, Detector, evaluate
-from golem.training.detector.model import MEAN, MULTIPLE, STD, PartNet
+from golem.training.detector.model import MULTIPLE, PartNet
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,14 +80,15 @@ def loss_terms(
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Return the focal loss of the heatmaps, the offset loss and the box loss.
 
-    The focal loss is equation (1) of Zhou et al. (2019) with alpha 2 and beta 4, per labelled part.
+    The focal loss is equation (1) of Zhou et al. (2019) with alpha 2 and beta 4, divided by the number of labelled
+    parts of each class, so that one tray weighs as much as all screws.
     """
     logits = output[:, : len(CLASSES)]
     p = torch.sigmoid(logits).clamp(1e-5, 1 - 1e-5)
     positive = (heat >= 1.0).float()
-    count = (positive * weight).sum().clamp(min=1.0)
+    count = (positive * weight).sum(dim=(0, 2, 3)).clamp(min=1.0)
     gain = positive * (1 - p) ** 2 * torch.log(p) + (1 - positive) * (1 - heat) ** 4 * p**2 * torch.log(1 - p)
-    focal = -(gain * weight).sum() / count
+    focal = -((gain * weight).sum(dim=(0, 2, 3)) / count).sum() / 2
     mask = regression[:, 6:7]
     total = mask.sum().clamp(min=1.0)
     guess = output[:, len(CLASSES) :]
@@ -112,8 +114,16 @@ def detector_of(model: PartNet) -> Detector:
     return detect
 
 
-def train(config: TrainConfig) -> Path:
-    """Train or resume; returns the path of the best checkpoint by mean AP on the held-out part."""
+def train(config: TrainConfig, stop: int | None = None) -> Path:
+    """Train or resume.
+
+    Args:
+        config: how.
+        stop: leave off at this step (a multiple of `config.check_every`), to be resumed.
+
+    Returns:
+        The path of the best checkpoint by mean AP on the held-out part.
+    """
     torch.set_num_threads(1)
     torch.manual_seed(config.seed)
     config.out.mkdir(parents=True, exist_ok=True)
@@ -138,7 +148,7 @@ def train(config: TrainConfig) -> Path:
             csv.writer(file).writerow(
                 ["step", "images", "cpu_s", "loss_heat", "loss_offset", "loss_box", *names]
             )
-    batches = _Batches(data, config.seed, config.batch, step, config.steps)
+    batches = _Batches(data, config.seed, config.batch, step, config.steps if stop is None else stop)
     loader = DataLoader(
         batches, batch_size=None, num_workers=config.workers, prefetch_factor=8 if config.workers else None
     )
