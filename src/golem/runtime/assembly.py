@@ -124,6 +124,10 @@ class Running:
         """The newest verdict of the safety gate."""
         return self.bus.latest(topics.SAFETY, GateResult)
 
+    def request(self, request: Request) -> None:
+        """Ask something of the safety gate as an operator does: activate, stop, reset; it decides."""
+        self._safety.request = request
+
     def start(self, skill: Skill[Context, Any], goal: object) -> SkillRun:
         """Start a skill; it advances with the executor.
 
