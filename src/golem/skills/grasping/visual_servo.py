@@ -93,8 +93,7 @@ class CentroidServo:
         c = self._config
         self._variance = self._variance + c.drift**2 * (t - self._t)
         self._t = t
-        if sightings is not None:
-            self._update(t, sightings, T_odom_gripper)
+        seen = sightings is not None and self._update(t, sightings, T_odom_gripper)
         status = ServoStatus.TRACKING
         if t - self._seen_at > c.lost_after:
             self._seen_at = t
@@ -113,7 +112,7 @@ class CentroidServo:
         if status is ServoStatus.TRACKING and confirmed:
             if lateral > c.tolerance or abs(height) > c.height_tolerance:
                 self._inside = 0
-            elif sightings:
+            elif seen:
                 self._inside += 1
             if self._inside >= c.dwell:
                 status = ServoStatus.CONVERGED
@@ -133,19 +132,19 @@ class CentroidServo:
         goal = top_down(grasp + (0.0, 0.0, above), self._yaw)
         return ServoStep(goal, self._x.copy(), float(np.sqrt(self._variance.max())), status)
 
-    def _update(self, t: float, sightings: list[LocalizedObject], T_odom_gripper: Array) -> None:
-        """Fuse the sighting that belongs to the target, if there is one in this frame."""
+    def _update(self, t: float, sightings: list[LocalizedObject], T_odom_gripper: Array) -> bool:
+        """Fuse the sighting that belongs to the target; return whether there is one in this frame."""
         c = self._config
         candidates = [s for s in sightings if s.label == self.label]
         if not candidates:
-            return
+            return False
         noise = np.array([c.sigma_lateral**2, c.sigma_lateral**2, c.sigma_depth**2])
         if self._sightings == 0:
             # The head camera may be off by more than the pitch of the screws: take what is under the hand.
             boresight = T_odom_gripper[:2, 3]
             nearest = min(candidates, key=lambda s: float(np.hypot(*(s.position[:2] - boresight))))
             if np.hypot(*(nearest.position[:2] - boresight)) > c.first_radius:
-                return
+                return False
             self._x, self._variance = nearest.position.copy(), noise
             self._depth = self._wanted_depth(nearest)
         else:
@@ -153,7 +152,7 @@ class CentroidServo:
             distances = [float(np.sum((s.position - self._x) ** 2 / total)) for s in candidates]
             best = int(np.argmin(distances))
             if distances[best] > c.gate:
-                return
+                return False
             gain = self._variance / total
             self._x = self._x + gain * (candidates[best].position - self._x)
             self._variance = (1.0 - gain) * self._variance
@@ -161,6 +160,7 @@ class CentroidServo:
             self._depth += float(gain[2]) * (self._wanted_depth(candidates[best]) - self._depth)
         self._sightings += 1
         self._seen_at = t
+        return True
 
     def _wanted_depth(self, sighting: LocalizedObject) -> float:
         return grasp_depth(sighting, self._centroid.depth, self._centroid.clearance)
