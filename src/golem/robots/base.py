@@ -17,9 +17,12 @@ class Robot(Protocol):
 
     Attributes:
         cameras: the cameras it carries, by name.
+        calibration: per camera the (4, 4) pose of its optical frame, as the calibration claims it, in the optical
+            frame of the nominal model; identity where the camera was never calibrated.
     """
 
     cameras: dict[str, CameraInfo]
+    calibration: dict[str, Array]
 
     def advance(self, command: LowCommand, hands: dict[Side, HandCommand], dt: float) -> None:
         """Let time pass under the given commands.

@@ -127,7 +127,8 @@ class CameraNode:
             return
         rgb, depth = self._guard.call(self._robot.capture, self._info.name)
         self._kinematics.update(state.q)
-        pose = base.T_odom_base @ self._kinematics.pose(self._optical)
+        T_base_optical = self._kinematics.pose(self._optical) @ self._robot.calibration[self._info.name]
+        pose = base.T_odom_base @ T_base_optical
         self._bus.publish(
             topics.frames(self._info.name), Frame(t, self._info, rgb, depth, pose), t, self._latency
         )

@@ -37,6 +37,8 @@ class PickConfig:
         workspace: x_min, x_max, y_min, y_max, z_min, z_max of the grasp frame in base_link [m], for the right arm
             (y is mirrored for the left). Inside the paper's box (x <= 0.60, |y| <= 0.45, -0.05 <= z <= 0.60).
         yaw: heading of the gripper's x axis when it points down [rad], right arm; mirrored for the left.
+        comfort: x, y in base_link around which the arm works best [m]; the nearest object is taken first.
+        attempts: how often a method that looks again may try to grasp and pull.
         clearance: height of the gripper above the object when it arrives and when it leaves [m].
         travel_height: least height of the gripper when it moves across, in odom [m]; clears the tray's walls.
         travel_speed: between places [m/s].
@@ -45,7 +47,7 @@ class PickConfig:
         servo_timeout: time after which the servo is given up [s].
         force: force of each finger [N].
         close_timeout: time the fingers may take [s].
-        pull: height of the straight vertical extraction [m]; longer than any screw.
+        pull: length of the straight extraction [m]; longer than any screw.
         pull_speed: how fast [m/s].
         tolerance: distance from a commanded pose at which the arm counts as arrived [m].
         drop_height: height of the fingertips above the container's floor when they open [m].
@@ -55,6 +57,8 @@ class PickConfig:
 
     workspace: tuple[float, float, float, float, float, float] = (0.30, 0.60, -0.30, 0.10, -0.15, 0.60)
     yaw: float = -1.5707963267948966
+    comfort: tuple[float, float] = (0.45, -0.12)
+    attempts: int = 2
     clearance: float = 0.15
     travel_height: float = 0.08
     travel_speed: float = 0.25
@@ -89,13 +93,7 @@ class Pick:
         try:
             target, container = await self._detect(context, goal)
             grasp = await self._approach(context, goal, target)
-            law = self._method.servo(target, grasp, context.t)
-            if law is None:
-                await self._descend(context, goal, grasp)
-            else:
-                await self._servo(context, goal, law)
-            timings["detect_to_grasp"] = context.t - timings["start"]
-            await self._extract(context, goal)
+            await self._take(context, goal, target, grasp, timings)
             await self._place(context, goal, container)
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
@@ -130,23 +128,23 @@ class Pick:
                 if context.t >= end:
                     missing = goal.container if reachable else f"reachable {goal.label}"
                     raise StageFailed("detect", "localizer", f"The head camera shows no {missing}.")
-        target = max(reachable, key=lambda o: o.detection.score)
+        target = min(reachable, key=lambda o: self._discomfort(context, goal, o))
         container = max(containers, key=lambda o: o.detection.score)
         context.say("detect", f"{len(reachable)} {goal.label}s in reach.", target=target.position.tolist())
         return target, container
 
     def _reachable(self, context: Context, goal: PickGoal, sightings: Sightings) -> list[LocalizedObject]:
         x0, x1, y0, y1, z0, z1 = self._config.workspace
-        if goal.side == "left":
-            y0, y1 = -y1, -y0
-        low, high = np.array([x0, y0, z0]), np.array([x1, y1, z1])
-        T_base_odom = np.linalg.inv(context.T_odom_base)
 
         def inside(o: LocalizedObject) -> bool:
-            p = T_base_odom[:3, :3] @ o.position + T_base_odom[:3, 3]
-            return bool(((p >= low) & (p <= high)).all())
+            x, y, z = _in_base(context, goal, o)
+            return x0 <= x <= x1 and y0 <= y <= y1 and z0 <= z <= z1
 
         return [o for o in sightings.objects if o.label == goal.label and inside(o)]
+
+    def _discomfort(self, context: Context, goal: PickGoal, o: LocalizedObject) -> float:
+        x, y, _ = _in_base(context, goal, o)
+        return float(np.hypot(x - self._config.comfort[0], y - self._config.comfort[1]))
 
     async def _approach(self, context: Context, goal: PickGoal, target: LocalizedObject) -> Grasp:
         """Bring the open hand over the object."""
@@ -159,6 +157,33 @@ class Pick:
         context.hands[goal.side].open(grasp.gap)
         await self._travel(context, goal.side, lifted(grasp.T_odom_gripper, self._config.clearance))
         return grasp
+
+    async def _take(
+        self,
+        context: Context,
+        goal: PickGoal,
+        target: LocalizedObject,
+        grasp: Grasp,
+        timings: dict[str, float],
+    ) -> None:
+        """Grasp and pull out. A method that looks again may try again; an open-loop one would only repeat itself."""
+        for attempt in range(1, self._config.attempts + 1):
+            law = self._method.servo(target, grasp, context.t)
+            try:
+                if law is None:
+                    await self._descend(context, goal, grasp)
+                else:
+                    await self._servo(context, goal, law)
+                timings["detect_to_grasp"] = context.t - timings["start"]
+                await self._extract(context, goal)
+                return
+            except StageFailed as failure:
+                if law is None or attempt == self._config.attempts:
+                    raise
+                context.say(failure.stage, f"{failure} Trying again.")
+                context.hands[goal.side].open(grasp.gap)
+                above = lifted(grasp.T_odom_gripper, self._config.clearance)
+                await self._travel(context, goal.side, above)
 
     async def _descend(self, context: Context, goal: PickGoal, grasp: Grasp) -> None:
         """Open loop: go straight down to the grasp as proposed, and close."""
@@ -219,11 +244,11 @@ class Pick:
             )
 
     async def _extract(self, context: Context, goal: PickGoal) -> None:
-        """Pull straight up along the vertical, then lift; the grip must hold."""
-        context.say("extract", "Pulling straight up.")
+        """Pull straight out against the approach direction, then lift; the grip must hold."""
+        context.say("extract", "Pulling straight out.")
         arm, hand = context.arms[goal.side], context.hands[goal.side]
         await arm.move(
-            lifted(arm.commanded, self._config.pull),
+            retracted(arm.commanded, self._config.pull),
             self._config.pull_speed,
             stop=lambda: not hand.status.holding,
         )
@@ -257,9 +282,23 @@ class Pick:
         await arm.settle(self._config.tolerance, 1.0)
 
 
+def _in_base(context: Context, goal: PickGoal, o: LocalizedObject) -> Array:
+    """Return the (3,) position of `o` in base_link [m], mirrored for the left hand as if it were the right."""
+    T = context.T_odom_base
+    p = T[:3, :3].T @ (o.position - T[:3, 3])
+    return p if goal.side == "right" else p * (1.0, -1.0, 1.0)
+
+
 def lifted(T: Array, height: float) -> Array:
     """Return pose `T` (4, 4) raised by `height` [m] along odom z."""
     return at_height(T, T[2, 3] + height)
+
+
+def retracted(T: Array, distance: float) -> Array:
+    """Return pose `T` (4, 4) moved back by `distance` [m] against its approach axis, z."""
+    back = T.copy()
+    back[:3, 3] -= distance * T[:3, 2]
+    return back
 
 
 def at_height(T: Array, z: float) -> Array:

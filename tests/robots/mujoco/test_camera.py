@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from golem.robots.mujoco.camera import CLIP, CameraRig, apply_extrinsics
+from golem.robots.mujoco.camera import CLIP, CameraRig
 from golem.robots.sensors.cameras import CAMERAS, T_MUJOCO_OPTICAL, project, rays
 from golem.types import Array, CameraInfo
 
@@ -185,27 +185,3 @@ def test_a_camera_the_model_lacks_is_refused() -> None:
     model, _ = two_cameras()
     with pytest.raises(KeyError, match="right_hand"):
         CameraRig(model, [CAMERAS["right_hand"]])
-
-
-def camera_pose(model: mujoco.MjModel, name: str) -> Array:
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    T = np.eye(4)
-    T[:3, :3] = data.camera(name).xmat.reshape(3, 3) @ T_MUJOCO_OPTICAL[:3, :3]
-    T[:3, 3] = data.camera(name).xpos
-    return T
-
-
-def test_extrinsic_error_moves_the_optical_frame_and_never_accumulates() -> None:
-    model, _ = two_cameras()
-    nominal, other = camera_pose(model, "head"), camera_pose(model, "left_hand")
-    angle = np.deg2rad(2.0)
-    T = np.eye(4)
-    T[1:3, 1:3] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    T[:3, 3] = [0.01, 0.02, -0.03]
-    for _ in range(3):
-        apply_extrinsics(model, "head", T)
-    np.testing.assert_allclose(camera_pose(model, "head"), nominal @ T, atol=1e-12)
-    np.testing.assert_array_equal(camera_pose(model, "left_hand"), other)
-    apply_extrinsics(model, "head", np.eye(4))
-    np.testing.assert_allclose(camera_pose(model, "head"), nominal, atol=1e-12)

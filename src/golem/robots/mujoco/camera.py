@@ -164,25 +164,3 @@ class CameraRig:
     ) -> None:
         """Close the rig."""
         self.close()
-
-
-def apply_extrinsics(model: mujoco.MjModel, name: str, T_nominal_actual: Array) -> None:
-    """Move a camera from where the compiled model puts it to where it really is; never accumulates.
-
-    Args:
-        model: its `cam_pos` and `cam_quat` of this camera are overwritten.
-        name: the camera.
-        T_nominal_actual: (4, 4) pose of the real optical frame in the nominal optical frame, as in
-            `EpisodeErrors`; the identity restores the nominal pose.
-    """
-    camera = model.camera(name).id
-    # The compiler keeps the nominal pose only in world axes at the reference posture.
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    R_body_world = data.xmat[model.cam_bodyid[camera]].reshape(3, 3).T
-    T_body_nominal = np.eye(4)
-    T_body_nominal[:3, :3] = R_body_world @ model.cam_mat0[camera].reshape(3, 3)
-    T_body_nominal[:3, 3] = R_body_world @ model.cam_pos0[camera]
-    T = T_body_nominal @ T_MUJOCO_OPTICAL @ T_nominal_actual @ T_MUJOCO_OPTICAL
-    model.cam_pos[camera] = T[:3, 3]
-    mujoco.mju_mat2Quat(model.cam_quat[camera], T[:3, :3].ravel())

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from golem.robots.model import magpie
 from golem.robots.model.limits import load_limits
-from golem.robots.mujoco.camera import CameraRig, apply_extrinsics
+from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.hand_servos import HandServos
 from golem.robots.mujoco.hoist import Hoist, HoistConfig
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP, Scene, build_scene
@@ -72,8 +72,8 @@ class MujocoRobot:
         self.data = mujoco.MjData(model)
         self._model = model
         self._errors = sample_episode(self.profile, stream(seed, "episode"))
-        for name, T_bias in self._errors.T_nominal_actual.items():
-            apply_extrinsics(model, name, T_bias)
+        # The cameras are where the model has them; it is the calibration that is wrong.
+        self.calibration = {name: np.linalg.inv(T) for name, T in self._errors.T_nominal_actual.items()}
         self._depth = {
             name: StereoDepth(info, self.profile.depth, stream(seed, f"depth/{name}"))
             for name, info in CAMERAS.items()

@@ -24,21 +24,28 @@ class CentroidConfig:
             2 mm while they close from there (parallelogram linkage).
     """
 
-    depth: float = 0.0115
-    clearance: float = 0.003
+    depth: float = 0.010
+    clearance: float = 0.004
     gap: float = 0.050
 
 
-def top_down(position: Array, yaw: float) -> Array:
-    """Return the (4, 4) gripper pose at `position` (3,) that points straight down.
+UP: Array = np.array([0.0, 0.0, 1.0])
+"""(3,) vertical in odom."""
 
-    The gripper's z (approach) is -z of odom; its x axis has the heading `yaw` about the vertical [rad].
+
+def grasp_pose(position: Array, yaw: float, normal: Array = UP) -> Array:
+    """Return the (4, 4) gripper pose at `position` (3,) that looks against `normal`.
+
+    The gripper's z (approach) is -`normal` (3,), of unit length; its x axis is as near to the heading `yaw` about the
+    vertical [rad] as that allows.
     """
-    c, s = math.cos(yaw), math.sin(yaw)
+    x = np.array([math.cos(yaw), math.sin(yaw), 0.0])
+    x -= (x @ normal) * normal
+    x /= np.linalg.norm(x)
     T = np.eye(4)
-    T[:3, 0] = (c, s, 0.0)
-    T[:3, 1] = (s, -c, 0.0)
-    T[:3, 2] = (0.0, 0.0, -1.0)
+    T[:3, 0] = x
+    T[:3, 1] = np.cross(-normal, x)
+    T[:3, 2] = -normal
     T[:3, 3] = position
     return T
 
@@ -67,4 +74,4 @@ class Centroid(OpenLoop):
         """Return the one top-down grasp; see `GraspMethod`."""
         depth = grasp_depth(target, self.config.depth, self.config.clearance)
         position = target.position - (0.0, 0.0, depth)
-        return [Grasp(top_down(position, yaw), self.config.gap, target.detection.score)]
+        return [Grasp(grasp_pose(position, yaw), self.config.gap, target.detection.score)]

@@ -2,7 +2,8 @@
 
 Not look-and-move (their 75 s): every frame updates a Kalman filter on the object's position in odom, and the gripper
 goes to the filtered position at the arm's rate. Errors of the head camera, of its calibration and of the joint
-encoders drop out, because camera and gripper sit on the same hand.
+encoders drop out, because camera and gripper sit on the same hand. For the same reason the hand is turned until it
+faces the plate squarely: tilt that the encoders do not know of shows in the plate's depth.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from golem.skills.grasping.base import Grasp, ServoLaw, ServoStatus, ServoStep
-from golem.skills.grasping.centroid import Centroid, CentroidConfig, grasp_depth, top_down
+from golem.skills.grasping.centroid import UP, Centroid, CentroidConfig, grasp_depth, grasp_pose
+from golem.skills.grasping.ground import ground_normal
 from golem.types import Array, LocalizedObject
 
 
@@ -21,6 +23,7 @@ class ServoConfig:
     """Noise, gates and patience of the loop.
 
     Attributes:
+        normal_gain: share of a frame's ground normal that is taken over; 0 keeps the vertical.
         drift: how fast the object may wander in odom, by base sway and encoder error [m/sqrt(s)].
         sigma_lateral: standard deviation of one sighting across the optical axis [m].
         sigma_depth: the same along the axis, at close range [m].
@@ -39,6 +42,7 @@ class ServoConfig:
         progress: what counts as progress [m].
     """
 
+    normal_gain: float = 0.2
     drift: float = 0.003
     sigma_lateral: float = 0.002
     sigma_depth: float = 0.002
@@ -78,6 +82,7 @@ class CentroidServo:
         self._x = np.array(target.position, dtype=float)
         self._variance: Array = np.full(3, config.first_radius**2)
         self._depth = centroid.depth
+        self._normal: Array = UP
         self._yaw = yaw
         self._t = t
         self._seen_at = t
@@ -104,10 +109,10 @@ class CentroidServo:
             if self._retreats > c.retreats:
                 status = ServoStatus.LOST
 
-        grasp = self._x - (0.0, 0.0, self._depth)
-        gripper = T_odom_gripper[:3, 3]
-        lateral = float(np.hypot(*(grasp - gripper)[:2]))
-        height = float(gripper[2] - grasp[2])
+        grasp = self._x - self._depth * self._normal
+        offset = T_odom_gripper[:3, 3] - grasp
+        height = float(offset @ self._normal)
+        lateral = float(np.linalg.norm(offset - height * self._normal))
         confirmed = self._sightings >= c.confirm
         if status is ServoStatus.TRACKING and confirmed:
             if lateral > c.tolerance or abs(height) > c.height_tolerance:
@@ -124,12 +129,9 @@ class CentroidServo:
         else:
             self._best, self._best_at = np.inf, t
 
-        above = (
-            np.clip(c.slope * (lateral - c.tolerance), 0.0, c.standoff)
-            if confirmed
-            else c.standoff + self._lift
-        )
-        goal = top_down(grasp + (0.0, 0.0, above), self._yaw)
+        funnel = float(np.clip(c.slope * (lateral - c.tolerance), 0.0, c.standoff))
+        above = funnel if confirmed else c.standoff + self._lift
+        goal = grasp_pose(grasp + above * self._normal, self._yaw, self._normal)
         return ServoStep(goal, self._x.copy(), float(np.sqrt(self._variance.max())), status)
 
     def _update(self, t: float, sightings: list[LocalizedObject], T_odom_gripper: Array) -> bool:
@@ -158,9 +160,17 @@ class CentroidServo:
             self._variance = (1.0 - gain) * self._variance
             # The ground gets clearer as the hand comes closer; the same gain as the height follows it.
             self._depth += float(gain[2]) * (self._wanted_depth(candidates[best]) - self._depth)
+            self._turn(candidates[best])
         self._sightings += 1
         self._seen_at = t
         return True
+
+    def _turn(self, sighting: LocalizedObject) -> None:
+        """Turn the approach towards the ground's normal: a hand that comes in askew jams the screw it pulls."""
+        normal = ground_normal(sighting)
+        if normal is not None:
+            mixed = self._normal + self._config.normal_gain * (normal - self._normal)
+            self._normal = mixed / np.linalg.norm(mixed)
 
     def _wanted_depth(self, sighting: LocalizedObject) -> float:
         return grasp_depth(sighting, self._centroid.depth, self._centroid.clearance)
