@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from golem.training.detector.dataset import Dataset
@@ -12,8 +11,7 @@ from golem.types import Detection
 
 def data(*rows: list[float]) -> Dataset:
     """Return one image with these labels."""
-    code = np.asarray(cv2.imencode(".jpg", np.zeros((48, 64, 3), np.uint8))[1], np.uint8)
-    return Dataset([code], [np.array(rows)], ["head"])
+    return Dataset([np.zeros((48, 64, 3), np.uint8)], [np.array(rows)], ["head"])
 
 
 def screw(x: float, y: float, ignore: float = 0.0) -> list[float]:

@@ -66,13 +66,14 @@ def add_hall(spec: mujoco.MjSpec) -> None:
     )  # fmt: skip
     hall = world.add_body(name="hall")
     for side in (-1, 1):
-        parts.visual(hall, _BOX, (0.05, 2.6, 0.002), (0.95, side * 1.9 + 0.0, 0.001),
+        parts.visual(hall, _BOX, (0.05, 2.6, 0.002), (0.95, side * 1.9, 0.001),
                      material="warning_yellow", quat=(0.70710678, 0, 0, 0.70710678))  # fmt: skip
-    parts.visual(hall, _BOX, (0.05, 6, 2.0), (6.0, 0, 2.0), material="wall_paint")
-    parts.visual(hall, _BOX, (0.06, 6, 0.45), (5.98, 0, 0.45), material="wall_band")
     for side in (-1, 1):
-        parts.visual(hall, _BOX, (7, 0.05, 2.0), (0, side * 6.0, 2.0), material="wall_paint")
-        parts.visual(hall, _BOX, (7, 0.06, 0.45), (0, side * 5.98, 0.45), material="wall_band")
+        parts.visual(hall, _BOX, (0.05, 6, 2.0), (side * 6.0, 0, 2.0), material="wall_paint")
+        parts.visual(hall, _BOX, (0.06, 6, 0.45), (side * 5.98, 0, 0.45), material="wall_band")
+    for side in (-1, 1):
+        parts.visual(hall, _BOX, (6, 0.05, 2.0), (0, side * 6.0, 2.0), material="wall_paint")
+        parts.visual(hall, _BOX, (6, 0.06, 0.45), (0, side * 5.98, 0.45), material="wall_band")
     for y in (-4, -2, 0, 2, 4):
         parts.visual(hall, _BOX, (0.08, 0.08, 2.0), (5.9, y, 2.0), material="aluminium")
     for x, y, z, level in ((0.2, 1.6, 3.2, 0.42), (0.2, -1.6, 3.2, 0.36), (2.6, 0.0, 3.4, 0.30)):

@@ -133,7 +133,7 @@ def _add_stand(body: mujoco.MjsBody, layout: PackLayout) -> None:
         flange = (top - COVER) / 2
         for size, pos in (
             ((0.03, hy, flange), (cx + side * (hx - 0.03), 0, -COVER - flange)),
-            ((hx, 0.03, flange), (cx, side * (hy - 0.03), -COVER - flange)),
+            ((hx - 0.06, 0.03, flange), (cx, side * (hy - 0.03), -COVER - flange)),
         ):
             parts.visual(body, _BOX, size, pos, material="aluminium")
             parts.collider(body, _BOX, size, pos)

@@ -51,7 +51,7 @@ def evaluate(data: Dataset, detect: Detector, working_score: float = 0.3) -> dic
     hits: dict[tuple[str, str], list[tuple[float, bool, float]]] = {}
     counts: dict[tuple[str, str], int] = {}
     for index, camera in enumerate(data.cameras):
-        found = detect(data.decode(index))
+        found = detect(data.images[index])
         for kind, label in enumerate(CLASSES):
             key = (camera, label)
             truth = data.labels[index][data.labels[index][:, 0] == kind]

@@ -63,6 +63,9 @@ def _solid(
         draw = next(d for d in world.draws if screw_name(d.slot) == part.body)
         faces = bool(axis @ T[2, :3] < -0.5)
         centre_world = data.xpos[body] + axis * draw.head_height
+    if part.label == "nut":
+        # The tip of the stud moves across the nut with the view, and a crop does not show where the camera is.
+        faces = False
     centre = project(info, T[:3, :3] @ centre_world + T[:3, 3]) if faces else (low + high) / 2
     if not _inside(info, centre):
         return []

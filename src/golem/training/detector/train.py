@@ -66,7 +66,7 @@ class _Batches(TorchDataset[tuple[Tensor, Tensor, Tensor, Tensor]]):
         images, heats, weights, regressions = [], [], [], []
         for _ in range(self._batch):
             k = int(rng.integers(len(self._data.images)))
-            piece, labels = augment.crop(self._data.decode(k), self._data.labels[k], rng)
+            piece, labels = augment.crop(self._data.images[k], self._data.labels[k], rng)
             heat, weight, regression = augment.targets(labels)
             images.append(augment.corrupt(piece, rng))
             heats.append(heat)
