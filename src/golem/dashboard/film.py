@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,10 @@ GIF_SCALE = 2 / 3
 """Size of a GIF's pictures, relative to the film's."""
 GIF_FRAMES = 240
 """A film with more pictures than this drops some in its GIF."""
+STILL = 6
+"""Change of a colour, of 255, below which a GIF's pixel stays what it was."""
+UNCHANGED = 255
+"""Palette index of a GIF's transparent colour."""
 MAX_GIF = 8_000_000
 """Size above which a GIF is written again, smaller [bytes]."""
 PANEL = (16, 20, 27)
@@ -176,25 +180,39 @@ class Film:
         return np.ascontiguousarray(picture[..., ::-1]).astype(np.uint8, copy=False)
 
     def _write_gif(self, path: Path, scale: float) -> None:
-        """Write the pictures with one palette: equal pixels stay equal, so that only what moves is stored."""
+        """Write the pictures with one palette; a pixel that hardly changes stays, so that only what moves is stored."""
         count = len(self._frames)
         samples = [self.picture(i, 0.25) for i in np.unique(np.linspace(0, count - 1, 24).astype(int))]
-        palette = Image.fromarray(np.concatenate(samples)).quantize(255, method=Image.Quantize.MEDIANCUT)
+        palette = Image.fromarray(np.concatenate(samples)).quantize(
+            UNCHANGED, method=Image.Quantize.MEDIANCUT
+        )
+        nearest = _nearest_colour(palette)
         stride = math.ceil(count / GIF_FRAMES)
 
-        def indexed(i: int) -> Image.Image:
-            picture = Image.fromarray(self.picture(i, scale))
-            return picture.quantize(palette=palette, dither=Image.Dither.NONE)
+        def indexed() -> Iterator[Image.Image]:
+            shown = np.full((1, 1, 3), -1000, np.int16)
+            index = np.zeros((1, 1), np.uint8)
+            for i in range(0, count, stride):
+                picture = self.picture(i, scale)
+                r, g, b = (picture[..., c] >> 2 for c in range(3))
+                changed = np.abs(picture - shown).max(axis=2) > STILL
+                index = np.where(changed, nearest[r, g, b], index)
+                shown = np.where(changed[..., None], picture, shown).astype(np.int16)
+                image = Image.fromarray(index)
+                image.putpalette(palette.getpalette() or [])
+                yield image
 
-        indexed(0).save(
+        images = indexed()
+        next(images).save(
             path,
             format="GIF",
             save_all=True,
-            append_images=(indexed(i) for i in range(stride, count, stride)),
+            append_images=images,
             duration=round(1000.0 * stride / self.fps),
             loop=0,
             disposal=1,
-            optimize=False,
+            transparency=UNCHANGED,
+            optimize=True,  # stores what did not change as transparent
         )
 
     def _write_video(self, path: Path) -> bool:
@@ -214,3 +232,10 @@ class Film:
 
 def _resized(picture: NDArray[Any], size: tuple[int, int]) -> NDArray[np.uint8]:
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def _nearest_colour(palette: Image.Image) -> NDArray[np.uint8]:
+    """Return (64, 64, 64) the index of the palette's nearest colour, by the upper six bits of red, green, blue."""
+    r, g, b = np.meshgrid(*[np.arange(2, 256, 4, dtype=np.uint8)] * 3, indexing="ij")
+    every = Image.fromarray(np.stack([r, g, b], axis=-1).reshape(512, 512, 3))
+    return np.asarray(every.quantize(palette=palette, dither=Image.Dither.NONE)).reshape(64, 64, 64)
