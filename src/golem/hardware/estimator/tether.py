@@ -33,17 +33,20 @@ class TetherEstimator:
 
     def _rotation(self, state: LowState) -> Array:
         """Return the (3, 3) rotation of base_link in odom: the IMU's, less the torso joint's about their common z."""
-        w, x, y, z = state.imu.quat
-        torso = np.array(
+        w, x, y, z = state.imu.quat.tolist()
+        # q_z(-heading) q q_z(-torso): both turns are about z, so they mix w with z and x with y by their sum and
+        # their difference.
+        torso = float(state.q[_TORSO])
+        add, sub = 0.5 * (self._heading + torso), 0.5 * (self._heading - torso)
+        c, s = math.cos(add), math.sin(add)
+        w, z = c * w + s * z, c * z - s * w
+        c, s = math.cos(sub), math.sin(sub)
+        x, y = c * x + s * y, c * y - s * x
+        k = 2.0 / (w * w + x * x + y * y + z * z)
+        return np.array(
             [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+                [1.0 - k * (y * y + z * z), k * (x * y - w * z), k * (x * z + w * y)],
+                [k * (x * y + w * z), 1.0 - k * (x * x + z * z), k * (y * z - w * x)],
+                [k * (x * z - w * y), k * (y * z + w * x), 1.0 - k * (x * x + y * y)],
             ]
         )
-        return _about_z(-self._heading) @ torso @ _about_z(-float(state.q[_TORSO]))
-
-
-def _about_z(angle: float) -> Array:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -92,7 +92,7 @@ class MujocoRobot:
         self._screws = np.array([model.body(name).id for name in self.scene.names.screws], dtype=int)
         first = np.array([model.joint(name).dofadr[0] for name in self.scene.names.screws], dtype=int)
         self._screw_v = (first[:, None] + np.arange(6)).ravel()
-        self._sensors = {n: _sensor(model, n) for n in ("imu_quat", "imu_gyro", "imu_acc")}
+        self._sensors = [_sensor(model, n) for n in ("imu_quat", "imu_gyro", "imu_acc")]
         self._tau = np.zeros(NUM_JOINTS)
 
         mujoco.mj_resetData(model, self.data)
@@ -111,22 +111,25 @@ class MujocoRobot:
         self._model.opt.timestep = step
         for side, hand in hands.items():
             self._hands[side].command(hand, dt)
+        # What the motors add to -kp q - kd dq; q is the true position, the encoders' error is in the target.
+        held = latched.kp * (latched.q - self._errors.joint_offset) + latched.kd * latched.dq + latched.tau
+        sway = self._errors.hoist_sway.offset(self.data.time)
         for _ in range(round(dt / step)):
-            self._motors(latched)
+            self._motors(latched, held)
             for hand in self._hands.values():
                 hand.drive(self.data)
-            self._hoist.apply(self.data, self._errors.hoist_sway.offset(self.data.time))
+            self._hoist.apply(self.data, sway)
             mujoco.mj_step(self._model, self.data)
 
     def joints(self) -> tuple[Array, Array, Array]:
         """Return q, dq, tau as the encoders and drives report them; see `Robot`."""
-        q = self.data.qpos[self._q] + self._errors.joint_offset
-        return q, self.data.qvel[self._v], self._tau.copy()
+        q = self.data.qpos.take(self._q) + self._errors.joint_offset
+        return q, self.data.qvel.take(self._v), self._tau.copy()
 
     def imu(self) -> Imu:
         """Return the present IMU sample; see `Robot`."""
-        read = {name: self.data.sensordata[where].copy() for name, where in self._sensors.items()}
-        return self._imu_model.measure(read["imu_quat"], read["imu_gyro"], read["imu_acc"])
+        quat, gyro, acc = (self.data.sensordata[where] for where in self._sensors)
+        return self._imu_model.measure(quat, gyro, acc)
 
     def hand(self, side: Side, t: float) -> HandState:
         """Return what one hand reports; see `Robot`."""
@@ -145,19 +148,18 @@ class MujocoRobot:
             self._rig.close()
             self._rig = None
 
-    def _motors(self, command: LowCommand) -> None:
+    def _motors(self, command: LowCommand, held: Array) -> None:
         """Run the PD loop of the 27 motor drives for one physics step."""
-        q = self.data.qpos[self._q] + self._errors.joint_offset
-        dq = self.data.qvel[self._v]
-        tau = command.kp * (command.q - q) + command.kd * (command.dq - dq) + command.tau
-        self._tau = np.clip(tau, -self._torque_limit, self._torque_limit)
+        tau = held - command.kp * self.data.qpos.take(self._q) - command.kd * self.data.qvel.take(self._v)
+        self._tau = np.minimum(np.maximum(tau, -self._torque_limit), self._torque_limit)
         self.data.ctrl[:NUM_JOINTS] = self._tau
 
     def _delicate(self) -> bool:
         """Return whether a screw moves, or a finger is so close that it may touch one."""
         if not len(self._screws):
             return False
-        if np.abs(self.data.qvel[self._screw_v]).max() > MOVING:
+        speeds = self.data.qvel.take(self._screw_v)
+        if max(speeds.max(), -speeds.min()) > MOVING:
             return True
         gaps = self.data.xpos[self._fingers, None] - self.data.xpos[None, self._screws]
         return bool((gaps * gaps).sum(axis=2).min() < self.config.near**2)

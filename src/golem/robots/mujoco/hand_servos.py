@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 
@@ -29,40 +31,52 @@ class HandServos:
         """Find the cranks and fingers of the hand on `side`."""
         names = [magpie.finger_names(side, finger) for finger in magpie.FINGERS]
         cranks = [model.joint(crank) for crank, _, _ in names]
-        self._q = np.array([j.qposadr[0] for j in cranks])
-        self._v = np.array([j.dofadr[0] for j in cranks])
-        self._q_finger = np.array([model.joint(finger).qposadr[0] for _, finger, _ in names])
-        self._u = np.array([model.actuator(crank).id for crank, _, _ in names])
+        self._q = [int(j.qposadr[0]) for j in cranks]
+        self._v = [int(j.dofadr[0]) for j in cranks]
+        self._q_finger = [int(model.joint(finger).qposadr[0]) for _, finger, _ in names]
+        self._u = [int(model.actuator(crank).id) for crank, _, _ in names]
         # The hinges may be counted in opposite senses; here both cranks count positive when closing.
-        self._sign = np.array([1.0 if j.range.sum() > 0 else -1.0 for j in cranks])
-        self._reference = np.zeros(2)
+        self._sign = [1.0 if j.range.sum() > 0 else -1.0 for j in cranks]
+        self._reference = 0.0
         self._force = magpie.MIN_FORCE
+        self._gap = math.nan
+        self._goal = 0.0
 
     def reset(self, data: mujoco.MjData, gap: float) -> None:
         """Place both fingers at an opening of `gap` [m]."""
-        self._reference[:] = magpie.crank_from_gap(gap)
-        data.qpos[self._q] = self._sign * self._reference
-        data.qpos[self._q_finger] = -self._sign * self._reference
+        self._reference = float(magpie.crank_from_gap(gap))
+        for q, q_finger, sign in zip(self._q, self._q_finger, self._sign, strict=True):
+            data.qpos[q] = sign * self._reference
+            data.qpos[q_finger] = -sign * self._reference
 
     def command(self, command: HandCommand, dt: float) -> None:
         """Let the reference move towards the commanded gap for `dt` [s]."""
-        goal = magpie.CLOSED + OVERTRAVEL if command.gap <= 0.0 else magpie.crank_from_gap(command.gap)
+        if command.gap != self._gap:
+            self._gap = command.gap
+            closes = command.gap <= 0.0
+            self._goal = magpie.CLOSED + OVERTRAVEL if closes else float(magpie.crank_from_gap(command.gap))
         reach = magpie.MAX_SPEED * dt
-        self._reference += np.clip(goal - self._reference, -reach, reach)
+        self._reference += min(max(self._goal - self._reference, -reach), reach)
         self._force = min(max(command.force, magpie.MIN_FORCE), magpie.MAX_FORCE)
+
+    # Scalars below: this runs at every physics step, where arrays of two cost more than the arithmetic.
 
     def drive(self, data: mujoco.MjData) -> None:
         """Set the crank torques for one physics step."""
-        theta = self._sign * data.qpos[self._q]
-        rate = self._sign * data.qvel[self._v]
-        ceiling = self._force * magpie.ARM * np.sin(magpie.ANGLE_OPEN + theta)
-        torque = SERVO_KP * (self._reference - theta) - SERVO_KD * rate
-        data.ctrl[self._u] = self._sign * np.minimum(np.maximum(torque, -ceiling), ceiling)
+        qpos, qvel, ctrl = data.qpos, data.qvel, data.ctrl
+        for q, v, u, sign in zip(self._q, self._v, self._u, self._sign, strict=True):
+            theta = sign * qpos.item(q)
+            ceiling = self._force * magpie.ARM * math.sin(magpie.ANGLE_OPEN + theta)
+            torque = SERVO_KP * (self._reference - theta) - SERVO_KD * sign * qvel.item(v)
+            ctrl[u] = sign * min(max(torque, -ceiling), ceiling)
 
     def read(self, data: mujoco.MjData, t: float) -> HandState:
         """Return the hand's report at time `t` [s]: the servos' present positions and loads."""
-        theta = self._sign * data.qpos[self._q]
-        fingers = np.asarray(magpie.pad_offset(theta))
-        load = self._sign * data.ctrl[self._u]
-        force = np.maximum(load, 0.0) / (magpie.ARM * np.sin(magpie.ANGLE_OPEN + theta))
-        return HandState(t, float(fingers.sum()), fingers, force)
+        qpos, ctrl = data.qpos, data.ctrl
+        fingers: list[float] = []
+        force: list[float] = []
+        for q, u, sign in zip(self._q, self._u, self._sign, strict=True):
+            theta = sign * qpos.item(q)
+            fingers.append(float(magpie.pad_offset(theta)))
+            force.append(max(sign * ctrl.item(u), 0.0) / (magpie.ARM * math.sin(magpie.ANGLE_OPEN + theta)))
+        return HandState(t, sum(fingers), np.array(fingers), np.array(force))

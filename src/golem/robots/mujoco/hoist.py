@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import mujoco
-import numpy as np
 
 from golem.types import Array
 
@@ -34,28 +34,38 @@ class Hoist:
     """Spring and damper between the pelvis and the hook, preloaded with the robot's weight."""
 
     def __init__(self, model: mujoco.MjModel, config: HoistConfig) -> None:
-        """Hang the body `pelvis` of `model`."""
+        """Hang the body `pelvis` of `model` from its free joint `base`."""
         self._body = model.body("pelvis").id
-        self._dof = int(model.body_dofadr[self._body])
+        joint = model.joint("base")
+        self._position = slice(int(joint.qposadr[0]), int(joint.qposadr[0]) + 3)
+        self._attitude = slice(self._position.stop, self._position.stop + 4)
+        self._velocity = slice(int(joint.dofadr[0]), int(joint.dofadr[0]) + 6)
         mass = float(model.body_subtreemass[self._body])
-        self._weight = -mass * model.opt.gravity
-        self._home = np.array([0.0, 0.0, config.height])
-        self._k = np.array(config.stiffness)
-        self._d = 2.0 * config.damping_ratio * np.sqrt(self._k * mass)
-        self._k_rot = np.array(config.rotational_stiffness)
+        self._weight: list[float] = (-mass * model.opt.gravity).tolist()
+        self._home = (0.0, 0.0, config.height)
+        self._k, self._k_rot = config.stiffness, config.rotational_stiffness
+        self._d = [2.0 * config.damping_ratio * math.sqrt(k * mass) for k in self._k]
         # 8 kg m^2: the robot about its pelvis, order of magnitude; only the damping ratio depends on it.
-        self._d_rot = 2.0 * config.damping_ratio * np.sqrt(self._k_rot * 8.0)
+        self._d_rot = [2.0 * config.damping_ratio * math.sqrt(k * 8.0) for k in self._k_rot]
 
     def apply(self, data: mujoco.MjData, sway: Array) -> None:
         """Set the wrench on the pelvis for the present state; the hook is displaced by `sway` (2,) [m]."""
-        wrench = data.xfrc_applied[self._body]
-        position = data.qpos[self._dof : self._dof + 3]
-        w, x, y, z = data.qpos[self._dof + 3 : self._dof + 7]
-        velocity = data.qvel[self._dof : self._dof + 6]
-        home = self._home.copy()
-        home[:2] += sway
-        wrench[:3] = self._k * (home - position) - self._d * velocity[:3] + self._weight
+        # Scalars: this runs at every physics step, where small arrays cost more than the arithmetic.
+        x, y, z = data.qpos[self._position].tolist()
+        w, *axis = data.qpos[self._attitude].tolist()
+        vx, vy, vz, *rate = data.qvel[self._velocity].tolist()
+        hook_x, hook_y, hook_z = self._home
+        hook_x, hook_y = hook_x + float(sway[0]), hook_y + float(sway[1])
+        k, d, carry = self._k, self._d, self._weight
         # Small rotations: the vector part of the quaternion is half the rotation vector. A free joint's angular
         # velocity is in the body frame, which differs from the world's by that same small rotation.
         sign = 2.0 if w >= 0.0 else -2.0
-        wrench[3:] = -self._k_rot * (sign * np.array([x, y, z])) - self._d_rot * velocity[3:]
+        k_rot, d_rot = self._k_rot, self._d_rot
+        data.xfrc_applied[self._body] = (
+            k[0] * (hook_x - x) - d[0] * vx + carry[0],
+            k[1] * (hook_y - y) - d[1] * vy + carry[1],
+            k[2] * (hook_z - z) - d[2] * vz + carry[2],
+            -k_rot[0] * sign * axis[0] - d_rot[0] * rate[0],
+            -k_rot[1] * sign * axis[1] - d_rot[1] * rate[1],
+            -k_rot[2] * sign * axis[2] - d_rot[2] * rate[2],
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,13 +81,14 @@ class ImuModel:
 
 def _small_rotation(rotvec: Array) -> Array:
     """Return the unit quaternion of a rotation vector; exact to third order, for angles of a few degrees."""
-    q = np.append(1.0, rotvec / 2)
-    return q / np.sqrt(q @ q)
+    x, y, z = (0.5 * rotvec).tolist()
+    scale = 1.0 / math.sqrt(1.0 + x * x + y * y + z * z)
+    return np.array([scale, scale * x, scale * y, scale * z])
 
 
 def _multiply(p: Array, q: Array) -> Array:
-    pw, px, py, pz = p
-    qw, qx, qy, qz = q
+    pw, px, py, pz = p.tolist()
+    qw, qx, qy, qz = q.tolist()
     return np.array(
         [
             pw * qw - px * qx - py * qy - pz * qz,
