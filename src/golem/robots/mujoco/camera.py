@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.robots.mujoco.gl import GlContext, shared_context
-from golem.robots.sensors.cameras import T_MUJOCO_OPTICAL
-from golem.types import Array, CameraInfo
+from golem.types import CameraInfo
 
 CLIP = (0.01, 60.0)
 """Near and far clipping plane [m]: nearer than the fingers are to the palm camera, farther than a hall is long."""
