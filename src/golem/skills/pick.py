@@ -245,8 +245,12 @@ class Pick:
 
     async def _extract(self, context: Context, goal: PickGoal) -> None:
         """Pull straight out against the approach direction, then lift; the grip must hold."""
-        context.say("extract", "Pulling straight out.")
         arm, hand = context.arms[goal.side], context.hands[goal.side]
+        # Off centre, one finger leans on its stop and the other pushes the object against its bore.
+        centred = arm.commanded.copy()
+        centred[:3, 3] += hand.status.offset * centred[:3, 1]
+        await arm.move(centred, self._config.pull_speed)
+        context.say("extract", "Pulling straight out.")
         await arm.move(
             retracted(arm.commanded, self._config.pull),
             self._config.pull_speed,

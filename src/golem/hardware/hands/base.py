@@ -36,12 +36,15 @@ class HandStatus:
         t: time stamp of the report it is based on [s].
         state: see `GripState`.
         gap: opening [m].
+        offset: where between the fingers the middle of the opening is, along the closing axis [m]: 0 when both are
+            equally far from the hand's centre plane, positive when finger a (+y) is further out.
         force: (2,) force of each finger [N].
     """
 
     t: float
     state: GripState
     gap: float
+    offset: float
     force: Array
 
     @property
@@ -67,5 +70,5 @@ class HandController(Protocol):
         ...
 
     def status(self) -> HandStatus:
-        """Return what the latest step found; gap and force are nan before the first."""
+        """Return what the latest step found; gap, offset and force are nan before the first."""
         ...

@@ -86,10 +86,11 @@ class MagpieHand:
         return HandCommand(t=t, gap=self._goal, force=self._force)
 
     def status(self) -> HandStatus:
-        """Return what the latest step found; gap and force are nan before the first."""
+        """Return what the latest step found; gap, offset and force are nan before the first."""
         if self._last is None:
-            return HandStatus(-math.inf, self._state, math.nan, np.full(2, math.nan))
-        return HandStatus(self._last.t, self._state, self._last.gap, self._last.force.copy())
+            return HandStatus(-math.inf, self._state, math.nan, math.nan, np.full(2, math.nan))
+        offset = 0.5 * float(self._last.fingers[0] - self._last.fingers[1])
+        return HandStatus(self._last.t, self._state, self._last.gap, offset, self._last.force.copy())
 
     def _begin(self, gap: float, force: float, state: GripState) -> None:
         self._goal = gap
