@@ -8,7 +8,7 @@ from golem.robots.worlds import parts
 from golem.types import Array
 
 
-def volume(vertices: Array, faces: Array) -> float:
+def volume(vertices: Array, faces: parts.Faces) -> float:
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 

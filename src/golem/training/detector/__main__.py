@@ -1,11 +1,11 @@
-"""`python -m golem.training.detector render|train|evaluate|export`."""
+"""`python -m golem.training.detector render|train|export|evaluate|curve`."""
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict
+import time
 from pathlib import Path
 
+import numpy as np
 import tyro
 
 from golem.training.detector import dataset
@@ -35,7 +35,7 @@ def render(
     dataset.generate(folder, seed, "train", worlds, per_camera)
 
 
-def train(data: Path = RUNS / "data", out: Path = RUNS / "run", seed: int = 0, steps: int = 20000) -> None:
+def train(data: Path = RUNS / "data", out: Path = RUNS / "run", seed: int = 0, steps: int = 12000) -> None:
     """Train on the rendered splits, or resume.
 
     Args:
@@ -59,26 +59,43 @@ def export(checkpoint: Path = RUNS / "run" / "best.pt", out: Path = RUNS / "dete
     print(export_onnx(checkpoint, out))
 
 
-def evaluate(data: Path = RUNS / "data", weights: Path | None = None, out: Path | None = None) -> None:
+def curve(run: Path = RUNS / "run", out: Path = RUNS / "curve.png") -> None:
+    """Draw the training curve.
+
+    Args:
+        run: folder of `train`.
+        out: PNG file.
+    """
+    from golem.training.detector.curve import draw_curve
+
+    draw_curve(run / "curve.csv", out)
+
+
+def evaluate(data: Path = RUNS / "data", weights: Path | None = None) -> None:
     """Print the held-out figures of an ONNX file through the run-time detector.
 
     Args:
         data: folder of the splits.
         weights: ONNX file; the shipped one if absent.
-        out: also write the figures there, as JSON.
     """
     from golem.capabilities.localization.onnx_detector import OnnxDetector, OnnxDetectorConfig
     from golem.training.detector.evaluate import THRESHOLD, evaluate, table
 
     detector = OnnxDetector(OnnxDetectorConfig(None if weights is None else str(weights), THRESHOLD))
-    scores = evaluate(dataset.load(data, "held_out"), detector.detect)
-    print(table(scores))
-    if out is not None:
-        out.write_text(json.dumps({f"{c}/{label}": asdict(s) for (c, label), s in scores.items()}, indent=1))
+    held = dataset.load(data, "held_out")
+    print(table(evaluate(held, detector.detect)))
+    for camera in ("head", "palm"):
+        times = []
+        for image, name in zip(held.images, held.cameras, strict=True):
+            if name == camera:
+                start = time.process_time()
+                detector.detect(image)
+                times.append(1e3 * (time.process_time() - start))
+        print(f"{camera}: {np.median(times):.1f} ms CPU per image (median of {len(times)}, one thread)")
 
 
 if __name__ == "__main__":
     tyro.extras.subcommand_cli_from_dict(
-        {"render": render, "train": train, "export": export, "evaluate": evaluate},
+        {"render": render, "train": train, "export": export, "evaluate": evaluate, "curve": curve},
         prog="golem.training.detector",
     )
