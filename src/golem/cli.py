@@ -92,10 +92,13 @@ def _train(words: list[str]) -> int:
     if not words or words[0] != "detector":
         raise unknown_name("thing to train", words[0] if words else "", ["detector"])
     _prepare_graphics()
-    from golem.training.detector.__main__ import main as train_detector
+    from golem.errors import MissingExtra
 
-    sys.argv = ["golem train detector", *words[1:]]
-    train_detector()
+    try:
+        from golem.training.detector.__main__ import main as train_detector
+    except ModuleNotFoundError as error:
+        raise MissingExtra(error.name or "torch", "train") from error
+    train_detector(words[1:])
     return 0
 
 

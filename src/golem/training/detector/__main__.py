@@ -94,8 +94,14 @@ def evaluate(data: Path = RUNS / "data", weights: Path | None = None) -> None:
         print(f"{camera}: {np.median(times):.1f} ms CPU per image (median of {len(times)}, one thread)")
 
 
-if __name__ == "__main__":
+def main(words: list[str] | None = None) -> None:
+    """Run one of the commands; `words` are the command line's by default."""
     tyro.extras.subcommand_cli_from_dict(
         {"render": render, "train": train, "export": export, "evaluate": evaluate, "curve": curve},
-        prog="golem.training.detector",
+        prog="golem train detector",
+        args=words,
     )
+
+
+if __name__ == "__main__":
+    main()

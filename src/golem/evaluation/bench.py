@@ -1,0 +1,169 @@
+"""`golem bench`: every performance figure beside its reference, in one run, in CPU time of this thread."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from golem.capabilities.arms.base import UpperBody
+from golem.capabilities.arms.diff_ik import DiffIK
+from golem.capabilities.arms.kinematics import UpperKinematics
+from golem.capabilities.arms.postures import posture
+from golem.errors import MissingExtra
+from golem.hardware.estop.base import EstopFrame
+from golem.hardware.safety.base import GateInputs, GateMemory, Request, SafetyLimits
+from golem.hardware.safety.gate import check
+from golem.hardware.servo.servo import Servo
+from golem.runtime.assembly import build, start_posture
+from golem.runtime.executor import TICK
+from golem.skills.pick import Pick, PickGoal
+from golem.stack import load_stack
+from golem.types import UPPER, Array, Frame, Imu, LowState
+
+
+@dataclass(frozen=True)
+class BenchConfig:
+    """Print every performance figure beside its reference, in CPU time."""
+
+    quick: bool = False
+    """Fewer repetitions."""
+    seed: int = 0
+    """Seed of the episodes."""
+    json: bool = False
+    """Print the figures as a last line of JSON."""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One measured figure.
+
+    Attributes:
+        name: what was measured.
+        median, p99: over the repetitions; equal where there is one.
+        unit: of both.
+        reference: what it is compared with, and where that comes from.
+    """
+
+    name: str
+    median: float
+    p99: float
+    unit: str
+    reference: str
+
+
+def run_bench(config: BenchConfig) -> list[Figure]:
+    """Measure and print."""
+    figures = [*_control(config), *_perception(config), *_robot(config)]
+    table = Table("figure", "median", "p99", "unit", "reference", title="GOLEM, CPU time of one thread")
+    for f in figures:
+        table.add_row(f.name, f"{f.median:.3g}", f"{f.p99:.3g}", f.unit, f.reference)
+    Console().print(table)
+    if config.json:
+        print(json.dumps([asdict(f) for f in figures]))
+    return figures
+
+
+def _timed(step: Callable[[int], object], n: int) -> Array:
+    """Return the (n,) CPU times of `step(0) ... step(n - 1)` [s]."""
+    times = np.empty(n)
+    for i in range(n):
+        start = time.thread_time_ns()
+        step(i)
+        times[i] = (time.thread_time_ns() - start) * 1e-9
+    return times
+
+
+def _figure(name: str, times: Array, scale: float, unit: str, reference: str) -> Figure:
+    return Figure(name, float(np.median(times)) * scale, float(np.quantile(times, 0.99)) * scale, unit, reference)
+
+
+def _control(config: BenchConfig) -> list[Figure]:
+    n = 1000 if config.quick else 20000
+    figures = [_ik("IK tick, diff_ik", DiffIK(), min(n, 4000), "80 us wanted")]
+    try:
+        from golem.capabilities.arms.pink_ik import PinkIK
+
+        figures.append(_ik("IK tick, pink_ik", PinkIK(), min(n, 4000), "137 us: Pink + daqp (notes)"))
+    except MissingExtra as error:
+        Console().print(f"pink_ik left out: {error}")
+    servo, limits, memory = Servo(), SafetyLimits.from_profile(), GateMemory()
+    rng = np.random.default_rng(config.seed)
+    q = start_posture() + 1e-4 * rng.standard_normal((n, 27))
+    imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
+    servo.reset(LowState(0.0, q[0], np.zeros(27), np.zeros(27), imu))
+
+    def tick(i: int) -> None:
+        nonlocal memory
+        t = i * TICK
+        state = LowState(t, q[i], np.zeros(27), np.zeros(27), imu)
+        command = servo.step(state, q[0], TICK)
+        request = Request.ACTIVATE if i == 1 else Request.NONE
+        memory = check(GateInputs(t, state, command, EstopFrame(t, i % 256, False), request), limits, memory).memory
+
+    figures.append(_figure("servo + safety tick", _timed(tick, n), 1e6, "us", "2000 us available at 500 Hz"))
+    return figures
+
+
+def _ik(name: str, ik: UpperBody, n: int, reference: str) -> Figure:
+    """Time both hands on circles of 8 cm radius and 4 s period at 100 Hz, as in the project's notes."""
+    q = start_posture()
+    q[UPPER] = posture("ready")
+    ik.reset(q)
+    kinematics = UpperKinematics()
+    left, right = kinematics.pose("left", q[UPPER]), kinematics.pose("right", q[UPPER])
+    targets = []
+    for i in range(n):
+        phase = 2 * np.pi * i * 0.01 / 4.0
+        offset = 0.08 * np.array([0.0, np.sin(phase), 1.0 - np.cos(phase)])
+        pair = [left.copy(), right.copy()]
+        for T in pair:
+            T[:3, 3] += offset
+        targets.append(pair)
+    return _figure(name, _timed(lambda i: ik.step(targets[i][0], targets[i][1], q, 0.01), n), 1e6, "us", reference)
+
+
+def _perception(config: BenchConfig) -> list[Figure]:
+    from golem.capabilities.localization.onnx_detector import OnnxDetector
+
+    n = 5 if config.quick else 40
+    _, robot = build(load_stack("tether", profile="field"), config.seed)
+    detector = OnnxDetector()
+    figures = []
+    try:
+        for camera in ("head", "right_hand"):
+            info = robot.cameras[camera]
+            size = f"{info.width}x{info.height}"
+            robot.capture(camera)
+            times = _timed(lambda i, camera=camera: robot.capture(camera), n)
+            figures.append(_figure(f"RGB-D frame {camera} {size}", times, 1e3, "ms", "with depth noise"))
+            rgb, depth = robot.capture(camera)
+            frame = Frame(0.0, info, rgb, depth, np.eye(4))
+            times = _timed(lambda i, frame=frame: detector.locate(frame, detector.classes), n)
+            figures.append(_figure(f"detector {camera} {size}", times, 1e3, "ms", "14.3 ms at 640x480 (notes)"))
+    finally:
+        robot.close()
+    return figures
+
+
+def _robot(config: BenchConfig) -> list[Figure]:
+    """Robot seconds per CPU second of a whole tethered trial, and of the same stack while no camera is asked for."""
+    figures = []
+    running, robot = build(load_stack("tether", profile="field"), config.seed)
+    try:
+        start = time.process_time()
+        running.executor.run(5.0)
+        blind = 5.0 / (time.process_time() - start)
+        start, since = time.process_time(), running.executor.t
+        running.execute(Pick(running.method), PickGoal(), 90.0)
+        seeing = (running.executor.t - since) / (time.process_time() - start)
+    finally:
+        robot.close()
+    figures.append(Figure("tethered stack without cameras", blind, blind, "robot s / CPU s", "5 wanted"))
+    figures.append(Figure("tethered pick with cameras", seeing, seeing, "robot s / CPU s", "1 wanted"))
+    return figures
