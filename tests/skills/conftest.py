@@ -128,7 +128,7 @@ class World:
         if self._state[side] is GripState.HOLDING and self.lose_at():
             self._state[side] = GripState.SLIPPED
         self.holds = self._state["right"] is GripState.HOLDING
-        status = HandStatus(self.t, self._state[side], self._gap[side], np.zeros(2))
+        status = HandStatus(self.t, self._state[side], self._gap[side], 0.0, np.zeros(2))
         self.bus.publish(topics.hand_status(side), status, self.t)
 
 

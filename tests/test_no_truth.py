@@ -1,0 +1,274 @@
+"""No module of a stack can reach the simulator's truth: neither by an import nor through any object it holds."""
+
+from __future__ import annotations
+
+import ast
+import gc
+import sys
+import types
+import weakref
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from golem import registry
+from golem.robots.mujoco.engine import MujocoRobot
+from golem.robots.mujoco.scene import Scene
+from golem.runtime.assembly import Running, build
+from golem.skills.base import Tick
+from golem.skills.pick import Pick, PickGoal
+from golem.stack import Stack
+
+SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
+
+# Who may name the simulator and what is in its world: the twin itself, those who judge, teach, show and check it.
+INSIDERS = (
+    "robots/mujoco",
+    "robots/worlds",
+    "evaluation",
+    "training",
+    "dashboard",
+    "cli.py",
+    "run.py",
+    "doctor.py",
+)
+# The twin's robot is built from the same table as the model that the modules use.
+BUILDERS = (*INSIDERS, "robots/model")
+SECRETS = {
+    "mujoco": BUILDERS,
+    "golem.robots.mujoco": INSIDERS,
+    # A realism profile says, among other things, how the screws of its worlds are drawn.
+    "golem.robots.worlds": (*INSIDERS, "robots/sensors/profiles.py"),
+    "golem.evaluation": INSIDERS,
+}
+
+
+def imports(source: str) -> set[str]:
+    """Return every dotted name that `source` imports, anywhere in its text, literal dynamic imports included."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "relative imports hide what is imported"
+            names.update(f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
+            called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            if called in ("import_module", "__import__"):
+                names.add(str(node.args[0].value))
+    return names
+
+
+def secrets(source: str, owner: str) -> list[str]:
+    """Return what `source`, the file `owner` (relative to the package), imports but must not."""
+    return [
+        name
+        for name in sorted(imports(source))
+        for secret, insiders in SECRETS.items()
+        if (name + ".").startswith(secret + ".") and not owner.startswith(insiders)
+    ]
+
+
+@pytest.mark.parametrize("path", sorted(SOURCE.rglob("*.py")), ids=lambda p: str(p.relative_to(SOURCE)))
+def test_only_insiders_import_the_simulator(path: Path) -> None:
+    owner = path.relative_to(SOURCE).as_posix()
+    assert secrets(path.read_text(encoding="utf-8"), owner) == []
+
+
+@pytest.mark.parametrize(
+    "leak",
+    [
+        "import mujoco",
+        "from mujoco import MjData",
+        "def f():\n    import mujoco.viewer",
+        "from golem.robots import mujoco",
+        "from golem.robots.mujoco.engine import MujocoRobot",
+        "from golem.robots.worlds.layout import PackLayout",
+        "import golem.evaluation.oracle",
+        "import importlib\nimportlib.import_module('golem.evaluation.oracle')",
+    ],
+)
+@pytest.mark.parametrize(
+    "owner", ["skills/pick.py", "runtime/assembly.py", "hardware/servo/servo.py", "stack.py"]
+)
+def test_a_secret_import_is_found(leak: str, owner: str) -> None:
+    assert secrets(leak, owner) != []
+
+
+TRUTH = (mujoco.MjData, mujoco.MjModel, mujoco.MjSpec, MujocoRobot, Scene, Running)
+"""What no module may reach; `Running` because it drives the robot."""
+
+
+def referents(thing: Any, namespaces: set[int]) -> Iterator[Any]:
+    """Yield what a piece of code that holds `thing` can get from it, other than by importing.
+
+    Followed are attributes, items, closures, defaults, bound methods, suspended coroutines, weak references and the
+    memory behind arrays. Not followed are modules, classes, and the namespaces of modules (`namespaces`, by id).
+    """
+    if isinstance(thing, types.ModuleType | type | types.CodeType | types.BuiltinFunctionType):
+        return
+    if isinstance(thing, types.FunctionType):
+        yield from (thing.__closure__, thing.__defaults__, thing.__kwdefaults__, thing.__dict__)
+        return
+    if isinstance(thing, np.ndarray):
+        yield thing.base
+        if thing.dtype.hasobject:
+            yield from thing.flat
+        return
+    if isinstance(thing, memoryview):
+        yield thing.obj
+    if isinstance(thing, weakref.ReferenceType):
+        yield thing()
+    if isinstance(thing, types.CoroutineType):
+        frame = thing.cr_frame
+        yield from () if frame is None else frame.f_locals.values()
+    for referent in gc.get_referents(thing):
+        if id(referent) not in namespaces:
+            yield referent
+
+
+def reachable(roots: Iterable[tuple[str, Any]]) -> list[str]:
+    """Return the ways from `roots` (name, object) to any `TRUTH`, each as names of types; empty if there is none."""
+    namespaces = {id(vars(module)) for module in list(sys.modules.values()) if hasattr(module, "__dict__")}
+    seen: dict[int, Any] = {}
+    queue = [(name, thing) for name, thing in roots]
+    found: list[str] = []
+    while queue:
+        way, thing = queue.pop()
+        if id(thing) in seen:
+            continue
+        seen[id(thing)] = thing
+        if isinstance(thing, TRUTH):
+            found.append(f"{way} -> {type(thing).__name__}")
+            continue
+        way = f"{way} -> {type(thing).__name__}" if len(way) < 400 else way
+        queue.extend((way, referent) for referent in referents(thing, namespaces))
+    assert len(seen) > 100, "the walk did not get anywhere"
+    return found
+
+
+class Inspected:
+    """A tether stack in the middle of a pick, with hold of every module it made."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.roots: list[tuple[str, Any]] = []
+        create = registry.create
+
+        def collect(slot: str, use: str, options: Any, **context: Any) -> Any:
+            module = create(slot, use, options, **context)
+            if slot != "robot":
+                assert not any(isinstance(value, TRUTH) for value in context.values())
+                self.roots.append((slot, module))
+            return module
+
+        monkeypatch.setattr(registry, "create", collect)
+        self.running, self.robot = build(Stack(), seed=0)
+        skill = Pick(self.running.method)
+        self.run = self.running.start(skill, PickGoal())
+        self.running.executor.run(0.2)
+        assert self.run.result is None
+        coroutine = self.run._coroutine
+        self.roots += [
+            ("context", self.running._context),
+            ("pick", skill),
+            ("coroutine", coroutine),
+            ("bus", self.running.bus),
+        ]
+
+    def module(self, slot: str) -> Any:
+        return next(module for name, module in self.roots if name == slot)
+
+
+@pytest.fixture
+def inspected(monkeypatch: pytest.MonkeyPatch) -> Iterator[Inspected]:
+    """A stack after 0.2 s of a pick."""
+    stack = Inspected(monkeypatch)
+    yield stack
+    stack.robot.close()
+
+
+def test_no_module_holds_a_way_to_the_truth(inspected: Inspected) -> None:
+    made = {name for name, _ in inspected.roots}
+    assert made >= set(registry.slots()) - {"robot"}
+    assert inspected.running.bus.count("realsense/head") > 0
+    assert reachable(inspected.roots) == []
+
+
+def closure(secret: Any) -> Callable[[], Any]:
+    return lambda: secret
+
+
+class Slotted:
+    __slots__ = ("hidden",)
+
+    def __init__(self, hidden: Any) -> None:
+        self.hidden = hidden
+
+
+async def suspended(secret: Any) -> None:
+    await Tick()
+    print(secret)
+
+
+def started(secret: Any) -> Any:
+    coroutine = suspended(secret)
+    coroutine.send(None)
+    return coroutine
+
+
+LEAKS: dict[str, Callable[[MujocoRobot], Any]] = {
+    "attribute": lambda robot: robot,
+    "bound method": lambda robot: robot.capture,
+    "closure": closure,
+    "nested containers": lambda robot: {"a": [({"b": robot.data},)]},
+    "slots": lambda robot: Slotted(robot.scene.model),
+    "default argument": lambda robot: eval("lambda d=d: d", {"d": robot.data}),
+    "coroutine": started,
+    "weak reference": weakref.ref,
+    "array of objects": lambda robot: np.array([robot, None], dtype=object),
+    "scene": lambda robot: robot.scene,
+}
+
+
+@pytest.mark.parametrize("kind", LEAKS)
+@pytest.mark.filterwarnings("ignore:coroutine")
+def test_a_planted_leak_is_found(kind: str, inspected: Inspected) -> None:
+    inspected.module("upper_body").planted = LEAKS[kind](inspected.robot)
+    ways = reachable(inspected.roots)
+    assert ways and ways[0].startswith("upper_body ->"), ways
+
+
+def test_a_leak_over_the_bus_is_found(inspected: Inspected) -> None:
+    inspected.running.bus.publish("leak", inspected.robot.data, 0.0)
+    assert any("MjData" in way for way in reachable(inspected.roots))
+
+
+def test_no_message_is_a_view_of_the_simulators_memory(inspected: Inspected) -> None:
+    data = inspected.robot.data
+    blocks = [data.qpos, data.qvel, data.ctrl, data.sensordata, data.xpos, data.qacc]
+    values = list(inspected.running.bus._now.values())
+    arrays = [a for a in _arrays(values) if a.size]
+    assert len(arrays) > 20
+    assert not any(np.shares_memory(a, block) for a in arrays for block in blocks)
+    assert any(np.shares_memory(a, data.qpos) for a in _arrays([*values, {"x": data.qpos[3:5]}]))
+
+
+def _arrays(values: Iterable[Any]) -> list[np.ndarray]:
+    """Return every array in messages: dataclasses, tuples and mappings."""
+    out: list[np.ndarray] = []
+    queue = list(values)
+    while queue:
+        value = queue.pop()
+        if isinstance(value, np.ndarray):
+            out.append(value)
+        elif isinstance(value, tuple | list):
+            queue.extend(value)
+        elif isinstance(value, dict):
+            queue.extend(value.values())
+        elif hasattr(value, "__dataclass_fields__"):
+            queue.extend(getattr(value, name) for name in value.__dataclass_fields__)
+    return out
