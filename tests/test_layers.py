@@ -19,7 +19,7 @@ LAYERS = (
     ("skills",),
     ("stack", "assembly", "runtime"),
     ("evaluation", "training", "dashboard", "doctor"),
-    ("run", "cli", "__main__"),
+    ("run", "demo", "cli", "__main__"),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 NOT_AT_RUN_TIME = "training"

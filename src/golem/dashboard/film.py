@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from golem.dashboard.scene import Shot, SpectatorView
-from golem.dashboard.status import Status, Timeline, camera_picture, read_status
+from golem.dashboard.status import Status, camera_picture, read_status
 from golem.errors import OutputError
 from golem.hardware.safety.base import GateState
 from golem.robots.mujoco.engine import MujocoRobot
@@ -54,8 +54,8 @@ class Film:
     """Collects pictures of a running stack in robot time.
 
     Attributes:
+        fps: pictures per second of robot time.
         headline: words at the top of every picture from now on.
-        timeline: the stages seen so far; empty it to begin anew.
     """
 
     def __init__(self, robot: MujocoRobot, size: tuple[int, int] = (960, 540), fps: float = 12.5) -> None:
@@ -71,26 +71,25 @@ class Film:
         self._view = SpectatorView(robot, SHOTS, rendered)
         self._frames: list[NDArray[np.uint8]] = []
         self._fonts = {k: ImageFont.load_default(size=round(k * size[1] / 540)) for k in (13, 15, 19)}
+        self._due = 0.0
         self.headline = ""
-        self.timeline = Timeline()
 
     def __len__(self) -> int:
         """Return the number of pictures taken."""
         return len(self._frames)
 
-    def run(self, running: Running, until: float, stop: Callable[[], bool]) -> None:
-        """Drive the stack in lock-step and film it, until time `until` [s] or until `stop()` is true."""
-        while running.executor.t < until and not stop():
-            running.executor.run(min(until, running.executor.t + 1.0 / self.fps), stop)
+    def tick(self, running: Running) -> None:
+        """Take a picture if one is due; call it at every tick of `running`."""
+        if running.executor.t >= self._due - 1e-9:
+            self._due = running.executor.t + 1.0 / self.fps
             self.frame(running)
 
     def frame(self, running: Running) -> NDArray[np.uint8]:
-        """Take one picture and keep it; call it every 1 / fps of robot time.
+        """Take one picture and keep it.
 
         Returns:
             (height, width, 3) RGB.
         """
-        self.timeline.update(running)
         status = read_status(running)
         shot = "close" if status.stage in CLOSE_STAGES else "wide"
         picture = _resized(self._view.picture(shot), self._size)

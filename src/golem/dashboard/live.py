@@ -101,16 +101,32 @@ class LiveView:
         """The panel with the operator's buttons."""
         return self._panel
 
-    def run(self, skill: Skill[Context, Any], goal: object, timeout: float = TIMEOUT) -> SkillResult:
+    def run(
+        self,
+        skill: Skill[Context, Any],
+        goal: object,
+        timeout: float = TIMEOUT,
+        watch: Callable[[], None] = lambda: None,
+    ) -> SkillResult:
         """Run a skill in real time while showing it; see `Running.execute`."""
-        self._timeline = Timeline()
+        self._timeline = Timeline.of(self._running)
         self._busy, self._wanted = True, False
+
+        def both() -> None:
+            watch()
+            self.tick()
+
         try:
-            return self._running.execute(skill, goal, timeout, watch=self.tick)
+            return self._running.execute(skill, goal, timeout, watch=both)
         finally:
             self._busy = False
             self._ended = self._running.executor.t
             self.update()
+
+    def await_spectator(self, patience: float = 15.0) -> None:
+        """Let time pass until somebody looks, at most `patience` [s] of robot time."""
+        end = self._running.executor.t + patience
+        self.idle(lambda: bool(self._server.get_clients()) or self._running.executor.t >= end)
 
     def wait_for_pick(self) -> None:
         """Let time pass until the operator asks for the next pick."""
@@ -159,10 +175,10 @@ class LiveView:
         status = read_status(self._running)
         with self._server.atomic():
             self._move_bodies()
-            seen = status.target is not None and self._busy
-            self._target.visible = self._target_label.visible = seen
-            if status.target is not None:
-                self._target.position = self._view.from_odom(status.target)
+            target = self._timeline.target if self._busy else None
+            self._target.visible = self._target_label.visible = target is not None
+            if target is not None:
+                self._target.position = self._view.from_odom(target)
         self._panel.show_status(
             status,
             self._timeline.durations(t if self._busy else self._ended),

@@ -35,7 +35,6 @@ class Status:
     Attributes:
         t: robot time [s].
         stage, text: what the skill says; empty before the first.
-        target: (3,) what the skill aims at, in odom [m], or None.
         safety: state of the safety gate.
         reason: why the gate does not let commands through; empty when it does.
     """
@@ -43,7 +42,6 @@ class Status:
     t: float
     stage: str
     text: str
-    target: Array | None
     safety: GateState
     reason: str
 
@@ -52,7 +50,6 @@ def read_status(running: Running) -> Status:
     """Return the present status of a stack."""
     feedback = running.bus.latest(topics.FEEDBACK, Feedback)
     gate = running.safety
-    target = None if feedback is None else feedback.data.get("target")
     reason = ""
     if gate is not None and gate.reason is not None:
         reason = f"{gate.reason}: {gate.detail}" if gate.detail else str(gate.reason)
@@ -60,7 +57,6 @@ def read_status(running: Running) -> Status:
         running.executor.t,
         "" if feedback is None else feedback.stage,
         "" if feedback is None else feedback.text,
-        None if target is None else np.asarray(target, dtype=float),
         GateState.INIT if gate is None else gate.state,
         reason,
     )
@@ -71,17 +67,31 @@ class Timeline:
 
     Attributes:
         stages: name and start [s] of each, in order.
+        target: (3,) what the skill aimed at last, in odom [m], or None.
     """
 
     def __init__(self) -> None:
         """Start empty."""
         self.stages: list[tuple[str, float]] = []
+        self.target: Array | None = None
+        self._seen = 0
+
+    @classmethod
+    def of(cls, running: Running) -> Timeline:
+        """Return a timeline that begins now: what was said before does not count."""
+        timeline = cls()
+        timeline._seen = running.bus.count(topics.FEEDBACK)
+        return timeline
 
     def update(self, running: Running) -> None:
         """Take in the newest feedback; call it often enough to miss no stage."""
+        count = running.bus.count(topics.FEEDBACK)
         feedback = running.bus.latest(topics.FEEDBACK, Feedback)
-        if feedback is None or (self.stages and feedback.t < self.stages[-1][1]):
+        if feedback is None or count == self._seen:
             return
+        self._seen = count
+        if "target" in feedback.data:
+            self.target = np.asarray(feedback.data["target"], dtype=float)
         if not self.stages or self.stages[-1][0] != feedback.stage:
             self.stages.append((feedback.stage, feedback.t))
 

@@ -1,0 +1,269 @@
+"""`golem demo`: the tethered robot pulls loosened screws from the pack, before your eyes or into a film."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+import webbrowser
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.dashboard.film import SHOTS, Film
+from golem.dashboard.live import LiveView
+from golem.dashboard.page import PickRecord, render_page
+from golem.dashboard.scene import SpectatorView
+from golem.dashboard.status import Timeline
+from golem.errors import ConfigError, OutputError
+from golem.evaluation.oracle import Oracle
+from golem.robots.mujoco.engine import MujocoRobot
+from golem.run import TIMEOUT, Narrator
+from golem.runtime.assembly import Running, build
+from golem.skills.base import SkillResult
+from golem.skills.pick import Pick, PickGoal
+from golem.stack import load_stack
+
+FPS = 10.0
+"""Pictures of the film per second of robot time."""
+PICTURE_SIZE = (1280, 720)
+PULLED = 0.8
+"""Time into the extraction at which the report's picture is taken [s]: the screw is out of its bore."""
+
+
+def no_display() -> bool:
+    """Return whether this machine has no screen to open a browser on."""
+    return sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+@dataclass(frozen=True)
+class DemoConfig:
+    """The robot, held by a hoist, pulls loosened screws from a battery pack and drops them in a tray."""
+
+    headless: bool = field(default_factory=no_display)
+    """Write a film instead of opening the live view; the default where there is no display."""
+    screws: int = 3
+    """How many screws shall be in the tray at the end; tried up to twice as often."""
+    profile: str = "bench"
+    """Realism profile: ideal, bench or field."""
+    seed: int = 0
+    """Seed of the episode."""
+    out: Path = Path("runs/demo")
+    """Folder for film, report and figures."""
+    port: int = 8080
+    """Port of the live view."""
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """How it went.
+
+    Attributes:
+        success: whether as many screws as asked for are in the tray, by the simulator's truth.
+        picks: each attempt.
+        screws: the screws in the tray.
+        films: the films, the GIF first; empty with the live view.
+        report: the HTML page.
+    """
+
+    success: bool
+    picks: list[PickRecord]
+    screws: list[str]
+    films: list[Path]
+    report: Path
+
+
+class Demo:
+    """One demonstration in progress."""
+
+    def __init__(self, config: DemoConfig, running: Running, robot: MujocoRobot) -> None:
+        """Demonstrate what `config` says with a built stack."""
+        self._config, self._running, self._robot = config, running, robot
+        self._oracle = Oracle(robot)
+        self._started = time.perf_counter()
+        self._timeline = Timeline()
+        self.picks: list[PickRecord] = []
+        self.picture: NDArray[np.uint8] | None = None
+
+    def in_tray(self) -> list[str]:
+        """Return the screws in the tray."""
+        return self._oracle.screws_in_tray()
+
+    def reached(self) -> bool:
+        """Return whether enough screws are in the tray."""
+        return len(self.in_tray()) >= self._config.screws
+
+    def over(self) -> bool:
+        """Return whether there is nothing left to try: reached, too many attempts, or the robot was stopped."""
+        stopped = bool(self.picks) and self.picks[-1].stage == "safety"
+        return self.reached() or stopped or len(self.picks) >= 2 * self._config.screws
+
+    def pick(self, execute: Callable[[], SkillResult]) -> None:
+        """Let the robot pick once, and judge it."""
+        before, start = set(self.in_tray()), self._running.executor.t
+        self._timeline = Timeline.of(self._running)
+        result = execute()
+        seconds = self._running.executor.t - start
+        new = sorted(set(self.in_tray()) - before)
+        self.picks.append(
+            PickRecord(
+                bool(new),
+                new[0] if new else None,
+                result.stage,
+                result.reason,
+                round(start, 3),
+                round(seconds, 3),
+                [(name, round(s, 3)) for name, s in self._timeline.durations(self._running.executor.t)],
+            )
+        )
+        what = f"{new[0]} is in the tray" if new else f"no screw in the tray. {result.reason}"
+        print(f"Pick {len(self.picks)}: {what} ({len(self.in_tray())} of {self._config.screws}).", flush=True)
+
+    def tick(self) -> None:
+        """Follow the stages, and take the report's picture when the first screw comes out."""
+        self._timeline.update(self._running)
+        stages = self._timeline.stages
+        if self.picture is None and stages and stages[-1][0] == "extract":
+            if self._running.executor.t - stages[-1][1] > PULLED:
+                view = SpectatorView(self._robot, SHOTS, PICTURE_SIZE, fancy=self._config.headless)
+                self.picture = view.picture("close")
+                view.close()
+
+    def write(self, films: list[Path]) -> DemoResult:
+        """Write figures and report."""
+        config, screws, folder = self._config, self.in_tray(), self._config.out
+        robot_time, wall = self._running.executor.t, time.perf_counter() - self._started
+        lead = (
+            f"{len(screws)} of {config.screws} screws in the tray after {len(self.picks)} picks, "
+            f"{robot_time:.0f} s of robot time and {wall:.0f} s by the clock."
+        )
+        facts = {
+            "stack": f"tether, digest {self._running.stack.digest()}",
+            "profile": config.profile,
+            "seed": str(config.seed),
+        }
+        page = render_page(lead, self.picks, self.picture, [film.name for film in films], facts)
+        report = folder / "report.html"
+        _write(report, page)
+        figures = {
+            "success": len(screws) >= config.screws,
+            "screws_in_tray": screws,
+            "asked": config.screws,
+            "picks": [asdict(pick) for pick in self.picks],
+            "robot_time": round(robot_time, 3),
+            "wall_time": round(wall, 1),
+            **facts,
+        }
+        _write(folder / "demo.json", json.dumps(figures, indent=2) + "\n")
+        print(f"{'Done' if figures['success'] else 'Failed'}: {lead}")
+        for film in films:
+            print(f"Film:   {film}")
+        print(f"Report: {report}", flush=True)
+        return DemoResult(len(screws) >= config.screws, self.picks, screws, films, report)
+
+
+def run_demo(config: DemoConfig) -> DemoResult:
+    """Run the demonstration, print what happens, and write film, report and figures to `config.out`.
+
+    Raises:
+        ConfigError: an option is wrong.
+        OutputError: the folder cannot be written.
+        ModuleFault: a module broke its contract.
+    """
+    if config.screws < 1:
+        raise ConfigError(f"--screws is {config.screws}; give a number from 1 on.")
+    _prepare(config.out)
+    running, robot = build(load_stack("tether", profile=config.profile), config.seed)
+    with ExitStack() as stack:
+        stack.callback(robot.close)
+        loose = len(robot.scene.names.screws)
+        if config.screws > loose:
+            raise ConfigError(
+                f"--screws is {config.screws}, but only {loose} screws are loosened; give 1 to {loose}."
+            )
+        print(
+            f"The robot hangs from a hoist in front of a battery pack with {loose} loosened screws in reach.\n"
+            f"It shall find {config.screws} of them in its cameras, pull them out and drop them in the tray "
+            f"(profile {config.profile}, seed {config.seed}).",
+            flush=True,
+        )
+        demo = Demo(config, running, robot)
+        if config.headless:
+            return _filmed(config, demo, running, robot)
+        view = LiveView(running, robot, config.port)
+        stack.callback(view.close)
+        return _shown(demo, running, view)
+
+
+def _filmed(config: DemoConfig, demo: Demo, running: Running, robot: MujocoRobot) -> DemoResult:
+    """Demonstrate into a film, as fast as the machine can."""
+    film = Film(robot, fps=FPS)
+    narrator = Narrator(running)
+
+    def watch() -> None:
+        narrator()
+        demo.tick()
+        film.tick(running)
+
+    try:
+        while not demo.over():
+            film.headline = f"{len(demo.in_tray())} of {config.screws} screws in the tray"
+            demo.pick(lambda: running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=watch))
+        film.headline = f"{len(demo.in_tray())} of {config.screws} screws in the tray"
+        film.frame(running)
+        print(f"Writing the film ({len(film)} pictures).", flush=True)
+        return demo.write(film.save(config.out / "demo.gif"))
+    finally:
+        film.close()
+
+
+def _shown(demo: Demo, running: Running, view: LiveView) -> DemoResult:
+    """Demonstrate in real time in the browser; afterwards the operator may go on until Ctrl-C."""
+    print(f"Watch it at {view.url} (it should open by itself).", flush=True)
+    webbrowser.open(view.url)
+    narrator = Narrator(running)
+
+    def watch() -> None:
+        narrator()
+        demo.tick()
+
+    def execute() -> SkillResult:
+        return view.run(Pick(running.method), PickGoal(), watch=watch)
+
+    view.await_spectator()
+    while not demo.over():
+        demo.pick(execute)
+    result = demo.write([])
+    print("The view stays open: its buttons pick further screws. Ctrl-C ends it.", flush=True)
+    try:
+        while True:
+            view.wait_for_pick()
+            demo.pick(execute)
+    except KeyboardInterrupt:
+        print()
+    return result
+
+
+def _prepare(folder: Path) -> None:
+    """Make sure that the folder can be written, before anything long begins."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"Cannot write to --out {folder}: {error.strerror}; choose another.") from error
+    if not os.access(folder, os.W_OK):
+        raise OutputError(f"Cannot write to --out {folder}: Permission denied; choose another.")
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file whole or not at all."""
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    except OSError as error:
+        raise OutputError(f"Cannot write {path}: {error.strerror}.") from error
