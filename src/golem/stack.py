@@ -54,7 +54,13 @@ class Stack:
         return getattr(self, slot)
 
     def with_choice(self, slot: str, use: str) -> Stack:
-        """Return a copy with another implementation in `slot` (and no options for it)."""
+        """Return a copy with another implementation in `slot` (and no options for it).
+
+        Raises:
+            ConfigError: there is no such slot.
+        """
+        if slot not in registry.slots():
+            raise unknown_name("slot", slot, registry.slots())
         return replace(self, **{slot: Choice(use)})
 
     def digest(self) -> str:
