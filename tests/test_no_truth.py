@@ -34,6 +34,7 @@ INSIDERS = (
     "dashboard",
     "cli.py",
     "run.py",
+    "demo.py",
     "doctor.py",
 )
 # The twin's robot is built from the same table as the model that the modules use.
