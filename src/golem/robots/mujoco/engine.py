@@ -73,7 +73,9 @@ class MujocoRobot:
         self._model = model
         self._errors = sample_episode(self.profile, stream(seed, "episode"))
         # The cameras are where the model has them; it is the calibration that is wrong.
-        self.calibration = {name: np.linalg.inv(T) for name, T in self._errors.T_nominal_actual.items()}
+        self.calibration: dict[str, Array] = {
+            name: np.linalg.inv(T) for name, T in self._errors.T_nominal_actual.items()
+        }
         self._depth = {
             name: StereoDepth(info, self.profile.depth, stream(seed, f"depth/{name}"))
             for name, info in CAMERAS.items()
