@@ -114,7 +114,7 @@ def _judge(stack: Stack, result: SkillResult, oracle: Oracle, watch: _Watch) -> 
         return TrialOutcome(True, DONE, None, result.reason, result.timings, series, watch.picture)
     # The skill may believe it succeeded: then the screw was lost between the pull and the tray.
     stage = result.stage if result.stage != DONE else "place"
-    slot = _blame(stage, result.slot, truth)
+    slot = blame(stage, result.slot, truth)
     module = (
         None if slot is None else f"{slot}: {stack.choice(slot).use}" if slot in registry.slots() else slot
     )
@@ -125,7 +125,7 @@ def _judge(stack: Stack, result: SkillResult, oracle: Oracle, watch: _Watch) -> 
     return TrialOutcome(False, stage, module, detail, result.timings, series, picture)
 
 
-def _blame(stage: str, slot: str | None, truth: GraspTruth | None) -> str | None:
+def blame(stage: str, slot: str | None, truth: GraspTruth | None) -> str | None:
     """Return the slot that lost a failed trial.
 
     Where the hand missed the screw, the larger of the two errors is to blame: where it was sent (perception and its

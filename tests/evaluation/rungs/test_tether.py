@@ -1,0 +1,113 @@
+"""The tether rung: real trials judged on the truth, the culprit named, the same record whatever ran before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from golem.errors import ConfigError
+from golem.evaluation.base import TrialSpec
+from golem.evaluation.oracle import GraspTruth
+from golem.evaluation.rungs.tether import PAD_REACH, STRAIGHT, Tether, blame
+
+BAD_MODULES = """
+import numpy as np
+from golem.capabilities.arms.base import ArmCommand
+from golem.capabilities.arms.diff_ik import DiffIK
+
+class Raises(DiffIK):
+    def step(self, *a):
+        raise ValueError("my bug")
+
+class Nan(DiffIK):
+    def step(self, *a):
+        command = super().step(*a)
+        command.q[3] = np.nan
+        return command
+
+class Short(DiffIK):
+    def step(self, *a):
+        c = super().step(*a)
+        return ArmCommand(c.q[:7], c.error_position, c.error_rotation, c.limited)
+"""
+
+
+def spec(method: str = "visual_servo", profile: str = "ideal", index: int = 0, **overrides: str) -> TrialSpec:
+    return TrialSpec("tether", method, profile, 0, index, overrides)
+
+
+@pytest.fixture(scope="module")
+def rung() -> Tether:
+    return Tether()
+
+
+@pytest.mark.parametrize("method", ["centroid", "visual_servo"])
+def test_a_perfect_robot_puts_the_screw_in_the_tray(method: str, rung: Tether) -> None:
+    outcome = rung.run(spec(method), None)
+    assert outcome.success, outcome.detail
+    assert 1.0 < outcome.timings["detect_to_grasp"] < 15.0
+    assert outcome.series["grasp_miss"] < PAD_REACH
+    assert outcome.picture is not None and outcome.picture.startswith(b"\x89PNG")
+
+
+def test_a_trial_depends_on_its_spec_alone(rung: Tether) -> None:
+    first = rung.run(spec(profile="field"), None)
+    rung.run(spec(profile="field", index=1), None)
+    again = Tether().run(spec(profile="field"), None)
+    assert first == again
+
+
+@pytest.mark.parametrize(
+    "name, reason",
+    [("Raises", "my bug"), ("Nan", "NaN"), ("Short", "shape (7,)")],
+    ids=["raises", "nan", "shape"],
+)
+def test_a_module_that_breaks_its_contract_is_named(
+    name: str, reason: str, tmp_path: Path, rung: Tether
+) -> None:
+    from golem.errors import ModuleFault
+
+    file = tmp_path / "mine.py"
+    file.write_text(BAD_MODULES)
+    with pytest.raises(ModuleFault) as fault:
+        rung.run(spec(upper_body=f"{file}:{name}"), None)
+    assert fault.value.slot == "upper_body" and fault.value.use.endswith(name)
+    assert reason in fault.value.reason
+
+
+def test_the_configuration_changes_with_a_users_file(tmp_path: Path, rung: Tether) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(BAD_MODULES)
+    before = rung.config("centroid", "field", {"upper_body": f"{file}:Nan"})
+    file.write_text(BAD_MODULES + "\n# changed\n")
+    after = rung.config("centroid", "field", {"upper_body": f"{file}:Nan"})
+    assert before["user_files"] != after["user_files"]
+    assert before["stack"] == after["stack"]
+
+
+def test_an_unknown_slot_is_refused(rung: Tether) -> None:
+    with pytest.raises(ConfigError, match="upper_body"):
+        rung.config("centroid", "field", {"upperbody": "diff_ik"})
+
+
+def truth(aim: float = 0.0, reach: float = 0.0, miss: float = 0.0, tilt: float = 0.0) -> GraspTruth:
+    return GraspTruth(aim, reach, miss, 0.004, tilt)
+
+
+@pytest.mark.parametrize(
+    "stage, slot, seen, culprit",
+    [
+        ("detect", "localizer", None, "localizer"),
+        ("servo", "upper_body", truth(aim=0.05), "upper_body"),
+        ("grasp", "grasp_method", truth(aim=0.05, reach=0.01, miss=0.05), "localizer"),
+        ("grasp", "grasp_method", truth(aim=0.01, reach=0.05, miss=0.05), "upper_body"),
+        ("extract", "grasp_method", truth(tilt=2 * STRAIGHT), "upper_body"),
+        ("extract", "grasp_method", truth(), "grasp_method"),
+        ("place", "grasp_method", truth(), "localizer"),
+    ],
+)
+def test_the_larger_error_takes_the_blame(
+    stage: str, slot: str, seen: GraspTruth | None, culprit: str
+) -> None:
+    assert blame(stage, slot, seen) == culprit

@@ -1,0 +1,90 @@
+"""What a user can get wrong on the command line ends in one sentence that names what would be right, and exit code 2."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from golem import cli
+
+BROKEN = {
+    "no command": ([], None),
+    "command": (["ladr"], "Did you mean 'ladder'?"),
+    "rung": (["ladder", "--rung", "teter"], "valid: tether. Did you mean 'tether'?"),
+    "method": (["ladder", "--method", "centriod"], "Did you mean 'centroid'?"),
+    "method file": (["ladder", "--method", "x.py:Mine"], "does not exist"),
+    "profile": (["ladder", "--profile", "feild"], "valid: bench, field, ideal"),
+    "n": (["ladder", "-n", "0"], "-n is 0; it must be 1 or more"),
+    "slot": (["ladder", "--use", "upperbody=diff_ik"], "Did you mean 'upper_body'?"),
+    "implementation": (["ladder", "--use", "upper_body=difik"], "Did you mean 'diff_ik'?"),
+    "use": (["ladder", "--use", "upper_body"], "slot=implementation"),
+    "stack": (["run", "nowhere"], "one of: tether"),
+    "run profile": (["run", "--profile", "feild"], "Did you mean 'field'?"),
+    "format": (["model", "export", "--format", "step", "--out", "x"], "valid: mjcf, urdf"),
+    "model": (["model", "import"], "valid: export"),
+    "train": (["train", "legs"], "valid: detector"),
+}
+
+
+@pytest.mark.parametrize("words, sentence", BROKEN.values(), ids=BROKEN.keys())
+def test_a_wrong_word_is_answered_in_one_sentence_and_writes_nothing(
+    words: list[str],
+    sentence: str | None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["golem", *words])
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    assert end.value.code == cli.BAD_INPUT
+    said = capsys.readouterr()
+    if sentence is None:
+        assert "usage: golem COMMAND" in said.out
+    else:
+        assert said.err.startswith("golem: ") and said.err.count("\n") == 1
+        assert sentence in said.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "text, sentence", [("upper_body: [", "line 1"), ("uper_body: diff_ik", "'upper_body'")]
+)
+def test_a_broken_stack_file_names_file_and_place(
+    text: str,
+    sentence: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "mine.yaml").write_text(text)
+    monkeypatch.setattr(sys, "argv", ["golem", "run", str(tmp_path / "mine.yaml")])
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    assert end.value.code == cli.BAD_INPUT
+    error = capsys.readouterr().err
+    assert "mine.yaml" in error and sentence in error
+
+
+def test_an_unwritable_folder_is_refused_before_anything_runs(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["golem", "ladder", "-n", "1", "--out", os.devnull + "/results"])
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    assert end.value.code == cli.BAD_INPUT
+    assert "Cannot write to --out" in capsys.readouterr().err
+
+
+def test_the_model_is_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for words in (["--format", "urdf"], ["--format", "mjcf", "--no-hands"]):
+        out = tmp_path / "model.xml"
+        monkeypatch.setattr(sys, "argv", ["golem", "model", "export", *words, "--out", str(out)])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        assert end.value.code == 0
+        assert "left_knee" in out.read_text()
