@@ -111,7 +111,11 @@ def test_the_head_sees_the_parts_where_they_are(
 ) -> None:
     truth = tops(stage, label)
     beside_tray = truth[:, 1] > -0.18
-    truth = truth[beside_tray & in_view(head, truth) & (np.linalg.norm(truth - head.T_odom_optical[:3, 3], axis=1) < 1.1)]
+    truth = truth[
+        beside_tray
+        & in_view(head, truth)
+        & (np.linalg.norm(truth - head.T_odom_optical[:3, 3], axis=1) < 1.1)
+    ]
     found = np.array([o.position for o in detector.locate(head, [label])])
     missed = nearest(truth, found) > tolerance
     assert len(truth) >= 5 and missed.mean() <= 0.15

@@ -62,3 +62,11 @@ def test_images_are_normalised_and_padded_with_the_mean_colour(shape: tuple[int,
     assert x.shape[2] % 16 == 0 and x.shape[3] % 16 == 0 and x.shape[2] - shape[0] < 16
     np.testing.assert_allclose(x[0, :, 0, 0], [-2.0, (127 / 255 - 0.5) / 0.5, 0.5], atol=1e-6)
     assert np.abs(x[..., shape[0] :, :]).sum() == 0.0
+
+
+def test_of_two_peaks_on_one_part_the_better_stays() -> None:
+    maps = empty()
+    maps[1, 4, 4], maps[1, 4, 6], maps[0, 4, 6], maps[1, 4, 12] = 2.0, 1.0, 1.0, 0.5
+    maps[4:] = np.log(12.0)
+    found = find_peaks(maps, LABELS, {"screw", "tray"}, 0.3, SIZE)
+    assert [(d.label, d.center[0]) for d in found] == [("tray", 17.5), ("screw", 25.5), ("tray", 49.5)]

@@ -10,6 +10,8 @@ from golem.types import Array, Detection
 
 STRIDE = 4
 """Pixels per cell of the maps; the middle of cell j is pixel 4 j + 1.5, as pixel centres are integers."""
+SAME_SHARE = 0.35
+"""Two centres of one class closer than this share of the better one's shorter side are one part."""
 
 
 def normalise(image: NDArray[np.uint8], mean: Array, std: Array, multiple: int) -> NDArray[np.float32]:
@@ -43,7 +45,8 @@ def find_peaks(
 ) -> list[Detection]:
     """Return the detections in one image's maps, best first.
 
-    A peak is a cell that is the greatest of its 3 x 3 neighbourhood in its class.
+    A peak is a cell that is the greatest of its 3 x 3 neighbourhood in its class; of several on one part, the best
+    stays.
 
     Args:
         maps: (classes + 6, h, w): logits, then the centre's offset [cells] and the log distances to the box's sides.
@@ -72,4 +75,15 @@ def find_peaks(
             box = np.array([x[k] - sides[0, k], y[k] - sides[1, k], x[k] + sides[2, k], y[k] + sides[3, k]])
             box = np.clip(box, 0.0, [width - 1, height - 1, width - 1, height - 1])
             found.append(Detection(label, float(scores[k]), box, np.array([x[k], y[k]])))
-    return sorted(found, key=lambda d: (-d.score, d.center[1], d.center[0]))
+    found.sort(key=lambda d: (-d.score, d.center[1], d.center[0]))
+    kept: list[Detection] = []
+    for detection in found:
+        if not any(_same(detection, better) for better in kept):
+            kept.append(detection)
+    return kept
+
+
+def _same(detection: Detection, better: Detection) -> bool:
+    """Tell whether a detection is a second peak on the part of a better one: same class, nearly the same centre."""
+    near = SAME_SHARE * float((better.box[2:] - better.box[:2]).min())
+    return detection.label == better.label and float(np.linalg.norm(detection.center - better.center)) < near

@@ -16,6 +16,8 @@ STD = (0.25, 0.25, 0.25)
 CROP = (320, 256)
 """Width and height of a training crop [px]."""
 ZOOM = (0.6, 1.35)
+LARGE = 15
+"""Shorter side from which a part counts as large [cells]."""
 
 
 def crop(
@@ -112,15 +114,18 @@ def targets(labels: Array) -> tuple[NDArray[np.float32], NDArray[np.float32], ND
             weight[c, max(b, 0) : max(f, 0), max(a, 0) : max(e, 0)] = 0.0
             continue
         gx, gy = (x - middle) / STRIDE, (y - middle) / STRIDE
-        sigma = float(np.clip(min(x1 - x0, y1 - y0) / STRIDE * 0.13, 0.7, 5.0))
+        side = min(x1 - x0, y1 - y0) / STRIDE
+        # Where the middle of a large part is cannot be told to the cell: a broad peak, and offsets from all over it.
+        sigma = float(np.clip(0.13 * side, 0.7, 2.0) if side < LARGE else np.clip(0.18 * side, 2.0, 8.0))
+        reach = 1 if side < LARGE else int(0.8 * sigma)
         blob = np.exp(-((columns - gx) ** 2 + (rows - gy) ** 2) / (2 * sigma**2)).astype(np.float32)
         i, j = int(np.clip(np.round(gy), 0, h - 1)), int(np.clip(np.round(gx), 0, w - 1))
         np.maximum(heat[c], blob, out=heat[c])
         heat[c, i, j] = 1.0
         sides = np.log(np.maximum([x - x0, y - y0, x1 - x, y1 - y], 1.0))
-        for di in (-1, 0, 1):
-            for dj in (-1, 0, 1):
-                r, s = i + di, j + dj
-                if 0 <= r < h and 0 <= s < w and (abs(di) + abs(dj) == 0 or regression[6, r, s] < 0.5):
-                    regression[:, r, s] = [gx - s, gy - r, *sides, 1.0 if di == dj == 0 else 0.3]
+        share = 2.4 / ((2 * reach + 1) ** 2 - 1)
+        for r in range(max(i - reach, 0), min(i + reach + 1, h)):
+            for q in range(max(j - reach, 0), min(j + reach + 1, w)):
+                if (r, q) == (i, j) or regression[6, r, q] < share:
+                    regression[:, r, q] = [gx - q, gy - r, *sides, 1.0 if (r, q) == (i, j) else share]
     return heat, weight, regression
