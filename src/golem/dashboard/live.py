@@ -69,7 +69,7 @@ class LiveView:
         self._panel = Panel(self._server)
         self._timeline = Timeline()
         self._build_scene(robot)
-        self._paused = self._busy = self._wanted = False
+        self._paused = self._busy = self._wanted = self._asking = False
         self._revive_until: float | None = None
         self._ended = 0.0
         self._note = ""
@@ -210,7 +210,6 @@ class LiveView:
             elif button is Button.RELEASE:
                 self._running.estop.release()
             elif button is Button.REVIVE:
-                self._running.request(Request.RESET)
                 self._revive_until = self._running.executor.t + PATIENCE
             elif button is Button.PICK:
                 self._wanted = not self._busy
@@ -219,7 +218,7 @@ class LiveView:
         self._revive()
 
     def _revive(self) -> None:
-        """Activate the gate as soon as its reset has armed it."""
+        """Reset the gate, and activate it as soon as that has armed it."""
         gate, t = self._running.safety, self._running.executor.t
         if self._revive_until is None or gate is None:
             return
@@ -229,6 +228,10 @@ class LiveView:
         elif t > self._revive_until:
             self._note = f"The safety gate refuses the reset: {gate.reason}."
             self._revive_until = None
+        else:
+            # Only the change to a request counts; asked again, because a released button is seen a frame later.
+            self._running.request(Request.NONE if self._asking else Request.RESET)
+            self._asking = not self._asking
 
     def close(self) -> None:
         """Stop serving."""

@@ -43,9 +43,10 @@ class Panel:
         self._asked: queue.SimpleQueue[Button] = queue.SimpleQueue()
         gui = server.gui
         gui.configure_theme(
-            control_layout="collapsible", control_width="medium", brand_color=(207, 116, 32),
+            control_width="medium", brand_color=(207, 116, 32),
             show_logo=False, show_share_button=False,
         )  # fmt: skip
+        gui.main_panel.dock_right()
         gui.set_panel_label("GOLEM")
         self._status = gui.add_html("")
         with gui.add_folder("Operator"):

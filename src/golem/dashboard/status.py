@@ -97,9 +97,10 @@ class Timeline:
 
     def durations(self, end: float) -> list[tuple[str, float]]:
         """Return each stage with how long it took [s]; the last lasts until time `end` [s]."""
-        ends = [start for _, start in self.stages[1:]] + [end]
+        ends = [start for _, start in self.stages] + [end]
         return [
-            (stage, max(0.0, stop - start)) for (stage, start), stop in zip(self.stages, ends, strict=True)
+            (stage, max(0.0, stop - start))
+            for (stage, start), stop in zip(self.stages, ends[1:], strict=True)
         ]
 
 

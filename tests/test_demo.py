@@ -1,0 +1,56 @@
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from golem.dashboard.page import PickRecord, render_page
+from golem.demo import DemoConfig, no_display, run_demo
+from golem.errors import ConfigError, GolemError, OutputError
+
+
+@pytest.mark.parametrize("variable", ["DISPLAY", "WAYLAND_DISPLAY"])
+def test_a_display_is_noticed(variable: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert no_display() and DemoConfig().headless
+    monkeypatch.setenv(variable, ":0")
+    assert not no_display() and not DemoConfig().headless
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [({"screws": 0}, "from 1 on"), ({"screws": 99}, "1 to 4"), ({"profile": "dream"}, "ideal")],
+)
+def test_wrong_options_are_answered_in_one_sentence(
+    options: dict[str, object], words: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ConfigError, match=words):
+        run_demo(DemoConfig(headless=True, out=tmp_path, **options))  # pyright: ignore[reportArgumentType]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_written_is_noticed_before_anything_runs(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="choose another"):
+        run_demo(DemoConfig(headless=True, out=tmp_path / "file" / "demo"))
+    if os.geteuid() != 0:
+        (tmp_path / "locked").mkdir(mode=0o500)
+        with pytest.raises(GolemError, match="Permission denied"):
+            run_demo(DemoConfig(headless=True, out=tmp_path / "locked"))
+
+
+def test_the_page_names_every_pick_and_escapes_what_it_quotes() -> None:
+    picks = [
+        PickRecord(
+            True, "screw_09", "done", "Fine.", 0.0, 8.5, [("detect", 0.2), ("servo", 2.0), ("done", 0.0)]
+        ),
+        PickRecord(False, None, "extract", "It <slipped>.", 8.5, 5.0, [("detect", 0.1), ("extract", 1.0)]),
+    ]
+    page = render_page("1 of 2", picks, None, ["demo.gif", "demo.mp4"], {"seed": "0"})
+    assert "screw_09 in the tray" in page and "lost in extract" in page
+    assert "<slipped>" not in page and "&lt;slipped&gt;" in page
+    assert 'src="demo.mp4"' in page and 'src="demo.gif"' in page
+    assert "http" not in page  # needs no network
