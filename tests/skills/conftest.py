@@ -13,6 +13,7 @@ from golem.middleware import topics
 from golem.middleware.bus import Bus
 from golem.middleware.topics import HandGoal, LookRequest, Sightings
 from golem.robots.model.kinematics import Kinematics
+from golem.skills.base import Feedback
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
 from golem.types import SIDES, Array, Detection, LocalizedObject, PalmTargets, Side
@@ -59,8 +60,9 @@ class World:
         objects: what each camera sees: asked at each frame for the true positions, by label.
         grips: what each closing finds, first come first served; True holds.
         holds: whether the right hand holds something.
+        loses: asked every tick whether what is held gets lost.
         sent: every pose the right arm was sent to, one per tick at most.
-        requests: every look request, as (camera, labels).
+        stages: every stage the skill spoke of, repetitions left out.
     """
 
     def __init__(self) -> None:
@@ -70,9 +72,9 @@ class World:
         self.objects: dict[str, Callable[[], list[LocalizedObject]]] = {}
         self.grips: list[bool] = []
         self.holds = False
-        self.lose_at: Callable[[], bool] = lambda: False
+        self.loses: Callable[[], bool] = lambda: False
         self.sent: list[Array] = []
-        self.feedback: list[str] = []
+        self.stages: list[str] = []
         self._tick = 0
         self._goals: dict[Side, int] = {side: 0 for side in SIDES}
         self._moving: dict[Side, int] = {side: 0 for side in SIDES}
@@ -108,6 +110,9 @@ class World:
         targets = self.bus.latest(topics.PALM_TARGETS, PalmTargets)
         if targets is not None and targets.right is not None:
             self.sent.append(targets.right)
+        feedback = self.bus.latest(topics.FEEDBACK, Feedback)
+        if feedback is not None and self.stages[-1:] != [feedback.stage]:
+            self.stages.append(feedback.stage)
         self.context.refresh(self.t)
 
     def _hand(self, side: Side) -> None:
@@ -125,7 +130,7 @@ class World:
                 held = self.grips.pop(0) if self.grips else False
                 self._state[side] = GripState.HOLDING if held else GripState.EMPTY
                 self._gap[side] = 0.01 if held else 0.0
-        if self._state[side] is GripState.HOLDING and self.lose_at():
+        if self._state[side] is GripState.HOLDING and self.loses():
             self._state[side] = GripState.SLIPPED
         self.holds = self._state["right"] is GripState.HOLDING
         status = HandStatus(self.t, self._state[side], self._gap[side], 0.0, np.zeros(2))

@@ -14,6 +14,10 @@ from golem.skills.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus
 from golem.types import Array, LocalizedObject, Side
 
 
+CLOSED = (GripState.HOLDING, GripState.EMPTY)
+"""States of a hand whose fingers have closed, on something or on nothing."""
+
+
 @dataclass(frozen=True)
 class PickGoal:
     """What to pick.
@@ -87,9 +91,20 @@ class Pick:
 
     async def run(self, context: Context, goal: PickGoal) -> SkillResult:
         """Pick one object; see `Skill`."""
-        timings: dict[str, float] = {"start": context.t}
         context.skill = self.name
+        try:
+            return await self._pursue(context, goal)
+        except SkillCancelled:
+            # Stay where we are; what is held stays held.
+            context.say("cancelled", "Stopped where it was.")
+            raise
+
+    async def _pursue(self, context: Context, goal: PickGoal) -> SkillResult:
+        """Go through the stages, and home, whether they succeeded or not."""
+        timings: dict[str, float] = {"start": context.t}
         home = context.arms[goal.side].pose
+        reason = f"The {goal.label} was dropped in the {goal.container}."
+        result = SkillResult(True, "done", None, reason, timings)
         try:
             target, container = await self._detect(context, goal)
             grasp = await self._approach(context, goal, target)
@@ -98,36 +113,29 @@ class Pick:
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
             context.hands[goal.side].open(self._config.release_gap)
-            await self._travel(context, goal.side, home)
-            timings["total"] = context.t - timings.pop("start")
-            return SkillResult(False, failure.stage, failure.slot, str(failure), timings)
-        except SkillCancelled:
-            # Stay where we are; what is held stays held.
-            context.say("cancelled", "Stopped where it was.")
-            raise
+            result = SkillResult(False, failure.stage, failure.slot, str(failure), timings)
         timings["total"] = context.t - timings.pop("start")
         await self._travel(context, goal.side, home)
-        context.say("done", f"The {goal.label} is in the {goal.container}.")
-        return SkillResult(
-            True, "done", None, f"The {goal.label} was dropped in the {goal.container}.", timings
-        )
+        if result.success:
+            context.say("done", f"The {goal.label} is in the {goal.container}.")
+        return result
 
     async def _detect(self, context: Context, goal: PickGoal) -> tuple[LocalizedObject, LocalizedObject]:
         """Look once with the head camera: the best reachable object, and the container."""
         context.say("detect", f"Looking for a {goal.label} and a {goal.container}.")
         with context.watch("head", goal.label, goal.container) as eye:
             end = context.t + self._config.look_timeout
+            problem = "The head camera gave no detections in time."
             while True:
                 sightings = await eye.look(end - context.t)
                 if sightings is None:
-                    raise StageFailed("detect", "localizer", "The head camera gave no detections in time.")
+                    raise StageFailed("detect", "localizer", problem)
                 reachable = self._reachable(context, goal, sightings)
                 containers = [o for o in sightings.objects if o.label == goal.container]
                 if reachable and containers:
                     break
-                if context.t >= end:
-                    missing = goal.container if reachable else f"reachable {goal.label}"
-                    raise StageFailed("detect", "localizer", f"The head camera shows no {missing}.")
+                missing = goal.container if reachable else f"reachable {goal.label}"
+                problem = f"The head camera shows no {missing}."
         target = min(reachable, key=lambda o: self._discomfort(context, goal, o))
         container = max(containers, key=lambda o: o.detection.score)
         context.say("detect", f"{len(reachable)} {goal.label}s in reach.", target=target.position.tolist())
@@ -196,7 +204,8 @@ class Pick:
                 "descend", "localizer", f"The hand was stopped {left * 1e3:.0f} mm before the grasp."
             )
         self._close(context, goal)
-        await context.until(lambda: context.hands[goal.side].status.holding, self._config.close_timeout)
+        hand = context.hands[goal.side]
+        await context.until(lambda: hand.status.state in CLOSED, self._config.close_timeout)
         self._check_grip(context, goal)
 
     async def _servo(self, context: Context, goal: PickGoal, law: ServoLaw) -> None:
@@ -205,7 +214,7 @@ class Pick:
         end = context.t + self._config.servo_timeout
         closing = False
         with context.watch(f"{goal.side}_hand", goal.label) as eye:
-            while context.t < end and not hand.status.holding:
+            while context.t < end and not (closing and hand.status.state in CLOSED):
                 fresh = eye.fresh()
                 step = law.step(context.t, None if fresh is None else list(fresh.objects), arm.pose)
                 if not closing:

@@ -1,0 +1,257 @@
+"""The pick skill, stage by stage, in a scripted world: each failure is named, and leaves the robot safe."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from golem.middleware import topics
+from golem.middleware.topics import HandGoal, LookRequest
+from golem.skills.base import SkillResult
+from golem.skills.grasping.base import Grasp, GraspMethod, OpenLoop
+from golem.skills.grasping.centroid import Centroid
+from golem.skills.grasping.visual_servo import VisualServo
+from golem.skills.pick import Pick, PickConfig, PickGoal
+from golem.types import Array, LocalizedObject, Side
+
+SCREW = np.array([0.43, -0.14, -0.03])
+TRAY = np.array([0.48, -0.31, -0.03])
+HEAD_ERROR = np.array([0.02, -0.015, 0.01])
+CONFIG = PickConfig(look_timeout=0.5, servo_timeout=8.0, close_timeout=0.5)
+
+
+def stocked(world: Any, thing: Any, screw: Array = SCREW, tray: Array = TRAY) -> Any:
+    """Fill the world: the head camera is off, the palm cameras are right, every closing holds."""
+    world.objects["head"] = lambda: [
+        thing("screw", screw + HEAD_ERROR, world.t),
+        thing("tray", tray, world.t),
+    ]
+    for side in ("left", "right"):
+        world.objects[f"{side}_hand"] = lambda: [thing("screw", screw, world.t)]
+    world.grips = [True] * 5
+    return world
+
+
+@pytest.fixture
+def full(world: Any, thing: Any) -> Any:
+    """A world with a screw and a tray."""
+    return stocked(world, thing)
+
+
+def picked(
+    world: Any, method: GraspMethod | None = None, side: Side = "right", config: PickConfig = CONFIG
+) -> SkillResult:
+    """Run a pick to its end."""
+    run = world.run(Pick(method or VisualServo(), config).run(world.context, PickGoal(side=side)))
+    assert run.result is not None
+    return run.result
+
+
+def assert_safe(world: Any, side: Side = "right") -> None:
+    """Check that every camera sleeps, the hand was told to open, and the arm was sent home."""
+    for camera in world.objects:
+        assert world.bus.latest(topics.look(camera), LookRequest) in (None, LookRequest())
+    goal = world.bus.latest(topics.hand_goal(side), HandGoal)
+    assert goal is not None and goal.gap is not None
+    np.testing.assert_allclose(world.context.arms[side].commanded[:3, 3], [0.35, -0.2, 0.1], atol=1e-9)
+
+
+def failed(result: SkillResult, stage: str, slot: str, words: str) -> None:
+    """Check how a pick failed."""
+    assert (result.success, result.stage, result.slot) == (False, stage, slot), result
+    assert words in result.reason
+    assert result.timings["total"] > 0.0 and "start" not in result.timings
+
+
+def test_a_pick_goes_through_its_stages(full: Any) -> None:
+    result = picked(full)
+    assert (result.success, result.stage, result.slot) == (True, "done", None), result
+    full.step()
+    assert full.stages == ["detect", "approach", "servo", "grasp", "extract", "place", "done"]
+    assert 0.0 < result.timings["detect_to_grasp"] < result.timings["total"]
+    assert set(result.timings) == {"detect_to_grasp", "total"}
+    assert_safe(full)
+
+
+def test_the_hand_closes_where_the_palm_camera_saw_the_screw(full: Any) -> None:
+    seen_at: list[Array] = []
+    tick = full.step
+
+    def step() -> None:
+        tick()
+        goal = full.bus.latest(topics.hand_goal("right"), HandGoal)
+        if goal is not None and goal.gap is None and not seen_at:
+            seen_at.append(full.context.arms["right"].commanded[:3, 3].copy())
+
+    full.step = step
+    picked(full)
+    assert np.linalg.norm((seen_at[0] - SCREW)[:2]) < 0.003
+
+
+def test_the_screw_is_let_go_above_the_tray(full: Any) -> None:
+    let_go: list[Array] = []
+    tick = full.step
+
+    def step() -> None:
+        held = full.holds
+        tick()
+        goal = full.bus.latest(topics.hand_goal("right"), HandGoal)
+        if held and goal is not None and goal.gap is not None and not let_go:
+            let_go.append(full.context.arms["right"].commanded[:3, 3].copy())
+
+    full.step = step
+    picked(full)
+    np.testing.assert_allclose(let_go[0], TRAY + (0.0, 0.0, CONFIG.drop_height), atol=1e-9)
+
+
+def test_the_extraction_is_straight_and_slow(full: Any) -> None:
+    picked(full)
+    path = np.array([T[:3, 3] for T in full.sent])
+    lowest = int(np.argmin(path[:, 2]))
+    pull = path[lowest:]
+    pull = pull[pull[:, 2] < path[lowest, 2] + CONFIG.pull]
+    assert np.ptp(pull[:, 0]) < 1e-3 and np.ptp(pull[:, 1]) < 1e-3
+    speed = np.linalg.norm(np.diff(pull, axis=0), axis=1) / 0.01
+    assert speed.max() <= CONFIG.pull_speed * (1 + 1e-6) + 1e-9
+
+
+def test_the_hand_never_travels_across_below_its_travel_height(full: Any) -> None:
+    picked(full, Centroid())
+    path = np.array([T[:3, 3] for T in full.sent])
+    across = np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1) / 0.01
+    assert path[1:][across > 0.02][:, 2].min() > CONFIG.travel_height - 1e-9
+
+
+def test_the_left_hand_is_the_mirror_of_the_right(world: Any, thing: Any) -> None:
+    flip = np.array([1.0, -1.0, 1.0])
+    stocked(world, thing, screw=SCREW * flip, tray=TRAY * flip)
+    result = picked(world, side="left")
+    assert result.success, result
+
+
+def test_of_several_screws_the_most_comfortable_is_taken(world: Any, thing: Any) -> None:
+    stocked(world, thing)
+    near = np.array([*CONFIG.comfort, -0.03])
+    others = [near + (0.1, 0.0, 0.0), near, near + (0.0, 0.15, 0.0)]
+    world.objects["head"] = lambda: (
+        [thing("screw", p, world.t) for p in others] + [thing("tray", TRAY, world.t)]
+    )
+    proposals: list[Array] = []
+
+    class Spy(Centroid):
+        def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+            proposals.append(target.position)
+            return super().propose(target, yaw)
+
+    picked(world, Spy())
+    np.testing.assert_array_equal(proposals[0], near)
+
+
+def test_a_head_camera_that_says_nothing_is_the_localizers_failure(world: Any) -> None:
+    failed(picked(world), "detect", "localizer", "no detections in time")
+    assert_safe(world)
+
+
+@pytest.mark.parametrize(
+    ("labels", "words"),
+    [
+        (["tray"], "no reachable screw"),
+        (["screw"], "no tray"),
+        ([], "no reachable screw"),
+        (["nut"], "screw"),
+    ],
+)
+def test_what_is_not_seen_is_named(labels: list[str], words: str, world: Any, thing: Any) -> None:
+    world.objects["head"] = lambda: [thing(label, SCREW, world.t) for label in labels]
+    failed(picked(world), "detect", "localizer", words)
+
+
+@pytest.mark.parametrize("place", [(0.43, 0.25, -0.03), (0.9, -0.1, -0.03), (0.43, -0.14, -0.4)])
+def test_what_is_out_of_reach_is_left_alone(place: tuple[float, ...], world: Any, thing: Any) -> None:
+    stocked(world, thing, screw=np.array(place))
+    failed(picked(world), "detect", "localizer", "no reachable screw")
+    assert_safe(world)
+
+
+def test_a_method_without_a_grasp_fails_in_approach(full: Any) -> None:
+    class Refuses(OpenLoop):
+        def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+            return []
+
+    failed(picked(full, Refuses()), "approach", "grasp_method", "No grasp was proposed")
+    assert_safe(full)
+
+
+def test_a_screw_the_palm_camera_never_sees_is_lost(full: Any) -> None:
+    full.objects["right_hand"] = lambda: []
+    failed(picked(full), "servo", "localizer", "lost the screw")
+    assert_safe(full)
+
+
+def test_a_hand_that_cannot_follow_stalls(full: Any) -> None:
+    full.kinematics.offset = np.array([0.01, 0.0, 0.0])
+    result = picked(full)
+    assert (result.stage, result.slot) == ("servo", "upper_body"), result
+    assert_safe_after_offset(full)
+
+
+def assert_safe_after_offset(world: Any) -> None:
+    goal = world.bus.latest(topics.hand_goal("right"), HandGoal)
+    assert goal is not None and goal.gap == CONFIG.release_gap
+
+
+def test_a_hand_stopped_on_its_way_down_fails_in_descend(full: Any) -> None:
+    full.kinematics.offset = np.array([0.0, 0.0, 0.03])
+    failed(picked(full, Centroid()), "descend", "localizer", "stopped 30 mm before the grasp")
+
+
+def test_an_empty_grip_is_tried_again_when_the_method_looks_again(full: Any) -> None:
+    full.grips = [False, True]
+    assert picked(full).success
+    assert full.stages.count("servo") == 2
+
+
+def test_an_open_loop_method_is_not_tried_again(full: Any) -> None:
+    full.grips = [False, True]
+    failed(picked(full, Centroid()), "grasp", "grasp_method", "hold nothing (gap 0 mm)")
+    assert full.stages == ["detect", "approach", "descend", "grasp"]
+    assert_safe(full)
+
+
+def test_two_empty_grips_are_a_failure(full: Any) -> None:
+    full.grips = [False, False, True]
+    failed(picked(full), "grasp", "grasp_method", "hold nothing")
+    assert_safe(full)
+
+
+def test_a_screw_that_slips_while_it_is_pulled(full: Any) -> None:
+    full.loses = lambda: full.stages[-1:] == ["extract"]
+    failed(picked(full), "extract", "grasp_method", "slipped out")
+    assert_safe(full)
+
+
+def test_a_screw_lost_on_the_way(full: Any) -> None:
+    full.loses = lambda: full.stages[-1:] == ["place"]
+    failed(picked(full), "place", "grasp_method", "lost on the way")
+    assert_safe(full)
+
+
+@pytest.mark.parametrize("share", np.linspace(0.0, 0.99, 12))
+def test_a_pick_can_be_cancelled_at_any_time(share: float, world: Any, thing: Any) -> None:
+    stocked(world, thing)
+    # A whole pick takes about 9 s in this world.
+    run = world.run(Pick(VisualServo(), CONFIG).run(world.context, PickGoal()), ticks=int(share * 850) + 1)
+    assert run.result is None
+    held = world.holds
+    sent = world.context.arms["right"].commanded.copy()
+    run.cancel()
+    assert run.result == SkillResult(False, "cancelled", None, "The skill was cancelled.")
+    for _ in range(30):
+        world.step()
+    assert world.holds == held or world.stages[-2:-1] == ["grasp"]
+    np.testing.assert_array_equal(world.context.arms["right"].commanded, sent)
+    for camera in world.objects:
+        assert world.bus.latest(topics.look(camera), LookRequest) in (None, LookRequest())
+    assert world.stages[-1] == "cancelled"
