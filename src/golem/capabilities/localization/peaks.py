@@ -10,6 +10,8 @@ from golem.types import Array, Detection
 
 STRIDE = 4
 """Pixels per cell of the maps; the middle of cell j is pixel 4 j + 1.5, as pixel centres are integers."""
+MOST = 200
+"""Candidates per class that are looked at; a pack has 68 fasteners."""
 SAME_SHARE = 0.35
 """Two centres of one class closer than this share of the better one's shorter side are one part."""
 
@@ -64,26 +66,25 @@ def find_peaks(
         heat = maps[index]
         peak = (heat >= logit) & (heat >= cv2.dilate(heat, np.ones((3, 3), np.uint8)))
         rows, columns = np.nonzero(peak)
+        best = np.argsort(-heat[rows, columns], kind="stable")[:MOST]
+        rows, columns = rows[best], columns[best]
         dx, dy, left, top, right, bottom = maps[len(labels) :, rows, columns].astype(np.float64)
-        x = STRIDE * (columns + dx) + (STRIDE - 1) / 2
-        y = STRIDE * (rows + dy) + (STRIDE - 1) / 2
-        sides = np.exp(np.clip([left, top, right, bottom], 0.0, 7.0))
+        centers = np.column_stack([STRIDE * (columns + dx), STRIDE * (rows + dy)]) + (STRIDE - 1) / 2
+        sides = np.exp(np.clip([left, top, right, bottom], 0.0, 7.0)).T
+        boxes = np.column_stack([centers - sides[:, :2], centers + sides[:, 2:]])
+        boxes = np.clip(boxes, 0.0, [width - 1, height - 1, width - 1, height - 1])
         scores = 1.0 / (1.0 + np.exp(-heat[rows, columns].astype(np.float64)))
-        for k in range(len(rows)):
-            if not (-0.5 <= x[k] <= width - 0.5 and -0.5 <= y[k] <= height - 0.5):
-                continue
-            box = np.array([x[k] - sides[0, k], y[k] - sides[1, k], x[k] + sides[2, k], y[k] + sides[3, k]])
-            box = np.clip(box, 0.0, [width - 1, height - 1, width - 1, height - 1])
-            found.append(Detection(label, float(scores[k]), box, np.array([x[k], y[k]])))
-    found.sort(key=lambda d: (-d.score, d.center[1], d.center[0]))
-    kept: list[Detection] = []
-    for detection in found:
-        if not any(_same(detection, better) for better in kept):
-            kept.append(detection)
+        inside = ((centers >= -0.5) & (centers <= np.array(size) - 0.5)).all(axis=1)
+        for k in _distinct(np.flatnonzero(inside), centers, boxes):
+            found.append(Detection(label, float(scores[k]), boxes[k], centers[k]))
+    return sorted(found, key=lambda d: (-d.score, d.center[1], d.center[0]))
+
+
+def _distinct(order: NDArray[np.intp], centers: Array, boxes: Array) -> list[int]:
+    """Return the candidates of `order` (best first) without second peaks on the part of a better one."""
+    reach = SAME_SHARE * (boxes[:, 2:] - boxes[:, :2]).min(axis=1)
+    kept: list[int] = []
+    for k in order:
+        if not kept or (np.linalg.norm(centers[kept] - centers[k], axis=1) >= reach[kept]).all():
+            kept.append(int(k))
     return kept
-
-
-def _same(detection: Detection, better: Detection) -> bool:
-    """Tell whether a detection is a second peak on the part of a better one: same class, nearly the same centre."""
-    near = SAME_SHARE * float((better.box[2:] - better.box[:2]).min())
-    return detection.label == better.label and float(np.linalg.norm(detection.center - better.center)) < near
