@@ -169,7 +169,11 @@ class Running:
             watch()
             return run.result is not None or self._stopped()
 
-        self.executor.run(self.executor.t + timeout, over, realtime)
+        try:
+            self.executor.run(self.executor.t + timeout, over, realtime)
+        except BaseException:
+            run.cancel()
+            raise
         if run.result is not None:
             return run.result
         run.cancel()
