@@ -13,7 +13,6 @@ from golem.skills.context import Context
 from golem.skills.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus
 from golem.types import Array, LocalizedObject, Side
 
-
 CLOSED = (GripState.HOLDING, GripState.EMPTY)
 """States of a hand whose fingers have closed, on something or on nothing."""
 

@@ -74,7 +74,8 @@ class MujocoRobot:
         self._errors = sample_episode(self.profile, stream(seed, "episode"))
         # The cameras are where the model has them; it is the calibration that is wrong.
         self.calibration: dict[str, Array] = {
-            name: np.linalg.inv(T) for name, T in self._errors.T_nominal_actual.items()
+            name: np.asarray(np.linalg.inv(T), dtype=np.float64)
+            for name, T in self._errors.T_nominal_actual.items()
         }
         self._depth = {
             name: StereoDepth(info, self.profile.depth, stream(seed, f"depth/{name}"))

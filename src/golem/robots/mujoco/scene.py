@@ -21,7 +21,9 @@ FINE_STEP = 0.0005
 """Physics step while a screw moves or a finger is about to touch one [s]; the bores need it."""
 
 
-ONLOOKER = CameraInfo("onlooker", 640, 480, fx=700.0, fy=700.0, cx=319.5, cy=239.5, near=0.0, far=60.0, rate=15.0)
+ONLOOKER = CameraInfo(
+    "onlooker", 640, 480, fx=700.0, fy=700.0, cx=319.5, cy=239.5, near=0.0, far=60.0, rate=15.0
+)
 """A camera beside the pack, for pictures of what happened."""
 
 
