@@ -10,7 +10,7 @@ from golem.capabilities.localization.base import Localizer
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.base import EmergencyStop, EstopFrame
 from golem.hardware.hands.base import HandController, HandStatus
-from golem.hardware.safety.base import GateInputs, GateMemory, GateState, Request, SafetyLimits
+from golem.hardware.safety.base import GateInputs, GateMemory, GateResult, GateState, Request, SafetyLimits
 from golem.hardware.safety.gate import check
 from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
@@ -173,7 +173,6 @@ class LowerBodyNode:
         self._bus, self._legs, self._guard = bus, legs, guard
         self._latency = guard.number("latency", legs.latency, least=0.0)
         self.period = 1.0 / guard.number("rate", legs.rate, least=MIN_RATE)
-        self._started = False
 
     def step(self, t: float) -> None:
         """Publish leg targets."""
@@ -181,8 +180,7 @@ class LowerBodyNode:
         base = self._bus.latest(topics.BASE, BaseEstimate)
         if state is None or base is None:
             return
-        if not self._started:
-            self._started = True
+        if not moving(self._bus):
             self._guard.call(self._legs.reset, state)
         twist = self._bus.latest(topics.TWIST, Twist) or Twist()
         command = self._guard.call(self._legs.step, state, base, twist, self.period)
@@ -200,7 +198,7 @@ class UpperBodyNode:
         self._bus, self._arms, self._guard = bus, arms, guard
         self._latency = guard.number("latency", arms.latency, least=0.0)
         self.period = 1.0 / guard.number("rate", arms.rate, least=MIN_RATE)
-        self._started = False
+        self._stopped_at = 0.0
 
     def step(self, t: float) -> None:
         """Publish upper-body targets."""
@@ -208,10 +206,13 @@ class UpperBodyNode:
         base = self._bus.latest(topics.BASE, BaseEstimate)
         if state is None or base is None:
             return
-        if not self._started:
-            self._started = True
+        if not moving(self._bus):
+            self._stopped_at = t
             self._guard.call(self._arms.reset, state.q)
-        targets = self._bus.latest(topics.PALM_TARGETS, PalmTargets) or PalmTargets(t)
+        targets = self._bus.latest(topics.PALM_TARGETS, PalmTargets)
+        if targets is None or targets.t <= self._stopped_at:
+            # A target from before a stop must not set the arms in motion when the robot is released.
+            targets = PalmTargets(t)
         T_base_odom = np.linalg.inv(base.T_odom_base)
         left, right = (None if T is None else T_base_odom @ T for T in (targets.left, targets.right))
         command = self._guard.call(self._arms.step, left, right, state.q, self.period)
@@ -262,20 +263,18 @@ class ServoNode:
     def __init__(self, bus: Bus, servo: MotorServo, guard: Guard) -> None:
         """Run `servo`."""
         self._bus, self._servo, self._guard = bus, servo, guard
-        self._hold: np.ndarray | None = None
 
     def step(self, t: float) -> None:
         """Publish the command that the safety gate shall judge."""
         state = self._bus.latest(topics.LOW_STATE, LowState)
         if state is None:
             return
-        if self._hold is None:
-            self._hold = state.q.copy()
+        if not moving(self._bus):
             self._guard.call(self._servo.reset, state)
         legs = self._bus.latest(topics.LEG_COMMAND, LegCommand)
         arms = self._bus.latest(topics.ARM_COMMAND, ArmCommand)
-        # A half that has not spoken yet stays where it was found.
-        q = self._hold.copy()
+        # A half that has not spoken yet stays where it is.
+        q = state.q.copy()
         if legs is not None:
             q[LEGS] = legs.q
         if arms is not None:
@@ -321,13 +320,17 @@ class SafetyNode:
 
     def step(self, t: float) -> None:
         """Let the newest command through, limited, or stop the robot."""
+        estop = self._bus.latest(topics.ESTOP, EstopFrame)
         # The gate acts on the edge of a request, and an activation before it is armed would be spent for nothing.
         waiting = self.request is Request.ACTIVATE and self._memory.mode is GateState.INIT
+        if waiting and estop is not None and estop.pressed:
+            # Released later, the button must not set free what was asked for before it was pressed.
+            self.request = Request.NONE
         inputs = GateInputs(
             t,
             self._bus.latest(topics.LOW_STATE, LowState),
             self._bus.latest(topics.LOW_CMD_REQUEST, LowCommand),
-            self._bus.latest(topics.ESTOP, EstopFrame),
+            estop,
             Request.NONE if waiting else self.request,
         )
         result = check(inputs, self._limits, self._memory)
@@ -355,6 +358,16 @@ class SkillNode:
         self._context.refresh(t)
         if self.run is not None:
             self.run.step()
+
+
+def moving(bus: Bus) -> bool:
+    """Return whether the safety gate lets commands through.
+
+    While it does not, every controller starts over from the measured state at each step, so that a release finds all
+    of them where the robot is.
+    """
+    result = bus.latest(topics.SAFETY, GateResult)
+    return result is not None and result.state is GateState.ACTIVE
 
 
 def _limp(t: float) -> LowCommand:
