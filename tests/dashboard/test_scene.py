@@ -44,6 +44,7 @@ def test_the_origin_of_odom_is_the_pelvis_at_the_start(twin: tuple[Running, Any]
 def test_looking_changes_neither_the_scene_nor_what_the_robot_sees(twin: tuple[Running, Any]) -> None:
     _, robot = twin
     model = robot.scene.model
+    lamp = model.vis.headlight.ambient.copy()
     lights, qpos = model.light_castshadow.copy(), robot.data.qpos.copy()
     noise = robot._depth["head"]._rng.bit_generator.state
     view = SpectatorView(robot, {"side": SHOT}, (64, 48), fancy=True)
@@ -52,5 +53,6 @@ def test_looking_changes_neither_the_scene_nor_what_the_robot_sees(twin: tuple[R
     assert picture.shape == (48, 64, 3) and head.shape == (240, 320, 3)
     assert picture.std() > 5.0  # something is in the picture
     np.testing.assert_array_equal(model.light_castshadow, lights)
+    np.testing.assert_array_equal(model.vis.headlight.ambient, lamp)
     np.testing.assert_array_equal(robot.data.qpos, qpos)
     np.testing.assert_equal(robot._depth["head"]._rng.bit_generator.state, noise)

@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from golem.dashboard.scene import Shot, SpectatorView
-from golem.dashboard.status import Status, camera_picture, read_status
+from golem.dashboard.status import CLASS_COLOURS, Status, camera_picture, read_status
 from golem.errors import OutputError
 from golem.hardware.safety.base import GateState
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.assembly import Running
 
 SHOTS = {
-    "wide": Shot(look_at=(0.36, -0.02, 1.16), azimuth=-152.0, elevation=-17.0, distance=2.35),
-    "close": Shot(look_at=(0.42, -0.14, 1.14), azimuth=-138.0, elevation=-20.0, distance=0.95),
+    "wide": Shot(look_at=(0.32, 0.04, 1.18), azimuth=-148.0, elevation=-17.0, distance=2.15),
+    "close": Shot(look_at=(0.38, -0.07, 1.14), azimuth=-120.0, elevation=-13.0, distance=0.80),
 }
 CLOSE_STAGES = ("descend", "servo", "grasp", "extract")
 """Stages that are filmed from near; the others are filmed wide."""
@@ -40,7 +40,7 @@ UNCHANGED = 255
 MAX_GIF = 8_000_000
 """Size above which a GIF is written again, smaller [bytes]."""
 PANEL = (16, 20, 27)
-INK, MUTED = (240, 242, 245), (150, 160, 173)
+INK, MUTED, ACCENT = (240, 242, 245), (150, 160, 173), (255, 196, 0)
 SAFETY_COLOURS = {
     GateState.ACTIVE: (63, 160, 110),
     GateState.ARMED: (224, 160, 50),
@@ -121,7 +121,7 @@ class Film:
         top = height - bar
         draw.rectangle((0, top, width, height), fill=PANEL)
         middle = top + bar / 2
-        draw.text((14 * unit, middle), status.stage, fill=(255, 196, 0), font=self._fonts[19], anchor="lm")
+        draw.text((14 * unit, middle), status.stage, fill=ACCENT, font=self._fonts[19], anchor="lm")
         draw.text((120 * unit, middle), status.text, fill=INK, font=self._fonts[15], anchor="lm")
         clock = f"{status.t:.1f} s"
         draw.text((width - 14 * unit, middle), clock, fill=MUTED, font=self._fonts[15], anchor="rm")
@@ -182,6 +182,8 @@ class Film:
         """Write the pictures with one palette; a pixel that hardly changes stays, so that only what moves is stored."""
         count = len(self._frames)
         samples = [self.picture(i, 0.25) for i in np.unique(np.linspace(0, count - 1, 24).astype(int))]
+        accents = [ACCENT, *SAFETY_COLOURS.values(), *CLASS_COLOURS.values()]
+        samples.append(np.resize(np.array(accents, np.uint8), (24, samples[0].shape[1], 3)))
         palette = Image.fromarray(np.concatenate(samples)).quantize(
             UNCHANGED, method=Image.Quantize.MEDIANCUT
         )

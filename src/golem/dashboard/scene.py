@@ -20,6 +20,9 @@ from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.types import Array, CameraInfo
 
+HEADLIGHT = (0.28, 0.32)
+"""Ambient and diffuse part of the light at a spectator's camera: the hall itself is lit for the robot's eyes."""
+
 
 @dataclass(frozen=True)
 class Shot:
@@ -121,13 +124,18 @@ class SpectatorView:
         if self._rig is None:
             views = {name: shot.view() for name, shot in self._shots.items()}
             self._rig = CameraRig(self._model, self._infos, fancy=self._fancy, views=views)
+        if name not in self._shots:
+            return self._rig.render(self._data, name)[0]
         # The lights belong to the model, and the robot's cameras see by them too.
-        kept = self._model.light_castshadow.copy()
+        lamp, shadows = self._model.vis.headlight, self._model.light_castshadow.copy()
+        kept = lamp.ambient.copy(), lamp.diffuse.copy()
+        lamp.ambient[:], lamp.diffuse[:] = HEADLIGHT
         self._model.light_castshadow[:] = self._fancy
         try:
             return self._rig.render(self._data, name)[0]
         finally:
-            self._model.light_castshadow[:] = kept
+            lamp.ambient[:], lamp.diffuse[:] = kept
+            self._model.light_castshadow[:] = shadows
 
     def close(self) -> None:
         """Release the renderer."""

@@ -80,7 +80,9 @@ def _timed(step: Callable[[int], object], n: int) -> Array:
 
 
 def _figure(name: str, times: Array, scale: float, unit: str, reference: str) -> Figure:
-    return Figure(name, float(np.median(times)) * scale, float(np.quantile(times, 0.99)) * scale, unit, reference)
+    return Figure(
+        name, float(np.median(times)) * scale, float(np.quantile(times, 0.99)) * scale, unit, reference
+    )
 
 
 def _control(config: BenchConfig) -> list[Figure]:
@@ -104,7 +106,9 @@ def _control(config: BenchConfig) -> list[Figure]:
         state = LowState(t, q[i], np.zeros(27), np.zeros(27), imu)
         command = servo.step(state, q[0], TICK)
         request = Request.ACTIVATE if i == 1 else Request.NONE
-        memory = check(GateInputs(t, state, command, EstopFrame(t, i % 256, False), request), limits, memory).memory
+        memory = check(
+            GateInputs(t, state, command, EstopFrame(t, i % 256, False), request), limits, memory
+        ).memory
 
     figures.append(_figure("servo + safety tick", _timed(tick, n), 1e6, "us", "2000 us available at 500 Hz"))
     return figures
@@ -125,7 +129,9 @@ def _ik(name: str, ik: UpperBody, n: int, reference: str) -> Figure:
         for T in pair:
             T[:3, 3] += offset
         targets.append(pair)
-    return _figure(name, _timed(lambda i: ik.step(targets[i][0], targets[i][1], q, 0.01), n), 1e6, "us", reference)
+    return _figure(
+        name, _timed(lambda i: ik.step(targets[i][0], targets[i][1], q, 0.01), n), 1e6, "us", reference
+    )
 
 
 def _perception(config: BenchConfig) -> list[Figure]:
@@ -145,7 +151,9 @@ def _perception(config: BenchConfig) -> list[Figure]:
             rgb, depth = robot.capture(camera)
             frame = Frame(0.0, info, rgb, depth, np.eye(4))
             times = _timed(lambda i, frame=frame: detector.locate(frame, detector.classes), n)
-            figures.append(_figure(f"detector {camera} {size}", times, 1e3, "ms", "14.3 ms at 640x480 (notes)"))
+            figures.append(
+                _figure(f"detector {camera} {size}", times, 1e3, "ms", "14.3 ms at 640x480 (notes)")
+            )
     finally:
         robot.close()
     return figures

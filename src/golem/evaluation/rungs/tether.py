@@ -23,6 +23,8 @@ TIMEOUT = 90.0
 """Robot time after which a trial is lost [s]; the paper's slowest grasps took about as long."""
 SETTLE = 0.5
 """Robot time a dropped screw gets to come to rest [s]."""
+ABORTED = ("safety", "fault", "timeout")
+"""Stages at which a skill was ended from outside: not a success, wherever the screw is."""
 PAD_REACH = 0.008
 """Half width of a finger pad [m]: a hand further off than this cannot hold the screw."""
 STRAIGHT = 0.087
@@ -110,7 +112,7 @@ def _judge(stack: Stack, result: SkillResult, oracle: Oracle, watch: _Watch) -> 
     """Say whether a screw is in the tray, and if not, which module lost it."""
     truth = watch.grasp
     series = {} if truth is None else {f"grasp_{name}": value for name, value in asdict(truth).items()}
-    if oracle.screws_in_tray():
+    if oracle.screws_in_tray() and result.stage not in ABORTED:
         return TrialOutcome(True, DONE, None, result.reason, result.timings, series, watch.picture)
     # The skill may believe it succeeded: then the screw was lost between the pull and the tray.
     stage = result.stage if result.stage != DONE else "place"

@@ -327,7 +327,7 @@ def _add_bus_bar(
                      name=f"{label}_stud")  # fmt: skip
         parts.collider(body, _CYLINDER, (0.0055, 0.006), (nx, ny, base + 0.006))
         geoms = (f"{label}_washer", f"{label}_hex", f"{label}_stud")
-        tip = origin + np.array([nx, ny, base + 0.012])
+        tip = origin + np.array([nx, ny, base + 0.0072])
         found.append(Part("nut", "pack", geoms, tip, np.array([0.017, 0.017, 0.012])))
     return found
 
