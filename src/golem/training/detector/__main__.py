@@ -18,9 +18,9 @@ RUNS = Path("runs/detector")
 def render(
     folder: Path = RUNS / "data",
     seed: int = 0,
-    worlds: int = 44,
-    held_out_worlds: int = 10,
-    per_camera: int = 55,
+    worlds: int = 150,
+    held_out_worlds: int = 30,
+    per_camera: int = 16,
 ) -> None:
     """Render the splits `train` and `held_out`; continues where it was stopped.
 
@@ -28,10 +28,10 @@ def render(
         folder: where to put them.
         seed: of the worlds.
         worlds: compiled worlds of the training split.
-        held_out_worlds: compiled worlds of the held-out split, 30 images per camera each.
-        per_camera: images of the head camera per training world, and as many of the palm cameras.
+        held_out_worlds: compiled worlds of the held-out split.
+        per_camera: images of the head camera per world, and as many of the palm cameras.
     """
-    dataset.generate(folder, seed, "held_out", held_out_worlds, 30)
+    dataset.generate(folder, seed, "held_out", held_out_worlds, per_camera)
     dataset.generate(folder, seed, "train", worlds, per_camera)
 
 

@@ -63,6 +63,8 @@ def _solid(
         draw = next(d for d in world.draws if screw_name(d.slot) == part.body)
         faces = bool(axis @ T[2, :3] < -0.5)
         centre_world = data.xpos[body] + axis * draw.head_height
+    if part.label == "tray":
+        centre_world = data.xpos[model.body(part.body).id]
     if part.label == "nut":
         # The tip of the stud moves across the nut with the view, and a crop does not show where the camera is.
         faces = False

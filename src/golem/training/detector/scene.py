@@ -72,14 +72,14 @@ def build_world(rng: np.random.Generator) -> World:
         window_y=(float(rng.uniform(-0.5, -0.3)), float(rng.uniform(0.3, 0.55))),
         window_depth=float(rng.uniform(0.03, 0.06)),
         empty_holes=tuple(int(i) for i in rng.choice(68, size=int(rng.integers(10, 22)), replace=False)),
-        tray_xy=(float(rng.uniform(0.3, 0.8)), float(rng.choice([-1, 1]) * rng.uniform(0.3, 0.75))),
         tray_size=(
             float(rng.uniform(0.16, 0.30)),
             float(rng.uniform(0.2, 0.34)),
             float(rng.uniform(0.03, 0.08)),
         ),
     )
-    layout = replace(layout, tray_z=layout.top_z + float(rng.choice([0.0, 0.0, 0.03])))
+    lifted = float(rng.choice([0.0, rng.uniform(0.02, 0.12)]))
+    layout = replace(layout, tray_z=layout.top_z + lifted, tray_xy=(layout.near_edge + 0.1, -0.3))
     free = [i for i in range(68) if i not in layout.empty_holes]
     draws = draw_screws(rng, WIDE, [int(i) for i in rng.choice(free, size=14, replace=False)])
     names = add_pack(spec, layout, draws)
@@ -177,9 +177,17 @@ def _random_colour(rng: np.random.Generator) -> Array:
 
 
 def randomise_objects(world: World, rng: np.random.Generator) -> None:
-    """Scatter distractors and take some screws out of their bores (into the tray, on the cover, or just raised)."""
+    """Move the tray, scatter distractors, take some screws out of their bores (tray, cover, or just raised)."""
     model, data, layout = world.model, world.data, world.layout
     mujoco.mj_resetData(model, data)
+    tray = model.body(world.names.tray).id
+    side = rng.choice([-1.0, 1.0])
+    tray_at = np.array(
+        [layout.near_edge + rng.uniform(-0.02, 0.5), side * rng.uniform(0.15, 0.65), layout.tray_z]
+    )
+    model.body_pos[tray] = tray_at
+    turn = rng.uniform(-np.pi, np.pi) if rng.random() < 0.3 else rng.normal(0.0, 0.05)
+    model.body_quat[tray] = [np.cos(turn / 2), 0.0, 0.0, np.sin(turn / 2)]
     for body in world.distractors:
         model.body_pos[body] = AWAY
         if rng.random() < 0.3:
@@ -194,8 +202,7 @@ def randomise_objects(world: World, rng: np.random.Generator) -> None:
             data.qpos[at : at + 3] += rng.uniform(0.0, 0.02) * draw.axis()
         elif choice < 0.45:
             if choice < 0.3:
-                sx, sy, _ = layout.tray_size
-                spot = np.array(layout.tray_xy) + rng.uniform(-0.4, 0.4, 2) * (sx, sy)
+                spot = tray_at[:2] + rng.uniform(-0.35, 0.35, 2) * min(layout.tray_size[:2])
                 z = layout.tray_z + 0.004
             else:
                 spot = np.array([layout.near_edge + rng.uniform(0.0, 0.7), rng.uniform(-0.6, 0.6)])
@@ -232,12 +239,14 @@ def place_head(world: World, rng: np.random.Generator) -> CameraInfo:
 def place_palm(world: World, rng: np.random.Generator) -> CameraInfo:
     """Carry the robot to where its palm camera looks down at a random part, sometimes with a screw in its fingers."""
     model, data = world.model, world.data
+    refresh(world)
     side = SIDES[int(rng.integers(2))]
     info = CAMERAS[f"{side}_hand"]
     labels = sorted({part.label for part in world.names.parts})
     label = labels[int(rng.integers(len(labels)))]
     choices = [part for part in world.names.parts if part.label == label]
-    target = choices[int(rng.integers(len(choices)))].position
+    part = choices[int(rng.integers(len(choices)))]
+    target = data.xpos[model.body(part.body).id] if label == "tray" else part.position
     height = float(np.exp(rng.uniform(np.log(0.10), np.log(0.50))))
     view = Rotation.from_euler("ZYX", [rng.uniform(-np.pi, np.pi), rng.normal(0, 0.12), rng.normal(0, 0.12)])
     R = view.as_matrix() @ T_MUJOCO_OPTICAL[:3, :3]
