@@ -121,7 +121,7 @@ class Demo:
                 [(name, round(s, 3)) for name, s in self._timeline.durations(self._running.executor.t)],
             )
         )
-        what = f"{new[0]} is in the tray" if new else f"no screw in the tray. {result.reason}"
+        what = f"{new[0]} is in the tray after {seconds:.1f} s" if new else f"failed. {result.reason}"
         print(f"Pick {len(self.picks)}: {what} ({len(self.in_tray())} of {self._config.screws}).", flush=True)
 
     def tick(self) -> None:
@@ -139,7 +139,7 @@ class Demo:
         config, screws, folder = self._config, self.in_tray(), self._config.out
         robot_time, wall = self._running.executor.t, time.perf_counter() - self._started
         lead = (
-            f"{len(screws)} of {config.screws} screws in the tray after {len(self.picks)} picks, "
+            f"{len(screws)} of {config.screws} screws in the tray after {len(self.picks)} pick{'s' * (len(self.picks) != 1)}, "
             f"{robot_time:.0f} s of robot time and {wall:.0f} s by the clock."
         )
         facts = {

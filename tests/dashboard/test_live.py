@@ -54,7 +54,8 @@ def test_bodies_cameras_and_target_follow(twin: tuple[Running, Any], view: LiveV
     robot.data.body("right_hand").xpos[:] = (1.0, 2.0, 3.0)
     view.update()
     np.testing.assert_allclose(view._bodies["right_hand"].position, (1.0, 2.0, 3.0))
-    np.testing.assert_allclose(view._target.position, (0.4, 0.0, robot.config.hoist.height - 0.04))
+    for marker in (view._target, view._target_label):
+        np.testing.assert_allclose(marker.position, (0.4, 0.0, robot.config.hoist.height - 0.04))
     assert view._target.visible
     assert set(view.panel._cameras) == {"right palm camera", "head camera"}
     assert "&lt;b&gt;" in view.panel._status.content

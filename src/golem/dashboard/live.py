@@ -93,7 +93,7 @@ class LiveView:
             mesh.name: scene.add_glb(f"/world/{mesh.name}", mesh.glb) for mesh in self._view.meshes()
         }
         self._target = scene.add_icosphere("/target", radius=0.012, color=TARGET_COLOUR, visible=False)
-        self._target_label = scene.add_label("/target/label", "target", visible=False)
+        self._target_label = scene.add_label("/target_label", "target", visible=False)
         self._move_bodies()
 
     @property
@@ -178,7 +178,7 @@ class LiveView:
             target = self._timeline.target if self._busy else None
             self._target.visible = self._target_label.visible = target is not None
             if target is not None:
-                self._target.position = self._view.from_odom(target)
+                self._target.position = self._target_label.position = self._view.from_odom(target)
         self._panel.show_status(
             status,
             self._timeline.durations(t if self._busy else self._ended),
