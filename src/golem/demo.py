@@ -138,8 +138,9 @@ class Demo:
         """Write figures and report."""
         config, screws, folder = self._config, self.in_tray(), self._config.out
         robot_time, wall = self._running.executor.t, time.perf_counter() - self._started
+        tries = f"{len(self.picks)} pick{'' if len(self.picks) == 1 else 's'}"
         lead = (
-            f"{len(screws)} of {config.screws} screws in the tray after {len(self.picks)} pick{'s' * (len(self.picks) != 1)}, "
+            f"{len(screws)} of {config.screws} screws in the tray after {tries}, "
             f"{robot_time:.0f} s of robot time and {wall:.0f} s by the clock."
         )
         facts = {

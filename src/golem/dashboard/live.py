@@ -88,7 +88,7 @@ class LiveView:
         scene.add_light_directional("/fill", intensity=0.5, position=(2.0, 3.0, 2.0))
         scene.set_background_image(_sky(), format="png")
         camera = self._server.initial_camera
-        camera.position, camera.look_at, camera.fov = (2.55, 1.3, 2.15), (0.38, -0.02, 1.08), 0.75
+        camera.position, camera.look_at, camera.fov = (2.1, 1.1, 1.95), (0.34, -0.04, 1.12), 0.75
         self._bodies = {
             mesh.name: scene.add_glb(f"/world/{mesh.name}", mesh.glb) for mesh in self._view.meshes()
         }

@@ -1,0 +1,75 @@
+"""Takes the pictures of the documentation: `python -m golem.dashboard.pictures docs/images`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from PIL import Image
+
+from golem.dashboard.film import Film
+from golem.dashboard.scene import Shot, SpectatorView
+from golem.dashboard.status import Timeline
+from golem.errors import GolemError
+from golem.run import TIMEOUT
+from golem.runtime.assembly import build
+from golem.skills.pick import Pick, PickGoal
+from golem.stack import Stack, load_stack
+
+PULL = Shot(look_at=(0.36, -0.03, 1.26), azimuth=-138.0, elevation=-15.0, distance=1.52, fovy=45.0)
+PULLED = 1.15
+"""Time into the extraction at which the picture is taken [s]: the screw is out, and still above its bore."""
+
+
+def take(folder: Path, stack: Stack, seed: int = 0) -> list[Path]:
+    """Write `pull.png` and `pick.gif`: the second pick, whose screw no tray hides.
+
+    Args:
+        folder: where to.
+        stack: what works.
+        seed: seed of the episode.
+
+    Returns:
+        The files.
+
+    Raises:
+        GolemError: a pick failed.
+    """
+    running, robot = build(stack, seed)
+    film = Film(robot, fps=10.0)
+    timeline = Timeline()
+    picture = folder / "pull.png"
+    taken = False
+
+    def watch() -> None:
+        nonlocal taken
+        film.tick(running)
+        timeline.update(running)
+        stage, since = timeline.stages[-1] if timeline.stages else ("", 0.0)
+        if not taken and stage == "extract" and running.executor.t - since > PULLED:
+            taken = True
+            view = SpectatorView(robot, {"pull": PULL}, (1280, 720), fancy=True)
+            Image.fromarray(view.picture("pull")).save(picture, optimize=True)
+            view.close()
+
+    def pick(watch: Callable[[], None]) -> None:
+        result = running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=watch)
+        if not result.success:
+            raise GolemError(f"No picture: {result.reason}")
+
+    try:
+        pick(lambda: None)
+        timeline = Timeline.of(running)
+        pick(watch)
+        gif, *rest = film.save(folder / "pick.gif")
+        for other in rest:
+            other.unlink()
+    finally:
+        film.close()
+        robot.close()
+    return [picture, gif]
+
+
+if __name__ == "__main__":
+    print(*take(Path(sys.argv[1]), load_stack("tether")), sep="\n")
