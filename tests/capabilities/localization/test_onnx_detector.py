@@ -118,7 +118,7 @@ def test_the_head_sees_the_parts_where_they_are(
     ]
     found = np.array([o.position for o in detector.locate(head, [label])])
     missed = nearest(truth, found) > tolerance
-    assert len(truth) >= 5 and missed.mean() <= 0.15
+    assert len(truth) >= 4 and missed.mean() <= 0.15
 
 
 def test_the_head_sees_the_tray(detector: OnnxDetector, stage: Stage, head: Frame) -> None:

@@ -23,6 +23,8 @@ class PackLayout:
 
     Attributes:
         near_edge: x of the cover's edge next to the robot [m].
+        center_y: y of the cover's middle [m]; half a fastener pitch to the left of the robot, so that one screw
+            stands before its middle and the tray is in the head camera's view.
         top_z: height of the cover's rim above the floor [m].
         size_x, size_y: outer size of the cover [m]; the long side runs along y (1.2 x 2.0 m in the paper).
         thickness: height of cover and tray of the pack together [m].
@@ -36,6 +38,7 @@ class PackLayout:
     """
 
     near_edge: float = 0.41
+    center_y: float = 0.0466
     top_z: float = 1.055
     size_x: float = 1.2
     size_y: float = 2.0
@@ -44,7 +47,7 @@ class PackLayout:
     window_y: tuple[float, float] = (-0.34, 0.34)
     window_depth: float = 0.035
     empty_holes: tuple[int, ...] = (5, 16, 24, 29, 62)
-    tray_xy: tuple[float, float] = (0.48, -0.31)
+    tray_xy: tuple[float, float] = (0.48, -0.28)
     tray_z: float = 1.068
     tray_size: tuple[float, float, float] = (0.18, 0.24, 0.045)
 

@@ -36,7 +36,7 @@ class Part:
         label: `screw`, `screw_hole`, `nut`, `bus_bar` or `tray`.
         body: the body it belongs to.
         geoms: the visible geoms that make it up; empty for a hole, which is an absence.
-        position: (3,) centre of its visible top in the world at the start [m].
+        position: (3,) centre of its visible top in the world at the start [m]; a nut's top is under its stud's tip.
         size: (3,) extent of its visible part in x, y and z [m].
     """
 
@@ -96,7 +96,7 @@ def add_pack(
     set_contact_options(spec)
     hall.add_materials(spec)
     hall.add_hall(spec)
-    origin = np.array([layout.near_edge, 0.0, layout.top_z])
+    origin = np.array([layout.near_edge, layout.center_y, layout.top_z])
     body = spec.worldbody.add_body(name="pack", pos=origin.tolist())
     holes = {draw.slot: draw.bore_radius for draw in draws} | dict.fromkeys(layout.empty_holes, 0.003)
     _add_stand(body, layout)

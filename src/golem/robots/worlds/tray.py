@@ -42,7 +42,7 @@ def add_tray(spec: mujoco.MjSpec, layout: PackLayout) -> str:
         parts.visual(body, _BOX, size, pos, material="tray_teal", name=f"tray_rim_{k}")
     over_cover = (
         layout.near_edge < layout.tray_xy[0] < layout.near_edge + layout.size_x
-        and abs(layout.tray_xy[1]) < layout.size_y / 2
+        and abs(layout.tray_xy[1] - layout.center_y) < layout.size_y / 2
     )
     foot = layout.top_z if over_cover else 0.0
     if layout.tray_z - foot > 0.005:
