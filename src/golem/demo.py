@@ -121,7 +121,11 @@ class Demo:
                 [(name, round(s, 3)) for name, s in self._timeline.durations(self._running.executor.t)],
             )
         )
-        what = f"{new[0]} is in the tray after {seconds:.1f} s" if new else f"failed. {result.reason}"
+        what = (
+            f"{new[0]} is in the tray after {seconds:.1f} s"
+            if new
+            else f"no new screw in the tray; the robot says: {result.reason}"
+        )
         print(f"Pick {len(self.picks)}: {what} ({len(self.in_tray())} of {self._config.screws}).", flush=True)
 
     def tick(self) -> None:
