@@ -40,6 +40,7 @@ class PickConfig:
         workspace: x_min, x_max, y_min, y_max, z_min, z_max of the grasp frame in base_link [m], for the right arm
             (y is mirrored for the left). Inside the paper's box (x <= 0.60, |y| <= 0.45, -0.05 <= z <= 0.60).
         yaw: heading of the gripper's x axis when it points down [rad], right arm; mirrored for the left.
+        container_radius: objects nearer than this to the container's middle lie in it and are left there [m].
         comfort: x, y in base_link around which the arm works best [m]; the nearest object is taken first.
         attempts: how often a method that looks again may try to grasp and pull.
         clearance: height of the gripper above the object when it arrives and when it leaves [m].
@@ -60,6 +61,7 @@ class PickConfig:
 
     workspace: tuple[float, float, float, float, float, float] = (0.30, 0.60, -0.30, 0.10, -0.15, 0.60)
     yaw: float = -1.5707963267948966
+    container_radius: float = 0.15
     comfort: tuple[float, float] = (0.45, -0.12)
     attempts: int = 2
     clearance: float = 0.15
@@ -129,25 +131,34 @@ class Pick:
                 sightings = await eye.look(end - context.t)
                 if sightings is None:
                     raise StageFailed("detect", "localizer", problem)
-                reachable = self._reachable(context, goal, sightings)
                 containers = [o for o in sightings.objects if o.label == goal.container]
-                if reachable and containers:
+                container = max(containers, key=lambda o: o.detection.score, default=None)
+                reachable = self._reachable(context, goal, sightings, container)
+                if reachable and container is not None:
                     break
                 missing = goal.container if reachable else f"reachable {goal.label}"
                 problem = f"The head camera shows no {missing}."
         target = min(reachable, key=lambda o: self._discomfort(context, goal, o))
-        container = max(containers, key=lambda o: o.detection.score)
         context.say("detect", f"{len(reachable)} {goal.label}s in reach.", target=target.position.tolist())
         return target, container
 
-    def _reachable(self, context: Context, goal: PickGoal, sightings: Sightings) -> list[LocalizedObject]:
+    def _reachable(
+        self, context: Context, goal: PickGoal, sightings: Sightings, container: LocalizedObject | None
+    ) -> list[LocalizedObject]:
+        """Return the objects within the workspace, without those that lie in the container already."""
         x0, x1, y0, y1, z0, z1 = self._config.workspace
 
-        def inside(o: LocalizedObject) -> bool:
+        def wanted(o: LocalizedObject) -> bool:
+            if o.label != goal.label:
+                return False
+            if container is not None:
+                apart = np.hypot(*(o.position - container.position)[:2])
+                if apart < self._config.container_radius:
+                    return False
             x, y, z = _in_base(context, goal, o)
             return x0 <= x <= x1 and y0 <= y <= y1 and z0 <= z <= z1
 
-        return [o for o in sightings.objects if o.label == goal.label and inside(o)]
+        return [o for o in sightings.objects if wanted(o)]
 
     def _discomfort(self, context: Context, goal: PickGoal, o: LocalizedObject) -> float:
         x, y, _ = _in_base(context, goal, o)
