@@ -1,4 +1,4 @@
-"""What a user can get wrong on the command line ends in one sentence that names what would be right, and exit code 2."""
+"""What a user gets wrong on the command line ends in one sentence that names what would be right, and exit code 2."""
 
 from __future__ import annotations
 

@@ -11,12 +11,12 @@ from typing import Any
 from golem import registry
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.oracle import GraspTruth, Oracle
+from golem.middleware import topics
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.sensors.profiles import PROFILES, load_profile
 from golem.runtime.assembly import Running, build
 from golem.skills.base import Feedback, SkillResult
 from golem.skills.pick import Pick, PickConfig, PickGoal
-from golem.middleware import topics
 from golem.stack import Stack, load_stack
 
 TIMEOUT = 90.0
