@@ -71,7 +71,9 @@ def test_the_exported_network_computes_what_the_trained_one_does(tmp_path: Path)
         image = torch.randn(1, 3, *size)
         with torch.inference_mode():
             expected = model(image).numpy()
-        np.testing.assert_allclose(session.run(["maps"], {"image": image.numpy()})[0], expected, atol=1e-4)
+        np.testing.assert_allclose(
+            np.asarray(session.run(["maps"], {"image": image.numpy()})[0]), expected, atol=1e-4
+        )
 
 
 def test_the_curve_of_the_shipped_weights_reaches_their_step() -> None:
