@@ -23,10 +23,10 @@ from golem.dashboard.status import Timeline
 from golem.errors import ConfigError, OutputError
 from golem.evaluation.oracle import Oracle
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.run import TIMEOUT, Narrator
+from golem.run import Narrator
 from golem.runtime.assembly import Running, build
 from golem.skills.base import SkillResult
-from golem.skills.pick import Pick, PickGoal
+from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import load_stack
 
 FPS = 10.0

@@ -10,11 +10,8 @@ from golem.dashboard.live import LiveView
 from golem.middleware import topics
 from golem.runtime.assembly import Running, build
 from golem.skills.base import Feedback, SkillResult
-from golem.skills.pick import Pick, PickGoal
+from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import load_stack
-
-TIMEOUT = 90.0
-"""Robot time after which the task is given up [s]."""
 
 
 @dataclass(frozen=True)

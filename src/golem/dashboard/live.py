@@ -28,6 +28,7 @@ from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.assembly import Running
 from golem.skills.base import Skill, SkillResult
 from golem.skills.context import Context
+from golem.skills.pick import TIMEOUT
 
 PERIOD = 0.05
 """Time between two updates of the picture [s]."""
@@ -36,8 +37,6 @@ CAMERA_PERIOD = 0.2
 CAMERA_WIDTH = 320
 """Width of these pictures [px]."""
 CAMERAS = {"right_hand": "right palm camera", "head": "head camera"}
-TIMEOUT = 90.0
-"""Robot time after which a skill is given up [s]."""
 LAG = 0.25
 """Delay behind the wall clock that is made up for [s]; a machine that is slower falls behind for good."""
 PATIENCE = 0.5

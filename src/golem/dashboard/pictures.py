@@ -12,9 +12,8 @@ from golem.dashboard.film import Film
 from golem.dashboard.scene import Shot, SpectatorView
 from golem.dashboard.status import Timeline
 from golem.errors import GolemError
-from golem.run import TIMEOUT
 from golem.runtime.assembly import build
-from golem.skills.pick import Pick, PickGoal
+from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import Stack, load_stack
 
 PULL = Shot(look_at=(0.36, -0.03, 1.26), azimuth=-138.0, elevation=-15.0, distance=1.52, fovy=45.0)

@@ -13,6 +13,8 @@ from golem.skills.context import Context
 from golem.skills.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus
 from golem.types import Array, LocalizedObject, Side
 
+TIMEOUT = 90.0
+"""Robot time after which a pick is given up [s]; the paper's grasps took 75 +- 16 s by the clock."""
 CLOSED = (GripState.HOLDING, GripState.EMPTY)
 """States of a hand whose fingers have closed, on something or on nothing."""
 

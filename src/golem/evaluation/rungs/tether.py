@@ -16,11 +16,9 @@ from golem.robots.mujoco.gl import shared_context
 from golem.robots.sensors.profiles import PROFILES, load_profile
 from golem.runtime.assembly import Running, build
 from golem.skills.base import Feedback, SkillResult
-from golem.skills.pick import Pick, PickConfig, PickGoal
+from golem.skills.pick import TIMEOUT, Pick, PickConfig, PickGoal
 from golem.stack import Stack, load_stack
 
-TIMEOUT = 90.0
-"""Robot time after which a trial is lost [s]; the paper's slowest grasps took about as long."""
 SETTLE = 0.5
 """Robot time a dropped screw gets to come to rest [s]."""
 ABORTED = ("safety", "fault", "timeout")
