@@ -24,8 +24,10 @@ from golem.evaluation.records import read_records
 Make = Callable[..., LadderConfig]
 
 SCRIPT = """
-import sys
+import signal, sys
 from pathlib import Path
+# A background job of a shell starts with Ctrl-C ignored, and so would this process if the tests run in one.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from golem.evaluation import base, ladder
 from golem.evaluation.ladder import LadderConfig, run_ladder
 ladder.code_digest = ladder.commit = lambda: "tested"
