@@ -93,6 +93,16 @@ def test_any_text_is_a_stack_or_a_config_error(text: str) -> None:
     assert len(stack.digest()) == 12
 
 
+@pytest.mark.parametrize(
+    "text",
+    ["{[a, b]: 1}", "? {a: 1}\n: 2", "profile: 2024-99-99", "profile: !!int foo", "[" * 2000],
+    ids=["list as key", "mapping as key", "no such date", "no integer", "nested without end"],
+)
+def test_what_the_yaml_library_stumbles_over_is_refused(text: str) -> None:
+    with pytest.raises(ConfigError, match=r"^x\.yaml.*not valid YAML \("):
+        parse_stack(text, "x.yaml")
+
+
 def test_a_file_that_is_not_there_is_answered_with_the_shipped_ones(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"No stack file '.*none\.yaml'.*tether"):
         load_stack(tmp_path / "none.yaml")

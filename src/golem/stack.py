@@ -108,6 +108,8 @@ def parse_stack(text: str, name: str) -> Stack:
         mark = getattr(error, "problem_mark", None)
         where = f", line {mark.line + 1}" if mark else ""
         raise ConfigError(f"{name}{where}: not valid YAML ({getattr(error, 'problem', error)}).") from error
+    except (ValueError, RecursionError) as error:  # PyYAML lets them through: `2024-99-99`, `[[[...`
+        raise ConfigError(f"{name}: not valid YAML ({error}).") from error
     if data is None:
         return Stack()
     if not isinstance(data, Mapping):
@@ -172,6 +174,8 @@ class _Loader(yaml.SafeLoader):
         """Return the mapping of `node`, in which no key may occur twice."""
         seen: set[str] = set()
         for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise yaml.constructor.ConstructorError(None, None, "a key is one word", key.start_mark)
             if key.value in seen:
                 raise yaml.constructor.ConstructorError(
                     None, None, f"'{key.value}' occurs twice", key.start_mark
