@@ -174,3 +174,8 @@ def test_a_new_name_may_be_registered_once(monkeypatch: pytest.MonkeyPatch) -> N
         registry.register("grasp_method", "mine", "golem.skills.grasping.visual_servo:VisualServo")
     with pytest.raises(ConfigError, match=r"Unknown slot 'grasp'.*Did you mean 'grasp_method'"):
         registry.register("grasp", "mine", "a:B")
+
+
+def test_a_class_that_does_not_say_what_it_takes_is_at_fault() -> None:
+    with pytest.raises(ModuleFault, match="builtins:dict failed: .*no signature"):
+        registry.create("grasp_method", "builtins:dict", {})

@@ -94,9 +94,9 @@ def create(slot: str, use: str, options: Mapping[str, object], **context: object
     """
     cls = load(slot, use)
     what = f"option of {slot}: {use}"
-    parameters = inspect.signature(cls).parameters
-    supplied = {key: value for key, value in context.items() if key in parameters}
     try:
+        parameters = inspect.signature(cls).parameters
+        supplied = {key: value for key, value in context.items() if key in parameters}
         config = _config_class(cls)
         arguments = (
             {"config": fill(what, config, options)} if config else convert_all(what, cls, options, supplied)
