@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from golem.capabilities.arms.base import check_pose
 from golem.runtime.guard import Guard
 from golem.skills.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus, ServoStep
 from golem.types import Array, LocalizedObject
@@ -20,6 +21,7 @@ class GuardedMethod:
         for grasp in grasps:
             self._guard.kind("a proposal", grasp, Grasp)
             self._guard.array("T_odom_gripper", grasp.T_odom_gripper, 4, 4)
+            self._guard.call(check_pose, "T_odom_gripper", grasp.T_odom_gripper)
             self._guard.number("gap", grasp.gap, least=0.0)
         return grasps
 
@@ -46,6 +48,7 @@ class GuardedLaw:
         self._guard.kind("the servo step", step, ServoStep)
         self._guard.kind("status", step.status, ServoStatus)
         self._guard.array("T_odom_gripper", step.T_odom_gripper, 4, 4)
+        self._guard.call(check_pose, "T_odom_gripper", step.T_odom_gripper)
         self._guard.array("target", step.target, 3)
         self._guard.number("sigma", step.sigma, least=0.0)
         return step

@@ -1,0 +1,59 @@
+"""A grasp method that returns nonsense is blamed by its own name, not as a fault of the skill."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from golem.errors import ModuleFault
+from golem.runtime.guard import Guard
+from golem.runtime.guarded import GuardedMethod
+from golem.skills.grasping.base import Grasp, OpenLoop, ServoStatus, ServoStep
+from golem.types import Array, Detection, LocalizedObject
+
+TARGET = LocalizedObject(
+    Detection("screw", 0.9, np.zeros(4), np.zeros(2)), 0.0, np.zeros(3), np.zeros((0, 3))
+)
+SHEARED = np.eye(4) + 0.1 * np.eye(4, k=1)
+
+
+class Scripted(OpenLoop):
+    """Proposes one grasp, and follows it with a law that says the same."""
+
+    label = "screw"
+
+    def __init__(self, T: Array) -> None:
+        self._T = T
+
+    def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+        return [Grasp(self._T, 0.05, 1.0)]
+
+    def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> Scripted:  # pyright: ignore
+        return self
+
+    def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
+        return ServoStep(self._T, np.zeros(3), 0.0, ServoStatus.TRACKING)
+
+
+def guarded(T: Array) -> GuardedMethod:
+    return GuardedMethod(Scripted(T), Guard("grasp_method", "mine.py:Mine"))
+
+
+def test_a_sound_pose_passes() -> None:
+    method = guarded(np.eye(4))
+    (grasp,) = method.propose(TARGET, 0.0)
+    law = method.servo(TARGET, grasp, 0.0)
+    assert law is not None
+    assert law.step(0.0, None, np.eye(4)).status is ServoStatus.TRACKING
+
+
+def test_a_pose_that_is_no_rigid_transform_is_the_methods_fault() -> None:
+    with pytest.raises(ModuleFault, match="grasp_method: mine.py:Mine failed: .*not a rigid transform"):
+        guarded(SHEARED).propose(TARGET, 0.0)
+
+
+def test_a_step_to_such_a_pose_is_the_methods_fault() -> None:
+    law = guarded(SHEARED).servo(TARGET, Grasp(np.eye(4), 0.05, 1.0), 0.0)
+    assert law is not None
+    with pytest.raises(ModuleFault, match="grasp_method: mine.py:Mine failed: .*not a rigid transform"):
+        law.step(0.0, None, np.eye(4))
