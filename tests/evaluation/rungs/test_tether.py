@@ -111,3 +111,20 @@ def test_the_larger_error_takes_the_blame(
     stage: str, slot: str, seen: GraspTruth | None, culprit: str
 ) -> None:
     assert blame(stage, slot, seen) == culprit
+
+
+def test_a_robot_without_a_truth_to_judge_on_is_refused(rung: Tether, tmp_path: Path) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text("class Robot:\n    pass\n")
+    with pytest.raises(ConfigError, match=r"mine\.py:Robot is not the twin, 'mujoco'"):
+        rung.config("centroid", "ideal", {"robot": f"{mine}:Robot"})
+
+
+def test_a_file_in_the_home_folder_may_be_named_by_the_tilde(
+    rung: Tether, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "mine.py").write_text("class Arms:\n    pass\n")
+    assert rung.config("centroid", "ideal", {"upper_body": "~/mine.py:Arms"})["user_files"].keys() == {
+        "upper_body"
+    }

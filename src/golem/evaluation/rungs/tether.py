@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from golem import registry
+from golem.errors import ConfigError
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.oracle import GraspTruth, Oracle
 from golem.middleware import topics
+from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.sensors.profiles import PROFILES, load_profile
 from golem.runtime.assembly import Running, build
@@ -42,11 +44,14 @@ class Tether:
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
         stack = _stack(method, profile, overrides)
-        for slot in registry.slots():
-            registry.load(slot, stack.choice(slot).use)
+        classes = {slot: registry.load(slot, stack.choice(slot).use) for slot in registry.slots()}
+        if not issubclass(classes["robot"], MujocoRobot):
+            raise ConfigError(
+                f"Rung tether judges on the simulator's truth; robot: {stack.robot.use} is not the twin, 'mujoco'."
+            )
         shared_context()
         files = {
-            slot: hashlib.sha256(Path(use.rpartition(":")[0]).read_bytes()).hexdigest()
+            slot: hashlib.sha256(Path(use.rpartition(":")[0]).expanduser().read_bytes()).hexdigest()
             for slot in registry.slots()
             if (use := stack.choice(slot).use).rpartition(":")[0].endswith(".py")
         }
