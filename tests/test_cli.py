@@ -22,6 +22,7 @@ BROKEN = {
     "implementation": (["ladder", "--use", "upper_body=difik"], "Did you mean 'diff_ik'?"),
     "use": (["ladder", "--use", "upper_body"], "slot=implementation"),
     "stack": (["run", "nowhere"], "one of: tether"),
+    "run seed": (["run", "--seed", "-1"], "The seed is -1; it must be 0 or more"),
     "run profile": (["run", "--profile", "feild"], "Did you mean 'field'?"),
     "format": (["model", "export", "--format", "step", "--out", "x"], "valid: mjcf, urdf"),
     "model": (["model", "import"], "valid: export"),

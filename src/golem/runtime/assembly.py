@@ -13,7 +13,7 @@ from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.legs.base import LowerBody
 from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.localization.base import Localizer
-from golem.errors import GolemError
+from golem.errors import ConfigError, GolemError
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.hands.base import HandController
@@ -202,10 +202,12 @@ def build(stack: Stack, seed: int) -> tuple[Running, Any]:
         The running stack, and the robot: for evaluation and viewers, never for modules.
 
     Raises:
-        ConfigError: a name, an option or the profile is wrong.
+        ConfigError: a name, an option, the profile or the seed is wrong.
         ModuleFault: a constructor raised, or a module lacks a part of its contract.
     """
     load_profile(stack.profile)
+    if seed < 0:
+        raise ConfigError(f"The seed is {seed}; it must be 0 or more.")
     choice = stack.robot
     robot = registry.create(
         "robot", choice.use, choice.options, profile=stack.profile, seed=seed, posture=start_posture()
