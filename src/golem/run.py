@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from tyro.conf import Positional
 
 from golem.dashboard.live import LiveView
+from golem.errors import ConfigError
 from golem.middleware import topics
+from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.assembly import Running, build
 from golem.skills.base import Feedback, SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
@@ -38,13 +40,16 @@ def run_stack(config: RunConfig) -> SkillResult:
         ModuleFault: a module broke its contract.
     """
     running, robot = build(load_stack(config.stack, profile=config.profile), config.seed)
+    narrator = Narrator(running)
     try:
         if config.view:
+            if not isinstance(robot, MujocoRobot):
+                raise ConfigError(f"--view shows the twin; robot: {running.stack.robot.use} is not 'mujoco'.")
             with LiveView(running, robot, config.port) as view:
                 print(f"Live view: {view.url}   (Ctrl-C ends it)")
-                return view.run(Pick(running.method), PickGoal())
-        narrator = Narrator(running)
-        result = running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=narrator)
+                result = view.run(Pick(running.method), PickGoal(), watch=narrator)
+        else:
+            result = running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=narrator)
     finally:
         robot.close()
     print(

@@ -54,3 +54,7 @@ class Robot(Protocol):
             depth: (height, width) float32 along the optical axis [m], 0 where invalid.
         """
         ...
+
+    def close(self) -> None:
+        """Release what the robot holds: rendering contexts, connections. Closing twice does nothing."""
+        ...
