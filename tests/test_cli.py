@@ -23,6 +23,7 @@ BROKEN = {
     "use": (["ladder", "--use", "upper_body"], "slot=implementation"),
     "stack": (["run", "nowhere"], "one of: tether"),
     "run seed": (["run", "--seed", "-1"], "The seed is -1; it must be 0 or more"),
+    "bench seed": (["bench", "--seed", "-1"], "--seed is -1; it must be 0 or more"),
     "run profile": (["run", "--profile", "feild"], "Did you mean 'field'?"),
     "format": (["model", "export", "--format", "step", "--out", "x"], "valid: mjcf, urdf"),
     "model": (["model", "import"], "valid: export"),

@@ -17,7 +17,7 @@ from golem.capabilities.arms.base import UpperBody
 from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.kinematics import UpperKinematics
 from golem.capabilities.arms.postures import posture
-from golem.errors import MissingExtra
+from golem.errors import ConfigError, MissingExtra
 from golem.hardware.estop.base import EstopFrame
 from golem.hardware.safety.base import GateInputs, GateMemory, Request, SafetyLimits
 from golem.hardware.safety.gate import check
@@ -61,7 +61,13 @@ class Figure:
 
 
 def run_bench(config: BenchConfig) -> list[Figure]:
-    """Measure and print."""
+    """Measure and print.
+
+    Raises:
+        ConfigError: the seed is negative.
+    """
+    if config.seed < 0:
+        raise ConfigError(f"--seed is {config.seed}; it must be 0 or more.")
     figures = [*_control(config), *_perception(config), *_robot(config)]
     table = Table("figure", "median", "p99", "unit", "reference", title="GOLEM, CPU time of one thread")
     for f in figures:
@@ -94,7 +100,7 @@ def _control(config: BenchConfig) -> list[Figure]:
     try:
         from golem.capabilities.arms.pink_ik import PinkIK
 
-        figures.append(_ik("IK tick, pink_ik", PinkIK(), min(n, 4000), "137 us: Pink + daqp (notes)"))
+        figures.append(_ik("IK tick, pink_ik", PinkIK(), min(n, 4000), "137 us: prototype of Pink + daqp"))
     except MissingExtra as error:
         Console().print(f"pink_ik left out: {error}")
     servo, limits, memory = Servo(), SafetyLimits.from_profile(), GateMemory()
@@ -118,7 +124,7 @@ def _control(config: BenchConfig) -> list[Figure]:
 
 
 def _ik(name: str, ik: UpperBody, n: int, reference: str) -> Figure:
-    """Time both hands on circles of 8 cm radius and 4 s period at 100 Hz, as in the project's notes."""
+    """Time both hands on circles of 8 cm radius and 4 s period at 100 Hz."""
     q = start_posture()
     q[UPPER] = posture("ready")
     ik.reset(q)
@@ -155,7 +161,7 @@ def _perception(config: BenchConfig) -> list[Figure]:
             frame = Frame(0.0, info, rgb, depth, np.eye(4))
             times = _timed(lambda i, frame=frame: detector.locate(frame, detector.classes), n)
             figures.append(
-                _figure(f"detector {camera} {size}", times, 1e3, "ms", "14.3 ms at 640x480 (notes)")
+                _figure(f"detector {camera} {size}", times, 1e3, "ms", "14.3 ms: 640x480, prototype")
             )
     finally:
         robot.close()
