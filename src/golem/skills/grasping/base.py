@@ -65,7 +65,7 @@ class ServoLaw(Protocol):
 
         Args:
             t: present time [s].
-            sightings: objects of one new frame, newest first by nothing: a set; None when no new frame came.
+            sightings: objects of one new frame, in no order; None when no new frame came.
             T_odom_gripper: (4, 4) where the gripper is by the measured joints.
         """
         ...
