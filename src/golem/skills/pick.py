@@ -39,8 +39,9 @@ class PickConfig:
     """Distances, speeds and forces.
 
     Attributes:
-        workspace: x_min, x_max, y_min, y_max, z_min, z_max of the grasp frame in base_link [m], for the right arm
-            (y is mirrored for the left). Inside the paper's box (x <= 0.60, |y| <= 0.45, -0.05 <= z <= 0.60).
+        workspace: x_min, x_max, y_min, y_max, z_min, z_max within which an object must lie to be picked, in base_link
+            [m], for the right arm (y is mirrored for the left). The paper's box (x <= 0.60, |y| <= 0.45, -0.05 <= z
+            <= 0.60) but for z, which reaches 0.10 m deeper.
         yaw: heading of the gripper's x axis when it points down [rad], right arm; mirrored for the left.
         container_radius: objects nearer than this to the container's middle lie in it and are left there [m].
         comfort: x, y in base_link around which the arm works best [m]; the nearest object is taken first.
