@@ -103,6 +103,11 @@ def test_what_the_yaml_library_stumbles_over_is_refused(text: str) -> None:
         parse_stack(text, "x.yaml")
 
 
+def test_a_number_that_is_none_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"x: hand\.settle: .*\.nan"):
+        parse_stack("hand: {use: magpie, settle: .nan}", "x")
+
+
 def test_a_file_that_is_not_there_is_answered_with_the_shipped_ones(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"No stack file '.*none\.yaml'.*tether"):
         load_stack(tmp_path / "none.yaml")

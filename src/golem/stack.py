@@ -152,6 +152,8 @@ def _check_options(where: str, value: object) -> None:
     elif isinstance(value, list):
         for inner in value:
             _check_options(where, inner)
+    elif value != value:
+        raise ConfigError(f"{where}: a number that is none (.nan) is no value.")
     elif not isinstance(value, str | int | float | None):
         raise ConfigError(
             f"{where}: a value is a word, a number, true, false, a list or a mapping, not a {type(value).__name__}."
