@@ -88,11 +88,6 @@ def crank_from_gap(gap: _T) -> _T:
     return np.maximum(np.arccos(cosine) - ANGLE_OPEN, 0.0)  # the arc cosine may round to just below
 
 
-def pad_advance(theta: _T) -> _T:
-    """Return how far the pads have moved along approach since fully open [m]; not monotonic near closed."""
-    return ARM * (np.sin(ANGLE_OPEN + theta) - np.sin(ANGLE_OPEN))
-
-
 def torque_for_force(force: _T, theta: float) -> _T:
     """Return the crank torque [N m] that presses a pad with `force` [N]: tau = F L sin(a0 + theta), virtual work."""
     return force * ARM * np.sin(ANGLE_OPEN + theta)
