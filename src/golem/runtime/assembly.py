@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.legs.base import LowerBody
 from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.localization.base import Localizer
-from golem.errors import ConfigError, GolemError
+from golem.errors import ConfigError, GolemError, ModuleFault
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.hands.base import HandController
@@ -71,6 +72,7 @@ class Running:
         self.bus = Bus()
         self.estop = VirtualEstop()
         self._safety = nodes.SafetyNode(self.bus, SafetyLimits.from_profile(stack.limits))
+        self._act = nodes.ActNode(self.bus, robot, Guard("robot", stack.robot.use))
         context = Context(self.bus, Kinematics(), nodes.SkillNode.period)
         self._context = context
         self._skills = nodes.SkillNode(context)
@@ -116,7 +118,7 @@ class Running:
             out.append(nodes.HandNode(bus, hand, side, guard))
         out.append(nodes.ServoNode(bus, *make("servo")))
         out.append(self._safety)
-        out.append(nodes.ActNode(bus, robot, robot_guard))
+        out.append(self._act)
         return out
 
     @property
@@ -173,6 +175,7 @@ class Running:
             self.executor.run(self.executor.t + timeout, over, realtime)
         except BaseException:
             run.cancel()
+            self.halt()
             raise
         if run.result is not None:
             return run.result
@@ -181,6 +184,13 @@ class Running:
         if self._stopped() and safety is not None:
             return SkillResult(False, "safety", "safety", f"Safety stop: {safety.reason}. {safety.detail}")
         return SkillResult(False, "timeout", None, f"Not done after {timeout:g} s of robot time.")
+
+    def halt(self) -> None:
+        """Stop the motors now, past every other module: the gate is asked to stop, and its damping command goes out."""
+        self.request(Request.STOP)
+        with suppress(ModuleFault):  # where the robot itself is what failed
+            self._safety.step(self.executor.t)
+            self._act.step(self.executor.t)
 
     def _stopped(self) -> bool:
         safety = self.safety

@@ -43,6 +43,9 @@ MIN_RATE = 1.0
 """Slowest controller that is taken for one [Hz]."""
 
 
+IDENTITY = np.eye(3)
+
+
 class SenseNode:
     """Publishes what motors, IMU and hands report."""
 
@@ -101,7 +104,10 @@ class EstimatorNode:
             self._guard.call(self._estimator.reset, state)
         estimate = self._guard.call(self._estimator.step, state, TICK)
         self._guard.kind("the estimate", estimate, BaseEstimate)
-        self._guard.array("T_odom_base", estimate.T_odom_base, 4, 4)
+        T = self._guard.array("T_odom_base", estimate.T_odom_base, 4, 4)
+        # A rotation to 1e-3: `check_pose` at 500 Hz would cost more than the estimate.
+        if np.abs(T[:3, :3] @ T[:3, :3].T - IDENTITY).max() > 1e-3:
+            raise self._guard.fault("T_odom_base is not a rigid transform")
         self._guard.array("velocity", estimate.velocity, 3)
         self._bus.publish(topics.BASE, estimate, t)
 
@@ -231,20 +237,18 @@ class HandNode:
         self._bus, self._hand, self._guard = bus, hand, guard
         self._side: Side = side
         self._goals = 0
+        self._frozen = False
 
     def step(self, t: float) -> None:
         """Pass a new goal on, take in the hand's report, publish its command and status."""
         state = self._bus.latest(topics.hand_state(self._side), HandState)
-        goal = self._bus.latest(topics.hand_goal(self._side), HandGoal)
-        count = self._bus.count(topics.hand_goal(self._side))
-        if goal is not None and count != self._goals:
-            self._goals = count
-            if goal.gap is None:
-                self._guard.call(self._hand.close, goal.force)
-            else:
-                self._guard.call(self._hand.open, goal.gap)
         if state is None:
             return
+        if moving(self._bus):
+            self._frozen = False
+            self._pass_goal()
+        else:
+            self._freeze(state)
         command = self._guard.call(self._hand.step, state, t)
         self._guard.kind("the hand command", command, HandCommand)
         self._guard.number("gap", command.gap, least=0.0)
@@ -253,6 +257,25 @@ class HandNode:
         self._guard.kind("the status", status, HandStatus)
         self._bus.publish(topics.hand_command(self._side), command, t)
         self._bus.publish(topics.hand_status(self._side), status, t)
+
+    def _pass_goal(self) -> None:
+        goal = self._bus.latest(topics.hand_goal(self._side), HandGoal)
+        count = self._bus.count(topics.hand_goal(self._side))
+        if goal is None or count == self._goals:
+            return
+        self._goals = count
+        if goal.gap is None:
+            self._guard.call(self._hand.close, goal.force)
+        else:
+            self._guard.call(self._hand.open, goal.gap)
+
+    def _freeze(self, state: HandState) -> None:
+        """While the safety gate is shut: keep what is held, else stay as it is; goals given meanwhile are void."""
+        self._goals = self._bus.count(topics.hand_goal(self._side))
+        if not self._frozen:
+            self._frozen = True
+            if not self._guard.call(self._hand.status).holding:
+                self._guard.call(self._hand.open, state.gap)
 
 
 class ServoNode:

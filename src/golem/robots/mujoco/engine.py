@@ -142,6 +142,9 @@ class MujocoRobot:
         """Expose one camera now; see `Robot`."""
         if self._rig is None:
             self._rig = CameraRig(self._model, self.cameras.values())
+        # A physics step ends with the joints one step ahead of the frames; the exposure shall show where they are.
+        mujoco.mj_kinematics(self._model, self.data)
+        mujoco.mj_camlight(self._model, self.data)
         rgb, depth = self._rig.render(self.data, camera)
         return rgb, self._depth[camera].measure(depth)
 
