@@ -85,7 +85,7 @@ D400 = DepthErrors(
     patch=8,
     # [vendor] the D4 processor reports disparity in 1/32 px.
     disparity_step=1 / 32,
-    # [assumption] surfaces seen flatter than this return nothing (notes: > 70 deg), and half of a specular one.
+    # [assumption] surfaces seen flatter than this return nothing, and half of a specular one.
     grazing=np.deg2rad(70.0),
     specular_loss=0.5,
     occlusion=True,

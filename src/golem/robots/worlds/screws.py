@@ -28,7 +28,8 @@ DRESSED_FLOOR = 0.004
 
 @dataclass(frozen=True, slots=True)
 class ScrewRanges:
-    """Uniform ranges of what differs from screw to screw (sources: notes on the pack; M5/M6 cover practice).
+    """Uniform ranges of what differs from screw to screw (assumed, after M5 and M6 cover screws; nobody
+    published the pack's).
 
     Attributes:
         friction: sliding friction coefficient of screw, bore and pad.
