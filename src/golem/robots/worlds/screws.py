@@ -28,8 +28,7 @@ DRESSED_FLOOR = 0.004
 
 @dataclass(frozen=True, slots=True)
 class ScrewRanges:
-    """Uniform ranges of what differs from screw to screw (assumed, after M5 and M6 cover screws; nobody
-    published the pack's).
+    """Uniform ranges of what differs from screw to screw; assumed, after M5 and M6 cover screws.
 
     Attributes:
         friction: sliding friction coefficient of screw, bore and pad.
