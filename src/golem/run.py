@@ -9,6 +9,7 @@ from tyro.conf import Positional
 from golem.dashboard.live import LiveView
 from golem.errors import ConfigError
 from golem.middleware import topics
+from golem.middleware.bus import News
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.assembly import Running, build
 from golem.skills.base import Feedback, SkillResult
@@ -63,17 +64,12 @@ class Narrator:
 
     def __init__(self, running: Running) -> None:
         """Listen to the skill of `running`."""
-        self._running = running
-        self._seen = 0
+        self._news = News(running.bus, topics.FEEDBACK, Feedback)
         self._stage = ""
 
     def __call__(self) -> None:
         """Look for news."""
-        count = self._running.bus.count(topics.FEEDBACK)
-        if count == self._seen:
-            return
-        self._seen = count
-        feedback = self._running.bus.latest(topics.FEEDBACK, Feedback)
+        feedback = self._news.read()
         if feedback is not None and (feedback.stage != self._stage or feedback.data.get("failed")):
             self._stage = feedback.stage
             print(f"{feedback.t:7.2f} s  {feedback.stage:9s} {feedback.text}")

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from golem.middleware.bus import Bus, WrongType
+from golem.middleware.bus import Bus, News, WrongType
 from golem.runtime.executor import TICK
 
 
@@ -93,3 +93,13 @@ def test_topics_name_what_was_delivered_and_its_type() -> None:
     bus.publish("c", 1, t=0.0, latency=1.0)
     assert bus.topics() == {"a": "str", "b": "float"}
     assert list(bus.topics()) == ["a", "b"]
+
+
+def test_news_gives_each_value_once_and_begins_now() -> None:
+    bus = Bus()
+    bus.publish("a", 1, 0.0)
+    news = News(bus, "a", int)
+    assert news.read() is None
+    bus.publish("a", 2, 0.1)
+    bus.publish("a", 3, 0.1)
+    assert (news.read(), news.read()) == (3, None)

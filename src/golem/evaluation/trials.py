@@ -14,9 +14,7 @@ from pathlib import Path
 
 from golem.errors import GolemError, ModuleFault
 from golem.evaluation.base import Rung, TrialOutcome, TrialSpec, make_rung
-
-FAULT = "fault"
-"""The stage of a trial in which a module broke its contract."""
+from golem.skills.runner import FAULT
 
 SINGLE_THREAD = {
     name: "1"

@@ -8,7 +8,7 @@ modules: nobody can reach another module (or the simulator) through it.
 from __future__ import annotations
 
 from collections import deque
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 from golem.errors import GolemError
 
@@ -65,3 +65,20 @@ class Bus:
     def topics(self) -> dict[str, str]:
         """Return the name of each stream that has delivered something, with the type it carries."""
         return {name: type(value).__name__ for name, value in sorted(self._now.items())}
+
+
+class News(Generic[T]):
+    """Reads one topic so that no value is taken twice."""
+
+    def __init__(self, bus: Bus, topic: str, kind: type[T]) -> None:
+        """Begin now: what was delivered before does not count."""
+        self._bus, self._topic, self._kind = bus, topic, kind
+        self._seen = bus.count(topic)
+
+    def read(self) -> T | None:
+        """Return the newest value if it is new since the last reading, else None."""
+        count = self._bus.count(self._topic)
+        if count == self._seen:
+            return None
+        self._seen = count
+        return self._bus.latest(self._topic, self._kind)

@@ -10,8 +10,8 @@ from golem.capabilities.localization.base import Localizer
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.base import EmergencyStop, EstopFrame
 from golem.hardware.hands.base import HandController, HandStatus
-from golem.hardware.safety.base import GateInputs, GateMemory, GateResult, GateState, Request, SafetyLimits
-from golem.hardware.safety.gate import check
+from golem.hardware.safety.base import GateInputs, GateResult, GateState, Request, SafetyLimits
+from golem.hardware.safety.gate import Gate
 from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
 from golem.middleware.bus import Bus
@@ -337,15 +337,14 @@ class SafetyNode:
 
     def __init__(self, bus: Bus, limits: SafetyLimits) -> None:
         """Enforce `limits`."""
-        self._bus, self._limits = bus, limits
-        self._memory = GateMemory()
+        self._bus, self._gate = bus, Gate(limits)
         self.request = Request.NONE
 
     def step(self, t: float) -> None:
         """Let the newest command through, limited, or stop the robot."""
         estop = self._bus.latest(topics.ESTOP, EstopFrame)
         # The gate acts on the edge of a request, and an activation before it is armed would be spent for nothing.
-        waiting = self.request is Request.ACTIVATE and self._memory.mode is GateState.INIT
+        waiting = self.request is Request.ACTIVATE and self._gate.memory.mode is GateState.INIT
         if waiting and estop is not None and estop.pressed:
             # Released later, the button must not set free what was asked for before it was pressed.
             self.request = Request.NONE
@@ -356,8 +355,7 @@ class SafetyNode:
             estop,
             Request.NONE if waiting else self.request,
         )
-        result = check(inputs, self._limits, self._memory)
-        self._memory = result.memory
+        result = self._gate.step(inputs)
         self._bus.publish(topics.LOW_CMD, result.command, t)
         self._bus.publish(topics.SAFETY, result, t)
 

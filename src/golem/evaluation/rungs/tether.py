@@ -13,17 +13,19 @@ from golem.errors import ConfigError
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.oracle import GraspTruth, Oracle
 from golem.middleware import topics
+from golem.middleware.bus import News
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.sensors.profiles import PROFILES, load_profile
 from golem.runtime.assembly import Running, build
 from golem.skills.base import Feedback, SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickConfig, PickGoal
+from golem.skills.runner import FAULT
 from golem.stack import Stack, load_stack
 
 SETTLE = 0.5
 """Robot time a dropped screw gets to come to rest [s]."""
-ABORTED = ("safety", "fault", "timeout")
+ABORTED = ("safety", FAULT, "timeout")
 """Stages at which a skill was ended from outside: not a success, wherever the screw is."""
 PAD_REACH = 0.008
 """Half width of a finger pad [m]: a hand further off than this cannot hold the screw."""
@@ -85,16 +87,12 @@ class _Watch:
 
     def __init__(self, running: Running, oracle: Oracle) -> None:
         self._running, self._oracle = running, oracle
-        self._seen = 0
+        self._news = News(running.bus, topics.FEEDBACK, Feedback)
         self.grasp: GraspTruth | None = None
         self.picture: bytes | None = None
 
     def __call__(self) -> None:
-        count = self._running.bus.count(topics.FEEDBACK)
-        if count == self._seen:
-            return
-        self._seen = count
-        feedback = self._running.bus.latest(topics.FEEDBACK, Feedback)
+        feedback = self._news.read()
         if feedback is None:
             return
         if feedback.stage == "grasp" and not feedback.data.get("failed"):
@@ -137,7 +135,7 @@ def blame(stage: str, slot: str | None, truth: GraspTruth | None) -> str | None:
     calibration) or where it went (the arm and its calibration). Where it did not miss, an off-axis pull is the arm's,
     and the rest is the grip's.
     """
-    if truth is None or stage in ("detect", "servo", "safety", "fault"):
+    if truth is None or stage in ("detect", "servo", "safety", FAULT):
         return slot
     if truth.miss > PAD_REACH:
         return "localizer" if truth.aim >= truth.reach else "upper_body"
