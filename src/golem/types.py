@@ -211,11 +211,17 @@ class BaseEstimate:
         t: time stamp [s].
         T_odom_base: (4, 4) pose of base_link in odom.
         velocity: (3,) linear velocity of base_link in odom [m/s].
+        height: height of base_link above the soles of the planted feet [m]; 0 where no foot carries the robot.
+        contact: (2,) probability that the left and the right foot carry load, 0 to 1.
+        stale: whether too little was measured for too long to rely on `velocity`.
     """
 
     t: float
     T_odom_base: Array
     velocity: Array = field(default_factory=lambda: np.zeros(3))
+    height: float = 0.0
+    contact: Array = field(default_factory=lambda: np.zeros(2))
+    stale: bool = False
 
 
 @dataclass(frozen=True, slots=True)

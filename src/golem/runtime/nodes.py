@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from golem.capabilities.arms.base import ArmCommand, UpperBody
-from golem.capabilities.legs.base import LegCommand, LowerBody
+from golem.capabilities.legs.base import STANDING, LegCommand, LowerBody
 from golem.capabilities.localization.base import Localizer
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.base import EmergencyStop, EstopFrame
@@ -36,7 +36,6 @@ from golem.types import (
     LowState,
     PalmTargets,
     Side,
-    Twist,
 )
 
 MIN_RATE = 1.0
@@ -188,8 +187,7 @@ class LowerBodyNode:
             return
         if not moving(self._bus):
             self._guard.call(self._legs.reset, state)
-        twist = self._bus.latest(topics.TWIST, Twist) or Twist()
-        command = self._guard.call(self._legs.step, state, base, twist, self.period)
+        command = self._guard.call(self._legs.step, state, base, STANDING, self.period)
         self._guard.kind("the leg command", command, LegCommand)
         for name in ("q", "kp", "kd"):
             self._guard.array(name, getattr(command, name), LEGS.stop - LEGS.start)

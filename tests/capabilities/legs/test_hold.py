@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.base import LowerBody
+from golem.capabilities.legs.base import LowerBody, Motion
 from golem.capabilities.legs.hold import STANCES, Hold, HoldConfig
 from golem.errors import ConfigError
 from golem.robots.model.limits import load_limits
@@ -24,7 +24,7 @@ def test_moves_to_the_stance_without_a_step_and_stays() -> None:
     hold.reset(state(0.1))
     previous = np.full(12, 0.1)
     for _ in range(100):
-        command = hold.step(state(0.1), BASE, Twist(1.0, 0.0, 0.0), 0.02)
+        command = hold.step(state(0.1), BASE, Motion(Twist(1.0, 0.0, 0.0), np.zeros(2), True), 0.02)
         assert np.abs(command.q - previous).max() <= 0.5 * 0.02 + 1e-12
         previous = command.q
     np.testing.assert_allclose(previous, np.tile(STANCES["stand"], 2))

@@ -1,51 +1,100 @@
-"""The contract of a lower-body controller: a base twist in, 12 leg joint targets out."""
+"""The contract of a lower-body controller: a base twist and a gait phase in, 12 leg joint targets out."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+import numpy as np
+
+from golem.capabilities.legs.gait import GaitConfig
 from golem.types import Array, BaseEstimate, LowState, Twist
 
 
 @dataclass(frozen=True, slots=True)
 class LegCommand:
-    """What the legs are told at one tick.
+    """What the legs are told at one tick: tau_motor = kp (q - q_meas) - kd dq_meas + tau.
 
     Attributes:
         q: (12,) joint targets in motor order, left leg then right leg [rad].
         kp: (12,) stiffness the controller wants at the motors [N m/rad].
         kd: (12,) damping the controller wants at the motors [N m s/rad].
+        tau: (12,) feed-forward torque [N m]. None leaves it to the servo, which then carries the weight of legs that
+            hang free: right in a hoist, wrong on the ground.
     """
 
     q: Array
     kp: Array
     kd: Array
+    tau: Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Envelope:
+    """The twists a controller can follow: lowest and highest vx, vy [m/s] and wz [rad/s]; zero is always inside."""
+
+    vx: tuple[float, float] = (0.0, 0.0)
+    vy: tuple[float, float] = (0.0, 0.0)
+    wz: tuple[float, float] = (0.0, 0.0)
+
+    def clamp(self, twist: Twist) -> Twist:
+        """Return the nearest twist inside, each component by itself."""
+        return Twist(
+            min(max(twist.vx, self.vx[0]), self.vx[1]),
+            min(max(twist.vy, self.vy[0]), self.vy[1]),
+            min(max(twist.wz, self.wz[0]), self.wz[1]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What the base layer asks of a controller at one tick.
+
+    Attributes:
+        twist: velocity of base_link, inside the controller's envelope; exactly zero means stand.
+        phase: (2,) gait phase of the left and the right leg, 0 to 1, a leg's stance first (see `gait.Gait`).
+        stepping: whether the gait clock runs; while it does not, both feet belong on the ground.
+    """
+
+    twist: Twist
+    phase: Array
+    stepping: bool
+
+
+STANDING = Motion(Twist(), np.array([0.0, 0.5]), False)
+"""Stand still."""
 
 
 @runtime_checkable
 class LowerBody(Protocol):
-    """Turns a base twist into joint targets of the legs; standing is the zero twist.
+    """Moves the base with the legs; standing is the zero twist.
+
+    The base layer (`locomotion.Locomotion`) clamps twists, runs the gait clock and decides when to step: no
+    controller does that itself.
 
     Attributes:
         rate: ticks per second it wants to be run at [Hz].
         latency: time from reading the state to the command being available [s].
+        envelope: the twists it can follow.
+        gait: the gait clock it wants.
     """
 
     rate: float
     latency: float
+    envelope: Envelope
+    gait: GaitConfig
 
     def reset(self, state: LowState) -> None:
         """Start from the measured `state`; whatever the controller remembered is forgotten."""
         ...
 
-    def step(self, state: LowState, base: BaseEstimate, twist: Twist, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
         """Advance by one tick.
 
         Args:
             state: measured joints and IMU.
-            base: estimated pose of base_link in odom and its velocity.
-            twist: commanded velocity in base_link; clamped to what the controller can do.
+            base: estimated pose, height and velocity of base_link.
+            motion: twist and gait phase to follow.
             dt: time since the previous tick [s], positive.
         """
         ...

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.legs.base import LegCommand
+from golem.capabilities.legs.base import Envelope, LegCommand, Motion
+from golem.capabilities.legs.gait import GaitConfig
 from golem.errors import ConfigError, unknown_name
-from golem.types import LEGS, Array, BaseEstimate, LowState, Twist
+from golem.types import LEGS, Array, BaseEstimate, LowState
 
 STANCES: dict[str, tuple[float, ...]] = {
     # Per leg: hip yaw, hip pitch, hip roll, knee, ankle pitch, ankle roll [rad].
@@ -45,7 +46,7 @@ class Hold:
     """Moves the legs to a stance and keeps them there, whatever the twist.
 
     Attributes:
-        rate, latency: see `LowerBody`.
+        rate, latency, envelope, gait: see `LowerBody`.
     """
 
     def __init__(self, config: HoldConfig | None = None) -> None:
@@ -65,6 +66,8 @@ class Hold:
             raise ConfigError(f"Hold needs a positive speed [rad/s], not {self.config.speed}.")
         self.rate = self.config.rate
         self.latency = 0.0
+        self.envelope = Envelope()
+        self.gait = GaitConfig(start="never")
         self._goal: Array = np.tile(np.asarray(STANCES[self.config.stance]), 2)
         self._kp: Array = np.tile(np.asarray(self.config.kp), 2)
         self._kd: Array = np.tile(np.asarray(self.config.kd), 2)
@@ -74,7 +77,7 @@ class Hold:
         """Start from the measured leg joints of `state`."""
         self._q = np.array(state.q[LEGS], dtype=np.float64)
 
-    def step(self, state: LowState, base: BaseEstimate, twist: Twist, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
         """Move the targets towards the stance by at most `speed * dt`; see `LowerBody.step`."""
         reach = self.config.speed * dt
         self._q = self._q + np.clip(self._goal - self._q, -reach, reach)

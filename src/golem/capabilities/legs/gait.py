@@ -1,0 +1,102 @@
+"""The gait clock and the gate that decides between standing and stepping, for one robot or for many at once.
+
+Phases run from 0 to 1 per period, the right leg half a period behind the left. A leg is in stance while its phase is
+below `stance`, so both are in double support for a moment after phase 0 and after phase 0.5.
+
+While the robot stands the clock rests. It starts when a twist is commanded or, with `start: recovery`, when the
+standing robot cannot keep its balance with its feet where they are: the capture point (CoM position plus velocity over
+the pendulum's frequency; Pratt et al., Humanoids 2006) has left the middle of the feet, or the feet are misplaced. It
+stops at a double support at which the twist is zero and both errors are small again, so that nobody stands on one leg.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.types import Array
+
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class GaitConfig:
+    """What a controller wants of its gait clock.
+
+    Attributes:
+        period: time of one step of each foot [s].
+        stance: share of the period for which a foot stays on the ground, more than a half.
+        start: when the clock runs: `never`, at a `command` other than zero, also for `recovery`, or `always`.
+        capture_start, capture_stop: distance between capture point and middle of the feet beyond which a standing
+            robot steps, and below which it may stop [m].
+        feet_start, feet_stop: the same for how far the feet are from where they belong relative to each other [m].
+    """
+
+    period: float = 0.7
+    stance: float = 0.55
+    start: Literal["never", "command", "recovery", "always"] = "recovery"
+    capture_start: float = 0.13
+    capture_stop: float = 0.07
+    feet_start: float = 0.12
+    feet_stop: float = 0.05
+
+
+class Gait:
+    """The gait clocks of `shape` robots.
+
+    Attributes:
+        config: the clock's parameters.
+        phase: (*shape,) phase of the left leg.
+        stepping: (*shape,) whether the clock runs.
+    """
+
+    def __init__(self, config: GaitConfig, shape: tuple[int, ...] = ()) -> None:
+        """Begin with every robot standing."""
+        self.config = config
+        self.phase: Array = np.zeros(shape)
+        self.stepping: Bools = np.zeros(shape, dtype=bool)
+
+    @property
+    def phases(self) -> Array:
+        """(*shape, 2) phase of the left and the right leg."""
+        return np.stack([self.phase, (self.phase + 0.5) % 1.0], axis=-1)
+
+    def reset(self, where: Bools | None = None) -> None:
+        """Let the robots `where` stand; None is all."""
+        chosen = np.ones_like(self.stepping) if where is None else where
+        self.phase = np.where(chosen, 0.0, self.phase)
+        self.stepping = self.stepping & ~chosen
+
+    def step(self, commanded: Bools, capture: Array, misplaced: Array, dt: float) -> None:
+        """Advance by `dt` [s].
+
+        Args:
+            commanded: (*shape,) whether a twist other than zero is asked for.
+            capture: (*shape, 2) capture point relative to the middle of the feet, x ahead, y left [m].
+            misplaced: (*shape,) how far the feet are from where they belong relative to each other [m].
+            dt: time since the previous tick [s].
+        """
+        config = self.config
+        error = np.hypot(capture[..., 0], capture[..., 1])
+        lost = (error > config.capture_start) | (misplaced > config.feet_start)
+        if config.start == "always":
+            wanted = np.ones_like(self.stepping)
+        elif config.start == "never":
+            wanted = np.zeros_like(self.stepping)
+        else:
+            wanted = commanded | lost if config.start == "recovery" else commanded
+        # The unloaded foot swings first: the right one, from phase 0, while the body leans to the left.
+        begins = wanted & ~self.stepping
+        self.phase = np.where(begins, np.where(capture[..., 1] >= 0.0, 0.0, 0.5), self.phase)
+        settled = (error < config.capture_stop) & (misplaced < config.feet_stop)
+        may_stop = ~wanted & (settled if config.start == "recovery" else True)
+        after = self.phase + dt / config.period
+        half = np.floor(2.0 * after) > np.floor(2.0 * self.phase)
+        ends = self.stepping & half & may_stop
+        running = (self.stepping | begins) & ~ends
+        self.phase = np.where(running & ~begins, after % 1.0, self.phase)
+        self.phase = np.where(ends, np.floor(2.0 * after) / 2.0 % 1.0, self.phase)
+        self.stepping = running
