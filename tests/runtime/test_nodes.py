@@ -36,7 +36,7 @@ class Estimator:
 
 class Servo:
     def reset(self, state): pass
-    def step(self, state, q_cmd, dt, leg_gains=None):
+    def step(self, state, q_cmd, dt, leg_gains=None, leg_tau=None):
         z, n = np.zeros(27), np.full(27, np.nan)
         bad = {{"": z, "nan": n, "shape": np.zeros(26), "none": None}}[BROKEN]
         return None if BROKEN == "none" else LowCommand(state.t, z, z, bad, z, z)

@@ -191,6 +191,8 @@ class LowerBodyNode:
         self._guard.kind("the leg command", command, LegCommand)
         for name in ("q", "kp", "kd"):
             self._guard.array(name, getattr(command, name), LEGS.stop - LEGS.start)
+        if command.tau is not None:
+            self._guard.array("tau", command.tau, LEGS.stop - LEGS.start)
         self._bus.publish(topics.LEG_COMMAND, command, t, self._latency)
 
 
@@ -300,8 +302,8 @@ class ServoNode:
             q[LEGS] = legs.q
         if arms is not None:
             q[UPPER] = arms.q
-        gains = None if legs is None else (legs.kp, legs.kd)
-        command = self._guard.call(self._servo.step, state, q, TICK, gains)
+        gains, tau = (None, None) if legs is None else ((legs.kp, legs.kd), legs.tau)
+        command = self._guard.call(self._servo.step, state, q, TICK, gains, tau)
         self._guard.kind("the motor command", command, LowCommand)
         for name in ("q", "dq", "tau", "kp", "kd"):
             self._guard.array(name, getattr(command, name), NUM_JOINTS)

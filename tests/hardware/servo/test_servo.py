@@ -142,6 +142,24 @@ def test_legs_take_the_gains_of_their_controller(state_at: Callable[..., LowStat
     np.testing.assert_array_equal(command.kp[12:], servo.gains.kp[12:])
 
 
+def test_legs_that_carry_the_robot_are_stiff_at_once_under_the_torque_of_their_controller(
+    state_at: Callable[..., LowState],
+) -> None:
+    servo, tau = Servo(), np.linspace(-60.0, 60.0, 12)
+    own = np.full(12, 123.0), np.full(12, 4.5)
+    state = state_at(0.0, READY)
+    hanging = settled(servo, state, READY, ticks=50)
+    servo.reset(state)
+    first = servo.step(state, READY, DT, own, tau)
+    np.testing.assert_array_equal(first.kp[:12], own[0])
+    np.testing.assert_array_equal(first.tau[:12], tau)
+    # The arms know nothing of it: they still ramp, and float on their own gravity torque.
+    assert np.all(first.kp[12:] < 0.01 * servo.gains.kp[12:])
+    np.testing.assert_allclose(first.tau[12:], hanging.tau[12:], atol=1e-12)
+    later = servo.step(state, READY + 0.01, 2.0, own, tau)
+    np.testing.assert_array_equal(later.tau[:12], tau)
+
+
 def test_an_unknown_limit_profile_is_named() -> None:
     with pytest.raises(ConfigError, match="paper"):
         Servo(ServoConfig(limits="papr"))

@@ -16,7 +16,12 @@ class MotorServo(Protocol):
         ...
 
     def step(
-        self, state: LowState, q_cmd: Array, dt: float, leg_gains: tuple[Array, Array] | None = None
+        self,
+        state: LowState,
+        q_cmd: Array,
+        dt: float,
+        leg_gains: tuple[Array, Array] | None = None,
+        leg_tau: Array | None = None,
     ) -> LowCommand:
         """Return the command for this tick.
 
@@ -25,5 +30,8 @@ class MotorServo(Protocol):
             q_cmd: (27,) joint targets [rad].
             dt: time since the previous tick [s], positive.
             leg_gains: kp [N m/rad] and kd [N m s/rad] of the legs, (12,) each, if their controller wants its own.
+            leg_tau: (12,) feed-forward torque of the legs [N m] from a controller that carries the robot with them. It
+                replaces the servo's own gravity torque and integral, and the gains of the legs then act in full from
+                the first tick: legs that stand must not soften. None: the legs hang, and the servo carries them.
         """
         ...

@@ -8,6 +8,9 @@
 state only, because the error of a moving joint is the lag of the damping term and not a missing torque; it is clamped;
 and it is frozen while the predicted torque saturates and the error pushes further out. There is no leak: a leaky
 integral would leave an error again.
+
+tau_g is that of a robot held at its base. Legs that carry the robot need another torque, which only their controller
+knows: where it gives one, the servo adds nothing of its own to the legs and leaves out their ramp.
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ import numpy as np
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gains import default_gains
 from golem.hardware.servo.gravity import Gravity
-from golem.types import LEGS, NUM_JOINTS, Array, LowCommand, LowState
+from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand, LowState
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +32,7 @@ class ServoConfig:
     Attributes:
         limits: name of the limit profile; the torque bound of the anti-windup is the safety gate's.
         ramp: time from reset to full stiffness [s]; feed-forward and damping act in full at once, so that raised
-            arms float instead of falling.
+            arms float instead of falling. Legs whose controller supplies their torque are stiff at once.
         steady_error: position error below which a joint's bias integrates [rad]; 0.1 rad is the sag of a shoulder
             under 4 kg at 0.6 m.
         steady_speed: joint speed below which it does [rad/s]. Faster motion would teach the bias the lag of the damping
@@ -74,7 +77,12 @@ class Servo:
         self._elapsed = 0.0
 
     def step(
-        self, state: LowState, q_cmd: Array, dt: float, leg_gains: tuple[Array, Array] | None = None
+        self,
+        state: LowState,
+        q_cmd: Array,
+        dt: float,
+        leg_gains: tuple[Array, Array] | None = None,
+        leg_tau: Array | None = None,
     ) -> LowCommand:
         """Return the command of this tick; see `MotorServo.step`."""
         self._elapsed += dt
@@ -83,13 +91,15 @@ class Servo:
             kp[LEGS], kd[LEGS] = leg_gains
         gravity = self._gravity.torque(state.q, state.imu.quat)
         if self._elapsed < self.config.ramp:
-            kp *= self._elapsed / self.config.ramp
+            ramped = slice(None) if leg_tau is None else UPPER
+            kp[ramped] *= self._elapsed / self.config.ramp
         elif self.config.integral:
             error = q_cmd - state.q
             self._integrate(error, state.dq, kp * error - kd * state.dq + gravity + self.bias, dt)
-        return LowCommand(
-            t=state.t, q=q_cmd.copy(), dq=np.zeros(NUM_JOINTS), tau=gravity + self.bias, kp=kp, kd=kd
-        )
+        tau = gravity + self.bias
+        if leg_tau is not None:
+            tau[LEGS] = leg_tau
+        return LowCommand(t=state.t, q=q_cmd.copy(), dq=np.zeros(NUM_JOINTS), tau=tau, kp=kp, kd=kd)
 
     def _integrate(self, error: Array, dq: Array, predicted: Array, dt: float) -> None:
         steady = (np.abs(error) < self.config.steady_error) & (np.abs(dq) < self.config.steady_speed)
