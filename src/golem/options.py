@@ -1,4 +1,4 @@
-"""Turns option values from a stack file into what a constructor's type hints ask for, or says why it cannot."""
+"""Reads YAML and turns option values into what a constructor's type hints ask for, or says why it cannot."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import typing
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, cast
+
+import yaml
 
 from golem.errors import ConfigError, unknown_name
 
@@ -63,8 +65,48 @@ def convert_all(
     return {key: _convert(f"{what} '{key}'", hints.get(key), value) for key, value in options.items()}
 
 
+def read_yaml(text: str, name: str) -> object:
+    """Return what the YAML `text` of the file called `name` says: None, a scalar, a list or a mapping.
+
+    Raises:
+        ConfigError: it is not YAML, names a key twice, or refers to itself; names the line.
+    """
+    try:
+        return yaml.load(text, _Loader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f", line {mark.line + 1}" if mark else ""
+        raise ConfigError(f"{name}{where}: not valid YAML ({getattr(error, 'problem', error)}).") from error
+    except (ValueError, RecursionError) as error:  # PyYAML lets them through: `2024-99-99`, `[[[...`
+        raise ConfigError(f"{name}: not valid YAML ({error}).") from error
+
+
+def check_values(where: str, value: object) -> None:
+    """Check that `value`, found at `where`, is made of words, numbers, truth values, lists and mappings by name.
+
+    Raises:
+        ConfigError: it holds something else, or a number that is none.
+    """
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            if not isinstance(key, str):
+                raise ConfigError(f"{where}: an option's name is a word, not {key!r}.")
+            check_values(f"{where}.{key}", inner)
+    elif isinstance(value, list):
+        for inner in value:
+            check_values(where, inner)
+    elif value != value:
+        raise ConfigError(f"{where}: a number that is none (.nan) is no value.")
+    elif not isinstance(value, str | int | float | None):
+        raise ConfigError(
+            f"{where}: a value is a word, a number, true, false, a list or a mapping, not a {type(value).__name__}."
+        )
+
+
 def dataclass_in(hint: Any) -> type[Any] | None:
     """Return the dataclass that a type hint is, or has among its alternatives."""
+    if typing.get_origin(hint) in (tuple, list):
+        return None
     for candidate in (hint, *typing.get_args(hint)):
         if inspect.isclass(candidate) and dataclasses.is_dataclass(candidate):
             return candidate
@@ -101,3 +143,27 @@ def _sequence(what: str, kind: type[Any], inner: tuple[Any, ...], value: Any) ->
     if len(members) != len(hints):
         raise ConfigError(f"The {what} has {len(hints)} values, not {len(members)}.")
     return kind([_convert(what, hint, member) for hint, member in zip(hints, members, strict=True)])
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML whose mappings name each key once, and in which nothing refers to itself."""
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """Refuse aliases: no file of ours has a use for them, and they can nest without end."""
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark
+            raise yaml.constructor.ConstructorError(None, None, "aliases are not allowed", mark)
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Return the mapping of `node`, in which no key may occur twice."""
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise yaml.constructor.ConstructorError(None, None, "a key is one word", key.start_mark)
+            if key.value in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"'{key.value}' occurs twice", key.start_mark
+                )
+            seen.add(str(key.value))
+        return super().construct_mapping(node, deep)

@@ -10,10 +10,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from golem import registry
 from golem.errors import ConfigError, unknown_name
+from golem.options import check_values, read_yaml
 
 
 @dataclass(frozen=True)
@@ -102,14 +101,7 @@ def load_stack(source: str | Path, profile: str | None = None) -> Stack:
 
 def parse_stack(text: str, name: str) -> Stack:
     """Parse the YAML `text` of the stack file called `name`; errors as in `load_stack`."""
-    try:
-        data = yaml.load(text, _Loader)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f", line {mark.line + 1}" if mark else ""
-        raise ConfigError(f"{name}{where}: not valid YAML ({getattr(error, 'problem', error)}).") from error
-    except (ValueError, RecursionError) as error:  # PyYAML lets them through: `2024-99-99`, `[[[...`
-        raise ConfigError(f"{name}: not valid YAML ({error}).") from error
+    data = read_yaml(text, name)
     if data is None:
         return Stack()
     if not isinstance(data, Mapping):
@@ -138,49 +130,5 @@ def _choice(name: str, slot: str, value: object) -> Choice:
             f"{', '.join(registry.names(slot))}, package.module:Class or file.py:Class."
         )
     options = {key: v for key, v in value.items() if key != "use"}
-    _check_options(f"{name}: {slot}", options)
+    check_values(f"{name}: {slot}", options)
     return Choice(value["use"], options)
-
-
-def _check_options(where: str, value: object) -> None:
-    """Raise unless `value` is made of words, numbers, truth values, lists and mappings of them by name."""
-    if isinstance(value, Mapping):
-        for key, inner in value.items():
-            if not isinstance(key, str):
-                raise ConfigError(f"{where}: an option's name is a word, not {key!r}.")
-            _check_options(f"{where}.{key}", inner)
-    elif isinstance(value, list):
-        for inner in value:
-            _check_options(where, inner)
-    elif value != value:
-        raise ConfigError(f"{where}: a number that is none (.nan) is no value.")
-    elif not isinstance(value, str | int | float | None):
-        raise ConfigError(
-            f"{where}: a value is a word, a number, true, false, a list or a mapping, not a {type(value).__name__}."
-        )
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML whose mappings name each key once, and in which nothing refers to itself."""
-
-    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        """Refuse aliases: a stack file has no use for them, and they can nest without end."""
-        if self.check_event(yaml.AliasEvent):
-            mark = self.peek_event().start_mark
-            raise yaml.constructor.ConstructorError(
-                None, None, "aliases are not allowed in a stack file", mark
-            )
-        return super().compose_node(parent, index)
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Return the mapping of `node`, in which no key may occur twice."""
-        seen: set[str] = set()
-        for key, _ in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                raise yaml.constructor.ConstructorError(None, None, "a key is one word", key.start_mark)
-            if key.value in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"'{key.value}' occurs twice", key.start_mark
-                )
-            seen.add(str(key.value))
-        return super().construct_mapping(node, deep)
