@@ -1,0 +1,244 @@
+"""How well the robot really stands: CoM margin, lean, sway, steps and falls, read from the simulator's truth.
+
+The CoM margin is the paper's measure (its section "Force-Adaptivity"): the signed horizontal distance from the
+projected centre of mass to the edge of the support polygon, positive inside. The polygon is the convex hull of the
+corners of every sole that touches something; during a step that is one foot, so that walking and recoveries which
+succeed dip below zero: read the minimum together with the time below zero and the final value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.robots.model.table import BASE_LINK, SOLE
+from golem.robots.mujoco.engine import MujocoRobot
+from golem.types import SIDES, Array
+
+PERIOD = 0.01
+"""Time between two samples [s]."""
+FALLEN_TILT = 0.8
+"""Tilt of the pelvis from which no controller came back [rad]."""
+FALLEN_HEIGHT = 0.55
+"""Height of the pelvis above the lower sole below which the robot is down [m]; standing it is 0.95."""
+SHORTEST_LIFT = 0.04
+"""Time without contact that counts as a foot lifted [s]: less is a sole that chatters."""
+FINAL = 0.5
+"""Length of the end of a trace over which its final margin is averaged [s]."""
+
+
+def convex_hull(points: Array) -> Array:
+    """Return the (m, 2) corners of the convex hull of `points` (n, 2), counter-clockwise (Andrew's monotone chain)."""
+    ordered = sorted({(float(x), float(y)) for x, y in points})
+    if len(ordered) < 3:
+        return np.array(ordered).reshape(-1, 2)
+
+    def chain(run: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+        kept: list[tuple[float, float]] = []
+        for x, y in run:
+            while len(kept) > 1:
+                (ax, ay), (bx, by) = kept[-2], kept[-1]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                    break
+                kept.pop()
+            kept.append((x, y))
+        return kept[:-1]
+
+    return np.array(chain(ordered) + chain(ordered[::-1]))
+
+
+def signed_margin(point: Array, polygon: Array) -> float:
+    """Return the distance of `point` (2,) to the edge of the convex `polygon` [m], positive inside.
+
+    Args:
+        point: the projected centre of mass.
+        polygon: (m, 2) corners, counter-clockwise; fewer than three enclose nothing.
+    """
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    to_point = point - polygon
+    cross = edges[:, 0] * to_point[:, 1] - edges[:, 1] * to_point[:, 0]
+    squared = np.maximum((edges * edges).sum(axis=1), 1e-18)
+    along = np.clip((to_point * edges).sum(axis=1) / squared, 0.0, 1.0)
+    distance = float(np.hypot(*(to_point - along[:, None] * edges).T).min())
+    return distance if len(polygon) > 2 and bool((cross >= 0.0).all()) else -distance
+
+
+@dataclass(frozen=True, slots=True)
+class BalanceTrace:
+    """What the base did over one trial, sampled every `PERIOD`; row i is time `t[i]`.
+
+    Attributes:
+        t: (n,) time [s].
+        margin: (n,) CoM margin [m].
+        base: (n, 3) position of base_link in the world [m].
+        rpy: (n, 3) roll, pitch and yaw of base_link [rad], yaw continuous.
+        tilt: (n,) angle between base_link's and the world's up [rad].
+        height: (n,) height of base_link above the lower sole's centre [m].
+        twist: (n, 3) forward, leftward [m/s] and yaw rate [rad/s] of base_link in its heading frame.
+        contact: (n, 2) whether the left and the right foot touch something.
+        force: (n, 3) force of the push in the world [N].
+    """
+
+    t: Array
+    margin: Array
+    base: Array
+    rpy: Array
+    tilt: Array
+    height: Array
+    twist: Array
+    contact: NDArray[np.bool_]
+    force: Array
+
+    def window(self, start: float, end: float = math.inf) -> BalanceTrace:
+        """Return the samples with `start` <= t < `end` [s]."""
+        chosen = (self.t >= start - 1e-9) & (self.t < end - 1e-9)
+        return BalanceTrace(*(getattr(self, f.name)[chosen] for f in fields(self)))
+
+    @property
+    def steps(self) -> int:
+        """How often a foot was lifted, the feet counted together."""
+        least = round(SHORTEST_LIFT / PERIOD)
+        return sum(_runs(~self.contact[:, foot], least) for foot in (0, 1))
+
+    @property
+    def base_range(self) -> float:
+        """Largest horizontal extent of the base's path, along x or y [m]."""
+        return float(np.ptp(self.base[:, :2], axis=0).max())
+
+    @property
+    def sway(self) -> float:
+        """Radial RMS of the base about its mean position [m]."""
+        return float(np.sqrt(self.base[:, :2].var(axis=0).sum()))
+
+    @property
+    def below_zero(self) -> float:
+        """Time during which the margin was negative [s]."""
+        return PERIOD * int((self.margin < 0.0).sum())
+
+    @property
+    def final_margin(self) -> float:
+        """Mean margin over the last `FINAL` seconds [m]."""
+        return float(self.margin[-round(FINAL / PERIOD) :].mean())
+
+    @property
+    def fallen(self) -> bool:
+        """Whether the robot fell at any time."""
+        return bool(((self.tilt > FALLEN_TILT) | (self.height < FALLEN_HEIGHT)).any())
+
+    def recovery_time(self, since: float) -> float:
+        """Return how long after `since` [s] the margin was negative for the last time [s]; 0 where it never was."""
+        late = self.t[(self.margin < 0.0) & (self.t >= since)]
+        return float(late[-1] - since) + PERIOD if len(late) else 0.0
+
+    def save(self, path: Path) -> None:
+        """Write the trace as a compressed npz with one float32 array per attribute; the folder is made."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        arrays = {
+            f.name: a if (a := getattr(self, f.name)).dtype == bool else a.astype(np.float32)
+            for f in fields(self)
+        }
+        np.savez_compressed(path, allow_pickle=False, **arrays)
+
+    @classmethod
+    def load(cls, path: Path) -> BalanceTrace:
+        """Return the trace that `save` wrote."""
+        with np.load(path) as stored:
+            return cls(
+                *(
+                    stored[f.name] if f.name == "contact" else stored[f.name].astype(np.float64)
+                    for f in fields(cls)
+                )
+            )
+
+
+def _runs(values: NDArray[np.bool_], least: int) -> int:
+    """Return how many runs of at least `least` true values there are."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], values, [False]]).astype(np.int8)))
+    return int((edges[1::2] - edges[::2] >= least).sum())
+
+
+class BalanceRecorder:
+    """Samples one twin; call it after every tick.
+
+    Attributes:
+        fallen: whether the robot has fallen.
+        margin: newest CoM margin [m].
+        contact: (2,) whether the feet touched something at the newest sample.
+    """
+
+    def __init__(self, robot: MujocoRobot) -> None:
+        """Look at `robot`."""
+        model = robot.scene.model
+        self._data = robot.data
+        self._base = model.body(BASE_LINK).id
+        self._free = int(model.joint("base").dofadr[0])
+        self._feet = np.array([model.body(f"{side}_ankle_roll_link").id for side in SIDES])
+        self._body_of_geom = model.geom_bodyid
+        self._root = model.body_rootid
+        self._corners = np.array([[x, y, SOLE.z] for x in SOLE.x for y in SOLE.y])
+        self._rows: list[tuple[float, ...]] = []
+        self._polygon: Array = convex_hull(self._soles().reshape(8, 3)[:, :2])
+        self._next = 0.0
+        self.fallen = False
+        self.margin = math.nan
+        self.contact: NDArray[np.bool_] = np.zeros(2, dtype=bool)
+
+    def __call__(self, t: float, force: Array | None = None) -> None:
+        """Sample at time `t` [s], if a sample is due, with the (3,) `force` of the push [N]."""
+        if t < self._next - 1e-9:
+            return
+        self._next = t + PERIOD
+        data = self._data
+        R = data.xmat[self._base].reshape(3, 3)
+        soles = self._soles()
+        self.contact = self._contacts()
+        if self.contact.any():  # in flight the last polygon counts
+            self._polygon = convex_hull(soles[self.contact].reshape(-1, 3)[:, :2])
+        self.margin = signed_margin(data.subtree_com[self._base, :2], self._polygon)
+        roll, pitch = math.atan2(R[2, 1], R[2, 2]), -math.asin(min(max(R[2, 0], -1.0), 1.0))
+        yaw = math.atan2(R[1, 0], R[0, 0])
+        tilt = math.acos(min(max(R[2, 2], -1.0), 1.0))
+        height = float(data.xpos[self._base, 2] - soles[..., 2].mean(axis=1).min())
+        self.fallen |= tilt > FALLEN_TILT or height < FALLEN_HEIGHT
+        velocity = data.qvel[self._free : self._free + 6]
+        c, s = math.cos(yaw), math.sin(yaw)
+        forward, left = c * velocity[0] + s * velocity[1], c * velocity[1] - s * velocity[0]
+        self._rows.append(
+            (t, self.margin, *data.xpos[self._base], roll, pitch, yaw, tilt, height)
+            + (forward, left, float(R[2] @ velocity[3:]), *self.contact)
+            + tuple(np.zeros(3) if force is None else force)
+        )
+
+    def trace(self) -> BalanceTrace:
+        """Return what was sampled so far."""
+        rows = np.array(self._rows, dtype=np.float64).reshape(-1, 18)
+        rows[:, 7] = np.unwrap(rows[:, 7])
+        return BalanceTrace(
+            t=rows[:, 0],
+            margin=rows[:, 1],
+            base=rows[:, 2:5],
+            rpy=rows[:, 5:8],
+            tilt=rows[:, 8],
+            height=rows[:, 9],
+            twist=rows[:, 10:13],
+            contact=rows[:, 13:15].astype(bool),
+            force=rows[:, 15:18],
+        )
+
+    def _soles(self) -> Array:
+        """Return the (2, 4, 3) corners of the soles in the world."""
+        R = self._data.xmat[self._feet].reshape(2, 3, 3)
+        return self._data.xpos[self._feet, None] + np.einsum("fij,cj->fci", R, self._corners)
+
+    def _contacts(self) -> NDArray[np.bool_]:
+        """Return (2,) whether each foot touches something that is not the robot."""
+        contact = self._data.contact
+        bodies = self._body_of_geom[contact.geom[contact.dist < 0.0]]
+        own = self._root[bodies] == self._root[self._base]
+        world = bodies[own[:, 0] != own[:, 1]]
+        return np.array([bool((world == foot).any()) for foot in self._feet])
