@@ -21,7 +21,8 @@ from golem.stack import Choice, Stack
 GOOD = """
 import numpy as np
 from golem.capabilities.arms.base import ArmCommand
-from golem.capabilities.legs.base import LegCommand
+from golem.capabilities.legs.base import Envelope, LegCommand
+from golem.capabilities.legs.gait import GaitConfig
 from golem.hardware.hands.base import GripState, HandStatus
 from golem.types import BaseEstimate, HandCommand, LowCommand
 
@@ -50,9 +51,9 @@ class Hand:
                 "shape": HandCommand(t, np.zeros(2), 1.0)}}[BROKEN]
 
 class Legs:
-    rate, latency = 50.0, 0.0
+    rate, latency, envelope, gait = 50.0, 0.0, Envelope(), GaitConfig()
     def reset(self, state): pass
-    def step(self, state, base, twist, dt):
+    def step(self, state, base, motion, dt):
         z = np.zeros(12)
         return {{"": LegCommand(z, z, z), "none": None, "nan": LegCommand(z, z * np.nan, z),
                 "shape": LegCommand(np.zeros(27), z, z)}}[BROKEN]

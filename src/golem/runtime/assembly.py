@@ -29,6 +29,7 @@ from golem.runtime import nodes
 from golem.runtime.executor import Executor, Node
 from golem.runtime.guard import Guard
 from golem.runtime.guarded import GuardedMethod
+from golem.runtime.legs import LowerBodyNode
 from golem.skills.base import Skill, SkillResult
 from golem.skills.context import Context
 from golem.skills.grasping.base import GraspMethod
@@ -111,7 +112,7 @@ class Running:
             out.append(nodes.CameraNode(bus, robot, name, optical, CAMERA_LATENCY, robot_guard))
             out.append(nodes.LocalizerNode(bus, localizer, name, localizer_guard))
         out.append(self._skills)
-        out.append(nodes.LowerBodyNode(bus, *make("lower_body")))
+        out.append(LowerBodyNode(bus, *make("lower_body")))
         out.append(nodes.UpperBodyNode(bus, *make("upper_body")))
         for side in SIDES:
             hand, guard = make("hand", side=side)
