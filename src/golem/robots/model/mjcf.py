@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from golem.robots.model import contact, looks, magpie
-from golem.robots.model.contact import Shape
+from golem.robots.model.contact import Feet, Shape
 from golem.robots.model.limits import load_limits
 from golem.robots.model.spatial import Inertial, quat_of
 from golem.robots.model.table import BASE_HEIGHT, BASE_LINK, DOF, FRAMES, JOINTS, LINKS, T_TORSO_HEAD_OPTICAL
@@ -22,7 +22,9 @@ _FLIP: Array = np.diag([1.0, -1.0, -1.0])
 """MuJoCo's camera axes in the optical frame: MuJoCo looks along -z with y up."""
 
 
-def robot_spec(hands: bool = True, torque: str = "urdf") -> mujoco.MjSpec:
+def robot_spec(
+    hands: bool = True, torque: str = "urdf", *, self_collision: bool = False, feet: Feet = "spheres"
+) -> mujoco.MjSpec:
     """Return the robot without floor, light or options.
 
     Names: bodies as the links; free joint `base`; joints and motors as in the table, the 27 motors first and in motor
@@ -33,6 +35,8 @@ def robot_spec(hands: bool = True, torque: str = "urdf") -> mujoco.MjSpec:
     Args:
         hands: with the MAGPIE hands and their cameras.
         torque: profile of the torque limits, see `limits.load_limits`.
+        self_collision: legs, arms and trunk touch each other, see `contact.self_pairs`.
+        feet: what the soles are to the floor.
 
     Raises:
         ConfigError: unknown torque profile.
@@ -59,14 +63,29 @@ def robot_spec(hands: bool = True, torque: str = "urdf") -> mujoco.MjSpec:
         )
         bodies[joint.child] = body
         _add_motor(spec, joint.name, float(limit))
-    for shape in contact.body_shapes():
+    for shape in contact.body_shapes(feet):
         _add_shape(bodies[shape.link], shape, contact.BODY)
     _add_torso_sensors(spec, bodies["torso_link"])
     if hands:
         for side in SIDES:
             _add_hand(spec, bodies[f"{side}_wrist_yaw_link"], side)
+    if self_collision:
+        _let_touch_itself(spec, hands)
     looks.add_looks(spec, hands)
     return spec
+
+
+def _let_touch_itself(spec: mujoco.MjSpec, hands: bool) -> None:
+    """Add the pairs of shapes that may meet, and the boxes among them that meet nothing else."""
+    boxes = [contact.foot_box(side) for side in SIDES]
+    if hands:
+        boxes += [contact.hand_box(side) for side in SIDES]
+    for box in boxes:
+        if spec.geom(box.name) is None:
+            _add_shape(spec.body(box.link), box, 0, 0)
+    for one, other in contact.self_pairs(hands):
+        # Without friction: what slides along a limb is of no interest, and every contact costs a third.
+        spec.add_pair(name=f"{one}-{other}", geomname1=one, geomname2=other, condim=1)
 
 
 def _add_body(
@@ -96,14 +115,15 @@ def _add_motor(spec: mujoco.MjSpec, joint: str, limit: float) -> None:
     motor.set_to_motor()
 
 
-def _add_shape(body: mujoco.MjsBody, shape: Shape, contype: int) -> None:
+def _add_shape(body: mujoco.MjsBody, shape: Shape, contype: int, conaffinity: int = contact.WORLD) -> None:
     body.add_geom(
+        name=shape.name,
         type=shape.kind,
         size=shape.size,
         pos=shape.pos,
         quat=shape.quat,
         contype=contype,
-        conaffinity=contact.WORLD,
+        conaffinity=conaffinity,
         friction=[shape.friction, 0.005, 0.0001],
         group=COLLISION_GROUP,
         mass=0.0,
