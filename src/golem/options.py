@@ -6,12 +6,15 @@ import dataclasses
 import inspect
 import typing
 from collections.abc import Collection, Mapping
+from math import inf
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import yaml
 
 from golem.errors import ConfigError, unknown_name
+from golem.types import Array
 
 _SCALARS: dict[Any, tuple[tuple[type, ...], str]] = {
     bool: ((bool,), "true or false"),
@@ -101,6 +104,28 @@ def check_values(where: str, value: object) -> None:
         raise ConfigError(
             f"{where}: a value is a word, a number, true, false, a list or a mapping, not a {type(value).__name__}."
         )
+
+
+def vector(what: str, value: object, size: int, *shorter: int) -> Array:
+    """Return the option `value`, one number or a list, as a (size,) array; a shorter list is repeated.
+
+    Args:
+        what: what the option is to the user, e.g. `"kp"`.
+        value: as it stands in the file.
+        size: length of a full list.
+        shorter: the other lengths that are accepted, divisors of `size`.
+
+    Raises:
+        ConfigError: it is no list of finite numbers, or has another length.
+    """
+    lengths = (1, *shorter, size)
+    wanted = f"one number or a list of {' or '.join(str(n) for n in lengths[1:])}"
+    numbers = cast("list[object]", list(value) if isinstance(value, list | tuple) else [value])
+    if not all(isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < inf for x in numbers):
+        raise ConfigError(f"The {what} is {wanted}, each finite, not {value!r}.")
+    if len(numbers) not in lengths:
+        raise ConfigError(f"The {what} is {wanted}, not a list of {len(numbers)}.")
+    return np.resize(np.array(numbers, dtype=np.float64), size)
 
 
 def dataclass_in(hint: Any) -> type[Any] | None:

@@ -1,0 +1,137 @@
+"""What a caller must know about a leg policy, read from the YAML file beside its network."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from golem.capabilities.legs.base import Envelope
+from golem.capabilities.legs.gait import GaitConfig
+from golem.capabilities.legs.observation import Layout, Term
+from golem.errors import ConfigError
+from golem.options import check_values, fill, read_yaml, vector
+from golem.types import LEGS, NUM_JOINTS, Array
+
+SHIPPED = Path(__file__).parent / "policies"
+"""Folder of the shipped descriptions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """How the network's output becomes joint targets: q0 + scale * clip(action) + swing.
+
+    Attributes:
+        scale: factor of the actions [rad]; one number, six (both legs alike) or twelve.
+        clip: actions are limited to +- this before scaling.
+        swing: amplitude of the stepping motion underneath (see `swing.swing_offset`) [rad]; 0 leaves it out.
+    """
+
+    scale: float | tuple[float, ...] = 0.25
+    clip: float = 100.0
+    swing: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A policy's description; the keys of its YAML file.
+
+    Attributes:
+        network: file name of the network, beside the description.
+        observation: terms in the order the network wants them.
+        posture: default posture q0 [rad]: six values (both legs alike), twelve, or 27 for all motors; the upper body is
+            zero where it is not given.
+        kp: stiffness of the leg motors [N m/rad]: one number, six or twelve.
+        kd: their damping [N m s/rad].
+        action: how actions become targets.
+        gait: the clock behind phase_sin, phase_cos and the swing.
+        envelope: the twists it can follow.
+        rate: ticks per second [Hz].
+        latency: time from reading the state to the targets being available [s].
+    """
+
+    network: str
+    observation: tuple[Term, ...]
+    posture: tuple[float, ...]
+    kp: float | tuple[float, ...]
+    kd: float | tuple[float, ...]
+    action: Action = field(default_factory=Action)
+    gait: GaitConfig = field(default_factory=GaitConfig)
+    envelope: Envelope = field(default_factory=Envelope)
+    rate: float = 50.0
+    latency: float = 0.002
+
+    def q0(self) -> Array:
+        """Return the default posture as (27,) [rad]."""
+        legs = LEGS.stop
+        if len(self.posture) == NUM_JOINTS:
+            return vector("posture", self.posture, NUM_JOINTS)
+        q = np.zeros(NUM_JOINTS)
+        q[LEGS] = vector("posture", self.posture, legs, legs // 2)
+        return q
+
+    def layout(self) -> Layout:
+        """Return the observation's layout.
+
+        Raises:
+            ConfigError: see `Layout`.
+        """
+        return Layout(self.observation, self.q0())
+
+
+def shipped() -> tuple[str, ...]:
+    """Return the names of the descriptions that come with the package."""
+    return tuple(sorted(path.stem for path in SHIPPED.glob("*.yaml")))
+
+
+def load_description(file: str | Path, network: str | Path | None = None) -> tuple[Description, Path]:
+    """Read a policy's description.
+
+    Args:
+        file: path of a YAML file, or the name of a shipped description.
+        network: path of the network; the file that the description names, beside it, if absent.
+
+    Returns:
+        The description, and the path of the network, which may not exist.
+
+    Raises:
+        ConfigError: no such file, not YAML, or a key or value that means nothing; names what would be valid.
+    """
+    path = SHIPPED / f"{file}.yaml" if str(file) in shipped() else Path(file).expanduser()
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(
+            f"The policy description '{file}' cannot be read ({getattr(error, 'strerror', None) or error}); "
+            f"give a path to a YAML file or one of: {', '.join(shipped())}."
+        ) from error
+    data = read_yaml(text, str(file))
+    if not isinstance(data, Mapping):
+        raise ConfigError(f"{file}: a policy description is a mapping such as 'network: policy.onnx'.")
+    check_values(str(file), data)
+    options = cast(Mapping[str, object], data)
+    description: Description = fill(f"key of {file}", Description, options)
+    _check_ranges(str(file), description)
+    return description, Path(network).expanduser() if network else path.parent / description.network
+
+
+def _check_ranges(name: str, d: Description) -> None:
+    """Raise where a number of the description called `name` cannot be meant."""
+    for what, value, fine, wanted in (
+        ("rate", d.rate, 1.0 <= d.rate < inf, "a number of ticks per second, at least 1"),
+        ("latency", d.latency, 0.0 <= d.latency < inf, "a time in seconds, not negative"),
+        ("gait.period", d.gait.period, 0.0 < d.gait.period < inf, "a time in seconds, positive"),
+        ("gait.stance", d.gait.stance, 0.5 < d.gait.stance < 1.0, "a share of the period, between 0.5 and 1"),
+        ("action.clip", d.action.clip, d.action.clip > 0.0, "a positive number"),
+        ("action.swing", d.action.swing, abs(d.action.swing) < inf, "an angle in radians"),
+    ):
+        if not fine:
+            raise ConfigError(f"{name}: '{what}' is {wanted}, not {value:g}.")
+    for axis in ("vx", "vy", "wz"):
+        low, high = getattr(d.envelope, axis)
+        if not (-inf < low <= 0.0 <= high < inf):
+            raise ConfigError(f"{name}: 'envelope.{axis}' is a range around zero, not {low:g} to {high:g}.")

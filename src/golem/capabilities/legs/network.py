@@ -1,0 +1,142 @@
+"""Networks from files: one observation in, twelve actions out, on one thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from golem.errors import ConfigError, MissingExtra
+
+Float32 = NDArray[np.float32]
+ACTIONS = 12
+"""Outputs of a leg policy, one per motor of the legs."""
+
+
+class Network(Protocol):
+    """A policy network. It may remember what it saw since the last `reset`."""
+
+    def reset(self) -> None:
+        """Forget everything."""
+        ...
+
+    def __call__(self, observation: Float32) -> Float32:
+        """Return the (12,) action for an observation (n,)."""
+        ...
+
+
+def load_network(path: Path, size: int) -> Network:
+    """Return the network in `path`, which takes `size` values.
+
+    Raises:
+        ConfigError: no such file, no such network, or it takes or returns something else.
+        MissingExtra: it is a TorchScript file, and torch is not installed.
+    """
+    if path.suffix not in LOADERS:
+        raise ConfigError(f"The network {path} ends in '{path.suffix}'; valid: {', '.join(LOADERS)}.")
+    if not path.is_file():
+        raise ConfigError(f"There is no network {path}; a policy's network lies beside its description.")
+    return LOADERS[path.suffix](path, size)
+
+
+class OnnxNetwork:
+    """A feed-forward network run by onnxruntime: one input (1, n) or (n,), one output of 12."""
+
+    def __init__(self, path: Path, size: int) -> None:
+        """Load `path`; see `load_network`."""
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        options.inter_op_num_threads = 1
+        try:
+            session = onnxruntime.InferenceSession(path.read_bytes(), options, ["CPUExecutionProvider"])
+        except Exception as error:  # onnxruntime's errors have no common base
+            raise ConfigError(f"{path} is not an ONNX network that onnxruntime can load.") from error
+        inputs, outputs = session.get_inputs(), session.get_outputs()
+        if len(inputs) != 1 or len(outputs) != 1:
+            raise ConfigError(
+                f"The network {path} has {len(inputs)} inputs and {len(outputs)} outputs; a policy has one of each."
+            )
+        width = inputs[0].shape[-1] if inputs[0].shape else None
+        if isinstance(width, int) and width != size:
+            raise _wrong_input(path, size, str(width))
+        self._name, self._batched = inputs[0].name, len(inputs[0].shape) == 2
+        self._session = session
+        try:
+            out = self(np.zeros(size, dtype=np.float32))
+        except Exception as error:  # onnxruntime's errors have no common base
+            raise _wrong_input(path, size, str(inputs[0].shape)) from error
+        _check_output(path, out)
+
+    def reset(self) -> None:
+        """Do nothing: the network has no memory."""
+
+    def __call__(self, observation: Float32) -> Float32:
+        """Return the action; see `Network`."""
+        x = observation[None] if self._batched else observation
+        out = np.asarray(self._session.run(None, {self._name: x})[0])
+        return out[0] if self._batched else out
+
+
+class TorchScriptNetwork:
+    """A TorchScript module that takes (1, n) and returns (1, 12).
+
+    A module with a memory of its own resets it in a method `reset_memory`. Loading one sets torch to one thread for
+    the whole process, and to run modules as they are written: the optimiser would change the last bits of the outputs
+    after the first calls.
+    """
+
+    def __init__(self, path: Path, size: int) -> None:
+        """Load `path`; see `load_network`."""
+        try:
+            import torch
+        except ImportError as error:
+            raise MissingExtra("torch", "train") from error
+        self._torch: Any = torch
+        torch.set_num_threads(1)
+        try:
+            self._module: Any = torch.jit.load(str(path), map_location="cpu").eval()
+        except RuntimeError as error:
+            raise ConfigError(f"{path} is not a TorchScript module that torch can load.") from error
+        self._forget: Callable[[], None] = getattr(self._module, "reset_memory", lambda: None)
+        try:
+            out = self(np.zeros(size, dtype=np.float32))
+        except RuntimeError as error:
+            raise _wrong_input(path, size, _reason(error)) from error
+        _check_output(path, out)
+        self.reset()
+
+    def reset(self) -> None:
+        """Clear the module's memory."""
+        self._forget()
+
+    def __call__(self, observation: Float32) -> Float32:
+        """Return the action; see `Network`."""
+        torch = self._torch
+        with torch.inference_mode(), torch.jit.optimized_execution(False):
+            return self._module(torch.from_numpy(observation)[None]).numpy()[0]
+
+
+LOADERS: dict[str, Callable[[Path, int], Network]] = {".onnx": OnnxNetwork, ".pt": TorchScriptNetwork}
+"""Which class reads a file, by its ending."""
+
+
+def _wrong_input(path: Path, size: int, found: str) -> ConfigError:
+    return ConfigError(
+        f"The network {path} does not take the {size} values of the described observation: {found}."
+    )
+
+
+def _reason(error: RuntimeError) -> str:
+    """Return the last line of what torch says, which names the shapes."""
+    return str(error).strip().splitlines()[-1].removeprefix("RuntimeError: ")
+
+
+def _check_output(path: Path, out: Float32) -> None:
+    if out.shape != (ACTIONS,):
+        raise ConfigError(
+            f"The network {path} returns {out.shape} for one observation; a leg policy returns ({ACTIONS},)."
+        )

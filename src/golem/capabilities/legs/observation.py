@@ -1,0 +1,168 @@
+"""What a leg policy sees: named terms, scaled and in the order its description lists them, for one robot or many."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.capabilities.legs.base import Motion
+from golem.errors import ConfigError, unknown_name
+from golem.options import vector
+from golem.robots.model.imu import base_rate
+from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
+from golem.types import LEGS, SIDES, UPPER, Array, BaseEstimate, LowState
+
+_WAIST = JOINT_INDEX["torso_joint"]
+_AXES = ("x", "y", "z")
+
+TERMS: dict[str, tuple[str, ...]] = {
+    "base_velocity": _AXES,
+    "base_rate": _AXES,
+    "gravity": _AXES,
+    "twist": ("vx", "vy", "wz"),
+    "joint_position": JOINT_NAMES,
+    "joint_velocity": JOINT_NAMES,
+    "last_action": JOINT_NAMES[LEGS],
+    "phase_sin": SIDES,
+    "phase_cos": SIDES,
+}
+"""Components of each term, in the order of its values.
+
+joint_position is relative to the policy's default posture. phase_sin and phase_cos are of 2 pi times the gait phase,
+and 0 while the gait clock rests.
+"""
+GROUPS: dict[str, tuple[str, ...]] = {"legs": JOINT_NAMES[LEGS], "upper": JOINT_NAMES[UPPER]}
+"""Words that stand for several joints in `Term.of`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Signals:
+    """What the terms are made from; the leading axes are those of the robots, none for one.
+
+    Attributes:
+        q, dq: (..., 27) joint positions [rad] and velocities [rad/s].
+        gyro: (..., 3) angular rate of base_link in base_link [rad/s].
+        gravity: (..., 3) unit vector along gravity in base_link, (0, 0, -1) when upright.
+        velocity: (..., 3) linear velocity of base_link in base_link [m/s].
+        twist: (..., 3) commanded vx, vy [m/s] and wz [rad/s].
+        action: (..., 12) the policy's last action.
+        phase: (..., 2) gait phase of the left and the right leg, 0 to 1.
+        stepping: (...) whether the gait clock runs.
+    """
+
+    q: Array
+    dq: Array
+    gyro: Array
+    gravity: Array
+    velocity: Array
+    twist: Array
+    action: Array
+    phase: Array
+    stepping: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """One term of an observation.
+
+    Attributes:
+        term: its name in `TERMS`.
+        scale: factor of its values, one for all or one for each.
+        of: which components, by the names in `TERMS` or of a group in `GROUPS`; empty is all.
+    """
+
+    term: str
+    scale: float | tuple[float, ...] = 1.0
+    of: tuple[str, ...] = ()
+
+
+class Layout:
+    """The order, offsets and scales of an observation.
+
+    Attributes:
+        size: number of values.
+        components: (size,) what each value is: term and component.
+    """
+
+    def __init__(self, terms: Sequence[Term], posture: Array) -> None:
+        """Look the terms up.
+
+        Args:
+            terms: in the order of the observation.
+            posture: (27,) default posture, which joint_position is relative to [rad].
+
+        Raises:
+            ConfigError: there is no term, an unknown term or component, or a scale of the wrong length.
+        """
+        if not terms:
+            raise ConfigError(f"An observation needs at least one term of: {', '.join(TERMS)}.")
+        chosen = [(t, name) for t in terms for name in _components(t)]
+        column = {key: i for i, key in enumerate((term, name) for term in TERMS for name in TERMS[term])}
+        self.components = tuple((t.term, name) for t, name in chosen)
+        self.size = len(chosen)
+        self._columns = np.array([column[key] for key in self.components])
+        default = {("joint_position", name): q for name, q in zip(JOINT_NAMES, posture, strict=True)}
+        self._offset = np.array([default.get(key, 0.0) for key in self.components])
+        self._scale = np.concatenate(
+            [vector(f"scale of {t.term}", t.scale, len(_components(t))) for t in terms]
+        )
+
+    def observe(self, signals: Signals) -> Array:
+        """Return the (..., size) observation."""
+        s = signals
+        angle = 2.0 * np.pi * s.phase
+        runs = s.stepping[..., None]
+        # In the order of TERMS.
+        values = np.concatenate(
+            [
+                *(s.velocity, s.gyro, s.gravity, s.twist, s.q, s.dq, s.action),
+                *(np.sin(angle) * runs, np.cos(angle) * runs),
+            ],
+            axis=-1,
+        )
+        return (values.take(self._columns, axis=-1) - self._offset) * self._scale
+
+
+def _components(term: Term) -> tuple[str, ...]:
+    """Return the components that `term` asks for.
+
+    Raises:
+        ConfigError: the term or a component does not exist.
+    """
+    if term.term not in TERMS:
+        raise unknown_name("observation term", term.term, TERMS)
+    names = TERMS[term.term]
+    if not term.of:
+        return names
+    groups = {group: members for group, members in GROUPS.items() if set(members) <= set(names)}
+    out: list[str] = []
+    for word in term.of:
+        if word not in names and word not in groups:
+            raise unknown_name(f"component of {term.term}", word, (*groups, *names))
+        out.extend(groups.get(word, (word,)))
+    return tuple(out)
+
+
+def measure(state: LowState, base: BaseEstimate, motion: Motion, action: Array) -> Signals:
+    """Return the signals of one robot: gravity and velocity from the base estimate, the rate from the torso IMU.
+
+    Args:
+        state: joints and IMU.
+        base: estimated pose and velocity of base_link.
+        motion: what the base layer asks for.
+        action: (12,) the policy's last action.
+    """
+    R = base.T_odom_base[:3, :3]
+    return Signals(
+        q=state.q,
+        dq=state.dq,
+        gyro=base_rate(state.imu.gyro, state.q[_WAIST], state.dq[_WAIST]),
+        gravity=-R[2],
+        velocity=base.velocity @ R,
+        twist=np.array((motion.twist.vx, motion.twist.vy, motion.twist.wz)),
+        action=action,
+        phase=motion.phase,
+        stepping=np.asarray(motion.stepping, dtype=np.float64),
+    )

@@ -1,0 +1,91 @@
+"""Lower body driven by any policy network whose description lies beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.capabilities.legs.base import LegCommand, Motion
+from golem.capabilities.legs.description import load_description
+from golem.capabilities.legs.network import ACTIONS, load_network
+from golem.capabilities.legs.observation import measure
+from golem.capabilities.legs.swing import swing_offset
+from golem.errors import GolemError
+from golem.options import vector
+from golem.types import LEGS, Array, BaseEstimate, LowState
+
+
+class BadAction(GolemError):
+    """A policy network returned something that is not finite."""
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyConfig:
+    """Options of `Policy`.
+
+    Attributes:
+        file: path of the description (YAML), or the name of a shipped one.
+        network: path of the network (.onnx or .pt); the one that the description names, beside it, if absent.
+    """
+
+    file: str
+    network: str | None = None
+
+
+class Policy:
+    """Runs a network on the observation its description lays out; its actions are offsets from a default posture.
+
+    Joint targets are q0 + scale * clip(action) + swing; there is no feed-forward torque.
+
+    Attributes:
+        rate, latency, envelope, gait: see `LowerBody`.
+    """
+
+    def __init__(self, config: PolicyConfig) -> None:
+        """Load description and network.
+
+        Raises:
+            ConfigError: a file is absent or says something it cannot mean, or the two do not fit each other.
+            MissingExtra: the network is a TorchScript file, and torch is not installed.
+        """
+        description, path = load_description(config.file, config.network)
+        self.description = description
+        self.rate = description.rate
+        self.latency = description.latency
+        self.envelope = description.envelope
+        self.gait = description.gait
+        self._layout = description.layout()
+        self._network = load_network(path, self._layout.size)
+        self._q0 = description.q0()[LEGS]
+        self._scale = vector("action.scale", description.action.scale, ACTIONS, ACTIONS // 2)
+        self._kp = vector("kp", description.kp, ACTIONS, ACTIONS // 2)
+        self._kd = vector("kd", description.kd, ACTIONS, ACTIONS // 2)
+        self._action: Array = np.zeros(ACTIONS)
+
+    def reset(self, state: LowState) -> None:
+        """Forget the last action and what the network remembers."""
+        self._action = np.zeros(ACTIONS)
+        self._network.reset()
+
+    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+        """Run the network once; see `LowerBody.step`.
+
+        Raises:
+            BadAction: the network returned NaN or infinity.
+        """
+        observation = self._layout.observe(measure(state, base, motion, self._action))
+        action = self._network(observation.astype(np.float32)).astype(np.float64)
+        if not np.isfinite(action).all():
+            culprit = np.flatnonzero(~np.isfinite(observation))
+            cause = (
+                f"; it was shown {self._layout.components[culprit[0]]} that is not finite"
+                if len(culprit)
+                else ""
+            )
+            raise BadAction(f"The network's action is not finite{cause}.")
+        clip = self.description.action.clip
+        self._action = np.clip(action, -clip, clip)
+        swing = swing_offset(motion.phase, self.gait.stance, self.description.action.swing)
+        q = self._q0 + self._scale * self._action + swing
+        return LegCommand(q, self._kp.copy(), self._kd.copy(), np.zeros(ACTIONS))
