@@ -1,0 +1,1 @@
+"""Training of the leg policy: batch physics, disturbances, rewards and the optimiser."""

@@ -1,0 +1,154 @@
+"""What works against the legs: arm and waist motions, payloads and pushes, each with a difficulty that grows.
+
+The upper body is the adversary of the paper's two-player game. Its first form is a curriculum of random motions
+between postures, ordered by how far and how fast they go; its second is a learned policy (see `train`), which chooses
+the velocities of the targets within the same bounds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.capabilities.arms.postures import POSTURES
+from golem.robots.model.limits import load_limits
+from golem.types import UPPER, Array
+
+NUM_UPPER = UPPER.stop - UPPER.start
+TOP_SPEED = 2.5
+"""Speed of a target at full difficulty [rad/s]; the safety gate lets 3 pass."""
+
+
+@dataclass
+class Difficulty:
+    """How hard the disturbances are, 0 to 1 each; raised while the robot stays up, lowered while it falls.
+
+    Attributes:
+        amplitude: share of the joint ranges that upper-body targets use.
+        speed: share of `TOP_SPEED`.
+        push: share of the largest impulse.
+        payload: share of the largest payload.
+    """
+
+    amplitude: float = 0.2
+    speed: float = 0.2
+    push: float = 0.1
+    payload: float = 0.0
+
+    def update(self, survival: float, rate: float) -> None:
+        """Move on where `survival` (share of episodes that reach their end) is high, step back where it is low.
+
+        ALMI's rule: up while the mean episode exceeds 80 % of its length, down twice as fast otherwise.
+        """
+        change = rate if survival > 0.8 else -2.0 * rate
+        for name in ("amplitude", "speed", "push", "payload"):
+            setattr(self, name, float(np.clip(getattr(self, name) + change, 0.05, 1.0)))
+
+
+class UpperBodyMotion:
+    """Targets of torso and arms for `n` robots, in motor order of the upper body.
+
+    Attributes:
+        target: (n, 15) joint targets [rad].
+    """
+
+    def __init__(self, n: int, rng: np.random.Generator) -> None:
+        """Begin at the home posture."""
+        limits = load_limits()
+        middle = 0.5 * (limits.lower + limits.upper)[UPPER]
+        half = 0.45 * (limits.upper - limits.lower)[UPPER]  # the gate's middle 90 %
+        half[0] = min(half[0], 1.2)  # further round, the arms are behind the robot
+        self._lower, self._upper = middle - half, middle + half
+        self._home = np.stack([POSTURES["home"], POSTURES["ready"], np.zeros(NUM_UPPER)])
+        self._rng = rng
+        self.target: Array = np.tile(POSTURES["home"], (n, 1))
+        self._goal: Array = self.target.copy()
+        self._speed: Array = np.zeros((n, 1))
+        self._left: Array = np.zeros(n)
+        self._centre: Array = self.target.copy()
+
+    def reset(self, where: NDArray[np.intp], amplitude: float) -> None:
+        """Start the robots `where` at a posture of their own, still."""
+        self._centre[where] = self._home[self._rng.integers(len(self._home), size=len(where))]
+        self.target[where] = self._draw(where, amplitude)
+        self._goal[where] = self.target[where]
+        self._left[where] = self._rng.uniform(0.5, 3.0, len(where))
+
+    def step(self, difficulty: Difficulty, dt: float) -> None:
+        """Move every target towards its goal; where one has waited long enough, draw the next."""
+        self._left -= dt
+        due = np.flatnonzero(self._left <= 0.0)
+        if len(due):
+            self._goal[due] = self._draw(due, difficulty.amplitude)
+            fastest = max(TOP_SPEED * difficulty.speed, 0.3)
+            self._speed[due, 0] = self._rng.uniform(0.2, fastest, len(due))
+            self._left[due] = self._rng.uniform(0.4, 4.0, len(due))
+        reach = self._speed * dt
+        self.target = self.target + np.clip(self._goal - self.target, -reach, reach)
+
+    def steer(self, where: NDArray[np.intp], action: Array, difficulty: Difficulty, dt: float) -> None:
+        """Let the learned adversary move the targets of `where`: `action` (m, 15) are speeds in units of the bound."""
+        speed = TOP_SPEED * max(difficulty.speed, 0.2) * np.clip(action, -1.0, 1.0)
+        lower = self._centre[where] + difficulty.amplitude * (self._lower - self._centre[where])
+        upper = self._centre[where] + difficulty.amplitude * (self._upper - self._centre[where])
+        self.target[where] = np.clip(self.target[where] + speed * dt, lower, upper)
+        self._goal[where] = self.target[where]
+
+    def _draw(self, where: NDArray[np.intp], amplitude: float) -> Array:
+        centre = self._centre[where]
+        anywhere = self._rng.uniform(self._lower, self._upper, centre.shape)
+        moved = self._rng.random(centre.shape) < 0.8
+        return centre + amplitude * self._rng.random((len(where), 1)) * np.where(
+            moved, anywhere - centre, 0.0
+        )
+
+
+class Pushes:
+    """Horizontal forces on torso or pelvis of `n` robots: short knocks and slow rods.
+
+    Attributes:
+        force: (n, 3) present force [N], world.
+        on_torso: (n,) whether it acts on the torso, else on the pelvis.
+    """
+
+    def __init__(self, n: int, largest: float, rng: np.random.Generator) -> None:
+        """Push with impulses up to `largest` [N s]."""
+        self._largest, self._rng = largest, rng
+        self.force: Array = np.zeros((n, 3))
+        self.on_torso: NDArray[np.bool_] = np.ones(n, dtype=bool)
+        self._peak: Array = np.zeros((n, 2))
+        self._start: Array = np.full(n, np.inf)
+        self._duration: Array = np.ones(n)
+        self._slow: NDArray[np.bool_] = np.zeros(n, dtype=bool)
+        self._t: Array = np.zeros(n)
+
+    def reset(self, where: NDArray[np.intp], difficulty: float) -> None:
+        """Leave the robots `where` alone for a while."""
+        self._t[where] = 0.0
+        self._draw(where, difficulty)
+
+    def step(self, difficulty: float, dt: float) -> None:
+        """Advance the time, and draw anew where a push is over."""
+        self._t += dt
+        over = np.flatnonzero(self._t > self._start + self._duration)
+        if len(over):
+            self._draw(over, difficulty)
+        share = (self._t - self._start) / self._duration
+        profile = np.where(self._slow, np.sin(np.pi * np.clip(share, 0.0, 1.0)), 1.0)
+        self.force[:, :2] = self._peak * (profile * ((share >= 0.0) & (share <= 1.0)))[:, None]
+
+    def _draw(self, where: NDArray[np.intp], difficulty: float) -> None:
+        rng, m = self._rng, len(where)
+        slow = rng.random(m) < 0.25
+        duration = np.where(slow, rng.uniform(0.5, 1.2, m), rng.uniform(0.1, 0.4, m))
+        # Mostly near the edge of what the robot is known to take: easy pushes teach little.
+        impulse = self._largest * difficulty * np.sqrt(rng.random(m))
+        force = impulse / duration * np.where(slow, 0.5 * np.pi, 1.0)
+        angle = rng.uniform(-np.pi, np.pi, m)
+        self._peak[where] = force[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        self._duration[where] = duration
+        self._slow[where] = slow
+        self._start[where] = self._t[where] + rng.uniform(1.5, 6.0, m)
+        self.on_torso[where] = np.where(slow, rng.random(m) < 0.2, rng.random(m) < 0.8)

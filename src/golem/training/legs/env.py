@@ -1,0 +1,254 @@
+"""The game between the legs and the disturbances: commands in, observations and rewards out, for many robots at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.capabilities.legs.balance import balance_errors, heading_frame
+from golem.capabilities.legs.base import Envelope
+from golem.capabilities.legs.gait import Gait, GaitConfig
+from golem.capabilities.legs.observation import Layout, Signals, Term
+from golem.capabilities.legs.swing import swing_offset
+from golem.robots.model.leg_kinematics import leg_poses, sole_centers
+from golem.training.legs.disturbances import Difficulty, Pushes, UpperBodyMotion
+from golem.training.legs.model import FEET_APART, STANCE, STEP
+from golem.training.legs.rewards import Rewards, Weights
+from golem.training.legs.world import Rows, World, WorldConfig
+from golem.types import Array
+
+PERIOD = 0.02
+"""Time between two actions [s]: 50 Hz, as ALMI."""
+LAYOUT = (
+    Term("base_velocity", 2.0),
+    Term("base_rate", 0.25),
+    Term("gravity", 2.0),
+    Term("twist", (2.0, 2.0, 1.0)),
+    Term("joint_position", 1.0, ("legs",)),
+    Term("joint_velocity", 0.05, ("legs",)),
+    Term("last_action", 0.5),
+    Term("joint_position", 0.5, ("upper",)),
+    Term("joint_velocity", 0.1, ("upper",)),
+    Term("phase_sin"),
+    Term("phase_cos"),
+)
+"""What the leg policy sees; the description beside its weights is written from this."""
+
+
+@dataclass(frozen=True)
+class EnvConfig:
+    """The task.
+
+    Attributes:
+        envelope: twists that are commanded, a little more than what the controller will declare.
+        standing: share of the commands that are zero.
+        accelerate: how fast a command may change [m/s^2, m/s^2, rad/s^2]; the base layer limits it likewise.
+        hold: shortest and longest time a command lasts [s].
+        episode: length of an episode [s].
+        action_scale: joint target per unit of action [rad].
+        swing: amplitude of the feed-forward swing [rad].
+        impulse: largest push at full difficulty [N s].
+        gait: clock and gate.
+        world: randomisation.
+        weights: of the rewards.
+    """
+
+    envelope: Envelope = field(default_factory=lambda: Envelope((-0.5, 0.9), (-0.4, 0.4), (-0.7, 0.7)))
+    standing: float = 0.4
+    accelerate: tuple[float, float, float] = (1.0, 1.0, 2.0)
+    hold: tuple[float, float] = (2.0, 7.0)
+    episode: float = 20.0
+    action_scale: float = 0.25
+    swing: float = 0.28
+    impulse: float = 100.0
+    gait: GaitConfig = field(default_factory=GaitConfig)
+    world: WorldConfig = field(default_factory=WorldConfig)
+    weights: Weights = field(default_factory=Weights)
+
+
+@dataclass
+class Step:
+    """What one action led to; leading axis (n,).
+
+    Attributes:
+        reward: of the legs.
+        ended: fallen.
+        truncated: the episode's time was over.
+        terms: mean of each reward term.
+    """
+
+    reward: Array
+    ended: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+    terms: dict[str, float]
+
+
+class LegsEnv:
+    """`n` robots with commands, gait clocks, disturbances and rewards.
+
+    Attributes:
+        difficulty: of the disturbances.
+        layout: of the policy's observation.
+        gait: the clocks.
+        twist: (n, 3) present command.
+    """
+
+    def __init__(self, n: int, config: EnvConfig, seed: int, threads: int) -> None:
+        """Build the world and start every robot."""
+        self.n, self.config = n, config
+        self._rng = np.random.default_rng(seed)
+        self.world = World(n, config.world, self._rng, threads)
+        self.difficulty = Difficulty()
+        self.layout = Layout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
+        self.gait = Gait(config.gait, (n,))
+        self.upper = UpperBodyMotion(n, self._rng)
+        self._pushes = Pushes(n, config.impulse, self._rng)
+        self._rewards = Rewards(n, config.weights, config.gait, STANCE)
+        self.twist: Array = np.zeros((n, 3))
+        self._goal: Array = np.zeros((n, 3))
+        self._left: Array = np.zeros(n)
+        self._time: Array = np.zeros(n)
+        self._action: Array = np.zeros((n, 12))
+        self._capture: Array = np.zeros((n, 2))
+        self._misplaced: Array = np.zeros(n)
+        self.reset(np.arange(n))
+        # Episodes shall not end all at once.
+        self._time = self._rng.uniform(0.0, config.episode, n)
+        self.world.read()
+        self._advance_gait(0.0)
+
+    def reset(self, where: Rows) -> None:
+        """Start the robots `where` anew."""
+        if not len(where):
+            return
+        self.upper.reset(where, self.difficulty.amplitude)
+        self.world.reset(where, self.upper.target[where], self.difficulty.payload)
+        self._pushes.reset(where, self.difficulty.push)
+        mask = np.zeros(self.n, dtype=bool)
+        mask[where] = True
+        self.gait.reset(mask)
+        self._rewards.reset(where)
+        self._time[where] = 0.0
+        self._action[where] = 0.0
+        self.twist[where] = 0.0
+        self._command(where)
+
+    def observe(self) -> tuple[Array, Array]:
+        """Return what the policy sees (n, layout.size), and beside it what only the critic knows (n, m)."""
+        sensed, truth = self.world.sensed, self.world.truth
+        R = sensed.R
+        signals = Signals(
+            q=sensed.q,
+            dq=sensed.dq,
+            gyro=sensed.rate,
+            gravity=-R[:, 2],
+            velocity=np.einsum("nji,nj->ni", R, sensed.velocity),
+            twist=self.twist,
+            action=self._action,
+            phase=self.gait.phases,
+            stepping=self.gait.stepping.astype(np.float64),
+        )
+        velocity = np.einsum("nji,nj->ni", truth.R, truth.velocity)
+        force = np.einsum("nji,nj->ni", truth.R, self._pushes.force)
+        known = [
+            2.0 * velocity,
+            0.01 * force,
+            self._pushes.on_torso[:, None],
+            0.002 * truth.force,
+            self.world.payload,
+            self.world.friction[:, None],
+            10.0 * self.world.slope,
+            10.0 * self._capture,
+            10.0 * self._misplaced[:, None],
+            10.0 * truth.clearance,
+            self.upper.target - sensed.q[:, 12:],
+            self._rewards.tracked_error(self.twist),
+            self.gait.stepping[:, None],
+        ]
+        return self.layout.observe(signals), np.concatenate(known, axis=1)
+
+    def step(self, action: Array, steered: Rows, speeds: Array) -> Step:
+        """Act for one period.
+
+        Args:
+            action: (n, 12) of the legs.
+            steered: the robots whose upper body the learned adversary moves.
+            speeds: (len(steered), 15) its action.
+        """
+        config, dt = self.config, PERIOD
+        self.upper.step(self.difficulty, dt)
+        if len(steered):
+            self.upper.steer(steered, speeds, self.difficulty, dt)
+        self._pushes.step(self.difficulty.push, dt)
+        action = np.clip(action, -10.0, 10.0)
+        stance = config.gait.stance
+        target = STANCE + config.action_scale * action + swing_offset(self.gait.phases, stance, config.swing)
+        self.world.step(
+            target, self.upper.target, self._pushes.force, self._pushes.on_torso, round(dt / STEP)
+        )
+        truth = self.world.truth
+        reward, terms = self._rewards(
+            truth, self.twist, self.gait, action, self._action, self._capture, self._misplaced, dt
+        )
+        self._action = action
+        self._time += dt
+        low = truth.height - truth.clearance.mean(axis=1) < 0.6
+        ended = low | (truth.R[:, 2, 2] < np.cos(0.8)) | ~np.isfinite(truth.q).all(axis=1)
+        truncated = ~ended & (self._time >= config.episode)
+        self._left -= dt
+        self._command(np.flatnonzero(self._left <= 0.0))
+        most = np.array(config.accelerate) * dt
+        self.twist = self.twist + np.clip(self._goal - self.twist, -most, most)
+        self._advance_gait(dt)
+        return Step(reward, ended, truncated, terms)
+
+    def restart(self, where: Rows) -> None:
+        """Start the robots `where` anew after a step, and make their measurements current."""
+        if len(where):
+            self.reset(where)
+            self.world.read()
+            self._balance()
+
+    def _advance_gait(self, dt: float) -> None:
+        self._balance()
+        before = self.gait.phases >= self.config.gait.stance
+        self.gait.step(np.abs(self.twist).max(axis=1) > 1e-6, self._capture, self._misplaced, dt)
+        swing = (self.gait.phases >= self.config.gait.stance) & self.gait.stepping[:, None]
+        middle = np.abs(self.gait.phases - 0.5 * (1.0 + self.config.gait.stance)) < 0.06
+        self.world.shim(before & swing & middle & (self.world.truth.force < 1.0))
+
+    def _balance(self) -> None:
+        """Compute the balance errors as the base layer does: from measured joints and the estimated velocity."""
+        sensed, R = self.world.sensed, self.world.sensed.R
+        p, R_foot = leg_poses(sensed.q[:, :12])
+        soles = np.einsum("nij,nkj->nki", R, sole_centers(p, R_foot))
+        com = self.world.truth.com
+        spin = np.einsum("nij,nj->ni", R, sensed.rate)
+        velocity = sensed.velocity + np.cross(spin, com)
+        self._capture, self._misplaced = balance_errors(R, com, velocity, soles, FEET_APART)
+
+    def _command(self, where: Rows) -> None:
+        rng, m, e = self._rng, len(where), self.config.envelope
+        if not m:
+            return
+        low, high = np.array([e.vx, e.vy, e.wz]).T
+        twist = rng.uniform(low, high, (m, 3))
+        # Often along one axis only: that is how robots are driven.
+        keep = rng.integers(-2, 3, m)
+        for axis in range(3):
+            twist[:, axis] = np.where((keep < 0) | (keep == axis), twist[:, axis], 0.0)
+        still = (rng.random(m) < self.config.standing) | (np.linalg.norm(twist, axis=1) < 0.1)
+        self._goal[where] = np.where(still[:, None], 0.0, twist)
+        self._left[where] = rng.uniform(*self.config.hold, m)
+
+    def heading_velocity(self) -> Array:
+        """Return the (n, 3) true velocity in the heading frame: vx, vy [m/s], wz [rad/s]."""
+        return heading_velocity(self.world.truth.R, self.world.truth.velocity, self.world.truth.rate)
+
+
+def heading_velocity(R: Array, velocity: Array, rate: Array) -> Array:
+    """Return (n, 3) vx, vy, wz from rotation (n, 3, 3), level velocity (n, 3) and body rate (n, 3)."""
+    planar = np.einsum("nji,nj->ni", heading_frame(R), velocity[:, :2])
+    return np.concatenate([planar, np.einsum("nj,nj->n", R[:, 2], rate)[:, None]], axis=1)

@@ -1,0 +1,165 @@
+"""What the legs are rewarded for: ALMI's terms (ALMI-Open, BSD-3) with sharper tracking and an explicit quiet stand.
+
+Velocities are judged by a running mean over about half a gait period: a walking body sways, and a reward on the
+instantaneous velocity pays for suppressing the sway instead of for arriving.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.capabilities.legs.balance import heading_frame
+from golem.capabilities.legs.gait import Gait, GaitConfig
+from golem.robots.model.limits import load_limits
+from golem.training.legs.model import STAND_HEIGHT
+from golem.training.legs.world import Rows, Truth
+from golem.types import LEGS, Array
+
+_YAW_ROLL = np.array([0, 2, 6, 8])
+_ANKLES = np.array([4, 5, 10, 11])
+CLEARANCE = 0.08
+"""Height of the sole in the middle of its swing [m]."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weight of each term, per second; positive rewards, negative punishes.
+
+    Attributes:
+        linear, angular: mean velocity as commanded, exp(-error^2 / 0.03).
+        linear_now, angular_now: present velocity as commanded, exp(-error^2 / 0.25).
+        alive: not fallen.
+        contact: feet on the ground when their phase says so, and off it when not.
+        swing_height: error of the height of a swinging sole [m^2].
+        upright: horizontal part of gravity in base_link, squared.
+        height: error of the base's height above the soles [m^2].
+        bounce: vertical velocity squared.
+        rock: roll and pitch rates squared.
+        torque, ankle_torque, acceleration, speed: squared, of the leg joints.
+        smooth: change of the action squared.
+        limits: how far joints are beyond 90 % of their range [rad].
+        hips: yaw and roll of the hips squared [rad^2].
+        slip: velocity of loaded soles squared.
+        feet: misplacement of the feet beyond 4 cm while both are on the ground [m].
+        impact: foot force above 800 N [N].
+        stand_posture: deviation from the stance squared, standing.
+        stand_still: base velocity squared, standing.
+        stand_center: capture point over the middle of the feet, exp(-error^2 / 0.03^2), standing.
+        stand_step: the gait clock runs although no velocity is commanded.
+    """
+
+    linear: float = 2.0
+    angular: float = 1.2
+    linear_now: float = 0.8
+    angular_now: float = 0.3
+    alive: float = 0.5
+    contact: float = 0.4
+    swing_height: float = -40.0
+    upright: float = -3.0
+    height: float = -20.0
+    bounce: float = -1.0
+    rock: float = -0.15
+    torque: float = -1e-5
+    ankle_torque: float = -5e-5
+    acceleration: float = -1.5e-7
+    speed: float = -1e-3
+    smooth: float = -0.015
+    limits: float = -5.0
+    hips: float = -1.0
+    slip: float = -0.4
+    feet: float = -4.0
+    impact: float = -0.002
+    stand_posture: float = -0.5
+    stand_still: float = -2.0
+    stand_center: float = 0.5
+    stand_step: float = -0.3
+
+
+class Rewards:
+    """Rewards of `n` robots, with the running means they need."""
+
+    def __init__(self, n: int, weights: Weights, gait: GaitConfig, stance: Array) -> None:
+        """Begin at rest."""
+        limits = load_limits()
+        middle = 0.5 * (limits.lower + limits.upper)[LEGS]
+        half = 0.45 * (limits.upper - limits.lower)[LEGS]
+        self._lower, self._upper = middle - half, middle + half
+        self._weights, self._stance = weights, stance
+        self._share = gait.period / 2.0
+        self._mean: Array = np.zeros((n, 3))
+        self._speed: Array = np.zeros((n, 12))
+
+    def reset(self, where: Rows) -> None:
+        """Put the robots `where` at rest."""
+        self._mean[where] = 0.0
+        self._speed[where] = 0.0
+
+    def tracked_error(self, twist: Array) -> Array:
+        """Return (n, 3): the mean velocity less the command, vx, vy [m/s], wz [rad/s]."""
+        return self._mean - twist
+
+    def __call__(
+        self,
+        truth: Truth,
+        twist: Array,
+        gait: Gait,
+        action: Array,
+        last: Array,
+        capture: Array,
+        misplaced: Array,
+        dt: float,
+    ) -> tuple[Array, dict[str, float]]:
+        """Return the reward (n,) of one period and the mean of each term."""
+        w = self._weights
+        planar = np.einsum("nji,nj->ni", heading_frame(truth.R), truth.velocity[:, :2])
+        wz = np.einsum("nj,nj->n", truth.R[:, 2], truth.rate)
+        now = np.concatenate([planar, wz[:, None]], axis=1)
+        self._mean += (now - self._mean) * (dt / (self._share + dt))
+        mean = np.square(self._mean - twist)
+        error = np.square(now - twist)
+        phase, stepping = gait.phases, gait.stepping
+        stance = ~stepping[:, None] | (phase < gait.config.stance)
+        loaded = truth.force > 5.0
+        swing = np.clip((phase - gait.config.stance) / (1.0 - gait.config.stance), 0.0, 1.0)
+        high = CLEARANCE * np.sin(np.pi * swing) - truth.clearance
+        legs, speed = truth.q[:, LEGS], truth.dq[:, LEGS]
+        torque = np.square(truth.torque[:, LEGS])
+        level = truth.height - truth.clearance.min(axis=1)
+        beyond = np.maximum(legs - self._upper, 0.0) + np.maximum(self._lower - legs, 0.0)
+        still = (np.abs(twist).max(axis=1) < 1e-6).astype(np.float64)
+        rest = still * ~stepping
+        slip = (np.square(truth.sole_velocity).sum(axis=2) * loaded).sum(axis=1)
+        terms: dict[str, Array] = {
+            "linear": np.exp(-(mean[:, 0] + mean[:, 1]) / 0.03),
+            "angular": np.exp(-mean[:, 2] / 0.03),
+            "linear_now": np.exp(-(error[:, 0] + error[:, 1]) / 0.25),
+            "angular_now": np.exp(-error[:, 2] / 0.25),
+            "alive": np.ones(len(twist)),
+            "contact": (loaded == stance).mean(axis=1),
+            "swing_height": (np.square(high) * ~stance).sum(axis=1),
+            "upright": np.square(truth.R[:, 2, :2]).sum(axis=1),
+            "height": np.square(level - STAND_HEIGHT),
+            "bounce": np.square(truth.velocity[:, 2]),
+            "rock": np.square(truth.rate[:, :2]).sum(axis=1),
+            "torque": torque.sum(axis=1),
+            "ankle_torque": torque[:, _ANKLES].sum(axis=1),
+            "acceleration": np.square((speed - self._speed) / dt).sum(axis=1),
+            "speed": np.square(speed).sum(axis=1),
+            "smooth": np.square(action - last).sum(axis=1),
+            "limits": beyond.sum(axis=1),
+            "hips": np.square(legs[:, _YAW_ROLL]).sum(axis=1),
+            "slip": slip,
+            "feet": np.maximum(misplaced - 0.04, 0.0) * stance.all(axis=1),
+            "impact": np.maximum(truth.force - 800.0, 0.0).sum(axis=1),
+            "stand_posture": np.square(legs - self._stance).sum(axis=1) * rest,
+            "stand_still": (np.square(truth.velocity[:, :2]).sum(axis=1) + np.square(wz)) * rest,
+            "stand_center": np.exp(-np.square(capture).sum(axis=1) / 0.03**2) * rest,
+            "stand_step": still * stepping,
+        }
+        self._speed = speed.copy()
+        weighted = {name: getattr(w, name) * value for name, value in terms.items()}
+        total = np.asarray(sum(weighted.values()), dtype=np.float64)
+        # A negative sum would teach the beginner to fall early.
+        return np.maximum(total, 0.0) * dt, {name: float(v.mean()) for name, v in weighted.items()}

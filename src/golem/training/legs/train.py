@@ -1,0 +1,271 @@
+"""The training loop: the legs against their disturbances, and later against a learned upper body."""
+
+from __future__ import annotations
+
+import csv
+import os
+import time
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from golem.errors import ConfigError, OutputError
+from golem.training.legs.disturbances import NUM_UPPER
+from golem.training.legs.env import EnvConfig, LegsEnv
+from golem.training.legs.mirror import Mirror, leg_mirror, upper_mirror
+from golem.training.legs.ppo import Actor, Ppo, PpoConfig
+from golem.training.legs.world import Rows
+from golem.types import Array
+
+CHECKPOINT = "checkpoint.pt"
+CURVE = "curve.csv"
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """One training run.
+
+    Attributes:
+        out: folder of checkpoint and curve; a run whose folder holds a checkpoint goes on from it.
+        seed: of weights, episodes and noise.
+        steps: actions of all robots together, e.g. 12e6.
+        robots: how many are simulated at once.
+        threads: of the physics and of the networks.
+        adversary: what moves the upper body: `none` (it rests in random postures), `motions` (the curriculum), or
+            `learned` (motions, and a policy that moves half of the robots once `learned_from` steps are done).
+        learned_from: steps after which the learned adversary begins.
+        rate: change of the difficulties per update.
+    """
+
+    out: Path = Path("runs/legs/seed0")
+    seed: int = 0
+    steps: float = 16e6
+    robots: int = 512
+    threads: int = 2
+    adversary: Literal["none", "motions", "learned"] = "learned"
+    learned_from: float = 4e6
+    rate: float = 0.004
+    env: EnvConfig = field(default_factory=EnvConfig)
+    ppo: PpoConfig = field(default_factory=PpoConfig)
+
+
+def train(config: TrainConfig) -> Path:
+    """Train, or go on; return the path of the checkpoint.
+
+    Raises:
+        ConfigError: fewer than two robots, no steps, or a checkpoint of another configuration in the folder.
+        OutputError: the folder cannot be written.
+    """
+    if config.robots < 2 or config.steps < 1 or config.threads < 1:
+        raise ConfigError("Training needs at least 2 robots, 1 step and 1 thread.")
+    try:
+        config.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"Cannot write to --out {config.out}: {error.strerror}; choose another.") from error
+    torch.set_num_threads(config.threads)
+    torch.manual_seed(config.seed)
+    run = _Run(config)
+    path = config.out / CHECKPOINT
+    if path.exists():
+        run.load(path)
+    while run.steps < config.steps:
+        run.update()
+        if run.updates % 20 == 0:
+            run.save(path)
+    run.save(path)
+    return path
+
+
+class _Run:
+    """Everything that changes while a run goes on."""
+
+    def __init__(self, config: TrainConfig) -> None:
+        self.config = config
+        self.steps = 0
+        self.updates = 0
+        self._cpu = 0.0
+        self.env = LegsEnv(config.robots, config.env, config.seed, config.threads)
+        if config.adversary == "none":
+            self.env.difficulty.amplitude = self.env.difficulty.speed = 0.0
+        seen = Mirror(self.env.layout.components)
+        obs, known = self.env.observe()
+        ppo = config.ppo
+        self.legs = Ppo(
+            Actor(seen, leg_mirror(), ppo.hidden, ppo.noise), known.shape[1], config.robots, ppo, config.seed
+        )
+        half = config.robots // 2
+        self._steered: Rows = np.arange(half)
+        self.upper = Ppo(
+            Actor(seen, upper_mirror(), ppo.hidden, 0.6), known.shape[1], half, ppo, config.seed + 1
+        )
+        self._survival = 0.0
+        self._obs, self._known = obs, known
+        self._log: list[dict[str, float]] = []
+
+    def update(self) -> None:
+        """Let every robot act `ppo.steps` times, then improve both players."""
+        began, config, env = time.process_time(), self.config, self.env
+        learned = config.adversary == "learned" and self.steps >= config.learned_from
+        steered: Rows = self._steered if learned else self._steered[:0]
+        meter = _Meter()
+        for _ in range(config.ppo.steps):
+            action = self.legs.act(self._obs, self._known)
+            speeds = np.zeros((0, NUM_UPPER))
+            if learned:
+                speeds = self.upper.act(self._obs[steered], self._known[steered])
+            step = env.step(action, steered, speeds)
+            meter.add(env, step.reward, step.ended, step.truncated, step.terms)
+            self.legs.learn_of(step.reward, step.ended, step.truncated)
+            if learned:
+                cut = step.ended[steered], step.truncated[steered]
+                self.upper.learn_of(-step.reward[steered], *cut)
+            env.restart(np.flatnonzero(step.ended | step.truncated))
+            self._obs, self._known = env.observe()
+        stats = self.legs.update(self._obs, self._known)
+        if learned:
+            self.upper.update(self._obs[steered], self._known[steered])
+        self.steps += config.ppo.steps * config.robots
+        self.updates += 1
+        if meter.finished:
+            share = min(1.0, meter.finished / 64.0)
+            self._survival += share * 0.5 * (meter.survived / meter.finished - self._survival)
+        env.difficulty.update(self._survival, config.rate)
+        if config.adversary == "none":
+            env.difficulty.amplitude = env.difficulty.speed = 0.0
+        self._cpu += time.process_time() - began
+        row = {"steps": self.steps, "cpu_s": self._cpu, "survival": self._survival}
+        row |= {"learned_adversary": float(learned)} | asdict(env.difficulty) | stats | meter.row()
+        self._log.append({name: float(value) for name, value in row.items()})
+        if self.updates % 10 == 0:
+            self._write()
+
+    def save(self, path: Path) -> None:
+        """Write the checkpoint, whole or not at all."""
+        self._write()
+        part = path.with_suffix(".part")
+        torch.save(
+            {
+                "legs": self.legs.state(),
+                "upper": self.upper.state(),
+                "steps": self.steps,
+                "updates": self.updates,
+                "cpu": self._cpu,
+                "survival": self._survival,
+                "difficulty": asdict(self.env.difficulty),
+                "config": _plain(self.config),
+            },
+            part,
+        )
+        os.replace(part, path)
+
+    def load(self, path: Path) -> None:
+        """Go on from a checkpoint, with new episodes.
+
+        Raises:
+            ConfigError: it was made with another seed, network or task.
+        """
+        saved = torch.load(path, weights_only=True)
+        free = ("out", "steps", "threads")
+        mine = {k: v for k, v in _plain(self.config).items() if k not in free}
+        if mine != {k: v for k, v in saved["config"].items() if k not in free}:
+            raise ConfigError(f"{path} was made with another configuration; choose another --out.")
+        self.legs.load(saved["legs"])
+        self.upper.load(saved["upper"])
+        self.steps, self.updates, self._cpu = saved["steps"], saved["updates"], saved["cpu"]
+        self._survival = saved["survival"]
+        for name, value in saved["difficulty"].items():
+            setattr(self.env.difficulty, name, value)
+        self.env.reset(np.arange(self.config.robots))
+        self.env.restart(np.arange(self.config.robots))
+        self._obs, self._known = self.env.observe()
+
+    def _write(self) -> None:
+        """Append what was logged to the curve, and print the newest row."""
+        if not self._log:
+            return
+        path = self.config.out / CURVE
+        new = not path.exists()
+        with path.open("a", newline="") as file:
+            writer = csv.DictWriter(file, list(self._log[0]))
+            if new:
+                writer.writeheader()
+            for row in self._log:
+                writer.writerow({name: f"{value:.5g}" for name, value in row.items()})
+        shown = (
+            "steps",
+            "cpu_s",
+            "falls",
+            "error_moving",
+            "error_standing",
+            "survival",
+            "push",
+            "std",
+            "reward",
+        )
+        print("  ".join(f"{name} {self._log[-1][name]:.4g}" for name in shown), flush=True)
+        self._log.clear()
+
+
+class _Meter:
+    """Sums over one update."""
+
+    def __init__(self) -> None:
+        self.finished = self.survived = 0
+        self._falls = 0
+        self._seconds = 0.0
+        self._moving: list[float] = []
+        self._standing: list[float] = []
+        self._stepping: list[float] = []
+        self._rewards: list[float] = []
+        self._terms: list[dict[str, float]] = []
+
+    def add(
+        self,
+        env: LegsEnv,
+        reward: Array,
+        ended: NDArray[np.bool_],
+        truncated: NDArray[np.bool_],
+        terms: dict[str, float],
+    ) -> None:
+        """Count one step of all robots."""
+        self._falls += int(ended.sum())
+        self.survived += int(truncated.sum())
+        self.finished += int((ended | truncated).sum())
+        self._seconds += 0.02 * env.n
+        moving = np.abs(env.twist).max(axis=1) > 1e-6
+        error = np.linalg.norm((env.heading_velocity() - env.twist)[:, :2], axis=1)
+        self._moving.append(float(error[moving].mean()) if moving.any() else 0.0)
+        self._standing.append(float(error[~moving].mean()) if (~moving).any() else 0.0)
+        self._stepping.append(float(env.gait.stepping[~moving].mean()) if (~moving).any() else 0.0)
+        self._rewards.append(float(reward.mean()))
+        self._terms.append(terms)
+
+    def row(self) -> dict[str, float]:
+        """Return the means; falls per robot second, errors in m/s."""
+        out = {
+            "falls": self._falls / self._seconds,
+            "error_moving": float(np.mean(self._moving)),
+            "error_standing": float(np.mean(self._standing)),
+            "steps_standing": float(np.mean(self._stepping)),
+            "reward": float(np.mean(self._rewards)),
+        }
+        return out | {
+            f"r_{name}": float(np.mean([terms[name] for terms in self._terms])) for name in self._terms[0]
+        }
+
+
+def _plain(config: TrainConfig) -> dict[str, Any]:
+    """Return `config` as data that any later version can read."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: plain(inner) for name, inner in value.items()}
+        if isinstance(value, tuple):
+            return [plain(inner) for inner in value]
+        return str(value) if isinstance(value, Path) else value
+
+    return plain(asdict(config))
