@@ -26,7 +26,10 @@ _IMPLEMENTATIONS: dict[str, dict[str, str]] = {
     "estimator": {"tether": "golem.hardware.estimator.tether:TetherEstimator"},
     "servo": {"pd_gravity": "golem.hardware.servo.servo:Servo"},
     "hand": {"magpie": "golem.hardware.hands.magpie:MagpieHand"},
-    "lower_body": {"hold": "golem.capabilities.legs.hold:Hold"},
+    "lower_body": {
+        "hold": "golem.capabilities.legs.hold:Hold",
+        "mpc": "golem.capabilities.legs.mpc.controller:MPC",
+    },
     "upper_body": {
         "diff_ik": "golem.capabilities.arms.diff_ik:DiffIK",
         "pink_ik": "golem.capabilities.arms.pink_ik:PinkIK",

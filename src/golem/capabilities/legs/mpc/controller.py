@@ -1,0 +1,121 @@
+"""Sampling MPC behind the lower-body contract: it stands, by planning a second ahead many times a second."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from golem.capabilities.legs.base import Envelope, LegCommand, Motion
+from golem.capabilities.legs.gait import GaitConfig
+from golem.capabilities.legs.hold import STANCES
+from golem.capabilities.legs.mpc.cost import CostConfig, cost
+from golem.capabilities.legs.mpc.model import PlanningModel
+from golem.capabilities.legs.mpc.planner import Planner, PlannerConfig
+from golem.errors import ConfigError, unknown_name
+from golem.types import LEGS, Array, BaseEstimate, LowState
+
+
+@dataclass(frozen=True, slots=True)
+class MPCConfig:
+    """Options of `MPC`.
+
+    Attributes:
+        planner: how plans are varied and chosen.
+        cost: what a plan shall achieve.
+        stance: name of the reference posture in `STANCES`.
+        kp: stiffness of hip yaw, pitch, roll, knee, ankle pitch, ankle roll [N m/rad].
+        kd: damping of the same six joints [N m s/rad].
+        horizon: how far a plan looks ahead [s].
+        timestep: step of the rollouts [s].
+        rate: ticks per second at which the plan is followed [Hz].
+        plan_rate: plans per second [Hz], at most `rate`.
+        latency: time one plan takes; see `LowerBody.latency`.
+        threads: worker threads of the rollouts; 0 uses the caller's thread.
+    """
+
+    planner: PlannerConfig = field(default_factory=PlannerConfig)
+    cost: CostConfig = field(default_factory=CostConfig)
+    stance: str = "crouch"
+    kp: tuple[float, ...] = (200.0, 200.0, 200.0, 300.0, 40.0, 40.0)
+    kd: tuple[float, ...] = (2.5, 2.5, 2.5, 4.0, 2.0, 2.0)
+    horizon: float = 1.0
+    timestep: float = 0.02
+    rate: float = 50.0
+    plan_rate: float = 25.0
+    latency: float = 0.02
+    threads: int = 2
+
+
+class MPC:
+    """Stands by sampling model predictive control; it cannot walk, and its envelope says so.
+
+    The command of every tick is the plan's value `latency` later, which is when the command arrives. What a new plan
+    cannot change any more, because the legs will have done it by the time the plan is there, is the same in all of its
+    rollouts.
+
+    Attributes:
+        rate, latency, envelope, gait: see `LowerBody`.
+        planner: the present plan.
+    """
+
+    def __init__(self, config: MPCConfig | None = None) -> None:
+        """Build the planning model.
+
+        Raises:
+            ConfigError: the stance is unknown, the gains are not six each, a time or rate is not positive, or an option
+                of the planner is wrong.
+        """
+        self.config = c = config or MPCConfig()
+        if c.stance not in STANCES:
+            raise unknown_name("stance", c.stance, STANCES)
+        if len(c.kp) != 6 or len(c.kd) != 6:
+            raise ConfigError(
+                "The MPC needs six values of kp and of kd: hip yaw, pitch, roll, knee, ankle pitch, roll."
+            )
+        if not 0.0 < c.timestep < c.horizon:
+            raise ConfigError(
+                f"The MPC's timestep ({c.timestep} s) must be positive and below its horizon ({c.horizon} s)."
+            )
+        if not 0.0 < c.plan_rate <= c.rate:
+            raise ConfigError(
+                f"The MPC's plan_rate ({c.plan_rate} Hz) must be positive and at most its rate ({c.rate} Hz)."
+            )
+        self.rate = c.rate
+        self.latency = c.latency
+        self.envelope = Envelope()
+        self.gait = GaitConfig(start="never")
+        self._posture: Array = np.tile(STANCES[c.stance], 2)
+        self._kp: Array = np.tile(c.kp, 2)
+        self._kd: Array = np.tile(c.kd, 2)
+        self._model = PlanningModel(self._posture, self._kp, self._kd, c.timestep, c.threads)
+        self.planner = Planner(c.planner, c.horizon, self._model.lower, self._model.upper)
+        self._times: Array = c.timestep * np.arange(round(c.horizon / c.timestep), dtype=np.float64)
+        self._committed = int(np.count_nonzero(self._times < c.latency - 1e-9))
+        self._age = np.inf
+
+    def reset(self, state: LowState) -> None:
+        """Plan to stay in the posture of `state`."""
+        self.planner.reset(np.clip(state.q[LEGS], self._model.lower, self._model.upper))
+        self._age = np.inf
+
+    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+        """Return the plan's targets for when they arrive, after planning anew if it is time; see `LowerBody.step`."""
+        self._age += dt
+        if self._age > 1.0 / self.config.plan_rate - 0.5 * dt:
+            self.plan(state, base)
+        q = self.planner.targets(np.array([self._age + self.latency]))[0]
+        return LegCommand(q=q, kp=self._kp.copy(), kd=self._kd.copy(), tau=self._model.stance.tau.copy())
+
+    def plan(self, state: LowState, base: BaseEstimate) -> None:
+        """Plan once from `state` and `base`: one iteration of sampling, rolling out and choosing."""
+        if np.isfinite(self._age):
+            self.planner.shift(self._age)
+        self._age = 0.0
+        self._model.measure(state, base)
+        knots = self.planner.sample()
+        targets = self.planner.targets(self._times, knots)
+        targets[:, : self._committed] = targets[0, : self._committed]
+        runs = self._model.rollout(targets)
+        costs = cost(self.config.cost, runs, self._model.stance, self._posture, self._model.torque)
+        self.planner.update(knots, costs)
