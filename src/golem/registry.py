@@ -27,8 +27,11 @@ _IMPLEMENTATIONS: dict[str, dict[str, str]] = {
     "servo": {"pd_gravity": "golem.hardware.servo.servo:Servo"},
     "hand": {"magpie": "golem.hardware.hands.magpie:MagpieHand"},
     "lower_body": {
+        "almi": "golem.capabilities.legs.almi:Almi",
         "hold": "golem.capabilities.legs.hold:Hold",
+        "policy": "golem.capabilities.legs.policy:Policy",
         "mpc": "golem.capabilities.legs.mpc.controller:MPC",
+        "wbc": "golem.capabilities.legs.wbc:Wbc",
     },
     "upper_body": {
         "diff_ik": "golem.capabilities.arms.diff_ik:DiffIK",

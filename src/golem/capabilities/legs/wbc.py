@@ -1,0 +1,282 @@
+"""Stands on both feet by whole-body control: one quadratic program per tick, and every number in it can be read.
+
+From the measured state alone follow four wishes, each a spring and a damper in acceleration: the centre of mass above
+the middle of the soles with the pelvis at the stance's height, an upright pelvis that faces where the feet point, soles
+that stay where they are, and the stance's posture. `wbc_qp.StanceProgram` finds contact forces and motor torques that
+come closest. There is no plan, no integral and no stepping: once the capture point has left the soles, it leans against
+the fall as hard as friction and motors allow.
+
+While a hoist carries a part of the robot, the program must know: feet that push with the whole weight would throw the
+robot up, or stretch the legs if they hang free. The share of the hoist is what the IMU feels and the torques of the
+legs do not explain; it goes over to the feet no faster than they are seen to take it, and does not come back until the
+next reset.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+
+from golem.capabilities.legs.base import Envelope, LegCommand, Motion
+from golem.capabilities.legs.gait import GaitConfig
+from golem.capabilities.legs.hold import STANCES
+from golem.capabilities.legs.wbc_qp import (
+    NUM_LEGS,
+    Solution,
+    StanceDynamics,
+    StanceProgram,
+    Tasks,
+    Weights,
+)
+from golem.errors import ConfigError, GolemError, unknown_name
+from golem.robots.model.leg_kinematics import leg_poses, sole_centers
+from golem.robots.model.limits import load_limits
+from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
+from golem.types import LEGS, Array, BaseEstimate, LowState
+
+_TORSO = JOINT_INDEX["torso_joint"]
+_G = 9.81
+
+
+class StanceError(GolemError):
+    """The stance controller has nothing sound to command."""
+
+
+@dataclass(frozen=True, slots=True)
+class WbcConfig:
+    """Options of `Wbc`.
+
+    Attributes:
+        stance: posture to stand in, a name in `hold.STANCES`.
+        com_ahead: where the centre of mass belongs, ahead of the middle of the soles [m].
+        height_speed: how fast the pelvis moves from where it is to the stance's height [m/s].
+        com_gain, com_damping: spring [1/s^2] and damper [1/s] of the centre of mass.
+        turn_gain, turn_damping: the same of the pelvis' orientation.
+        posture_gain, posture_damping: the same of the leg joints.
+        feet_damping: damper of the soles [1/s].
+        kd: damping in the motors of hip yaw, pitch, roll, knee, ankle pitch, roll [N m s/rad]; at the measured speed
+            the feed-forward cancels it, so that it only acts on what happens between two ticks.
+        friction: coefficient the feet may rely on; the soles have 0.8, and the inscribed pyramid keeps less.
+        sole_margin: how far the centre of pressure stays inside the edge of a sole [m].
+        torque_profile: a profile of `robots.model.limits`.
+        torque_ratio: share of those limits that is used. 0.85 is just below what the safety gate lets through.
+        weights: of the tasks.
+        engage: shortest time in which the feet take over the whole weight from a hoist [s].
+        reach: share of the weight that the feet try to take beyond what they carry already.
+        patience: ticks in a row without a solution for which the last one is kept.
+        hands: whether the robot wears the MAGPIE hands.
+        rate: ticks per second [Hz].
+    """
+
+    stance: str = "crouch"
+    com_ahead: float = 0.0
+    height_speed: float = 0.1
+    com_gain: float = 40.0
+    com_damping: float = 12.0
+    turn_gain: float = 100.0
+    turn_damping: float = 20.0
+    posture_gain: float = 50.0
+    posture_damping: float = 14.0
+    feet_damping: float = 50.0
+    kd: tuple[float, ...] = (2.0, 2.0, 2.0, 2.0, 1.0, 1.0)
+    friction: float = 0.6
+    sole_margin: float = 0.005
+    torque_profile: str = "urdf"
+    torque_ratio: float = 0.85
+    weights: Weights = field(default_factory=lambda: Weights(turn=0.02))
+    engage: float = 0.5
+    reach: float = 0.15
+    patience: int = 5
+    hands: bool = True
+    rate: float = 500.0
+
+
+@dataclass(frozen=True, slots=True)
+class WbcReport:
+    """Why the legs were told what they were told at one tick; vectors are in level axes.
+
+    Attributes:
+        t: time of the state it answers [s].
+        com_error: (3,) from the centre of mass to where it belongs [m]; the height is the pelvis'.
+        com_velocity: (3,) [m/s].
+        capture: (2,) capture point relative to the middle of the soles [m].
+        com_wish, com_given: (3,) acceleration of the centre of mass asked for, and what the forces give it [m/s^2].
+        turn_wish, turn_given: (3,) the same for the pelvis' angular acceleration, in its own axes [rad/s^2].
+        forces: (2, 4, 3) on the corners of the left and the right sole [N].
+        corners: (2, 4, 3) where these act, relative to base_link [m].
+        torque: (12,) of the leg motors [N m].
+        at_limit: joints whose torque is at its bound.
+        lifting: (2, 4) corners that do not push: a foot is about to tip about the others.
+        hoist: what a hoist is believed to carry [N].
+        iterations: of the solver.
+        solved: False where the solver failed and the previous torque was kept.
+    """
+
+    t: float
+    com_error: Array
+    com_velocity: Array
+    capture: Array
+    com_wish: Array
+    com_given: Array
+    turn_wish: Array
+    turn_given: Array
+    forces: Array
+    corners: Array
+    torque: Array
+    at_limit: tuple[str, ...]
+    lifting: Array
+    hoist: float
+    iterations: int
+    solved: bool
+
+
+class Wbc:
+    """The stance controller; it ignores the twist, and its envelope is empty.
+
+    Attributes:
+        config: its options.
+        rate, latency, envelope, gait: see `LowerBody`.
+    """
+
+    def __init__(self, config: WbcConfig | None = None) -> None:
+        """Build the model and the program.
+
+        Raises:
+            ConfigError: unknown stance or torque profile, or not six values of kd.
+        """
+        self.config = c = config or WbcConfig()
+        if c.stance not in STANCES:
+            raise unknown_name("stance", c.stance, STANCES)
+        if len(c.kd) != NUM_LEGS // 2:
+            raise ConfigError("Wbc needs six values of kd: hip yaw, pitch, roll, knee, ankle pitch, roll.")
+        self.rate = c.rate
+        self.latency = 0.0
+        self.envelope = Envelope()
+        self.gait = GaitConfig(start="never")
+        self._rest: Array = np.tile(np.asarray(STANCES[c.stance]), 2)
+        self._rest_height = -float(sole_centers(*leg_poses(self._rest))[:, 2].mean())
+        self._kp, self._kd = np.zeros(NUM_LEGS), np.tile(c.kd, 2)
+        self._bound: Array = c.torque_ratio * load_limits(c.torque_profile).torque[LEGS]
+        self._dynamics = StanceDynamics(c.hands)
+        self._program = StanceProgram(self._bound, c.friction, c.sole_margin, c.weights)
+        self._height: float | None = None
+        self._hoist = 0.0
+        self._solution: Solution | None = None
+        self._failures = 0
+        self._asked: tuple[float, Array, Array, Tasks] | None = None
+
+    def reset(self, state: LowState) -> None:
+        """Forget height, hoist and solution; the next tick takes them from its measurements."""
+        self._height = None
+        self._solution = None
+        self._failures = 0
+        self._asked = None
+
+    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+        """Solve for this tick's torques; see `LowerBody.step`.
+
+        Raises:
+            StanceError: a measurement is not finite, or there was no solution for too many ticks.
+        """
+        c, d = self.config, self._dynamics
+        q, dq = state.q[LEGS], state.dq[LEGS]
+        rate = base_rate(state)
+        if not math.isfinite(sum(float(x.sum()) for x in (state.q, state.dq, rate, base.velocity))):
+            raise StanceError("Wbc was given a joint, a rate or a base velocity that is not finite.")
+        R = base.T_odom_base[:3, :3]
+        d.update(R, base.velocity, rate, state.q, state.dq)
+        middle = d.soles.mean(axis=0)
+        self._advance(state, -float(middle[2]), dt)
+        level, goal = self._goal(middle)
+        tasks = Tasks(
+            com=c.com_gain * (goal - d.com) - c.com_damping * d.com_velocity,
+            turn=c.turn_gain * pin.log3(R.T @ level) - c.turn_damping * rate,
+            feet=-c.feet_damping * d.soles_velocity,
+            legs=c.posture_gain * (self._rest - q) - c.posture_damping * dq,
+        )
+        solution = self._program.solve(d, tasks, self._hoist)
+        self._failures = self._failures + 1 if solution is None else 0
+        self._solution = solution or self._solution
+        if self._solution is None or self._failures > c.patience:
+            raise StanceError(f"Wbc found no contact forces for {self._failures} ticks in a row.")
+        self._asked = state.t, middle, goal, tasks
+        return LegCommand(q.copy(), self._kp.copy(), self._kd.copy(), self._solution.torque + self._kd * dq)
+
+    @property
+    def last(self) -> WbcReport | None:
+        """The report of the last tick, worked out when it is asked for; None before the first tick."""
+        if self._asked is None or self._solution is None:
+            return None
+        t, middle, goal, tasks = self._asked
+        d, solution = self._dynamics, self._solution
+        forces = solution.forces
+        pendulum = math.sqrt(max(float(d.com[2] - middle[2]), 0.1) / _G)
+        given = forces.sum(axis=(0, 1)) / d.mass
+        given[2] += self._hoist / d.mass - _G
+        full = np.abs(solution.torque) > self._bound - 1e-3
+        corners = d.soles[:, None] + np.einsum("fij,cj->fci", d.soles_R, self._program.corners)
+        return WbcReport(
+            t=t,
+            com_error=goal - d.com,
+            com_velocity=d.com_velocity,
+            capture=(d.com - middle)[:2] + pendulum * d.com_velocity[:2],
+            com_wish=tasks.com,
+            com_given=given,
+            turn_wish=tasks.turn,
+            turn_given=solution.acceleration[3:6],
+            forces=forces,
+            corners=corners,
+            torque=solution.torque,
+            at_limit=tuple(JOINT_NAMES[i] for i in np.flatnonzero(full)),
+            lifting=np.einsum("fci,fi->fc", forces, d.soles_R[:, :, 2]) < 1e-3,
+            hoist=self._hoist,
+            iterations=solution.iterations,
+            solved=self._failures == 0,
+        )
+
+    def _goal(self, middle: Array) -> tuple[Array, Array]:
+        """Return the rotation that base_link shall have, and where the centre of mass belongs."""
+        assert self._height is not None
+        d = self._dynamics
+        ahead = d.soles_R[0, :2, 0] + d.soles_R[1, :2, 0]
+        c, s = (ahead / np.linalg.norm(ahead)).tolist()
+        level = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        # The pelvis' height stands in for the CoM's, so that raising an arm bends no knee.
+        goal = middle + self.config.com_ahead * level[:, 0]
+        goal[2] += self._height + d.com[2]
+        return level, goal
+
+    def _advance(self, state: LowState, height: float, dt: float) -> None:
+        """Move the wished height towards the stance's, and the weight from a hoist to the feet."""
+        c, weight = self.config, self._dynamics.mass * _G
+        first = self._height is None
+        if not first and self._hoist == 0.0 and self._height == self._rest_height:
+            return
+        wished = height if self._height is None else self._height
+        reach = c.height_speed * dt
+        self._height = wished + min(max(self._rest_height - wished, -reach), reach)
+        if not first and self._hoist == 0.0:
+            return
+        felt = self._dynamics.mass * _upward(state)
+        carried = felt - self._dynamics.load(state.tau[LEGS])
+        share = min(max(carried - c.reach * weight, 0.0), weight)
+        least = self._hoist - weight * dt / c.engage
+        self._hoist = share if first else min(max(share, least), self._hoist)
+
+
+def base_rate(state: LowState) -> Array:
+    """Return the (3,) angular velocity of base_link in its own axes: the IMU's, less the waist joint's [rad/s]."""
+    yaw = float(state.q[_TORSO])
+    c, s = math.cos(yaw), math.sin(yaw)
+    x, y, z = state.imu.gyro.tolist()
+    return np.array([c * x - s * y, s * x + c * y, z - float(state.dq[_TORSO])])
+
+
+def _upward(state: LowState) -> float:
+    """Return the upward component of the specific force that the IMU feels: g at rest [m/s^2]."""
+    w, x, y, z = state.imu.quat.tolist()
+    up = np.array([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z])
+    return float(up @ state.imu.acc) / (w * w + x * x + y * y + z * z)

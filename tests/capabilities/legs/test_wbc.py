@@ -1,0 +1,183 @@
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from tests.capabilities.legs.floor_plant import FloorPlant
+
+from golem.capabilities.arms.postures import POSTURES
+from golem.capabilities.legs.base import STANDING, LowerBody
+from golem.capabilities.legs.hold import STANCES
+from golem.capabilities.legs.wbc import StanceError, Wbc, WbcConfig, base_rate
+from golem.capabilities.legs.wbc_qp import StanceDynamics, StanceProgram, Tasks, Weights
+from golem.errors import ConfigError
+from golem.robots.model import pinocchio_model
+from golem.robots.model.leg_kinematics import SOLE_CENTER
+from golem.robots.model.limits import load_limits
+from golem.robots.model.table import DOF
+from golem.types import LEGS, NUM_JOINTS, UPPER, Array, BaseEstimate, Imu, LowState
+
+FRICTION = 0.6
+BOUND = 0.85 * load_limits().torque[LEGS]
+
+
+def crouching() -> Array:
+    q = np.zeros(NUM_JOINTS)
+    q[LEGS] = np.tile(STANCES["crouch"], 2)
+    q[UPPER] = POSTURES["home"]
+    return q
+
+
+def state(q: Array, tau: Array | None = None, acc: float = 9.81) -> LowState:
+    zero = np.zeros(NUM_JOINTS)
+    imu = Imu(np.array([1.0, 0, 0, 0]), np.zeros(3), np.array([0, 0, acc]))
+    return LowState(0.0, q, zero, zero if tau is None else tau, imu)
+
+
+def still(height: float = 0.96) -> BaseEstimate:
+    T = np.eye(4)
+    T[2, 3] = height
+    return BaseEstimate(0.0, T, height=height, contact=np.ones(2))
+
+
+@cache
+def dynamics() -> StanceDynamics:
+    return StanceDynamics()
+
+
+@cache
+def reference() -> pin.Model:
+    """The model of the robot with nothing of the stance controller in it."""
+    model = pinocchio_model.build(free_base=True)
+    model.armature[6:] = DOF.armature
+    return model
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_solutions_obey_physics_whatever_is_asked(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    q = crouching() + rng.normal(0.0, 0.15, NUM_JOINTS)
+    dq = rng.normal(0.0, 1.0, NUM_JOINTS)
+    R = pin.exp3(rng.normal(0.0, 0.3, 3))
+    velocity, rate = rng.normal(0.0, 0.5, 3), rng.normal(0.0, 1.0, 3)
+    d = dynamics()
+    d.update(R, velocity, rate, q, dq)
+    wild = Tasks(*(rng.normal(0.0, 30.0, n) for n in (3, 3, 12, 12)))
+    program = StanceProgram(BOUND, FRICTION, 0.005, Weights())
+    solution = program.solve(d, wild)
+    assert solution is not None
+    # Equations of motion by another road: recursive Newton-Euler with the forces on the ankle links.
+    model = reference()
+    data = model.createData()
+    configuration = np.concatenate([np.zeros(3), pin.Quaternion(R).coeffs(), q])
+    v, a = np.concatenate([R.T @ velocity, rate, dq]), np.zeros(33)
+    a[:18] = solution.acceleration
+    tau = pin.rnea(model, data, configuration, v, a)
+    tau[6:] += DOF.damping * dq
+    pin.computeJointJacobians(model, data, configuration)
+    for foot, side in enumerate(("left", "right")):
+        frame = model.getFrameId(f"{side}_ankle_roll_link")
+        J = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+        place = pin.updateFramePlacement(model, data, frame)
+        for corner, force in zip(program.corners, solution.forces[foot], strict=True):
+            point = place.rotation @ (corner + SOLE_CENTER)
+            tau -= J.T @ np.concatenate([force, np.cross(point, force)])
+    np.testing.assert_allclose(tau[:6], 0.0, atol=1e-6)
+    np.testing.assert_allclose(tau[6:18], solution.torque, atol=1e-6)
+    assert (np.abs(solution.torque) <= BOUND + 1e-6).all()
+    local = np.einsum("fij,fci->fcj", d.soles_R, solution.forces)
+    assert (local[..., 2] >= -1e-6).all()
+    assert (np.abs(local[..., 0]) + np.abs(local[..., 1]) <= FRICTION * local[..., 2] + 1e-6).all()
+
+
+def test_a_quiet_stance_takes_the_torques_of_inverse_dynamics() -> None:
+    # Without springs nothing is asked to accelerate, so what is left is statics.
+    legs = Wbc(WbcConfig(com_gain=0.0, turn_gain=0.0, posture_gain=0.0))
+    q = crouching()
+    legs.reset(state(q))
+    command = legs.step(state(q, acc=0.0), still(), STANDING, 0.002)
+    report = legs.last
+    assert command.tau is not None and report is not None
+    np.testing.assert_array_equal(command.kp, 0.0)
+    total = report.forces.sum(axis=(0, 1))
+    model = reference()
+    data = model.createData()
+    configuration = np.concatenate([np.zeros(6), [1.0], q])
+    np.testing.assert_allclose(total, [0, 0, pin.computeTotalMass(model) * 9.81], atol=0.5)
+    pressure = np.einsum("fc,fci->i", report.forces[..., 2], report.corners) / total[2]
+    np.testing.assert_allclose(pressure[:2], pin.centerOfMass(model, data, configuration)[:2], atol=1e-3)
+    tau = pin.rnea(model, data, configuration, np.zeros(33), np.zeros(33))
+    pin.computeJointJacobians(model, data, configuration)
+    for foot, side in enumerate(("left", "right")):
+        frame = model.getFrameId(f"{side}_ankle_roll_link")
+        J = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+        ankle = pin.updateFramePlacement(model, data, frame).translation
+        for point, force in zip(report.corners[foot], report.forces[foot], strict=True):
+            tau -= J.T @ np.concatenate([force, np.cross(point - ankle, force)])
+    np.testing.assert_allclose(command.tau, tau[6:18], atol=0.3)
+
+
+def test_stands_on_a_floor_and_takes_a_small_push() -> None:
+    legs = Wbc()
+    assert isinstance(legs, LowerBody)
+    plant = FloorPlant()
+    assert plant.run(legs, 5.0, (1.0, 0.2, np.array([60.0, 60.0, 0.0])))
+    report = legs.last
+    assert report is not None and report.solved and report.at_limit == ()
+    assert np.linalg.norm(report.com_error[:2]) < 0.02
+    assert np.linalg.norm(plant.data.qvel[:6]) < 0.05
+
+
+def test_weight_moves_from_a_hoist_to_the_feet_no_faster_than_they_take_it() -> None:
+    legs = Wbc()
+    q = crouching()
+    weight = dynamics().mass * 9.81
+
+    def ticks(n: int, tau: Array) -> float:
+        for _ in range(n):
+            legs.step(state(q, tau), still(), STANDING, 0.002)
+        assert legs.last is not None
+        np.testing.assert_allclose(
+            legs.last.forces[..., 2].sum(), weight - legs.last.hoist, rtol=0.02, atol=5.0
+        )
+        return legs.last.hoist / weight
+
+    dynamics().update(np.eye(3), np.zeros(3), np.zeros(3), q, np.zeros(NUM_JOINTS))
+    hanging = np.zeros(NUM_JOINTS)
+    hanging[LEGS] = dynamics().h[6:]
+    legs.reset(state(q, hanging))
+    # Legs that hang free never take more than the reach ...
+    assert ticks(1, hanging) == pytest.approx(0.85, abs=0.02)
+    assert ticks(500, hanging) == pytest.approx(0.85, abs=0.02)
+    # ... those that carry the weight get it, in the time of the ramp ...
+    standing = np.zeros(NUM_JOINTS)
+    command = Wbc().step(state(q, standing, 0.0), still(), STANDING, 0.002)
+    assert command.tau is not None
+    standing[LEGS] = command.tau
+    assert ticks(100, standing) == pytest.approx(0.85 - 0.2 / 0.5, abs=0.05)
+    assert ticks(200, standing) == 0.0
+    # ... and do not give it back.
+    assert ticks(10, hanging) == 0.0
+
+
+def test_base_rate_undoes_the_waist() -> None:
+    q, dq = np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
+    q[12], dq[12] = 0.7, 1.5
+    rate = np.array([0.3, -0.2, 0.5])
+    gyro = pin.exp3(np.array([0, 0, 0.7])).T @ rate + np.array([0, 0, 1.5])
+    imu = Imu(np.array([1.0, 0, 0, 0]), gyro, np.zeros(3))
+    np.testing.assert_allclose(base_rate(LowState(0.0, q, dq, dq, imu)), rate)
+
+
+def test_bad_measurements_and_options_are_named() -> None:
+    legs = Wbc()
+    broken = crouching()
+    broken[3] = np.nan
+    with pytest.raises(StanceError, match="not finite"):
+        legs.step(state(broken), still(), STANDING, 0.002)
+    with pytest.raises(ConfigError, match="crouch"):
+        Wbc(WbcConfig(stance="croch"))
+    with pytest.raises(ConfigError, match="six"):
+        Wbc(WbcConfig(kd=(1.0, 2.0)))
