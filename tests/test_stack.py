@@ -128,12 +128,19 @@ def test_a_file_is_read(tmp_path: Path) -> None:
 
 CHANGED: dict[str, Any] = {
     slot: Choice(getattr(Stack(), slot).use, {"option": 1}) for slot in registry.slots()
-} | {"profile": "field", "limits": "paper"}
+} | {"fallback": Choice("hold"), "profile": "field", "limits": "paper"}
 
 
 @pytest.mark.parametrize("key", [f.name for f in fields(Stack)])
 def test_the_digest_changes_with_everything(key: str) -> None:
     assert replace(Stack(), **{key: CHANGED[key]}).digest() != Stack().digest()
+
+
+def test_a_robot_on_its_feet_falls_back_on_legs_that_balance() -> None:
+    assert Stack().legs_in_reserve == Choice("hold")
+    assert parse_stack("robot: {use: mujoco, support: ground}", "x").legs_in_reserve == Choice("almi")
+    chosen = parse_stack("fallback: {use: hold, stance: crouch}", "x")
+    assert chosen.legs_in_reserve == Choice("hold", {"stance": "crouch"})
 
 
 def test_the_digest_does_not_depend_on_the_order_of_options() -> None:

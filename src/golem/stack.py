@@ -33,6 +33,8 @@ class Stack:
     """A whole stack: one choice per slot, the realism profile and the torque limits.
 
     Attributes:
+        fallback: the lower body that takes the legs when `lower_body` fails. None: `almi` where the robot's option
+            `support` is `ground`, else `hold`.
         profile: realism profile of a simulated robot: ideal, bench or field.
         limits: torque limit profile the safety gate enforces: urdf or paper.
     """
@@ -45,12 +47,18 @@ class Stack:
     upper_body: Choice = Choice("diff_ik")
     localizer: Choice = Choice("onnx")
     grasp_method: Choice = Choice("visual_servo")
+    fallback: Choice | None = None
     profile: str = "bench"
     limits: str = "urdf"
 
     def choice(self, slot: str) -> Choice:
         """Return what sits in `slot`."""
         return getattr(self, slot)
+
+    @property
+    def legs_in_reserve(self) -> Choice:
+        """The lower body that takes the legs when `lower_body` fails."""
+        return self.fallback or Choice("almi" if self.robot.options.get("support") == "ground" else "hold")
 
     def with_choice(self, slot: str, use: str) -> Stack:
         """Return a copy with another implementation in `slot` (and no options for it).
@@ -111,7 +119,8 @@ def parse_stack(text: str, name: str) -> Stack:
     for key, value in data.items():
         if key not in valid:
             raise unknown_name(f"key in {name}", str(key), valid)
-        values[key] = _choice(name, key, value) if key in registry.slots() else _word(name, key, value)
+        slot = "lower_body" if key == "fallback" else key
+        values[key] = _choice(name, key, slot, value) if slot in registry.slots() else _word(name, key, value)
     return Stack(**values)
 
 
@@ -121,14 +130,14 @@ def _word(name: str, key: str, value: object) -> str:
     return value
 
 
-def _choice(name: str, slot: str, value: object) -> Choice:
+def _choice(name: str, key: str, slot: str, value: object) -> Choice:
     if isinstance(value, str):
         return Choice(value)
     if not isinstance(value, Mapping) or not isinstance(value.get("use"), str):
         raise ConfigError(
-            f"{name}: '{slot}' wants '{{use: NAME, option: value, ...}}', with NAME one of "
+            f"{name}: '{key}' wants '{{use: NAME, option: value, ...}}', with NAME one of "
             f"{', '.join(registry.names(slot))}, package.module:Class or file.py:Class."
         )
     options = {key: v for key, v in value.items() if key != "use"}
-    check_values(f"{name}: {slot}", options)
+    check_values(f"{name}: {key}", options)
     return Choice(value["use"], options)

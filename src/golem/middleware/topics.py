@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from golem.types import LocalizedObject, Side
+from golem.types import Array, LocalizedObject, Side, Twist
 
 LOW_STATE = "lowstate"
 """`LowState` at 500 Hz, from the robot."""
@@ -26,6 +26,10 @@ LEG_COMMAND = "leg_command"
 """`LegCommand`, from the lower-body controller."""
 TWIST = "cmd_vel"
 """`Twist` for the lower body."""
+LEG_STATUS = "legs/status"
+"""`LegStatus`, from the base layer of the lower body."""
+ODOMETRY = "odometry"
+"""`Odometry` from whatever locates the robot better than its base estimate; a stack without it never sends any."""
 FEEDBACK = "skill/feedback"
 """`Feedback` of the running skill."""
 
@@ -102,3 +106,43 @@ class HandGoal:
 
     gap: float | None
     force: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class LegStatus:
+    """What the base layer of the lower body did at one tick.
+
+    Attributes:
+        t: time [s].
+        commanded: the newest twist, as it came: it may be far outside what is possible, or not finite.
+        applied: the twist the controller was given.
+        clamped: whether `commanded` lies outside the controller's envelope.
+        reason: why `applied` is not on its way to `commanded`; empty where it is.
+        stepping: whether the gait clock runs.
+        phase: (2,) gait phase of the left and the right leg, 0 to 1.
+        controller: the implementation in charge, as the stack names it.
+        fault: how the stack's own controller failed, once the fallback is in charge; else None.
+    """
+
+    t: float
+    commanded: Twist
+    applied: Twist
+    clamped: bool
+    reason: str
+    stepping: bool
+    phase: Array
+    controller: str
+    fault: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Where base_link is in odom by a source of its own.
+
+    Attributes:
+        t: time of the measurement [s].
+        T_odom_base: (4, 4) pose of base_link in odom.
+    """
+
+    t: float
+    T_odom_base: Array

@@ -29,12 +29,12 @@ from golem.runtime import nodes
 from golem.runtime.executor import Executor, Node
 from golem.runtime.guard import Guard
 from golem.runtime.guarded import GuardedMethod
-from golem.runtime.legs import LowerBodyNode
+from golem.runtime.legs import Legs, LowerBodyNode
 from golem.skills.base import Skill, SkillResult
 from golem.skills.context import Context
 from golem.skills.grasping.base import GraspMethod
 from golem.skills.runner import SkillRun
-from golem.stack import Stack
+from golem.stack import Choice, Stack
 from golem.types import LEGS, NUM_JOINTS, SIDES, UPPER, Array, Side
 
 CAMERA_LATENCY = 0.033
@@ -92,8 +92,8 @@ class Running:
     def _nodes(self, stack: Stack, robot: Robot) -> list[Node]:
         """Return the nodes in the order of one tick: measure, estimate, perceive, decide, control, protect, act."""
 
-        def make(slot: str, **context: object) -> tuple[Any, Guard]:
-            choice = stack.choice(slot)
+        def make(slot: str, chosen: Choice | None = None, **context: object) -> tuple[Any, Guard]:
+            choice = chosen or stack.choice(slot)
             guard = Guard(slot, choice.use)
             module = registry.create(slot, choice.use, choice.options, **context)
             guard.satisfies(module, CONTRACTS[slot])
@@ -102,6 +102,8 @@ class Running:
         bus = self.bus
         robot_guard = Guard("robot", stack.robot.use)
         localizer, localizer_guard = make("localizer")
+        reserve = make("lower_body", stack.legs_in_reserve)
+        self._legs = LowerBodyNode(bus, Legs(*make("lower_body")), Legs(*reserve))
         out: list[Node] = [
             nodes.SenseNode(bus, robot, robot_guard),
             nodes.EstimatorNode(bus, *make("estimator")),
@@ -112,7 +114,7 @@ class Running:
             out.append(nodes.CameraNode(bus, robot, name, optical, CAMERA_LATENCY, robot_guard))
             out.append(nodes.LocalizerNode(bus, localizer, name, localizer_guard))
         out.append(self._skills)
-        out.append(LowerBodyNode(bus, *make("lower_body")))
+        out.append(self._legs)
         out.append(nodes.UpperBodyNode(bus, *make("upper_body")))
         for side in SIDES:
             hand, guard = make("hand", side=side)
@@ -164,13 +166,16 @@ class Running:
             watch: called after every tick, for judges and viewers.
 
         Returns:
-            The result; a safety stop or a timeout ends the skill with a result that says so.
+            The result; a safety stop or a timeout ends the skill with a result that says so. After a fault of the
+            lower body the fallback gets the time to stand before this returns.
         """
         run = self.start(skill, goal)
+        self._legs.realtime = realtime
 
         def over() -> bool:
             watch()
-            return run.result is not None or self._stopped()
+            ended = run.result is not None and not self._legs.recovering(self.executor.t)
+            return ended or self._stopped()
 
         try:
             self.executor.run(self.executor.t + timeout, over, realtime)

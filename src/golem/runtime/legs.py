@@ -1,36 +1,145 @@
-"""The node of the lower body: connects a leg controller to the bus."""
+"""The node of the lower body: connects the leg controller to the bus, and falls back on another when it fails."""
 
 from __future__ import annotations
 
-from golem.capabilities.legs.base import STANDING, LegCommand, LowerBody
+import time
+
+from golem.capabilities.legs.base import LegCommand, LowerBody
+from golem.capabilities.legs.locomotion import Locomotion
+from golem.errors import ModuleFault
 from golem.middleware import topics
-from golem.middleware.bus import Bus
+from golem.middleware.bus import Bus, News
+from golem.middleware.topics import LegStatus
 from golem.runtime.guard import Guard
 from golem.runtime.nodes import MIN_RATE, moving
-from golem.types import LEGS, BaseEstimate, LowState
+from golem.types import LEGS, BaseEstimate, LowState, Twist
+
+MAX_LATENCY = 0.1
+"""Latency a leg controller may have [s]: a third of the time constant sqrt(h/g) with which the robot falls."""
+OVERRUNS = 5
+"""Ticks in a row that may each take longer than their period, where the wall clock counts; one is a hiccup."""
+RECOVERY = 2.0
+"""Time the fallback gets to come to a stand [s]: from 0.8 m/s with a margin, and two steps [own]."""
+JOINTS = LEGS.stop - LEGS.start
+
+
+class Legs:
+    """A leg controller and who watches it.
+
+    Attributes:
+        controller, guard: the two.
+        rate: ticks per second [Hz].
+    """
+
+    def __init__(self, controller: LowerBody, guard: Guard) -> None:
+        """Take `controller`, watched by `guard`.
+
+        Raises:
+            ModuleFault: its rate or its latency is none.
+        """
+        self.controller, self.guard = controller, guard
+        self.rate = guard.number("rate", controller.rate, least=MIN_RATE)
+        self.check_latency()
+
+    def check_latency(self) -> float:
+        """Return the latency at this moment [s]; a controller may measure its own.
+
+        Raises:
+            ModuleFault: it is no latency.
+        """
+        return self.guard.number("latency", self.controller.latency, least=0.0)
 
 
 class LowerBodyNode:
-    """Runs the leg controller at its rate."""
+    """Runs the leg controller at its rate; when it fails, the fallback for the rest of the run.
 
-    def __init__(self, bus: Bus, legs: LowerBody, guard: Guard) -> None:
-        """Run `legs`."""
-        self._bus, self._legs, self._guard = bus, legs, guard
-        self._latency = guard.number("latency", legs.latency, least=0.0)
-        self.period = 1.0 / guard.number("rate", legs.rate, least=MIN_RATE)
+    A controller fails when it raises, returns what the contract forbids, declares a latency beyond `MAX_LATENCY`, or
+    takes longer than its period `OVERRUNS` times in a row. The fallback then gets the legs in the same tick, at zero
+    twist. When it fails too, the fault goes up and stops the motors.
+
+    Attributes:
+        realtime: whether the wall clock counts; in lock-step a controller pays by its declared latency.
+    """
+
+    def __init__(self, bus: Bus, legs: Legs, fallback: Legs) -> None:
+        """Run `legs`, with `fallback` in reserve."""
+        self._bus, self._legs, self._fallback = bus, legs, fallback
+        self._locomotion = Locomotion(legs.controller)
+        self._twists = News(bus, topics.TWIST, Twist)
+        self._fault: ModuleFault | None = None
+        self._failed_at = -RECOVERY
+        self._overruns = 0
+        self.realtime = False
+        self.period = 1.0 / max(legs.rate, fallback.rate)
+
+    def recovering(self, t: float) -> bool:
+        """Return whether at time `t` [s] the fallback has just taken over."""
+        return t - self._failed_at < RECOVERY
 
     def step(self, t: float) -> None:
-        """Publish leg targets."""
+        """Publish leg targets, and what the base layer did."""
         state = self._bus.latest(topics.LOW_STATE, LowState)
         base = self._bus.latest(topics.BASE, BaseEstimate)
         if state is None or base is None:
             return
+        twist = self._twists.read()
+        try:
+            command = self._control(state, base, twist)
+        except ModuleFault as fault:
+            if self._fault is not None:
+                raise self._both(fault) from fault
+            # A copy: the one that was raised holds every frame it passed.
+            self._fault = ModuleFault(fault.slot, fault.use, fault.reason)
+            self._failed_at = t
+            self._legs = self._fallback
+            try:
+                self._legs.guard.call(self._locomotion.hand_over, self._legs.controller, state)
+                command = self._control(state, base, None)
+            except ModuleFault as second:
+                raise self._both(second) from second
+        self._bus.publish(topics.LEG_COMMAND, command, t, self._legs.check_latency())
+        self._report(t)
+
+    def _control(self, state: LowState, base: BaseEstimate, twist: Twist | None) -> LegCommand:
+        """Run the controller in charge for one tick; a fault of it is raised."""
+        guard = self._legs.guard
+        started = time.perf_counter()
         if not moving(self._bus):
-            self._guard.call(self._legs.reset, state)
-        command = self._guard.call(self._legs.step, state, base, STANDING, self.period)
-        self._guard.kind("the leg command", command, LegCommand)
+            guard.call(self._locomotion.reset, state)
+            twist = None
+        command = guard.call(self._locomotion.step, state, base, twist, self.period)
+        late = self.realtime and time.perf_counter() - started > 1.0 / self._legs.rate
+        self._overruns = self._overruns + 1 if late else 0
+        if self._overruns >= OVERRUNS:
+            raise guard.fault(f"it took longer than its period {OVERRUNS} times in a row")
+        latency = self._legs.check_latency()
+        if latency > MAX_LATENCY:
+            raise guard.fault(f"its latency is {latency:g} s, legs need at most {MAX_LATENCY:g} s")
+        guard.kind("the leg command", command, LegCommand)
         for name in ("q", "kp", "kd"):
-            self._guard.array(name, getattr(command, name), LEGS.stop - LEGS.start)
+            guard.array(name, getattr(command, name), JOINTS)
         if command.tau is not None:
-            self._guard.array("tau", command.tau, LEGS.stop - LEGS.start)
-        self._bus.publish(topics.LEG_COMMAND, command, t, self._latency)
+            guard.array("tau", command.tau, JOINTS)
+        return command
+
+    def _both(self, second: ModuleFault) -> ModuleFault:
+        """Return the fault of the stack's own controller, with that of the fallback added."""
+        first = self._fault
+        assert first is not None
+        reason = f"{first.reason}; the fallback {second.use} failed too: {second.reason}"
+        return ModuleFault(first.slot, first.use, reason)
+
+    def _report(self, t: float) -> None:
+        locomotion = self._locomotion
+        status = LegStatus(
+            t,
+            locomotion.commanded,
+            locomotion.applied,
+            locomotion.clamped,
+            locomotion.reason,
+            bool(locomotion.gait.stepping),
+            locomotion.gait.phases,
+            self._legs.guard.use,
+            None if self._fault is None else str(self._fault),
+        )
+        self._bus.publish(topics.LEG_STATUS, status, t)

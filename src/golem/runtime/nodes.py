@@ -15,7 +15,7 @@ from golem.hardware.safety.gate import Gate
 from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
 from golem.middleware.bus import Bus
-from golem.middleware.topics import HandGoal, LookRequest, Sightings
+from golem.middleware.topics import HandGoal, LegStatus, LookRequest, Sightings
 from golem.robots.base import Robot
 from golem.robots.model.kinematics import Kinematics
 from golem.runtime.executor import TICK
@@ -335,7 +335,7 @@ class SafetyNode:
 
 
 class SkillNode:
-    """Resumes the running skill.
+    """Resumes the running skill, and ends it once the lower body runs on its fallback.
 
     Attributes:
         run: the skill in execution, or None.
@@ -351,8 +351,12 @@ class SkillNode:
     def step(self, t: float) -> None:
         """Resume the skill until its next await."""
         self._context.refresh(t)
-        if self.run is not None:
-            self.run.step()
+        if self.run is None:
+            return
+        legs = self._context.bus.latest(topics.LEG_STATUS, LegStatus)
+        if legs is not None and legs.fault is not None:
+            self.run.fail("lower_body", legs.fault)
+        self.run.step()
 
 
 def moving(bus: Bus) -> bool:

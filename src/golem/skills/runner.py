@@ -38,6 +38,13 @@ class SkillRun:
         if self.result is None:
             self._guard(lambda: self._coroutine.throw(SkillCancelled()))
 
+    def fail(self, slot: str, reason: str) -> None:
+        """End the skill because the module in `slot` broke its contract; the skill learns it as a cancellation."""
+        if self.result is None:
+            self._guard(lambda: self._coroutine.throw(SkillCancelled()))
+            self._coroutine.close()
+            self.result = SkillResult(False, FAULT, slot, reason)
+
     def _guard(self, resume: Callable[[], object]) -> None:
         """Resume the skill; whatever ends it becomes its result."""
         try:

@@ -1,0 +1,177 @@
+"""The base layer of the lower body: what every leg controller gets done for it.
+
+It judges the twist (finite, inside the envelope, recent), limits its acceleration, runs the gait clock from the
+balance of the measured robot, and runs the controller at its own rate. The controller sees a `Motion` it can follow.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.capabilities.legs.balance import balance_errors
+from golem.capabilities.legs.base import LegCommand, LowerBody, Motion
+from golem.capabilities.legs.gait import Gait
+from golem.capabilities.legs.pacing import Paced
+from golem.robots.model.imu import base_rate
+from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.leg_kinematics import SOLE_CENTER
+from golem.robots.model.table import JOINT_NAMES
+from golem.types import NUM_JOINTS, SIDES, Array, BaseEstimate, LowState, Twist
+
+ZERO = Twist()
+_WAIST = JOINT_NAMES.index("torso_joint")
+_ANKLES = tuple(f"{side}_ankle_roll_link" for side in SIDES)
+
+
+@dataclass(frozen=True, slots=True)
+class LocomotionConfig:
+    """Options of the base layer.
+
+    Attributes:
+        dead_band: norm of (vx, vy, wz) below which a twist counts as zero [m/s, rad/s]: ALMI's (and the paper's) 0.1.
+        acceleration: bounds on the change of vx, vy [m/s^2] and wz [rad/s^2] [own: full speed in less than a second].
+        timeout: age of the newest twist from which it counts as zero [s]: whoever sent it may have died.
+        gate_rate: how often the gait clock runs at most [Hz]; controllers may be faster.
+    """
+
+    dead_band: float = 0.1
+    acceleration: tuple[float, float, float] = (1.0, 1.0, 2.0)
+    timeout: float = 0.5
+    gate_rate: float = 100.0
+
+
+class Locomotion:
+    """Runs one leg controller, or another one after a hand-over, under one twist and one gait clock.
+
+    Attributes:
+        config: options.
+        commanded: the newest twist, as it came.
+        applied: the twist the controller gets.
+        clamped: whether the commanded twist lies outside the controller's envelope.
+        reason: why the controller does not get the commanded twist; empty where it does, slewing aside.
+        gait: the gait clock.
+    """
+
+    def __init__(self, controller: LowerBody, config: LocomotionConfig | None = None) -> None:
+        """Run `controller`."""
+        self.config = config or LocomotionConfig()
+        self.gait = Gait(controller.gait)
+        self._paced = Paced(controller)
+        self._kinematics = Kinematics()
+        left, right = self._soles(np.zeros(NUM_JOINTS))
+        # With both hips straight and level the distance of the feet does not depend on how far the knees are bent.
+        self._stance: Array = (left - right)[:2]
+        self._forget()
+
+    @property
+    def controller(self) -> LowerBody:
+        """The controller in charge."""
+        return self._paced.controller
+
+    def reset(self, state: LowState) -> None:
+        """Stand, from the measured `state` on; a twist from before is void."""
+        self._forget()
+        self.gait.reset()
+        self._paced.reset(state)
+
+    def hand_over(self, controller: LowerBody, state: LowState) -> None:
+        """Give the legs to `controller` at the measured `state`, at zero twist; a step that was begun is finished."""
+        self._forget()
+        self._paced = Paced(controller)
+        self._paced.reset(state)
+
+    def step(self, state: LowState, base: BaseEstimate, twist: Twist | None, dt: float) -> LegCommand:
+        """Advance by one tick.
+
+        Args:
+            state: measured joints and IMU.
+            base: estimated pose and velocity of base_link.
+            twist: a twist that was commanded since the previous tick, or None.
+            dt: time since the previous tick [s], positive.
+        """
+        self._listen(twist, dt)
+        self._slew(self._wanted(), dt)
+        self._until_gate -= dt
+        self._since_gate += dt
+        if self._until_gate < 1e-6:
+            self._clock(state, base, self._since_gate)
+            self._until_gate = max(self._until_gate + 1.0 / self.config.gate_rate, 0.0)
+            self._since_gate = 0.0
+        motion = Motion(self.applied, self.gait.phases, bool(self.gait.stepping))
+        return self._paced.step(state, base, motion, dt)
+
+    def _forget(self) -> None:
+        self.commanded = self.applied = ZERO
+        self.clamped = False
+        self.reason = ""
+        self._age = math.inf
+        self._until_gate = self._since_gate = 0.0
+
+    def _listen(self, twist: Twist | None, dt: float) -> None:
+        self._age += dt
+        if twist is not None:
+            self.commanded, self._age = twist, 0.0
+
+    def _wanted(self) -> Twist:
+        """Return the commanded twist as far as it can be followed; note why it cannot."""
+        self.clamped = False
+        asked = self.commanded
+        if not all(map(math.isfinite, (asked.vx, asked.vy, asked.wz))):
+            self.reason = "the commanded twist is not finite"
+            return ZERO
+        if asked == ZERO:
+            self.reason = ""
+            return ZERO
+        if self._age > self.config.timeout:
+            self.reason = f"no twist came for {self.config.timeout:g} s"
+            return ZERO
+        wanted = self.controller.envelope.clamp(asked)
+        self.clamped = wanted != asked
+        self.reason = "the commanded twist is outside the envelope" if self.clamped else ""
+        if _size(wanted) < self.config.dead_band:
+            self.reason = self.reason or "the commanded twist is inside the dead band"
+            return ZERO
+        return wanted
+
+    def _slew(self, wanted: Twist, dt: float) -> None:
+        """Bring the applied twist towards `wanted`; on its way to a stop it ends at the dead band."""
+        steps = (a * dt for a in self.config.acceleration)
+        now, goal = self.applied, wanted
+        applied = Twist(
+            *(
+                x + min(max(y - x, -step), step)
+                for x, y, step in zip(_values(now), _values(goal), steps, strict=True)
+            )
+        )
+        stopped = wanted == ZERO and _size(applied) < self.config.dead_band
+        self.applied = ZERO if stopped else applied
+
+    def _clock(self, state: LowState, base: BaseEstimate, dt: float) -> None:
+        """Advance the gait clock by `dt` [s] from how well the measured robot stands."""
+        R = base.T_odom_base[:3, :3]
+        soles = self._soles(state.q)
+        com = R @ self._kinematics.com()
+        rate = R @ base_rate(state.imu.gyro, state.q[_WAIST], state.dq[_WAIST])
+        velocity = base.velocity + np.cross(rate, com)
+        capture, misplaced = balance_errors(R, com, velocity, soles @ R.T, self._stance)
+        self.gait.config = self.controller.gait
+        self.gait.step(np.asarray(self.applied != ZERO), capture, misplaced, dt)
+
+    def _soles(self, q: Array) -> Array:
+        """Return the (2, 3) centres of the soles in base_link at the joints `q` (27,) [m]."""
+        self._kinematics.update(q)
+        return np.array([(self._kinematics.pose(ankle) @ _SOLE)[:3] for ankle in _ANKLES])
+
+
+_SOLE: Array = np.append(SOLE_CENTER, 1.0)
+
+
+def _values(twist: Twist) -> tuple[float, float, float]:
+    return twist.vx, twist.vy, twist.wz
+
+
+def _size(twist: Twist) -> float:
+    return math.hypot(twist.vx, twist.vy, twist.wz)

@@ -1,0 +1,46 @@
+"""A robot that stands in its crouch, and a controller that remembers what it was asked."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from golem.capabilities.legs.base import Envelope, LegCommand, Motion
+from golem.capabilities.legs.gait import GaitConfig
+from golem.capabilities.legs.hold import STANCES
+from golem.types import LEGS, NUM_JOINTS, BaseEstimate, Imu, LowState
+
+
+class Recorder:
+    """A controller that asks for zero and remembers every motion and time step."""
+
+    def __init__(
+        self, rate: float = 50.0, envelope: Envelope | None = None, gait: GaitConfig | None = None
+    ) -> None:
+        self.rate, self.latency = rate, 0.0
+        self.envelope = envelope or Envelope((-0.4, 0.8), (-0.3, 0.3), (-0.6, 0.6))
+        self.gait = gait or GaitConfig()
+        self.motions: list[Motion] = []
+        self.steps: list[float] = []
+        self.resets = 0
+
+    def reset(self, state: LowState) -> None:
+        self.resets += 1
+
+    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+        self.motions.append(motion)
+        self.steps.append(dt)
+        zero = np.zeros(12)
+        return LegCommand(zero, zero, zero)
+
+
+def crouching() -> LowState:
+    """The state of a robot that stands still and upright."""
+    q = np.zeros(NUM_JOINTS)
+    q[LEGS] = np.tile(STANCES["crouch"], 2)
+    imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
+    return LowState(0.0, q, np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS), imu)
+
+
+def still() -> BaseEstimate:
+    """The estimate of a base at rest."""
+    return BaseEstimate(0.0, np.eye(4), height=0.92, contact=np.ones(2))

@@ -1,0 +1,210 @@
+"""The base layer: which twist a controller gets, when it steps, and how often it runs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.capabilities.legs.recorder import Recorder, crouching, still
+
+from golem.capabilities.legs.base import Envelope
+from golem.capabilities.legs.gait import GaitConfig
+from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
+from golem.types import Array, Twist
+
+DT = 0.02
+ZERO = Twist()
+
+
+class Driver:
+    """Runs a base layer over a robot that stands still."""
+
+    def __init__(self, controller: Recorder) -> None:
+        self.controller, self.state, self.base = controller, crouching(), still()
+        self.layer = Locomotion(controller)
+        self.layer.reset(self.state)
+
+    def run(self, seconds: float, twist: Twist | None = None, dt: float = DT) -> None:
+        """Command `twist` at every tick; None says nothing."""
+        for _ in range(round(seconds / dt)):
+            self.layer.step(self.state, self.base, twist, dt)
+
+    @property
+    def applied(self) -> Twist:
+        return self.controller.motions[-1].twist
+
+
+@pytest.fixture
+def driver() -> Driver:
+    return Driver(Recorder())
+
+
+def test_a_twist_inside_the_envelope_is_reached_at_the_allowed_acceleration(driver: Driver) -> None:
+    twist = Twist(0.5, -0.2, 0.4)
+    driver.run(1.0, twist)
+    assert driver.applied == twist
+    assert (driver.layer.clamped, driver.layer.reason) == (False, "")
+    v = np.array([(m.twist.vx, m.twist.vy, m.twist.wz) for m in driver.controller.motions])
+    assert (np.abs(np.diff(v, axis=0)) <= np.array(LocomotionConfig().acceleration) * DT + 1e-12).all()
+    assert v[0, 0] == pytest.approx(1.0 * DT)
+
+
+@pytest.mark.parametrize("huge", [Twist(1e9, 0.0, 0.0), Twist(0.0, -1e300, 5.0)])
+def test_a_huge_twist_is_clamped_to_the_envelope_and_reported(driver: Driver, huge: Twist) -> None:
+    driver.run(2.0, huge)
+    assert driver.applied == driver.controller.envelope.clamp(huge)
+    assert driver.layer.clamped
+    assert "outside the envelope" in driver.layer.reason
+    assert driver.layer.commanded == huge
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("component", ["vx", "vy", "wz"])
+def test_a_twist_that_is_not_finite_stops_the_robot_and_is_reported(
+    driver: Driver, bad: float, component: str
+) -> None:
+    driver.run(1.0, Twist(0.5))
+    driver.run(1.0, replace(Twist(0.5), **{component: bad}))
+    assert driver.applied == ZERO
+    assert "not finite" in driver.layer.reason
+
+
+def test_below_the_dead_band_the_twist_is_exactly_zero(driver: Driver) -> None:
+    driver.run(1.0, Twist(0.06, 0.05, 0.05))
+    assert {m.twist for m in driver.controller.motions} == {ZERO}
+    assert "dead band" in driver.layer.reason
+    driver.run(1.0, Twist(0.08, 0.05, 0.05))
+    assert driver.applied == Twist(0.08, 0.05, 0.05)
+
+
+def test_a_stop_ends_exactly_at_zero(driver: Driver) -> None:
+    driver.run(1.0, Twist(0.5, 0.1, 0.3))
+    driver.run(0.6, ZERO)
+    assert driver.applied == ZERO
+    assert driver.layer.reason == ""
+
+
+def test_a_stream_that_ends_stops_the_robot_after_half_a_second(driver: Driver) -> None:
+    driver.run(1.0, Twist(0.5))
+    driver.run(0.48)
+    assert driver.applied == Twist(0.5)
+    driver.run(0.6)
+    assert driver.applied == ZERO
+    assert "no twist came for 0.5 s" in driver.layer.reason
+
+
+def test_a_twist_from_before_a_reset_is_void(driver: Driver) -> None:
+    driver.run(1.0, Twist(0.5))
+    driver.layer.reset(driver.state)
+    driver.run(0.1)
+    assert driver.applied == ZERO
+    assert not driver.controller.motions[-1].stepping
+
+
+def test_a_commanded_robot_steps_until_it_stands(driver: Driver) -> None:
+    driver.run(0.5)
+    assert not any(m.stepping for m in driver.controller.motions)
+    driver.run(2.0, Twist(0.5))
+    walking = driver.controller.motions[-50:]
+    assert all(m.stepping for m in walking)
+    phases = np.array([m.phase for m in walking])
+    np.testing.assert_allclose((phases[:, 1] - phases[:, 0]) % 1.0, 0.5, atol=1e-9)
+    np.testing.assert_allclose(np.diff(phases[:, 0]) % 1.0, DT / driver.controller.gait.period, atol=1e-9)
+    driver.run(2.0, ZERO)
+    last = driver.controller.motions[-1]
+    assert not last.stepping
+    assert last.twist == ZERO
+
+
+@pytest.mark.parametrize(
+    ("velocity", "gyro", "steps"),
+    [
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False),
+        ((0.3, 0.0, 0.0), (0.0, 0.0, 0.0), False),
+        ((0.5, 0.0, 0.0), (0.0, 0.0, 0.0), True),
+        ((0.0, 0.6, 0.0), (0.0, 0.0, 0.0), True),
+        # The CoM lies below base_link: a base that pitches forward swings it back, one that moves on brings it ahead.
+        ((0.4, 0.0, 0.0), (0.0, 3.0, 0.0), False),
+        ((0.4, 0.0, 0.0), (0.0, -3.0, 0.0), True),
+    ],
+)
+def test_a_standing_robot_steps_when_its_capture_point_leaves_its_feet(
+    driver: Driver, velocity: tuple[float, ...], gyro: tuple[float, ...], steps: bool
+) -> None:
+    driver.base = replace(driver.base, velocity=np.array(velocity))
+    driver.state = replace(driver.state, imu=replace(driver.state.imu, gyro=np.array(gyro)))
+    driver.run(DT)
+    assert driver.controller.motions[-1].stepping is steps
+
+
+def test_the_gate_turns_with_the_robot(driver: Driver) -> None:
+    """A velocity towards the left of a robot that looks along -y makes it lift its right foot first."""
+    T = np.eye(4)
+    T[:2, :2] = [[0.0, 1.0], [-1.0, 0.0]]
+    driver.base = replace(driver.base, T_odom_base=T, velocity=np.array([0.6, 0.0, 0.0]))
+    driver.run(DT)
+    np.testing.assert_allclose(driver.controller.motions[-1].phase, [0.0, 0.5], atol=1e-9)
+    driver.layer.reset(driver.state)
+    driver.base = replace(driver.base, velocity=np.array([-0.6, 0.0, 0.0]))
+    driver.run(DT)
+    np.testing.assert_allclose(driver.controller.motions[-1].phase, [0.5, 0.0], atol=1e-9)
+
+
+def test_feet_that_stand_wrongly_make_it_step(driver: Driver) -> None:
+    q: Array = driver.state.q.copy()
+    q[2], q[8] = 0.15, -0.15
+    driver.state = replace(driver.state, q=q)
+    driver.run(DT)
+    assert driver.controller.motions[-1].stepping
+
+
+def test_the_waist_is_not_the_pelvis(driver: Driver) -> None:
+    """A waist that swings turns the gyro with it, but not the base: nothing there shall look like a fall."""
+    q, dq = driver.state.q.copy(), np.zeros(27)
+    q[12], dq[12] = 0.6, 8.0
+    imu = replace(driver.state.imu, gyro=np.array([0.0, 0.0, 8.0]))
+    driver.state = replace(driver.state, q=q, dq=dq, imu=imu)
+    driver.run(0.2)
+    assert not any(m.stepping for m in driver.controller.motions)
+
+
+def test_a_controller_that_changes_its_gait_gets_it(driver: Driver) -> None:
+    driver.run(1.0, Twist(0.5))
+    driver.controller.gait = GaitConfig(period=1.4)
+    driver.run(0.1, Twist(0.5))
+    phases = [m.phase[0] for m in driver.controller.motions[-2:]]
+    assert (phases[1] - phases[0]) % 1.0 == pytest.approx(DT / 1.4)
+
+
+@given(rate=st.sampled_from([50.0, 100.0, 200.0, 500.0]), loop=st.sampled_from([100.0, 200.0, 500.0]))
+def test_a_controller_runs_at_its_own_rate_in_a_faster_loop(rate: float, loop: float) -> None:
+    rate = min(rate, loop)
+    controller = Recorder(rate)
+    layer = Locomotion(controller)
+    state, base = crouching(), still()
+    layer.reset(state)
+    for _ in range(round(0.5 * loop)):
+        layer.step(state, base, Twist(0.5), 1.0 / loop)
+    assert len(controller.steps) == pytest.approx(0.5 * rate, abs=1)
+    np.testing.assert_allclose(controller.steps[1:], 1.0 / rate, atol=1.0 / loop + 1e-9)
+    # The phase keeps the controller's period whatever the rates.
+    assert sum(controller.steps) == pytest.approx(0.5, abs=1.0 / rate + 1e-9)
+
+
+def test_after_a_hand_over_the_clock_goes_on_and_the_twist_is_zero(driver: Driver) -> None:
+    driver.run(1.0, Twist(0.5))
+    before = driver.controller.motions[-1].phase[0]
+    other = Recorder(envelope=Envelope((-0.1, 0.1), (0.0, 0.0), (0.0, 0.0)))
+    driver.layer.hand_over(other, driver.state)
+    driver.run(DT)
+    assert other.resets == 1
+    first = other.motions[0]
+    assert first.twist == ZERO
+    assert first.stepping
+    assert (first.phase[0] - before) % 1.0 == pytest.approx(DT / other.gait.period)
+    driver.run(1.0, Twist(0.5))
+    assert other.motions[-1].twist == Twist(0.1)
