@@ -65,10 +65,10 @@ def robot_spec(
         _add_motor(spec, joint.name, float(limit))
     for shape in contact.body_shapes(feet):
         _add_shape(bodies[shape.link], shape, contact.BODY)
-    _add_torso_sensors(spec, bodies["torso_link"])
+    add_torso_sensors(spec)
     if hands:
         for side in SIDES:
-            _add_hand(spec, bodies[f"{side}_wrist_yaw_link"], side)
+            add_hand(spec, side)
     if self_collision:
         _let_touch_itself(spec, hands)
     looks.add_looks(spec, hands)
@@ -136,10 +136,13 @@ def _add_camera(body: mujoco.MjsBody, name: str, T_body_optical: Array, fovy: fl
     body.add_camera(name=name, pos=T_body_optical[:3, 3], quat=quat, fovy=fovy)
 
 
-def _add_torso_sensors(spec: mujoco.MjSpec, torso: mujoco.MjsBody) -> None:
+def add_torso_sensors(spec: mujoco.MjSpec) -> None:
+    """Add head camera and IMU; a site `imu` that is there already stays where it is."""
+    torso = spec.body("torso_link")
     _add_camera(torso, "head", T_TORSO_HEAD_OPTICAL, HEAD_FOVY)
     T = FRAMES["imu_link"].T_parent_frame
-    torso.add_site(name="imu", pos=T[:3, 3], quat=quat_of(T[:3, :3]), size=[0.01] * 3, group=4)
+    if spec.site("imu") is None:
+        torso.add_site(name="imu", pos=T[:3, 3], quat=quat_of(T[:3, :3]), size=[0.01] * 3, group=4)
     for name, kind in (
         ("imu_quat", mujoco.mjtSensor.mjSENS_FRAMEQUAT),
         ("imu_gyro", mujoco.mjtSensor.mjSENS_GYRO),
@@ -148,7 +151,9 @@ def _add_torso_sensors(spec: mujoco.MjSpec, torso: mujoco.MjsBody) -> None:
         spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="imu")
 
 
-def _add_hand(spec: mujoco.MjSpec, wrist: mujoco.MjsBody, side: Side) -> None:
+def add_hand(spec: mujoco.MjSpec, side: Side) -> None:
+    """Mount a MAGPIE hand with its camera and motors to `{side}_wrist_yaw_link`."""
+    wrist = spec.body(f"{side}_wrist_yaw_link")
     T = magpie.T_WRIST_HAND
     hand = _add_body(wrist, magpie.hand_name(side), magpie.BASE, T[:3, 3], T[:3, :3])
     _add_shape(hand, contact.housing_shape(magpie.hand_name(side)), contact.HAND)

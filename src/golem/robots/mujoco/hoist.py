@@ -1,4 +1,4 @@
-"""The hoist that holds the robot at the pelvis, its legs unloaded."""
+"""The hoist that holds the robot at the pelvis: its legs unloaded, or its feet on the floor until it is let go."""
 
 from __future__ import annotations
 
@@ -30,6 +30,10 @@ class HoistConfig:
     damping_ratio: float = 0.7
 
 
+RELEASE_TIME = 0.5
+"""Time in which a released hoist hands the weight over to the feet [s]."""
+
+
 class Hoist:
     """Spring and damper between the pelvis and the hook, preloaded with the robot's weight."""
 
@@ -47,9 +51,23 @@ class Hoist:
         self._d = [2.0 * config.damping_ratio * math.sqrt(k * mass) for k in self._k]
         # 8 kg m^2: the robot about its pelvis, order of magnitude; only the damping ratio depends on it.
         self._d_rot = [2.0 * config.damping_ratio * math.sqrt(k * 8.0) for k in self._k_rot]
+        self._released_at = math.inf
+
+    @property
+    def released(self) -> bool:
+        """Whether `release` was called."""
+        return self._released_at < math.inf
+
+    def release(self, t: float) -> None:
+        """Let go smoothly from time `t` [s] on; a second call does nothing."""
+        self._released_at = min(self._released_at, t)
 
     def apply(self, data: mujoco.MjData, sway: Array) -> None:
         """Set the wrench on the pelvis for the present state; the hook is displaced by `sway` (2,) [m]."""
+        share = self._share(data.time)
+        if share == 0.0:
+            data.xfrc_applied[self._body] = 0.0
+            return
         # Scalars: this runs at every physics step, where small arrays cost more than the arithmetic.
         x, y, z = data.qpos[self._position].tolist()
         w, *axis = data.qpos[self._attitude].tolist()
@@ -69,3 +87,10 @@ class Hoist:
             -k_rot[1] * sign * axis[1] - d_rot[1] * rate[1],
             -k_rot[2] * sign * axis[2] - d_rot[2] * rate[2],
         )
+        if share < 1.0:
+            data.xfrc_applied[self._body] *= share
+
+    def _share(self, t: float) -> float:
+        """Return how much of the wrench is left at time `t` [s], 1 to 0."""
+        gone = (t - self._released_at) / RELEASE_TIME
+        return 1.0 if gone <= 0.0 else 0.0 if gone >= 1.0 else 0.5 * (1.0 + math.cos(math.pi * gone))

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from golem.robots.model import mjcf
+from golem.errors import ConfigError
+from golem.robots.model import contact, magpie, mjcf
+from golem.robots.model.looks import VISUAL_GROUP
+from golem.robots.model.table import BASE_LINK, JOINT_NAMES
+from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream
+from golem.robots.worlds import parts, terrain
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
 from golem.robots.worlds.screws import ScrewDraw, draw_screws
-from golem.types import CameraInfo
+from golem.types import SIDES, Array, CameraInfo
 
 COARSE_STEP = 0.002
 """Physics step while nothing delicate is touched [s]."""
@@ -24,7 +30,7 @@ FINE_STEP = 0.0005
 ONLOOKER = CameraInfo(
     "onlooker", 640, 480, fx=700.0, fy=700.0, cx=319.5, cy=239.5, near=0.0, far=60.0, rate=15.0
 )
-"""A camera beside the pack, for pictures of what happened."""
+"""A camera beside the pack, for pictures of what happened; in a world without a pack it goes along with the robot."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +39,7 @@ class Scene:
 
     Attributes:
         model: the model.
-        names: what the pack added.
+        names: what the pack added; nothing in a world without one.
         layout: where the pack stands.
         draws: the loosened screws.
     """
@@ -44,40 +50,133 @@ class Scene:
     draws: tuple[ScrewDraw, ...]
 
 
-def build_scene(layout: PackLayout, profile: RealismProfile, seed: int, reach_y: float) -> Scene:
-    """Compile the pack world for one seed.
+def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfile, seed: int) -> Scene:
+    """Compile the world of one seed.
 
     Args:
+        config: robot and world.
         layout: where the pack stands; x, y from the robot's pelvis, z from the floor.
         profile: ranges of the screws.
-        seed: draws the screws.
-        reach_y: the fasteners of the near edge with |y| up to this are loosened [m].
+        seed: draws screws or terrain.
+
+    Raises:
+        ConfigError: an option of `config` has no meaning, or its MJCF is no robot of this kind.
     """
-    spec = mjcf.robot_spec(hands=True)
-    slots = [s for s in layout.reachable(reach_y) if s not in layout.empty_holes]
-    draws = draw_screws(stream(seed, "world/screws"), profile.screws, slots)
-    names = add_pack(spec, layout, draws)
-    _add_onlooker(spec, layout)
+    spec = _robot(config)
+    draws: list[ScrewDraw] = []
+    names = PackNames((), np.zeros((0, 3)), "", ())
+    if config.world == "pack":
+        slots = [s for s in layout.reachable(config.reach_y) if s not in layout.empty_holes]
+        draws = draw_screws(stream(seed, "world/screws"), profile.screws, slots)
+        names = add_pack(spec, layout, draws)
+        _add_onlooker(spec, layout)
+    else:
+        _add_terrain(spec, config, seed)
+        _add_companion(spec)
+    if config.cone is not None:
+        spec.option.cone = mujoco.mjtCone[f"mjCONE_{config.cone.upper()}"]
     spec.option.timestep = COARSE_STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    for kind, name in (
-        (mujoco.mjtSensor.mjSENS_FRAMEQUAT, "imu_quat"),
-        (mujoco.mjtSensor.mjSENS_GYRO, "imu_gyro"),
-        (mujoco.mjtSensor.mjSENS_ACCELEROMETER, "imu_acc"),
-    ):
-        if name not in {s.name for s in spec.sensors}:
-            spec.add_sensor(type=kind, name=name, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="imu")
     return Scene(spec.compile(), names, layout, tuple(draws))
+
+
+def _robot(config: MujocoConfig) -> mujoco.MjSpec:
+    """Return the robot that `config` describes, without a world."""
+    if config.mjcf is not None:
+        spec = foreign_robot(config.mjcf)
+    else:
+        limbs = config.self_collision
+        spec = mjcf.robot_spec(
+            torque=config.torque_profile,
+            self_collision=config.support == "ground" if limbs is None else limbs,
+            feet=config.feet,
+        )
+    for side in SIDES:
+        for geom in spec.body(f"{side}_ankle_roll_link").geoms:
+            # With a higher priority its friction is the pair's; otherwise the greater of the two would be.
+            geom.priority = 1
+            geom.friction[0] = config.friction
+    for side, mass in zip(SIDES, config.payload, strict=True):
+        if mass > 0.0:
+            _add_payload(spec.body(magpie.hand_name(side)), mass)
+    return spec
+
+
+def foreign_robot(path: Path) -> mujoco.MjSpec:
+    """Return the robot of another MJCF file with our hands, cameras and names, its limbs touching the world only.
+
+    Args:
+        path: an H1-2 with the vendor's 27 motors, links, joints and `imu` site, angles in radians.
+
+    Raises:
+        ConfigError: it cannot be read, or is no such robot.
+    """
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+    except (ValueError, OSError) as error:
+        raise ConfigError(f"The robot's MJCF '{path}' cannot be read: {error}.") from error
+    base = spec.body(BASE_LINK)
+    motors = tuple(actuator.name for actuator in spec.actuators)
+    if base is None or spec.site("imu") is None or motors != JOINT_NAMES or spec.compiler.degree:
+        raise ConfigError(
+            f"'{path}' is not the robot: it takes the link {BASE_LINK}, a site imu, angles in radians, and the motors "
+            f"{JOINT_NAMES[0]} to {JOINT_NAMES[-1]} in the vendor's order."
+        )
+    base.joints[0].name = "base"
+    for sensor in spec.sensors:
+        spec.delete(sensor)
+    for geom in spec.geoms:
+        if geom.contype:
+            geom.contype, geom.conaffinity, geom.group = contact.BODY, contact.WORLD, mjcf.COLLISION_GROUP
+        else:
+            geom.group = VISUAL_GROUP
+    mjcf.add_torso_sensors(spec)
+    for side in SIDES:
+        mjcf.add_hand(spec, side)
+    return spec
+
+
+def _add_payload(hand: mujoco.MjsBody, mass: float) -> None:
+    """Fix a ball of `mass` [kg] where the fingers meet; it touches nothing."""
+    radius = 0.04
+    body = hand.add_body(
+        name=f"{hand.name}_payload",
+        pos=magpie.T_HAND_GRIPPER[:3, 3],
+        mass=mass,
+        inertia=[0.4 * mass * radius**2] * 3,
+        explicitinertial=True,
+    )
+    parts.visual(body, mujoco.mjtGeom.mjGEOM_SPHERE, (radius,), material="", rgba=(0.9, 0.5, 0.1, 1.0))
+
+
+def _add_terrain(spec: mujoco.MjSpec, config: MujocoConfig, seed: int) -> None:
+    if config.world == "slope":
+        terrain.add_slope(spec, config.slope)
+    elif config.world == "rubble":
+        terrain.add_rubble(spec, config.rubble, stream(seed, "world/rubble"))
+    else:
+        terrain.add_open(spec)
 
 
 def _add_onlooker(spec: mujoco.MjSpec, layout: PackLayout) -> None:
     """Add a fixed camera that watches hands and near edge from the robot's left; no module of a stack sees it."""
     eye = np.array([layout.near_edge + 0.95, 0.75, layout.top_z + 0.70])
     target = np.array([layout.near_edge + 0.02, -0.15, layout.top_z + 0.06])
+    _aim(spec.worldbody.add_camera(name=ONLOOKER.name), eye, target)
+
+
+def _add_companion(spec: mujoco.MjSpec) -> None:
+    """Add a camera that goes along with the robot without turning, ahead of it to the left."""
+    camera = spec.body(BASE_LINK).add_camera(name=ONLOOKER.name)
+    camera.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACK
+    _aim(camera, np.array([2.6, 2.0, 0.5]), np.zeros(3))
+
+
+def _aim(camera: mujoco.MjsCamera, eye: Array, target: Array) -> None:
+    """Place `camera` at `eye` and let it look at `target`, (3,) each in its body's frame [m]."""
     back = (eye - target) / np.linalg.norm(eye - target)
     right = np.cross([0.0, 0.0, 1.0], back)
     right /= np.linalg.norm(right)
-    axes = np.concatenate([right, np.cross(back, right)])
-    camera = spec.worldbody.add_camera(name=ONLOOKER.name, pos=eye.tolist())
+    camera.pos = eye.tolist()
     camera.alt.type = mujoco.mjtOrientation.mjORIENTATION_XYAXES
-    camera.alt.xyaxes = axes.tolist()
+    camera.alt.xyaxes = np.concatenate([right, np.cross(back, right)]).tolist()

@@ -28,6 +28,9 @@ MATERIALS: dict[str, tuple[tuple[float, float, float, float], float, float, floa
     "label_white": ((0.93, 0.93, 0.92, 1.0), 0.1, 0.1, 0.0),
 }
 
+FLOOR_FRICTION = 1.0
+"""Sliding friction of the floor."""
+
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 
 
@@ -39,10 +42,15 @@ def add_materials(spec: mujoco.MjSpec) -> None:
         )
 
 
-def add_hall(spec: mujoco.MjSpec) -> None:
+def add_hall(spec: mujoco.MjSpec, half: float = 6.0, *, marks: bool = True) -> None:
     """Add the floor (collides), walls and sky (seen only) and three lights without shadows.
 
     Shadows cost five times the rendering time on a CPU; set `model.light_castshadow` for figures.
+
+    Args:
+        spec: the world to extend.
+        half: half side of the hall [m].
+        marks: paint the yellow lines of the work place ahead of the robot.
     """
     texture = mujoco.mjtTexture
     builtin = mujoco.mjtBuiltin
@@ -61,21 +69,22 @@ def add_hall(spec: mujoco.MjSpec) -> None:
     floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "concrete"
     world = spec.worldbody
     world.add_geom(
-        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[8, 8, 0.1], material="concrete",
-        contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1, friction=[1.0, 0.01, 0.001],
+        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[half + 2, half + 2, 0.1], material="concrete",
+        contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1,
+        friction=[FLOOR_FRICTION, 0.01, 0.001],
     )  # fmt: skip
     hall = world.add_body(name="hall")
-    for side in (-1, 1):
+    for side in (-1, 1) if marks else ():
         parts.visual(hall, _BOX, (0.05, 2.6, 0.002), (0.95, side * 1.9, 0.001),
                      material="warning_yellow", quat=(0.70710678, 0, 0, 0.70710678))  # fmt: skip
     for side in (-1, 1):
-        parts.visual(hall, _BOX, (0.05, 6, 2.0), (side * 6.0, 0, 2.0), material="wall_paint")
-        parts.visual(hall, _BOX, (0.06, 6, 0.45), (side * 5.98, 0, 0.45), material="wall_band")
+        parts.visual(hall, _BOX, (0.05, half, 2.0), (side * half, 0, 2.0), material="wall_paint")
+        parts.visual(hall, _BOX, (0.06, half, 0.45), (side * (half - 0.02), 0, 0.45), material="wall_band")
     for side in (-1, 1):
-        parts.visual(hall, _BOX, (6, 0.05, 2.0), (0, side * 6.0, 2.0), material="wall_paint")
-        parts.visual(hall, _BOX, (6, 0.06, 0.45), (0, side * 5.98, 0.45), material="wall_band")
+        parts.visual(hall, _BOX, (half, 0.05, 2.0), (0, side * half, 2.0), material="wall_paint")
+        parts.visual(hall, _BOX, (half, 0.06, 0.45), (0, side * (half - 0.02), 0.45), material="wall_band")
     for y in (-4, -2, 0, 2, 4):
-        parts.visual(hall, _BOX, (0.08, 0.08, 2.0), (5.9, y, 2.0), material="aluminium")
+        parts.visual(hall, _BOX, (0.08, 0.08, 2.0), (half - 0.1, y, 2.0), material="aluminium")
     for x, y, z, level in ((0.2, 1.6, 3.2, 0.42), (0.2, -1.6, 3.2, 0.36), (2.6, 0.0, 3.4, 0.30)):
         aim = [0.9 - x, -y, 1.0 - z]
         world.add_light(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,6 +50,10 @@ class PackLayout:
     tray_xy: tuple[float, float] = (0.48, -0.28)
     tray_z: float = 1.068
     tray_size: tuple[float, float, float] = (0.18, 0.24, 0.045)
+
+    def raised(self, by: float) -> PackLayout:
+        """Return the layout with pack and tray `by` higher [m]."""
+        return replace(self, top_z=self.top_z + by, tray_z=self.tray_z + by)
 
     def fasteners(self) -> Array:
         """Return the (68, 2) x, y of the fasteners in the pack frame (origin: middle of the near edge, on the rim).

@@ -1,0 +1,108 @@
+"""Where the simulated robot really is and what it really touches: for evaluation and viewers, never for a module."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import mujoco
+import numpy as np
+
+from golem.robots.model.table import BASE_LINK, SOLE
+from golem.types import SIDES, Array
+
+_CORNERS = np.array([[x, y, SOLE.z] for x, y in product(SOLE.x, SOLE.y)])
+"""(4, 3) corners of a sole in its ankle_roll frame [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class BaseTruth:
+    """Pose and velocity of base_link.
+
+    Attributes:
+        T_world_base: (4, 4).
+        velocity: (3,) of its origin in the world [m/s].
+        rate: (3,) angular, in base_link [rad/s].
+    """
+
+    T_world_base: Array
+    velocity: Array
+    rate: Array
+
+    @property
+    def tilt(self) -> float:
+        """Angle between the base's and the world's up [rad]."""
+        return float(np.arccos(np.clip(self.T_world_base[2, 2], -1.0, 1.0)))
+
+
+class Truth:
+    """Reads a simulation; nothing is stored, every call describes the present state.
+
+    Contacts, forces and centre of mass are those at the start of the last physics step.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Read `data` of `model`, whose robot hangs on the free joint `base`."""
+        self._model, self._data = model, data
+        self._base = model.body(BASE_LINK).id
+        joint = model.joint("base")
+        self._q, self._v = int(joint.qposadr[0]), int(joint.dofadr[0])
+        self._feet = [model.body(f"{side}_ankle_roll_link").id for side in SIDES]
+        mine = model.body_rootid == self._base
+        # Per geom: -1 for the world, 0 and 1 for the feet, 2 for the rest of the robot.
+        part = np.where(mine[model.geom_bodyid], len(SIDES), -1)
+        for foot, body in enumerate(self._feet):
+            part[model.geom_bodyid == body] = foot
+        self._part: list[int] = part.tolist()
+
+    def base(self) -> BaseTruth:
+        """Return where base_link is and how it moves."""
+        T = np.eye(4)
+        T[:3, 3] = self._data.qpos[self._q : self._q + 3]
+        R = np.empty(9)
+        mujoco.mju_quat2Mat(R, self._data.qpos[self._q + 3 : self._q + 7])
+        T[:3, :3] = R.reshape(3, 3)
+        v = self._data.qvel[self._v : self._v + 6]
+        return BaseTruth(T, v[:3].copy(), v[3:].copy())
+
+    def com(self) -> tuple[Array, Array]:
+        """Return position [m] and velocity [m/s] of the robot's centre of mass in the world, (3,) each."""
+        mujoco.mj_subtreeVel(self._model, self._data)
+        return self._data.subtree_com[self._base].copy(), self._data.subtree_linvel[self._base].copy()
+
+    def soles(self) -> Array:
+        """Return the corners of the left and the right sole in the world, (2, 4, 3) [m]."""
+        R = self._data.xmat[self._feet].reshape(2, 3, 3)
+        return self._data.xpos[self._feet][:, None] + np.einsum("fij,cj->fci", R, _CORNERS)
+
+    def foot_forces(self) -> Array:
+        """Return the force of the world on the left and the right foot, (2, 3) [N], in the world."""
+        forces, wrench = np.zeros((2, 3)), np.zeros(6)
+        contact = self._data.contact
+        frames = contact.frame
+        for i, (one, other) in enumerate(contact.geom.tolist()):
+            parts = self._part[one], self._part[other]
+            foot = max(parts)
+            if min(parts) >= 0 or foot not in (0, 1):
+                continue
+            mujoco.mj_contactForce(self._model, self._data, i, wrench)
+            # The contact's normal points from its first geom to its second, and so does the force on the second.
+            sign = 1.0 if foot == parts[1] else -1.0
+            forces[foot] += sign * wrench[:3] @ frames[i].reshape(3, 3)
+        return forces
+
+    def touches(self) -> tuple[str, ...]:
+        """Return the bodies other than the feet that touch something that is not the robot, sorted."""
+        names = set[str]()
+        for pair in self._data.contact.geom.tolist():
+            parts = [self._part[geom] for geom in pair]
+            if min(parts) < 0 and max(parts) == len(SIDES):
+                geom = pair[parts.index(len(SIDES))]
+                names.add(self._model.body(self._model.geom_bodyid[geom]).name)
+        return tuple(sorted(names))
+
+    def fallen(self, height: float = 0.6, tilt: float = 0.8) -> bool:
+        """Return whether base_link is less than `height` [m] above the lower sole or leans more than `tilt` [rad]."""
+        base = self.base()
+        floor = self._data.xpos[self._feet, 2].min() + SOLE.z
+        return bool(base.T_world_base[2, 3] - floor < height) or base.tilt > tilt

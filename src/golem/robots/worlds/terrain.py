@@ -1,0 +1,86 @@
+"""Grounds to stand and walk on: the empty hall, a ramp, a field of uneven tiles."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+
+from golem.robots.worlds import hall, parts
+
+FLAT = 1.0
+"""Half side of the flat square around the start [m]."""
+HALL = 10.0
+"""Half side of the hall [m]: room for six metres straight ahead."""
+RAMP = (3.0, 1.5, 4.0)
+"""Length of the ramp's slope and of the platform behind it, and its width [m]; then it goes down again."""
+TILE = 0.3
+"""Side of a tile [m]: a foot of 0.26 m rarely has one for itself."""
+FIELD = 4.0
+"""Half side of the field of tiles [m]."""
+
+_BOX = mujoco.mjtGeom.mjGEOM_BOX
+_THICK = 0.1
+
+
+def add_open(spec: mujoco.MjSpec) -> None:
+    """Add the empty hall."""
+    hall.add_materials(spec)
+    hall.add_hall(spec, HALL, marks=False)
+
+
+def add_slope(spec: mujoco.MjSpec, angle: float) -> None:
+    """Add a hall with a ramp across the way of a robot that walks ahead: up, a platform, down.
+
+    Args:
+        spec: the world to extend.
+        angle: inclination [rad].
+    """
+    add_open(spec)
+    length, level, width = RAMP
+    c, s = math.cos(angle), math.sin(angle)
+    rise, run = length * s, length * c
+    body = spec.worldbody.add_body(name="terrain", pos=[FLAT, 0.0, 0.0])
+    half = math.sin(angle / 2), math.cos(angle / 2)
+    # Each box is placed by the middle of its top, half its thickness below along its normal.
+    for x, tilt in ((run / 2, -1.0), (run * 1.5 + level, 1.0)):
+        center = (x + tilt * s * _THICK / 2 * -1.0, 0.0, rise / 2 - c * _THICK / 2)
+        _block(body, (length / 2, width / 2, _THICK / 2), center, quat=(half[1], 0.0, tilt * half[0], 0.0))
+    _block(body, (level / 2, width / 2, _THICK / 2), (run + level / 2, 0.0, rise - _THICK / 2))
+
+
+def add_rubble(spec: mujoco.MjSpec, height: float, rng: np.random.Generator) -> None:
+    """Add a hall whose floor around the start is laid with tiles of uneven height.
+
+    Args:
+        spec: the world to extend.
+        height: of the highest tile [m]; every tile's is drawn evenly from 0 to it, so a step is that high at most.
+        rng: draws the heights.
+    """
+    add_open(spec)
+    body = spec.worldbody.add_body(name="terrain")
+    count = round(2 * FIELD / TILE)
+    heights = height * rng.random((count, count))
+    middles = TILE * (np.arange(count) - (count - 1) / 2)
+    for i, x in enumerate(middles):
+        for j, y in enumerate(middles):
+            if max(abs(x), abs(y)) - TILE / 2 < FLAT:
+                continue
+            shade = 0.45 + 0.25 * float(heights[i, j]) / max(height, 1e-9)
+            size = (TILE / 2, TILE / 2, _THICK / 2)
+            _block(body, size, (x, y, float(heights[i, j]) - _THICK / 2), shade=shade)
+
+
+def _block(
+    body: mujoco.MjsBody,
+    size: tuple[float, float, float],
+    pos: tuple[float, float, float],
+    *,
+    quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
+    shade: float = 0.62,
+) -> None:
+    """Add a box that is seen and stood on."""
+    geom = parts.collider(body, _BOX, size, pos, quat=quat, friction=hall.FLOOR_FRICTION)
+    geom.rgba = [shade, shade, 0.95 * shade, 1.0]
+    geom.group = parts.VISUAL_GROUP
