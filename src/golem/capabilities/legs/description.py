@@ -17,6 +17,8 @@ from golem.errors import ConfigError
 from golem.options import check_values, fill, read_yaml, vector
 from golem.types import LEGS, NUM_JOINTS, Array
 
+JOINTS = LEGS.stop - LEGS.start
+"""Motors of the legs."""
 SHIPPED = Path(__file__).parent / "policies"
 """Folder of the shipped descriptions."""
 
@@ -66,13 +68,40 @@ class Description:
     latency: float = 0.002
 
     def q0(self) -> Array:
-        """Return the default posture as (27,) [rad]."""
-        legs = LEGS.stop
+        """Return the default posture as (27,) [rad].
+
+        Raises:
+            ConfigError: it has another length, or is not finite.
+        """
         if len(self.posture) == NUM_JOINTS:
             return vector("posture", self.posture, NUM_JOINTS)
+        if len(self.posture) not in (JOINTS // 2, JOINTS):
+            raise ConfigError(
+                f"The posture is a list of {JOINTS // 2}, {JOINTS} or {NUM_JOINTS}, not of {len(self.posture)}."
+            )
         q = np.zeros(NUM_JOINTS)
-        q[LEGS] = vector("posture", self.posture, legs, legs // 2)
+        q[LEGS] = vector("posture", self.posture, JOINTS, JOINTS // 2)
         return q
+
+    def gains(self) -> tuple[Array, Array]:
+        """Return kp and kd, (12,) each.
+
+        Raises:
+            ConfigError: one has another length, or is negative or not finite.
+        """
+        out = vector("kp", self.kp, JOINTS, JOINTS // 2), vector("kd", self.kd, JOINTS, JOINTS // 2)
+        for name, values in zip(("kp", "kd"), out, strict=True):
+            if values.min() < 0.0:
+                raise ConfigError(f"The {name} must not be negative, and one is {values.min():g}.")
+        return out
+
+    def action_scale(self) -> Array:
+        """Return the factor of each action, (12,) [rad].
+
+        Raises:
+            ConfigError: it has another length, or is not finite.
+        """
+        return vector("action.scale", self.action.scale, JOINTS, JOINTS // 2)
 
     def layout(self) -> Layout:
         """Return the observation's layout.
@@ -115,12 +144,18 @@ def load_description(file: str | Path, network: str | Path | None = None) -> tup
     check_values(str(file), data)
     options = cast(Mapping[str, object], data)
     description: Description = fill(f"key of {file}", Description, options)
-    _check_ranges(str(file), description)
+    try:
+        _check(description)
+    except ConfigError as error:
+        raise ConfigError(f"{file}: {error}") from error
     return description, Path(network).expanduser() if network else path.parent / description.network
 
 
-def _check_ranges(name: str, d: Description) -> None:
-    """Raise where a number of the description called `name` cannot be meant."""
+def _check(d: Description) -> None:
+    """Raise where something in `d` cannot be meant."""
+    d.gains()
+    d.action_scale()
+    d.layout()
     for what, value, fine, wanted in (
         ("rate", d.rate, 1.0 <= d.rate < inf, "a number of ticks per second, at least 1"),
         ("latency", d.latency, 0.0 <= d.latency < inf, "a time in seconds, not negative"),
@@ -130,8 +165,8 @@ def _check_ranges(name: str, d: Description) -> None:
         ("action.swing", d.action.swing, abs(d.action.swing) < inf, "an angle in radians"),
     ):
         if not fine:
-            raise ConfigError(f"{name}: '{what}' is {wanted}, not {value:g}.")
+            raise ConfigError(f"The {what} is {wanted}, not {value:g}.")
     for axis in ("vx", "vy", "wz"):
         low, high = getattr(d.envelope, axis)
         if not (-inf < low <= 0.0 <= high < inf):
-            raise ConfigError(f"{name}: 'envelope.{axis}' is a range around zero, not {low:g} to {high:g}.")
+            raise ConfigError(f"The envelope.{axis} is a range around zero, not {low:g} to {high:g}.")

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.capabilities.legs.base import LegCommand, Motion
-from golem.capabilities.legs.description import load_description
-from golem.capabilities.legs.network import ACTIONS, load_network
+from golem.capabilities.legs.description import JOINTS, load_description
+from golem.capabilities.legs.network import load_network
 from golem.capabilities.legs.observation import measure
 from golem.capabilities.legs.swing import swing_offset
 from golem.errors import GolemError
-from golem.options import vector
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
 
@@ -58,14 +57,13 @@ class Policy:
         self._layout = description.layout()
         self._network = load_network(path, self._layout.size)
         self._q0 = description.q0()[LEGS]
-        self._scale = vector("action.scale", description.action.scale, ACTIONS, ACTIONS // 2)
-        self._kp = vector("kp", description.kp, ACTIONS, ACTIONS // 2)
-        self._kd = vector("kd", description.kd, ACTIONS, ACTIONS // 2)
-        self._action: Array = np.zeros(ACTIONS)
+        self._scale = description.action_scale()
+        self._kp, self._kd = description.gains()
+        self._action: Array = np.zeros(JOINTS)
 
     def reset(self, state: LowState) -> None:
         """Forget the last action and what the network remembers."""
-        self._action = np.zeros(ACTIONS)
+        self._action = np.zeros(JOINTS)
         self._network.reset()
 
     def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
@@ -88,4 +86,4 @@ class Policy:
         self._action = np.clip(action, -clip, clip)
         swing = swing_offset(motion.phase, self.gait.stance, self.description.action.swing)
         q = self._q0 + self._scale * self._action + swing
-        return LegCommand(q, self._kp.copy(), self._kd.copy(), np.zeros(ACTIONS))
+        return LegCommand(q, self._kp.copy(), self._kd.copy(), np.zeros(JOINTS))
