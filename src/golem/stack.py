@@ -58,7 +58,12 @@ class Stack:
     @property
     def legs_in_reserve(self) -> Choice:
         """The lower body that takes the legs when `lower_body` fails."""
-        return self.fallback or Choice("almi" if self.robot.options.get("support") == "ground" else "hold")
+        return self.fallback or Choice("almi" if self.on_ground else "hold")
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether the robot stands on its feet."""
+        return self.robot.options.get("support") == "ground"
 
     def with_choice(self, slot: str, use: str) -> Stack:
         """Return a copy with another implementation in `slot` (and no options for it).

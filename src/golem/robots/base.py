@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,4 +57,19 @@ class Robot(Protocol):
 
     def close(self) -> None:
         """Release what the robot holds: rendering contexts, connections. Closing twice does nothing."""
+        ...
+
+
+@runtime_checkable
+class Banded(Protocol):
+    """A robot that is brought up standing, with a band that keeps it upright until its legs do.
+
+    Attributes:
+        banded: whether there is a band that is still to be let go; false for a robot that hangs and shall hang.
+    """
+
+    banded: bool
+
+    def release(self) -> None:
+        """Let the band go, smoothly; an operator's act. Without a band it does nothing."""
         ...

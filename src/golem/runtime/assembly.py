@@ -22,7 +22,7 @@ from golem.hardware.safety.base import GateResult, GateState, Request, SafetyLim
 from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
 from golem.middleware.bus import Bus
-from golem.robots.base import Robot
+from golem.robots.base import Banded, Robot
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.sensors.profiles import load_profile
 from golem.runtime import nodes
@@ -30,6 +30,7 @@ from golem.runtime.executor import Executor, Node
 from golem.runtime.guard import Guard
 from golem.runtime.guarded import GuardedMethod
 from golem.runtime.legs import Legs, LowerBodyNode
+from golem.runtime.release import ReleaseNode
 from golem.skills.base import Skill, SkillResult
 from golem.skills.context import Context
 from golem.skills.grasping.base import GraspMethod
@@ -121,6 +122,8 @@ class Running:
             out.append(nodes.HandNode(bus, hand, side, guard))
         out.append(nodes.ServoNode(bus, *make("servo")))
         out.append(self._safety)
+        if isinstance(robot, Banded):
+            out.append(ReleaseNode(bus, robot, robot_guard))
         out.append(self._act)
         return out
 
@@ -203,10 +206,10 @@ class Running:
         return safety is not None and safety.state in (GateState.STOP1, GateState.STOP0)
 
 
-def start_posture() -> Array:
-    """Return the (27,) posture an episode starts in: legs in the stand stance, arms at home [rad]."""
+def start_posture(on_ground: bool = False) -> Array:
+    """Return the (27,) posture an episode starts in [rad]: arms at home, legs as they hang or as they stand."""
     q = np.zeros(NUM_JOINTS)
-    q[LEGS] = np.tile(STANCES["stand"], 2)
+    q[LEGS] = np.tile(STANCES["crouch" if on_ground else "stand"], 2)
     q[UPPER] = POSTURES["home"]
     return q
 
@@ -224,9 +227,9 @@ def build(stack: Stack, seed: int) -> tuple[Running, Any]:
     load_profile(stack.profile)
     if seed < 0:
         raise ConfigError(f"The seed is {seed}; it must be 0 or more.")
-    choice = stack.robot
+    choice, posture = stack.robot, start_posture(stack.on_ground)
     robot = registry.create(
-        "robot", choice.use, choice.options, profile=stack.profile, seed=seed, posture=start_posture()
+        "robot", choice.use, choice.options, profile=stack.profile, seed=seed, posture=posture
     )
     Guard("robot", choice.use).satisfies(robot, Robot)
     return Running(stack, robot), robot
