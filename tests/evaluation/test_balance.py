@@ -17,7 +17,7 @@ from golem.evaluation.balance import (
     signed_margin,
 )
 from golem.robots.model.table import SOLE
-from golem.robots.mujoco.engine import MujocoRobot
+from golem.robots.mujoco.engine import MujocoRobot, standing_height
 from golem.runtime.assembly import start_posture
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -26,9 +26,7 @@ SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 def trace(n: int = 200) -> BalanceTrace:
     t = PERIOD * np.arange(n, dtype=np.float64)
     zeros = np.zeros((n, 3))
-    return BalanceTrace(
-        t, np.full(n, 0.1), zeros, zeros, np.zeros(n), np.full(n, 0.95), zeros, np.ones((n, 2), bool), zeros
-    )
+    return BalanceTrace(t, np.full(n, 0.1), zeros, zeros, np.zeros(n), zeros, np.ones((n, 2), bool), zeros)
 
 
 def test_the_hull_leaves_out_what_is_inside_and_runs_counter_clockwise() -> None:
@@ -81,8 +79,6 @@ def test_measures_of_a_known_trace() -> None:
     assert known.base_range == pytest.approx(0.008, rel=0.01)
     assert known.sway == pytest.approx(np.hypot(0.004, 0.001) / np.sqrt(2), rel=0.02)
     assert known.window(0.5, 0.8).final_margin == pytest.approx(-0.05)
-    assert not known.fallen
-    assert replace(known, height=np.where(t < 1.0, 0.95, 0.4)).fallen
 
 
 def test_a_trace_survives_being_written(tmp_path: Path) -> None:
@@ -116,13 +112,8 @@ def place(robot: MujocoRobot, height: float, roll: float = 0.0, speed: float = 0
     return recorder
 
 
-def standing_height(robot: MujocoRobot) -> float:
-    recorder = place(robot, 2.0)
-    return float(recorder.trace().height[0])
-
-
 def test_both_feet_on_the_ground_hold_the_mass_between_them(robot: MujocoRobot) -> None:
-    recorder = place(robot, standing_height(robot) - 0.002, speed=0.3)
+    recorder = place(robot, standing_height(start_posture()) - 0.002, speed=0.3)
     seen = recorder.trace()
     assert recorder.contact.tolist() == [True, True]
     assert 0.05 < recorder.margin < 0.5 * (SOLE.x[1] - SOLE.x[0])
@@ -131,7 +122,7 @@ def test_both_feet_on_the_ground_hold_the_mass_between_them(robot: MujocoRobot) 
 
 
 def test_standing_on_the_edge_of_one_foot_puts_the_mass_outside(robot: MujocoRobot) -> None:
-    both = standing_height(robot)
+    both = standing_height(start_posture())
     roll = 0.3
     for height in np.arange(both + 0.15, both - 0.15, -0.002):
         recorder = place(robot, float(height), roll)

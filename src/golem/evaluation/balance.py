@@ -16,18 +16,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.robots.model.table import BASE_LINK, SOLE
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.types import SIDES, Array
+from golem.types import Array
 
+TRACE = "trace.npz"
+"""Name of the file that holds a trial's trace among its artefacts."""
 PERIOD = 0.01
 """Time between two samples [s]."""
-FALLEN_TILT = 0.8
-"""Tilt of the pelvis from which no controller came back [rad]."""
-FALLEN_HEIGHT = 0.55
-"""Height of the pelvis above the lower sole below which the robot is down [m]; standing it is 0.95."""
+TOUCH = 1.0
+"""Force from which a foot counts as in contact [N]."""
 SHORTEST_LIFT = 0.04
 """Time without contact that counts as a foot lifted [s]: less is a sole that chatters."""
+QUIET_SPEED = 0.05
+"""Horizontal speed of the base below which a robot with both feet down counts as standing quietly [m/s]."""
 FINAL = 0.5
 """Length of the end of a trace over which its final margin is averaged [s]."""
 
@@ -78,7 +79,6 @@ class BalanceTrace:
         base: (n, 3) position of base_link in the world [m].
         rpy: (n, 3) roll, pitch and yaw of base_link [rad], yaw continuous.
         tilt: (n,) angle between base_link's and the world's up [rad].
-        height: (n,) height of base_link above the lower sole's centre [m].
         twist: (n, 3) forward, leftward [m/s] and yaw rate [rad/s] of base_link in its heading frame.
         contact: (n, 2) whether the left and the right foot touch something.
         force: (n, 3) force of the push in the world [N].
@@ -89,7 +89,6 @@ class BalanceTrace:
     base: Array
     rpy: Array
     tilt: Array
-    height: Array
     twist: Array
     contact: NDArray[np.bool_]
     force: Array
@@ -124,11 +123,6 @@ class BalanceTrace:
     def final_margin(self) -> float:
         """Mean margin over the last `FINAL` seconds [m]."""
         return float(self.margin[-round(FINAL / PERIOD) :].mean())
-
-    @property
-    def fallen(self) -> bool:
-        """Whether the robot fell at any time."""
-        return bool(((self.tilt > FALLEN_TILT) | (self.height < FALLEN_HEIGHT)).any())
 
     def recovery_time(self, since: float) -> float:
         """Return how long after `since` [s] the margin was negative for the last time [s]; 0 where it never was."""
@@ -167,25 +161,20 @@ class BalanceRecorder:
 
     Attributes:
         fallen: whether the robot has fallen.
-        margin: newest CoM margin [m].
+        margin, yaw: newest CoM margin [m] and heading [rad].
         contact: (2,) whether the feet touched something at the newest sample.
+        quiet: for how long the robot has been standing still, both feet down, margin positive [s].
     """
 
     def __init__(self, robot: MujocoRobot) -> None:
         """Look at `robot`."""
-        model = robot.scene.model
-        self._data = robot.data
-        self._base = model.body(BASE_LINK).id
-        self._free = int(model.joint("base").dofadr[0])
-        self._feet = np.array([model.body(f"{side}_ankle_roll_link").id for side in SIDES])
-        self._body_of_geom = model.geom_bodyid
-        self._root = model.body_rootid
-        self._corners = np.array([[x, y, SOLE.z] for x in SOLE.x for y in SOLE.y])
+        self._truth = robot.truth
         self._rows: list[tuple[float, ...]] = []
-        self._polygon: Array = convex_hull(self._soles().reshape(8, 3)[:, :2])
+        self._polygon: Array = _support(self._truth.soles())
         self._next = 0.0
         self.fallen = False
-        self.margin = math.nan
+        self.margin = self.yaw = 0.0
+        self.quiet = 0.0
         self.contact: NDArray[np.bool_] = np.zeros(2, dtype=bool)
 
     def __call__(self, t: float, force: Array | None = None) -> None:
@@ -193,30 +182,28 @@ class BalanceRecorder:
         if t < self._next - 1e-9:
             return
         self._next = t + PERIOD
-        data = self._data
-        R = data.xmat[self._base].reshape(3, 3)
-        soles = self._soles()
-        self.contact = self._contacts()
+        base = self._truth.base()
+        R, position = base.T_world_base[:3, :3], base.T_world_base[:3, 3]
+        self.contact = np.linalg.norm(self._truth.foot_forces(), axis=1) > TOUCH
         if self.contact.any():  # in flight the last polygon counts
-            self._polygon = convex_hull(soles[self.contact].reshape(-1, 3)[:, :2])
-        self.margin = signed_margin(data.subtree_com[self._base, :2], self._polygon)
+            self._polygon = _support(self._truth.soles()[self.contact])
+        self.margin = signed_margin(self._truth.com()[0][:2], self._polygon)
+        self.fallen |= self._truth.fallen()
         roll, pitch = math.atan2(R[2, 1], R[2, 2]), -math.asin(min(max(R[2, 0], -1.0), 1.0))
-        yaw = math.atan2(R[1, 0], R[0, 0])
-        tilt = math.acos(min(max(R[2, 2], -1.0), 1.0))
-        height = float(data.xpos[self._base, 2] - soles[..., 2].mean(axis=1).min())
-        self.fallen |= tilt > FALLEN_TILT or height < FALLEN_HEIGHT
-        velocity = data.qvel[self._free : self._free + 6]
+        yaw = self.yaw = math.atan2(R[1, 0], R[0, 0])
         c, s = math.cos(yaw), math.sin(yaw)
-        forward, left = c * velocity[0] + s * velocity[1], c * velocity[1] - s * velocity[0]
+        vx, vy, _ = base.velocity
+        forward, left = c * vx + s * vy, c * vy - s * vx
+        still = math.hypot(forward, left) < QUIET_SPEED and self.margin > 0.0 and bool(self.contact.all())
+        self.quiet = self.quiet + PERIOD if still else 0.0
         self._rows.append(
-            (t, self.margin, *data.xpos[self._base], roll, pitch, yaw, tilt, height)
-            + (forward, left, float(R[2] @ velocity[3:]), *self.contact)
-            + tuple(np.zeros(3) if force is None else force)
+            (t, self.margin, *position, roll, pitch, yaw, base.tilt, forward, left, float(R[2] @ base.rate))
+            + (*self.contact, *(np.zeros(3) if force is None else force))
         )
 
     def trace(self) -> BalanceTrace:
         """Return what was sampled so far."""
-        rows = np.array(self._rows, dtype=np.float64).reshape(-1, 18)
+        rows = np.array(self._rows, dtype=np.float64).reshape(-1, 17)
         rows[:, 7] = np.unwrap(rows[:, 7])
         return BalanceTrace(
             t=rows[:, 0],
@@ -224,21 +211,12 @@ class BalanceRecorder:
             base=rows[:, 2:5],
             rpy=rows[:, 5:8],
             tilt=rows[:, 8],
-            height=rows[:, 9],
-            twist=rows[:, 10:13],
-            contact=rows[:, 13:15].astype(bool),
-            force=rows[:, 15:18],
+            twist=rows[:, 9:12],
+            contact=rows[:, 12:14].astype(bool),
+            force=rows[:, 14:17],
         )
 
-    def _soles(self) -> Array:
-        """Return the (2, 4, 3) corners of the soles in the world."""
-        R = self._data.xmat[self._feet].reshape(2, 3, 3)
-        return self._data.xpos[self._feet, None] + np.einsum("fij,cj->fci", R, self._corners)
 
-    def _contacts(self) -> NDArray[np.bool_]:
-        """Return (2,) whether each foot touches something that is not the robot."""
-        contact = self._data.contact
-        bodies = self._body_of_geom[contact.geom[contact.dist < 0.0]]
-        own = self._root[bodies] == self._root[self._base]
-        world = bodies[own[:, 0] != own[:, 1]]
-        return np.array([bool((world == foot).any()) for foot in self._feet])
+def _support(soles: Array) -> Array:
+    """Return the polygon that `soles` (n, 4, 3) span."""
+    return convex_hull(soles.reshape(-1, 3)[:, :2])

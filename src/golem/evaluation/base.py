@@ -20,7 +20,10 @@ from golem.errors import unknown_name
 DONE = "done"
 """The stage of a trial that lost nothing."""
 
-RUNGS: dict[str, str] = {"tether": "golem.evaluation.rungs.tether:Tether"}
+RUNGS: dict[str, str] = {
+    "tether": "golem.evaluation.rungs.tether:Tether",
+    "push": "golem.evaluation.rungs.push:PushRung",
+}
 """Rung name -> `module:Class`; the module is imported when the rung is used."""
 
 

@@ -20,7 +20,7 @@ from tyro.conf import arg
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.evaluation.base import TrialSpec, make_rung, rung_target
 from golem.evaluation.provenance import code_digest, commit, digest, versions
-from golem.evaluation.records import Provenance, RunFolder, TrialRecord, trial_name
+from golem.evaluation.records import Provenance, RunFolder, TrialRecord, artefacts
 from golem.evaluation.report import render
 from golem.evaluation.summary import Summary, summarise
 from golem.evaluation.trials import SINGLE_THREAD, Finished, Refused, run_trial, start_worker
@@ -180,7 +180,7 @@ def _finished(
         try:
             with _ctrl_c_held():
                 for spec in todo:
-                    future = pool.submit(run_trial, target, spec, out / "artefacts" / trial_name(spec))
+                    future = pool.submit(run_trial, target, spec, artefacts(out, spec))
                     pending[future] = spec
             while pending:
                 for future in wait(pending, return_when=FIRST_COMPLETED).done:

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import golem
+from golem import registry
+from golem.stack import Stack
 
 PACKAGES = ("golem-humanoid", "numpy", "scipy", "mujoco", "pin", "daqp", "onnxruntime")
 """Distributions whose version may change a trial's outcome."""
@@ -22,6 +24,18 @@ def digest(data: Mapping[str, Any]) -> str:
     """Return 16 hex digits that identify JSON-like `data`, whatever the order of its keys."""
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def user_files(stack: Stack) -> dict[str, str]:
+    """Return, for what a stack names that is a file, `slot/name` -> hash of its content."""
+    found: dict[str, str] = {}
+    for slot in registry.slots():
+        choice = stack.choice(slot)
+        named = {"use": choice.use.rpartition(":")[0], **choice.options}
+        for name, value in named.items():
+            if isinstance(value, str) and (path := Path(value).expanduser()).is_file():
+                found[f"{slot}/{name}"] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return found
 
 
 def versions() -> dict[str, str]:

@@ -124,10 +124,15 @@ class Provenance:
         )
 
 
-def trial_name(spec: TrialSpec) -> str:
+def trial_name(trial: TrialSpec | TrialRecord) -> str:
     """Return the file name, without suffix, of what belongs to one trial."""
     # A method may be named `folder/file.py:Class`.
-    return f"{re.sub(r'[^A-Za-z0-9_.-]', '_', spec.method)}-{spec.index:05d}"
+    return f"{re.sub(r'[^A-Za-z0-9_.-]', '_', trial.method)}-{trial.index:05d}"
+
+
+def artefacts(folder: Path, trial: TrialSpec | TrialRecord) -> Path:
+    """Return the folder within the run `folder` for what one trial keeps beside its record."""
+    return folder / "artefacts" / trial_name(trial)
 
 
 def read_records(path: Path) -> list[TrialRecord]:

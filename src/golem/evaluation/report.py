@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import base64
+import struct
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib import resources
 from pathlib import Path
 
+from golem.evaluation.balance import TRACE, BalanceTrace
+from golem.evaluation.courses import MOST, Course, margin_plot
+from golem.evaluation.measures import MEASURES, Measure
 from golem.evaluation.paper import PAPER
-from golem.evaluation.records import TrialRecord
-from golem.evaluation.statistics import wilson
+from golem.evaluation.records import TrialRecord, artefacts
+from golem.evaluation.statistics import spread, wilson
 from golem.evaluation.summary import NO_MODULE, MethodSummary, Summary
 from golem.evaluation.svg import Dot, interval_bar, percent_axis, stacked, strips, trial_map
 
@@ -36,6 +40,8 @@ def render(command: str, records: Sequence[TrialRecord], summary: Summary, folde
         _map(grouped),
         _failures(summary),
         _times(grouped),
+        _measures(grouped),
+        _margins(grouped, folder),
         _pictures(grouped, folder),
         _lost_trials(records),
         _reading(first.rung),
@@ -206,6 +212,51 @@ def _times(grouped: Mapping[str, Sequence[TrialRecord]]) -> str:
     )
 
 
+def _measures(grouped: Mapping[str, Sequence[TrialRecord]]) -> str:
+    """Return a table of what the rung measured: median and quartiles per method."""
+    names = dict.fromkeys(name for rows in grouped.values() for r in rows for name in r.series)
+    if not names:
+        return ""
+    lines: list[str] = []
+    for name in names:
+        measure = MEASURES.get(name, Measure(name.replace("_", " ")))
+        cells: list[str] = []
+        for rows in grouped.values():
+            s = spread([measure.scale * r.series[name] for r in rows if name in r.series])
+            cells.append(
+                '<td class="num">-</td>'
+                if s is None
+                else f'<td class="num">{s.median:.3g}<small>{s.q1:.3g} to {s.q3:.3g}</small></td>'
+            )
+        lines.append(f"<tr><td>{escape(measure.label)}</td><td>{measure.unit}</td>{''.join(cells)}</tr>")
+    head = "".join(f'<th class="num">{escape(method)}</th>' for method in grouped)
+    return _card(
+        "What was measured",
+        f'<div class="scroll"><table><tr><th>measure</th><th>unit</th>{head}</tr>{"".join(lines)}</table></div>',
+        "Median over the trials, and quartiles; on the simulator's truth.",
+    )
+
+
+def _margins(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> str:
+    """Return the CoM margin over time, per method, of the trials that kept a trace."""
+    parts: list[str] = []
+    for i, (method, rows) in enumerate(grouped.items()):
+        kept = [(r, path) for r in rows if (path := artefacts(folder, r) / TRACE).is_file()]
+        courses = [Course(BalanceTrace.load(path), r.success, _says(r)) for r, path in kept[:MOST]]
+        plot = margin_plot(courses, i % 6) if courses else ""
+        if plot:
+            parts.append(f"<h3>{escape(method)}</h3>{plot}")
+    if not parts:
+        return ""
+    return _card(
+        "CoM margin",
+        "".join(parts),
+        "Signed distance of the projected centre of mass to the edge of the support polygon (the soles in contact), "
+        f"positive inside; the force of the push above it. The first {MOST} trials of each method, trial 0 bold; a "
+        "cross ends a lost one. A step makes the polygon one foot: the margin may dip below zero and come back.",
+    )
+
+
 def _pictures(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> str:
     figures = []
     for rows in grouped.values():
@@ -213,10 +264,14 @@ def _pictures(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> str
             chosen = next((r for r in rows if r.success is success and r.picture is not None), None)
             if chosen is None or chosen.picture is None or not (folder / chosen.picture).is_file():
                 continue
-            data = base64.b64encode((folder / chosen.picture).read_bytes()).decode()
-            says = escape(_says(chosen))
+            png = (folder / chosen.picture).read_bytes()
+            # Width and height stand at a fixed place in a PNG; a strip of pictures takes the whole line.
+            width, height = struct.unpack(">II", png[16:24])
+            data = base64.b64encode(png).decode()
+            says, cls = escape(_says(chosen)), ' class="strip"' if width > 2 * height else ""
             figures.append(
-                f'<figure><img alt="{escape(chosen.method)}, {says}" src="data:image/png;base64,{data}">'
+                f'<figure{cls}><img alt="{escape(chosen.method)}, {says}" '
+                f'src="data:image/png;base64,{data}">'
                 f"<figcaption><b>{escape(chosen.method)}</b>, {says}</figcaption></figure>"
             )
     if not figures:

@@ -26,7 +26,7 @@ class Dot:
     title: str
 
 
-def _tag(name: str, content: str = "", /, **attributes: str | float) -> str:
+def tag(name: str, content: str = "", /, **attributes: str | float) -> str:
     """Return one SVG element; `cls` becomes `class`, underscores become hyphens, numbers two decimals."""
     parts = []
     for key, value in attributes.items():
@@ -35,21 +35,31 @@ def _tag(name: str, content: str = "", /, **attributes: str | float) -> str:
     return f"<{name}{''.join(parts)}>{content}</{name}>"
 
 
-def _text(x: float, y: float, words: str, cls: str = "", anchor: str = "start") -> str:
-    return _tag("text", escape(words), x=float(x), y=float(y), cls=cls, text_anchor=anchor)
+def text(x: float, y: float, words: str, cls: str = "", anchor: str = "start") -> str:
+    """Return `words` at a point; `anchor` is start, middle or end."""
+    return tag("text", escape(words), x=float(x), y=float(y), cls=cls, text_anchor=anchor)
 
 
-def _line(x1: float, y1: float, x2: float, y2: float, cls: str) -> str:
-    return _tag("line", x1=float(x1), y1=float(y1), x2=float(x2), y2=float(y2), cls=cls)
+def line(x1: float, y1: float, x2: float, y2: float, cls: str) -> str:
+    """Return a straight line."""
+    return tag("line", x1=float(x1), y1=float(y1), x2=float(x2), y2=float(y2), cls=cls)
 
 
-def _rect(x: float, y: float, width: float, height: float, cls: str, title: str = "") -> str:
-    tip = _tag("title", escape(title)) if title else ""
-    return _tag("rect", tip, x=float(x), y=float(y), width=float(width), height=float(height), cls=cls)
+def rect(x: float, y: float, width: float, height: float, cls: str, title: str = "") -> str:
+    """Return a rectangle; a hover says `title`."""
+    tip = tag("title", escape(title)) if title else ""
+    return tag("rect", tip, x=float(x), y=float(y), width=float(width), height=float(height), cls=cls)
 
 
-def _svg(width: float, height: float, content: str, label: str) -> str:
-    return _tag("svg", content, viewBox=f"0 0 {width:g} {height:g}", role="img", aria_label=label)
+def polyline(points: Sequence[tuple[float, float]], cls: str, title: str = "") -> str:
+    """Return a line through `points`; a hover says `title`."""
+    tip = tag("title", escape(title)) if title else ""
+    return tag("polyline", tip, points=" ".join(f"{x:.1f},{y:.1f}" for x, y in points), cls=cls)
+
+
+def svg(width: float, height: float, content: str, label: str) -> str:
+    """Return a whole drawing, which says `label` to those who cannot see it."""
+    return tag("svg", content, viewBox=f"0 0 {width:g} {height:g}", role="img", aria_label=label)
 
 
 def ticks(low: float, high: float, about: int = 6) -> list[float]:
@@ -77,24 +87,24 @@ def interval_bar(
     def x(value: float) -> float:
         return 8 + (width - 16) * value
 
-    parts = [_line(x(g / 4), 0, x(g / 4), height, "grid") for g in range(5)]
-    parts.append(_rect(x(interval.low), 10, x(interval.high) - x(interval.low), 10, f"band m{color}"))
-    parts.append(_rect(x(rate) - 2.5, 5, 5, 20, f"fill m{color}"))
+    parts = [line(x(g / 4), 0, x(g / 4), height, "grid") for g in range(5)]
+    parts.append(rect(x(interval.low), 10, x(interval.high) - x(interval.low), 10, f"band m{color}"))
+    parts.append(rect(x(rate) - 2.5, 5, 5, 20, f"fill m{color}"))
     for row, (published, bounds, label) in enumerate(paper):
         y = 34 + lane * row
-        tip = _tag("title", escape(label))
-        parts.append(_line(x(bounds.low), y, x(bounds.high), y, "paper"))
-        parts.append(_tag("circle", tip, cx=x(published), cy=float(y), r=3.5, cls="paperdot"))
-    return _svg(width, height, "".join(parts), f"{100 * rate:.1f} percent")
+        tip = tag("title", escape(label))
+        parts.append(line(x(bounds.low), y, x(bounds.high), y, "paper"))
+        parts.append(tag("circle", tip, cx=x(published), cy=float(y), r=3.5, cls="paperdot"))
+    return svg(width, height, "".join(parts), f"{100 * rate:.1f} percent")
 
 
 def percent_axis() -> str:
     """Return the axis that stands above `interval_bar`."""
     marks = [
-        _text(8 + 384 * g / 4, 12, f"{25 * g}", "tick", ("start", "middle", "middle", "middle", "end")[g])
+        text(8 + 384 * g / 4, 12, f"{25 * g}", "tick", ("start", "middle", "middle", "middle", "end")[g])
         for g in range(5)
     ]
-    return _svg(400, 16, "".join(marks), "0 to 100 percent")
+    return svg(400, 16, "".join(marks), "0 to 100 percent")
 
 
 def stacked(rows: Mapping[str, Mapping[str, int]], totals: Mapping[str, int], names: Sequence[str]) -> str:
@@ -109,19 +119,17 @@ def stacked(rows: Mapping[str, Mapping[str, int]], totals: Mapping[str, int], na
     scale = (WIDTH - GUTTER - 80) / max(totals.values())
     for i, (method, causes) in enumerate(rows.items()):
         y, x = 8 + pitch * i, float(GUTTER)
-        parts.append(_text(GUTTER - 12, y + 17, method, "name", "end"))
-        parts.append(_rect(GUTTER, y, totals[method] * scale, 24, "track"))
+        parts.append(text(GUTTER - 12, y + 17, method, "name", "end"))
+        parts.append(rect(GUTTER, y, totals[method] * scale, 24, "track"))
         for cause, count in sorted(causes.items(), key=lambda item: names.index(item[0])):
             width = count * scale
-            parts.append(_rect(x, y, width, 24, f"cause s{names.index(cause) % 8}", f"{cause}: {count}"))
+            parts.append(rect(x, y, width, 24, f"cause s{names.index(cause) % 8}", f"{cause}: {count}"))
             if width > 22:
-                parts.append(_text(x + width / 2, y + 16.5, str(count), "inbar", "middle"))
+                parts.append(text(x + width / 2, y + 16.5, str(count), "inbar", "middle"))
             x += width
         lost = sum(causes.values())
-        parts.append(
-            _text(GUTTER + totals[method] * scale + 8, y + 17, f"{lost} of {totals[method]}", "tick")
-        )
-    return _svg(WIDTH, 12 + pitch * len(rows), "".join(parts), "failures by cause")
+        parts.append(text(GUTTER + totals[method] * scale + 8, y + 17, f"{lost} of {totals[method]}", "tick"))
+    return svg(WIDTH, 12 + pitch * len(rows), "".join(parts), "failures by cause")
 
 
 def trial_map(rows: Mapping[str, Sequence[tuple[bool, str]]]) -> str:
@@ -134,16 +142,16 @@ def trial_map(rows: Mapping[str, Sequence[tuple[bool, str]]]) -> str:
     block, cell = 50, (WIDTH - GUTTER) / 50
     parts, y = [], 0.0
     for start in range(0, n, block):
-        parts.append(_text(GUTTER, y + 11, f"trial {start}", "tick"))
+        parts.append(text(GUTTER, y + 11, f"trial {start}", "tick"))
         y += 16
         for method, cells in rows.items():
-            parts.append(_text(GUTTER - 12, y + cell - 3, method, "name", "end"))
+            parts.append(text(GUTTER - 12, y + cell - 3, method, "name", "end"))
             for column, (success, title) in enumerate(cells[start : start + block]):
                 cls = "won" if success else "lost"
-                parts.append(_rect(GUTTER + column * cell + 0.75, y, cell - 1.5, cell - 1.5, cls, title))
+                parts.append(rect(GUTTER + column * cell + 0.75, y, cell - 1.5, cell - 1.5, cls, title))
             y += cell + 1
         y += 8
-    return _svg(WIDTH, y, "".join(parts), "outcome of each trial")
+    return svg(WIDTH, y, "".join(parts), "outcome of each trial")
 
 
 def strips(rows: Mapping[str, Sequence[Dot]], unit: str) -> str:
@@ -161,26 +169,26 @@ def strips(rows: Mapping[str, Sequence[Dot]], unit: str) -> str:
     def x(value: float) -> float:
         return GUTTER + (WIDTH - GUTTER - 30) * (value - low) / (high - low)
 
-    parts = [_line(x(mark), 4, x(mark), bottom, "grid") for mark in marks]
-    parts += [_text(x(mark), bottom + 16, f"{mark:g}", "tick", "middle") for mark in marks]
-    parts.append(_text(GUTTER - 12, bottom + 16, unit, "tick", "end"))
+    parts = [line(x(mark), 4, x(mark), bottom, "grid") for mark in marks]
+    parts += [text(x(mark), bottom + 16, f"{mark:g}", "tick", "middle") for mark in marks]
+    parts.append(text(GUTTER - 12, bottom + 16, unit, "tick", "end"))
     for i, (method, dots) in enumerate(rows.items()):
         middle = 8 + pitch * i + pitch / 2
-        parts.append(_text(GUTTER - 12, middle + 5, method, "name", "end"))
+        parts.append(text(GUTTER - 12, middle + 5, method, "name", "end"))
         if not dots:
-            parts.append(_text(GUTTER + 8, middle + 5, "no trial reached it", "tick"))
+            parts.append(text(GUTTER + 8, middle + 5, "no trial reached it", "tick"))
             continue
         p10, q1, median, q3, p90 = (
             x(q) for q in np.percentile([dot.value for dot in dots], (10, 25, 50, 75, 90))
         )
-        parts.append(_line(p10, middle - 12, p90, middle - 12, f"whisker m{i % 6}"))
-        parts.append(_rect(q1, middle - 19, max(q3 - q1, 1), 14, f"box m{i % 6}"))
-        parts.append(_line(median, middle - 22, median, middle - 2, f"median m{i % 6}"))
+        parts.append(line(p10, middle - 12, p90, middle - 12, f"whisker m{i % 6}"))
+        parts.append(rect(q1, middle - 19, max(q3 - q1, 1), 14, f"box m{i % 6}"))
+        parts.append(line(median, middle - 22, median, middle - 2, f"median m{i % 6}"))
         for k, dot in enumerate(dots):
             # The golden ratio spreads neighbours over the lane, the same way each time.
             y = middle + 6 + 16 * ((k * 0.618034) % 1)
             cls = f"dot m{i % 6}" if dot.success else f"dot hollow m{i % 6}"
             parts.append(
-                _tag("circle", _tag("title", escape(dot.title)), cx=x(dot.value), cy=y, r=3.2, cls=cls)
+                tag("circle", tag("title", escape(dot.title)), cx=x(dot.value), cy=y, r=3.2, cls=cls)
             )
-    return _svg(WIDTH, bottom + 24, "".join(parts), f"distribution in {unit}")
+    return svg(WIDTH, bottom + 24, "".join(parts), f"distribution in {unit}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -12,6 +11,7 @@ from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.oracle import GraspTruth, Oracle
+from golem.evaluation.provenance import user_files
 from golem.middleware import topics
 from golem.middleware.bus import News
 from golem.robots.mujoco.engine import MujocoRobot
@@ -52,18 +52,13 @@ class Tether:
                 f"Rung tether judges on the simulator's truth; robot: {stack.robot.use} is not the twin, 'mujoco'."
             )
         shared_context()
-        files = {
-            slot: hashlib.sha256(Path(use.rpartition(":")[0]).expanduser().read_bytes()).hexdigest()
-            for slot in registry.slots()
-            if (use := stack.choice(slot).use).rpartition(":")[0].endswith(".py")
-        }
         return {
             "stack": asdict(stack),
             "profile": asdict(load_profile(profile)),
             "goal": asdict(PickGoal()),
             "skill": asdict(PickConfig()),
             "timeout": TIMEOUT,
-            "user_files": files,
+            "user_files": user_files(stack),
         }
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:

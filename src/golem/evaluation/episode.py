@@ -1,0 +1,172 @@
+"""One robot on its feet under judgement: the whole stack in lock-step, pushed and watched from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from golem.errors import ConfigError
+from golem.evaluation.balance import BalanceRecorder
+from golem.evaluation.exercise import Exercise
+from golem.evaluation.pushes import Push
+from golem.hardware.safety.base import GateState
+from golem.middleware import topics
+from golem.middleware.topics import LegStatus
+from golem.robots.mujoco.engine import MujocoRobot
+from golem.runtime.assembly import build
+from golem.runtime.executor import TICK
+from golem.skills.runner import FAULT
+from golem.stack import Choice, Stack, load_stack
+from golem.types import Array
+
+STACK = "stand"
+"""The shipped stack whose robot stands on its own feet."""
+POLICY = "policy"
+"""The lower body that runs a policy file."""
+
+
+def lower_body(method: str) -> Choice:
+    """Return the lower body a method stands for.
+
+    Args:
+        method: a registered name, a user's `file.py:Class` or `package.module:Class`, or `policy:DESCRIPTION` or
+            `policy:DESCRIPTION:NETWORK`, the files of a policy.
+    """
+    name, *files = method.split(":")
+    if name != POLICY or not files:
+        return Choice(method)
+    return Choice(name, dict(zip(("file", "network"), files, strict=False)))
+
+
+def legs_stack(
+    method: str,
+    profile: str,
+    overrides: Mapping[str, str] | None = None,
+    robot: Mapping[str, object] | None = None,
+) -> Stack:
+    """Return the standing stack with the lower body `method`.
+
+    Args:
+        method: see `lower_body`.
+        profile: realism profile.
+        overrides: slot -> implementation that replaces the stack's own.
+        robot: options of the twin that differ from the stack's own; without any, an open floor.
+    """
+    stack = load_stack(STACK, profile=profile)
+    stack = replace(stack, lower_body=lower_body(method))
+    options = {**stack.robot.options, "world": "open", **(robot or {})}
+    stack = replace(stack, robot=replace(stack.robot, options=options))
+    for slot, use in (overrides or {}).items():
+        stack = stack.with_choice(slot, use)
+    return stack
+
+
+def episode_seed(seed: int, index: int) -> int:
+    """Return the twin's seed of trial `index`: far enough apart that runs of neighbouring seeds share no episode."""
+    return seed * 1_000_003 + index
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """How a robot was lost.
+
+    Attributes:
+        stage: `fall`, `safety` (its gate stopped it, as an operator's e-stop would) or `fault` (the leg controller
+            broke its contract, and the fallback took over).
+        detail: one sentence.
+    """
+
+    stage: str
+    detail: str
+
+
+class Episode:
+    """A robot that exercises while it is pushed and recorded.
+
+    Attributes:
+        running, robot: the stack and its twin.
+        recorder: samples the twin's balance after every tick.
+        force: (3,) present force of the push in the world [N].
+    """
+
+    def __init__(self, stack: Stack, seed: int, exercise: Exercise) -> None:
+        """Build `stack` for the twin's seed and begin the exercise.
+
+        Raises:
+            ConfigError: the stack's robot is not the twin, or a name or an option is wrong.
+            ModuleFault: a constructor raised.
+        """
+        self.running, robot = build(stack, seed)
+        if not isinstance(robot, MujocoRobot):
+            raise ConfigError(
+                f"Balance is judged on the simulator's truth; robot: {stack.robot.use} is not 'mujoco'."
+            )
+        self.robot = robot
+        self.recorder = BalanceRecorder(robot)
+        self._push: tuple[Push, float, float] | None = None
+        self.force: Array = np.zeros(3)
+        self.running.start(exercise, None)
+
+    @property
+    def t(self) -> float:
+        """Robot time [s]."""
+        return self.running.executor.t
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the safety gate has stopped the robot."""
+        safety = self.running.safety
+        return safety is not None and safety.state in (GateState.STOP1, GateState.STOP0)
+
+    @property
+    def over(self) -> bool:
+        """Whether the robot fell, was stopped, or lost its leg controller."""
+        return self.recorder.fallen or self.stopped or self._fault is not None
+
+    @property
+    def loss(self) -> Loss | None:
+        """How the robot was lost; None while it was not."""
+        if self._fault is not None:
+            return Loss(FAULT, self._fault)
+        if self.recorder.fallen:
+            return Loss("fall", f"The robot fell at {self.t:.1f} s.")
+        safety = self.running.safety
+        if self.stopped and safety is not None:
+            return Loss("safety", f"Safety stop at {self.t:.1f} s: {safety.reason}. {safety.detail}")
+        return None
+
+    @property
+    def _fault(self) -> str | None:
+        legs = self.running.bus.latest(topics.LEG_STATUS, LegStatus)
+        return None if legs is None else legs.fault
+
+    def run(self, seconds: float, until: Callable[[], bool] = lambda: False) -> None:
+        """Let up to `seconds` of robot time pass; a fall, a stop or `until()` ends it early."""
+        self.running.executor.run(self.t + seconds, lambda: self._look() or until())
+
+    def push(self, push: Push) -> None:
+        """Begin `push` now; it goes on while the episode runs."""
+        self._push = (push, self.t, self.recorder.yaw)
+        self._drive()
+
+    def close(self) -> None:
+        """Release what the twin holds."""
+        self.robot.close()
+
+    def _look(self) -> bool:
+        self.recorder(self.t, self.force)
+        self._drive()
+        return self.over
+
+    def _drive(self) -> None:
+        """Apply the push for the coming tick."""
+        if self._push is None:
+            return
+        push, start, yaw = self._push
+        elapsed = self.t - start + 0.5 * TICK
+        self.force = push.force(elapsed, yaw)
+        self.robot.push(self.force, push.body, None if push.point is None else np.array(push.point))
+        if elapsed > push.duration:
+            self._push = None

@@ -1,0 +1,78 @@
+"""The pushes of the evaluation: the paper's rod at the pelvis, and short shoves against the torso."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from golem.robots.model.table import BASE_LINK
+from golem.types import Array
+
+DIRECTIONS = ("front", "front_left", "left", "back_left", "back", "back_right", "right", "front_right")
+"""Where a push drives the robot, in its heading frame, in steps of 45 deg from straight ahead to the left."""
+ROD_TIME = 1.0
+"""Duration of a push with the rod [s]."""
+SHOVE_TIME = 0.2
+"""Duration of a shove [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """A horizontal force for a short time, in a direction that stays what it was when the push began.
+
+    Attributes:
+        body: link it acts on.
+        point: where on the link, in its frame [m]; None is its centre of mass.
+        direction: name in `DIRECTIONS`.
+        peak: largest force [N].
+        duration: how long [s].
+        shape: constant, or half a sine.
+    """
+
+    body: str
+    point: tuple[float, float, float] | None
+    direction: str
+    peak: float
+    duration: float
+    shape: Literal["constant", "half_sine"]
+
+    def force(self, elapsed: float, yaw: float) -> Array:
+        """Return the (3,) force in the world [N].
+
+        Args:
+            elapsed: time since the push began [s].
+            yaw: heading of the robot when it began [rad].
+        """
+        if not 0.0 <= elapsed < self.duration:
+            return np.zeros(3)
+        size = self.peak
+        if self.shape == "half_sine":
+            size *= math.sin(math.pi * elapsed / self.duration)
+        angle = yaw + self.bearing
+        return size * np.array([math.cos(angle), math.sin(angle), 0.0])
+
+    @property
+    def bearing(self) -> float:
+        """Its direction in the robot's heading frame [rad]."""
+        return DIRECTIONS.index(self.direction) * math.pi / 4
+
+    @property
+    def impulse(self) -> float:
+        """Its impulse [N s]."""
+        return self.peak * self.duration * (1.0 if self.shape == "constant" else 2.0 / math.pi)
+
+
+def rod(direction: str, peak: float) -> Push:
+    """Return a push with the paper's rod: half a sine of `ROD_TIME` at the pelvis, up to `peak` [N].
+
+    The paper's rod is moved by a person, who pushes until the robot yields; the force's course is not published.
+    """
+    return Push(BASE_LINK, (0.0, 0.0, 0.0), direction, peak, ROD_TIME, "half_sine")
+
+
+def shove(direction: str, impulse: float) -> Push:
+    """Return a constant force on the torso for `SHOVE_TIME` that transfers `impulse` [N s]."""
+    return Push("torso_link", None, direction, impulse / SHOVE_TIME, SHOVE_TIME, "constant")

@@ -1,0 +1,123 @@
+"""Rung `push`: the paper's rod pushes the standing robot at the pelvis; one lower body per method."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from golem import registry
+from golem.evaluation.balance import TRACE, BalanceTrace
+from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
+from golem.evaluation.episode import Episode, Loss, episode_seed, legs_stack
+from golem.evaluation.exercise import ArmMotion, Exercise
+from golem.evaluation.provenance import user_files
+from golem.evaluation.pushes import DIRECTIONS, Push, rod
+from golem.evaluation.strip import Strip
+from golem.robots.sensors.profiles import PROFILES, load_profile
+
+PEAK = (22.1, 6.9)
+"""Mean and deviation of the rod's peak force [N], from the paper's ALMI trials."""
+LEAST_PEAK = 5.0
+"""Peak below which a draw is raised to it [N]."""
+SETTLE = (2.5, 3.5)
+"""Range of the time before the push [s]; the arms are then in motion."""
+MOMENTS = (0.5, 0.5, 0.4, 0.6)
+"""Times between the moments of the strip of pictures, from the begin of the push on [s]."""
+PATIENCE = 5.0
+"""Time after that in which the robot has to stand still again [s]; one that does not is judged as it is."""
+QUIET = 1.0
+"""Time of quiet standing that ends a trial [s]."""
+
+
+class PushRung:
+    """One push per trial; success is standing again with the CoM inside the support polygon.
+
+    The rod's force is not cut when the margin becomes negative, as a person's hand would: a robot that steps would
+    otherwise be pushed less than one that does not.
+    """
+
+    name = "push"
+    profiles = tuple(PROFILES)
+
+    def methods(self) -> tuple[str, ...]:
+        """Return the registered lower bodies; `policy:FILE` and `vendor:FILE` name a policy file."""
+        return registry.names("lower_body")
+
+    def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
+        """Return what determines a trial besides its seed; see `Rung`."""
+        stack = legs_stack(method, profile, overrides)
+        return {
+            "stack": asdict(stack),
+            "profile": asdict(load_profile(profile)),
+            "peak": PEAK,
+            "settle": SETTLE,
+            "patience": PATIENCE,
+            "user_files": user_files(stack),
+        }
+
+    def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
+        """Run one trial; see `Rung`."""
+        stack = legs_stack(spec.method, spec.profile, spec.overrides)
+        push, settle = draw(spec.rng("push"))
+        episode = Episode(stack, episode_seed(spec.seed, spec.index), Exercise(ArmMotion(spec.rng("arms"))))
+        try:
+            strip = Strip(episode.robot, push.bearing)
+            episode.run(settle)
+            start = episode.t
+            episode.push(push)
+            for seconds in MOMENTS:
+                strip.keep(episode.t, episode.force)
+                episode.run(seconds)
+            episode.run(PATIENCE, until=lambda: episode.recorder.quiet >= QUIET)
+            strip.keep(episode.t, episode.force)
+            trace = episode.recorder.trace()
+            if artefacts is not None:
+                trace.save(artefacts / TRACE)
+            outcome = judge(trace, start, push, episode.loss, spec.method)
+            shown = not outcome.success or spec.index == 0
+            return replace(outcome, picture=strip.picture() if shown else None)
+        finally:
+            episode.close()
+
+
+def draw(rng: np.random.Generator) -> tuple[Push, float]:
+    """Return the push of one trial, and the time before it [s]."""
+    direction = DIRECTIONS[rng.integers(len(DIRECTIONS))]
+    peak = max(float(rng.normal(*PEAK)), LEAST_PEAK)
+    return rod(direction, peak), float(rng.uniform(*SETTLE))
+
+
+def measures(trace: BalanceTrace, start: float) -> dict[str, float]:
+    """Return the paper's measures of a push that began at `start` [s], SI units."""
+    after = trace.window(start)
+    if not len(after.t):
+        return {}
+    return {
+        "peak_force": float(np.linalg.norm(after.force, axis=1).max()),
+        "peak_lean": float(np.abs(after.rpy[:, 1]).max()),
+        "peak_tilt": float(after.tilt.max()),
+        "margin_before": trace.window(start - 0.5, start).final_margin,
+        "margin_min": float(after.margin.min()),
+        "margin_final": after.final_margin,
+        "below_zero": after.below_zero,
+        "steps": float(after.steps),
+        "displacement": float(np.hypot(*(after.base[-1] - after.base[0])[:2])),
+    }
+
+
+def judge(trace: BalanceTrace, start: float, push: Push, loss: Loss | None, method: str) -> TrialOutcome:
+    """Say whether the robot stands again after `push`, which began at `start` [s], and if not, how it failed."""
+    series = measures(trace, start)
+    pushed = f"pushed with {push.peak:.0f} N to the {push.direction.replace('_', ' ')}"
+    if loss is None and series["margin_final"] <= 0.0:
+        loss = Loss("balance", f"The CoM margin ends at {1e3 * series['margin_final']:.0f} mm.")
+    if loss is not None:
+        stage = loss.stage if series else "settle"
+        detail = f"{loss.detail} It was {pushed} at {start:.1f} s."
+        return TrialOutcome(False, stage, f"lower_body: {method}", detail, series=series)
+    timings = {"recovery": trace.recovery_time(start)}
+    return TrialOutcome(True, DONE, None, f"stands, {pushed}", timings, series)
