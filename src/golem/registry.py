@@ -23,7 +23,10 @@ from golem.options import convert_all, dataclass_in, fill
 
 _IMPLEMENTATIONS: dict[str, dict[str, str]] = {
     "robot": {"mujoco": "golem.robots.mujoco.engine:MujocoRobot"},
-    "estimator": {"tether": "golem.hardware.estimator.tether:TetherEstimator"},
+    "estimator": {
+        "tether": "golem.hardware.estimator.tether:TetherEstimator",
+        "random_walk_kf": "golem.hardware.estimator.random_walk_kf:RandomWalkKF",
+    },
     "servo": {"pd_gravity": "golem.hardware.servo.servo:Servo"},
     "hand": {"magpie": "golem.hardware.hands.magpie:MagpieHand"},
     "lower_body": {
@@ -31,6 +34,7 @@ _IMPLEMENTATIONS: dict[str, dict[str, str]] = {
         "hold": "golem.capabilities.legs.hold:Hold",
         "policy": "golem.capabilities.legs.policy:Policy",
         "mpc": "golem.capabilities.legs.mpc.controller:MPC",
+        "vendor": "golem.capabilities.legs.vendor:Vendor",
         "wbc": "golem.capabilities.legs.wbc:Wbc",
     },
     "upper_body": {
@@ -42,6 +46,7 @@ _IMPLEMENTATIONS: dict[str, dict[str, str]] = {
         "centroid": "golem.skills.grasping.centroid:Centroid",
         "visual_servo": "golem.skills.grasping.visual_servo:VisualServo",
     },
+    "navigator": {"goto": "golem.capabilities.navigation.goto:GoTo"},
 }
 
 

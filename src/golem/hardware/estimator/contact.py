@@ -19,16 +19,14 @@ class ContactConfig:
         middle, width: force of probability one half, and of the sigmoid's scale [N].
         settle: time after touch-down for which a foot is not believed to stand still: it lands, slides and rolls [s].
         ramp: time over which it is then believed more and more [s].
-        smoothing: time constant of the low-pass on the force [s].
     """
 
-    touch: float = 100.0
-    leave: float = 50.0
-    middle: float = 100.0
-    width: float = 25.0
+    touch: float = 120.0
+    leave: float = 60.0
+    middle: float = 150.0
+    width: float = 35.0
     settle: float = 0.03
     ramp: float = 0.02
-    smoothing: float = 0.005
 
 
 class Contact:
@@ -36,7 +34,6 @@ class Contact:
 
     Attributes:
         config: thresholds and times.
-        force: (*shape, 2) smoothed force of the left and the right foot [N].
         planted: (*shape, 2) whether the foot is on the ground.
         age: (*shape, 2) time since it touched down [s].
     """
@@ -44,7 +41,6 @@ class Contact:
     def __init__(self, config: ContactConfig, shape: tuple[int, ...] = ()) -> None:
         """Begin with feet of which nothing is known."""
         self.config = config
-        self.force: Array = np.zeros((*shape, 2))
         self.planted: NDArray[np.bool_] = np.zeros((*shape, 2), dtype=bool)
         self.age: Array = np.zeros((*shape, 2))
         self._new: NDArray[np.bool_] = np.ones(shape, dtype=bool)
@@ -69,13 +65,11 @@ class Contact:
         """
         c = self.config
         new = self._new[..., None]
-        share = np.where(new, 1.0, dt / (c.smoothing + dt))
-        self.force = self.force + share * (force - self.force)
-        planted = self.force > np.where(self.planted & ~new, c.leave, c.touch)
+        planted = force > np.where(self.planted & ~new, c.leave, c.touch)
         long_ago = c.settle + c.ramp
         self.age = np.where(planted, np.where(new, long_ago, np.where(self.planted, self.age + dt, 0.0)), 0.0)
         self.planted = planted
         self._new = np.zeros_like(self._new)
-        probability = planted / (1.0 + np.exp((c.middle - self.force) / c.width))
+        probability = planted / (1.0 + np.exp((c.middle - force) / c.width))
         trust = np.minimum(np.maximum((self.age - c.settle) / c.ramp, 0.0), 1.0)
         return probability, probability * trust

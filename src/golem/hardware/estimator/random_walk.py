@@ -35,7 +35,7 @@ class RandomWalkConfig:
         start: standard deviation of the velocity after a reset [m/s].
     """
 
-    walk: float = 1.0
+    walk: float = 0.5
     foot_noise: float = 0.05
     least_weight: float = 0.05
     gate: float = 11.34
