@@ -21,6 +21,7 @@ from golem.robots.mujoco.scene import Scene
 from golem.runtime.assembly import Running, build
 from golem.skills.base import Tick
 from golem.skills.pick import Pick, PickGoal
+from golem.skills.walk import Walk
 from golem.stack import Stack
 
 SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
@@ -178,6 +179,7 @@ class Inspected:
             ("pick", skill),
             ("coroutine", coroutine),
             ("bus", self.running.bus),
+            ("walk", Walk(self.running.navigator)),
         ]
 
     def module(self, slot: str) -> Any:

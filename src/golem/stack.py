@@ -47,6 +47,7 @@ class Stack:
     upper_body: Choice = Choice("diff_ik")
     localizer: Choice = Choice("onnx")
     grasp_method: Choice = Choice("visual_servo")
+    navigator: Choice = Choice("goto")
     fallback: Choice | None = None
     profile: str = "bench"
     limits: str = "urdf"

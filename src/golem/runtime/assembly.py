@@ -14,6 +14,7 @@ from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.legs.base import LowerBody
 from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.localization.base import Localizer
+from golem.capabilities.navigation.base import Navigator
 from golem.errors import ConfigError, GolemError, ModuleFault
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.virtual import VirtualEstop
@@ -28,7 +29,7 @@ from golem.robots.sensors.profiles import load_profile
 from golem.runtime import nodes
 from golem.runtime.executor import Executor, Node
 from golem.runtime.guard import Guard
-from golem.runtime.guarded import GuardedMethod
+from golem.runtime.guarded import GuardedMethod, GuardedNavigator
 from golem.runtime.legs import Legs, LowerBodyNode
 from golem.runtime.release import ReleaseNode
 from golem.skills.base import Skill, SkillResult
@@ -49,6 +50,8 @@ CONTRACTS: dict[str, type[Any]] = {
     "lower_body": LowerBody,
     "upper_body": UpperBody,
     "localizer": Localizer,
+    "grasp_method": GraspMethod,
+    "navigator": Navigator,
 }
 """What the module in a slot must have."""
 
@@ -84,23 +87,24 @@ class Running:
     @property
     def method(self) -> GraspMethod:
         """The stack's grasp method, new and guarded."""
-        choice = self.stack.grasp_method
-        method = registry.create("grasp_method", choice.use, choice.options)
-        guard = Guard("grasp_method", choice.use)
-        guard.satisfies(method, GraspMethod)
-        return GuardedMethod(method, guard)
+        return GuardedMethod(*self._make("grasp_method"))
+
+    @property
+    def navigator(self) -> Navigator:
+        """The stack's navigator, new and guarded."""
+        return GuardedNavigator(*self._make("navigator"))
+
+    def _make(self, slot: str, chosen: Choice | None = None, **context: object) -> tuple[Any, Guard]:
+        """Return a new module for `slot`, by default the stack's choice, and the guard that watches it."""
+        choice = chosen or self.stack.choice(slot)
+        guard = Guard(slot, choice.use)
+        module = registry.create(slot, choice.use, choice.options, **context)
+        guard.satisfies(module, CONTRACTS[slot])
+        return module, guard
 
     def _nodes(self, stack: Stack, robot: Robot) -> list[Node]:
         """Return the nodes in the order of one tick: measure, estimate, perceive, decide, control, protect, act."""
-
-        def make(slot: str, chosen: Choice | None = None, **context: object) -> tuple[Any, Guard]:
-            choice = chosen or stack.choice(slot)
-            guard = Guard(slot, choice.use)
-            module = registry.create(slot, choice.use, choice.options, **context)
-            guard.satisfies(module, CONTRACTS[slot])
-            return module, guard
-
-        bus = self.bus
+        bus, make = self.bus, self._make
         robot_guard = Guard("robot", stack.robot.use)
         localizer, localizer_guard = make("localizer")
         reserve = make("lower_body", stack.legs_in_reserve)

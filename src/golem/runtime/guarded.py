@@ -1,11 +1,12 @@
-"""Grasp methods behind a guard: a user's method may raise or return nonsense, and the fault shall carry its name."""
+"""Modules that skills call, behind a guard: a user's may raise or return nonsense, and the fault carries its name."""
 
 from __future__ import annotations
 
 from golem.capabilities.arms.base import check_pose
+from golem.capabilities.navigation.base import Course, Navigator, PlanarPose
 from golem.runtime.guard import Guard
 from golem.skills.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus, ServoStep
-from golem.types import Array, LocalizedObject
+from golem.types import Array, LocalizedObject, Twist
 
 
 class GuardedMethod:
@@ -52,3 +53,26 @@ class GuardedLaw:
         self._guard.array("target", step.target, 3)
         self._guard.number("sigma", step.sigma, least=0.0)
         return step
+
+
+class GuardedNavigator:
+    """A `Navigator` whose faults name the module."""
+
+    def __init__(self, navigator: Navigator, guard: Guard) -> None:
+        """Watch `navigator`."""
+        self._navigator, self._guard = navigator, guard
+
+    def start(self, goal: PlanarPose) -> None:
+        """Give the navigator its goal; see `Navigator`."""
+        self._guard.call(self._navigator.start, goal)
+
+    def step(self, pose: PlanarPose, stepping: bool, dt: float) -> Course:
+        """Return the navigator's course; see `Navigator`."""
+        course = self._guard.call(self._navigator.step, pose, stepping, dt)
+        self._guard.kind("the course", course, Course)
+        self._guard.kind("twist", course.twist, Twist)
+        for name in ("vx", "vy", "wz"):
+            self._guard.number(name, getattr(course.twist, name))
+        self._guard.kind("arrived", course.arrived, bool)
+        self._guard.kind("left", course.left, PlanarPose)
+        return course

@@ -1,4 +1,4 @@
-"""What a skill works with: its two arms and hands, its eyes, its clock, a place to speak."""
+"""What a skill works with: its legs, its two arms and hands, its eyes, its clock, a place to speak."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from golem.capabilities.arms.line import Line
 from golem.hardware.hands.base import HandStatus
 from golem.middleware import topics
 from golem.middleware.bus import Bus
-from golem.middleware.topics import HandGoal, LookRequest, Sightings
+from golem.middleware.topics import HandGoal, LegStatus, LookRequest, Odometry, Sightings
 from golem.robots.model.kinematics import Kinematics
 from golem.skills.base import Feedback, StageFailed, Tick
-from golem.types import Array, BaseEstimate, LowState, PalmTargets, Side
+from golem.types import Array, BaseEstimate, LowState, PalmTargets, Side, Twist
 
 
 class Hand:
@@ -127,6 +127,36 @@ class Arm:
         self._context.send_palms()
 
 
+class Legs:
+    """The lower body, as a skill commands and reads it."""
+
+    def __init__(self, context: Context) -> None:
+        """Speak for the legs."""
+        self._context = context
+
+    @property
+    def status(self) -> LegStatus:
+        """What the base layer of the legs reports now.
+
+        Raises:
+            StageFailed: it has not reported yet.
+        """
+        status = self._context.bus.latest(topics.LEG_STATUS, LegStatus)
+        if status is None:
+            raise StageFailed("walk", "lower_body", "The legs do not report.")
+        return status
+
+    @property
+    def pose(self) -> Array:
+        """(4, 4) pose of base_link in odom by the odometry, or by the base estimate in a stack without one."""
+        odometry = self._context.bus.latest(topics.ODOMETRY, Odometry)
+        return self._context.T_odom_base if odometry is None else odometry.T_odom_base
+
+    def drive(self, twist: Twist) -> None:
+        """Move the base with `twist`; to be said again at least every 0.5 s, or the robot stands."""
+        self._context.publish(topics.TWIST, twist)
+
+
 class Context:
     """The world as a skill sees it. Holds the bus, never a module.
 
@@ -135,6 +165,7 @@ class Context:
         kinematics: forward kinematics of the nominal model at the newest measured joints.
         period: time between two ticks of the skill [s].
         t: present time [s].
+        legs: the lower body.
         arms, hands: by side.
         skill: name of the running skill, for its feedback.
     """
@@ -146,6 +177,7 @@ class Context:
         self.period = period
         self.t = 0.0
         self.skill = ""
+        self.legs = Legs(self)
         self.arms: dict[Side, Arm] = {"left": Arm(self, "left"), "right": Arm(self, "right")}
         self.hands: dict[Side, Hand] = {"left": Hand(self, "left"), "right": Hand(self, "right")}
 

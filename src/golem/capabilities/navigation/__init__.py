@@ -1,0 +1,1 @@
+"""Navigation: where the base shall go, as twists for the lower body."""
