@@ -30,6 +30,8 @@ class Outer:
     mode: Literal["a", "b"] = "a"
     file: Path = Path("x")
     limit: float | None = None
+    kind: Literal["p", "q"] | None = None
+    weights: Path | None = None
     anything: Any = None
 
 
@@ -48,6 +50,8 @@ def test_values_take_the_types_of_the_fields() -> None:
             "mode": "b",
             "file": "data/x.onnx",
             "limit": 2,
+            "kind": "q",
+            "weights": "w.onnx",
             "anything": {"a": [1]},
         },
     )
@@ -62,6 +66,8 @@ def test_values_take_the_types_of_the_fields() -> None:
         "b",
         Path("data/x.onnx"),
         2.0,
+        "q",
+        Path("w.onnx"),
         {"a": [1]},
     )
     assert isinstance(got.inner.tolerance, float) and isinstance(got.gains, tuple)
@@ -71,8 +77,9 @@ def test_a_dataclass_may_be_passed_as_one() -> None:
     assert fill("option", Outer, {"name": "n", "inner": Inner(5.0)}).inner == Inner(5.0)
 
 
-def test_a_nested_dataclass_that_may_be_absent_may_be_none() -> None:
-    assert fill("option", Outer, {"name": "n", "other": None}).other is None
+def test_what_may_be_absent_may_be_none() -> None:
+    absent = fill("option", Outer, {"name": "n", "other": None, "limit": None, "kind": None})
+    assert absent.other is None and absent.limit is None and absent.kind is None
 
 
 @pytest.mark.parametrize(
@@ -90,6 +97,9 @@ def test_a_nested_dataclass_that_may_be_absent_may_be_none() -> None:
         ({"name": "n", "gains": [1.0, "x"]}, ["option 'gains'", "a number", "'x'"]),
         ({"name": "n", "corner": [1.0]}, ["option 'corner'", "2 values, not 1"]),
         ({"name": "n", "mode": "c"}, ["option 'mode'", "'c'", "a, b"]),
+        ({"name": "n", "kind": "r"}, ["option 'kind'", "'r'", "p, q"]),
+        ({"name": "n", "limit": "much"}, ["option 'limit'", "a number", "'much'"]),
+        ({"name": "n", "other": 3}, ["option 'other'", "mapping", "3"]),
         ({}, ["option 'name'", "must be given"]),
     ],
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import types
 import typing
 from collections.abc import Collection, Mapping
 from math import inf
@@ -152,6 +153,8 @@ def _convert(what: str, hint: Any, value: Any) -> Any:
             raise ConfigError(f"The {what} is {wanted}, not {value!r}.")
         return hint(value)
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (types.UnionType, typing.Union) and len(inner) == 2 and inner[1] is type(None):
+        return None if value is None else _convert(what, inner[0], value)
     if origin is typing.Literal and value not in inner:
         raise unknown_name(f"value of {what}", str(value), map(str, inner))
     if origin in (tuple, list):

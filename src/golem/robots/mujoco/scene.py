@@ -74,7 +74,7 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
         _add_terrain(spec, config, seed)
         _add_companion(spec)
     if config.cone is not None:
-        spec.option.cone = mujoco.mjtCone[f"mjCONE_{config.cone.upper()}"]
+        spec.option.cone = mujoco.mjtCone.__members__[f"mjCONE_{config.cone.upper()}"]
     spec.option.timestep = COARSE_STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     return Scene(spec.compile(), names, layout, tuple(draws))

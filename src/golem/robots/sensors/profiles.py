@@ -55,7 +55,7 @@ class RealismProfile:
         arm_offset, leg_offset: standard deviation of the encoder zero of torso and arm joints, of leg joints [rad].
         actuator_delay: time from a motor command's publication to the torque [s].
         imu: errors of the IMU.
-        hoist_sway, stand_sway: radial RMS of the base's horizontal sway, tethered and standing [m].
+        hoist_sway: radial RMS of the base's horizontal sway in the hoist [m]; a robot that stands sways by itself.
         screws: ranges of the loosened screws.
     """
 
@@ -68,7 +68,6 @@ class RealismProfile:
     actuator_delay: float = 0.0
     imu: ImuErrors = ImuErrors()
     hoist_sway: float = 0.0
-    stand_sway: float = 0.0
     screws: ScrewRanges = field(default_factory=ScrewRanges)
 
 
@@ -121,7 +120,6 @@ PROFILES: dict[str, RealismProfile] = {
         imu=IMU,
         # [paper] sway while standing in their simulation: 0.10 mm radial RMS. [assumption] the same in the hoist.
         hoist_sway=0.0001,
-        stand_sway=0.0001,
     ),
     "field": RealismProfile(
         "field",
@@ -141,10 +139,8 @@ PROFILES: dict[str, RealismProfile] = {
         # [C] one period of the command stream and one of the motor bus.
         actuator_delay=0.004,
         imu=IMU,
-        # [assumption] half of the standing sway; nobody published the sway of the hoisted robot.
+        # [assumption] half of the standing robot's 4.6 mm radial RMS [paper]; nobody published that of the hoisted one.
         hoist_sway=0.0023,
-        # [paper] radial sway RMS of the standing robot.
-        stand_sway=0.0046,
     ),
 }
 """Every profile by name."""
@@ -174,14 +170,13 @@ class EpisodeErrors:
             calibration claims.
         joint_offset: (27,) reported minus true joint position [rad].
         imu: bias of the IMU.
-        hoist_sway, stand_sway: horizontal motion of the base, tethered and standing.
+        hoist_sway: horizontal motion of the base in the hoist.
     """
 
     T_nominal_actual: dict[str, Array]
     joint_offset: Array
     imu: ImuBias
     hoist_sway: Sway
-    stand_sway: Sway
 
 
 def sample_episode(profile: RealismProfile, rng: np.random.Generator) -> EpisodeErrors:
@@ -191,7 +186,7 @@ def sample_episode(profile: RealismProfile, rng: np.random.Generator) -> Episode
         profile: magnitudes.
         rng: e.g. `stream(seed, "episode")`; each kind of error draws from a child of it.
     """
-    cameras, joints, imu, hoist, stand = rng.spawn(5)
+    cameras, joints, imu, hoist = rng.spawn(4)
     sigma = np.zeros(NUM_JOINTS)
     sigma[LEGS] = profile.leg_offset
     sigma[UPPER] = profile.arm_offset
@@ -203,7 +198,6 @@ def sample_episode(profile: RealismProfile, rng: np.random.Generator) -> Episode
         joint_offset=sigma * joints.standard_normal(NUM_JOINTS),
         imu=profile.imu.draw_bias(imu),
         hoist_sway=draw_sway(profile.hoist_sway, hoist),
-        stand_sway=draw_sway(profile.stand_sway, stand),
     )
 
 

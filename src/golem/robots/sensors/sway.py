@@ -1,4 +1,4 @@
-"""Horizontal sway of the base: what a hoist's rope or a balancing controller does to it."""
+"""Horizontal sway of the base: what a hoist's rope does to it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from golem.types import Array
 TONES = 4
 """Sinusoids per axis."""
 BAND = (0.2, 0.8)
-"""Frequencies [Hz]; assumption: a pendulum of 4 m to 1 m (0.25 to 0.5 Hz) or the upright robot, with a margin."""
+"""Frequencies [Hz]; assumption: a pendulum of 4 m to 1 m (0.25 to 0.5 Hz), with a margin."""
 
 
 @dataclass(frozen=True, slots=True)
