@@ -128,7 +128,7 @@ def test_a_file_is_read(tmp_path: Path) -> None:
 
 CHANGED: dict[str, Any] = {
     slot: Choice(getattr(Stack(), slot).use, {"option": 1}) for slot in registry.slots()
-} | {"fallback": Choice("hold"), "profile": "field", "limits": "paper"}
+} | {"fallback": Choice("hold"), "onboard": Choice("hold"), "profile": "field", "limits": "paper"}
 
 
 @pytest.mark.parametrize("key", [f.name for f in fields(Stack)])
@@ -154,3 +154,11 @@ def test_another_choice_comes_without_the_options_of_the_old_one() -> None:
     changed = stack.with_choice("hand", "mine.py:Hand")
     assert changed.hand == Choice("mine.py:Hand")
     assert changed.profile == "field"
+
+
+def test_the_twin_runs_legs_on_board_where_something_speaks_to_them() -> None:
+    assert parse_stack("onboard: hold", "x").legs_on_board is None
+    assert parse_stack("lower_body: vendor", "x").legs_on_board == Choice("almi")
+    assert parse_stack("fallback: vendor", "x").legs_on_board == Choice("almi")
+    chosen = parse_stack("lower_body: vendor\nonboard: {use: policy, file: x.yaml}", "x")
+    assert chosen.legs_on_board == Choice("policy", {"file": "x.yaml"})

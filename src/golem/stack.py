@@ -35,6 +35,7 @@ class Stack:
     Attributes:
         fallback: the lower body that takes the legs when `lower_body` fails. None: `almi` where the robot's option
             `support` is `ground`, else `hold`.
+        onboard: the lower body that the twin's on-board controller runs for `vendor`. None: `almi`.
         profile: realism profile of a simulated robot: ideal, bench or field.
         limits: torque limit profile the safety gate enforces: urdf or paper.
     """
@@ -49,6 +50,7 @@ class Stack:
     grasp_method: Choice = Choice("visual_servo")
     navigator: Choice = Choice("goto")
     fallback: Choice | None = None
+    onboard: Choice | None = None
     profile: str = "bench"
     limits: str = "urdf"
 
@@ -60,6 +62,12 @@ class Stack:
     def legs_in_reserve(self) -> Choice:
         """The lower body that takes the legs when `lower_body` fails."""
         return self.fallback or Choice("almi" if self.on_ground else "hold")
+
+    @property
+    def legs_on_board(self) -> Choice | None:
+        """The lower body of the twin's on-board controller; None where nothing speaks to that."""
+        spoken_to = "vendor" in (self.lower_body.use, self.legs_in_reserve.use)
+        return self.onboard or Choice("almi") if spoken_to else None
 
     @property
     def on_ground(self) -> bool:
@@ -125,7 +133,7 @@ def parse_stack(text: str, name: str) -> Stack:
     for key, value in data.items():
         if key not in valid:
             raise unknown_name(f"key in {name}", str(key), valid)
-        slot = "lower_body" if key == "fallback" else key
+        slot = "lower_body" if key in ("fallback", "onboard") else key
         values[key] = _choice(name, key, slot, value) if slot in registry.slots() else _word(name, key, value)
     return Stack(**values)
 

@@ -23,6 +23,7 @@ from golem.hardware.safety.base import GateResult, GateState, Request, SafetyLim
 from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
 from golem.middleware.bus import Bus
+from golem.middleware.unitree_api import LOCO_APIS
 from golem.robots.base import Banded, Robot
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.sensors.profiles import load_profile
@@ -31,6 +32,7 @@ from golem.runtime.executor import Executor, Node
 from golem.runtime.guard import Guard
 from golem.runtime.guarded import GuardedMethod, GuardedNavigator
 from golem.runtime.legs import Legs, LowerBodyNode
+from golem.runtime.onboard import BusOnboard, LocoServiceNode
 from golem.runtime.release import ReleaseNode
 from golem.skills.base import Skill, SkillResult
 from golem.skills.context import Context
@@ -107,8 +109,9 @@ class Running:
         bus, make = self.bus, self._make
         robot_guard = Guard("robot", stack.robot.use)
         localizer, localizer_guard = make("localizer")
-        reserve = make("lower_body", stack.legs_in_reserve)
-        self._legs = LowerBodyNode(bus, Legs(*make("lower_body")), Legs(*reserve))
+        lower_body = make("lower_body", onboard=BusOnboard(bus))
+        reserve = make("lower_body", stack.legs_in_reserve, onboard=BusOnboard(bus))
+        self._legs = LowerBodyNode(bus, Legs(*lower_body), Legs(*reserve))
         out: list[Node] = [
             nodes.SenseNode(bus, robot, robot_guard),
             nodes.EstimatorNode(bus, *make("estimator")),
@@ -119,6 +122,9 @@ class Running:
             out.append(nodes.CameraNode(bus, robot, name, optical, CAMERA_LATENCY, robot_guard))
             out.append(nodes.LocalizerNode(bus, localizer, name, localizer_guard))
         out.append(self._skills)
+        if stack.legs_on_board is not None:
+            legs = Legs(*make("lower_body", stack.legs_on_board))
+            out.append(LocoServiceNode(bus, LOCO_APIS["h1"], legs))
         out.append(self._legs)
         out.append(nodes.UpperBodyNode(bus, *make("upper_body")))
         for side in SIDES:

@@ -49,6 +49,19 @@ class Legs:
         """
         return self.guard.number("latency", self.controller.latency, least=0.0)
 
+    def check(self, command: object) -> LegCommand:
+        """Return the `command` that the controller returned.
+
+        Raises:
+            ModuleFault: it is none, or not finite.
+        """
+        checked = self.guard.kind("the leg command", command, LegCommand)
+        for name in ("q", "kp", "kd"):
+            self.guard.array(name, getattr(checked, name), JOINTS)
+        if checked.tau is not None:
+            self.guard.array("tau", checked.tau, JOINTS)
+        return checked
+
 
 class LowerBodyNode:
     """Runs the leg controller at its rate; when it fails, the fallback for the rest of the run.
@@ -115,12 +128,7 @@ class LowerBodyNode:
         latency = self._legs.check_latency()
         if latency > MAX_LATENCY:
             raise guard.fault(f"its latency is {latency:g} s, legs need at most {MAX_LATENCY:g} s")
-        guard.kind("the leg command", command, LegCommand)
-        for name in ("q", "kp", "kd"):
-            guard.array(name, getattr(command, name), JOINTS)
-        if command.tau is not None:
-            guard.array("tau", command.tau, JOINTS)
-        return command
+        return self._legs.check(command)
 
     def _both(self, second: ModuleFault) -> ModuleFault:
         """Return the fault of the stack's own controller, with that of the fallback added."""

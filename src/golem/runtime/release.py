@@ -27,7 +27,8 @@ class ReleaseNode:
         """Release the band when all is ready; a stop before that starts the wait anew."""
         if not self._robot.banded:
             return
-        if not moving(self._bus) or self._bus.latest(topics.LEG_COMMAND, LegCommand) is None:
+        legs = self._bus.latest(topics.LEG_COMMAND, LegCommand)
+        if not moving(self._bus) or legs is None or not legs.kp.any():
             self._waiting_since = t
         elif t - self._waiting_since >= READY:
             self._guard.call(self._robot.release)

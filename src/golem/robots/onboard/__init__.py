@@ -1,0 +1,1 @@
+"""What the vendor's own computer on the robot does, for twins that have none."""

@@ -1,0 +1,97 @@
+"""The vendor's loco service as a client meets it: a state machine behind calls, and a velocity that runs out.
+
+States: zero torque, damp, stand up, start; in the last one the robot balances and follows velocities. zero torque and
+damp are reached from everywhere, stand up from damp, start once the robot has stood up. Which calls the real service
+refuses is not published; these are the transitions that its examples make.
+"""
+
+from __future__ import annotations
+
+import math
+
+from golem.middleware.unitree_api import (
+    BAD_PARAMETER,
+    GET_VERSION,
+    NOT_IMPLEMENTED,
+    OK,
+    LocoApi,
+    Request,
+    Response,
+    decode_int,
+    decode_velocity,
+    encode,
+)
+from golem.types import Twist
+
+
+class LocoService:
+    """Answers calls; whoever moves the legs asks it for the state and the twist.
+
+    Attributes:
+        api: its numbers.
+        state: id of the present state.
+        standing: whether the legs have reached the standing posture; set by whoever moves them.
+        failure: why the legs cannot be controlled; empty while they can. Set by whoever moves them.
+    """
+
+    def __init__(self, api: LocoApi) -> None:
+        """Begin limp, as after power-on."""
+        self.api = api
+        self.state = api.zero_torque
+        self.standing = False
+        self.failure = ""
+        self._twist = Twist()
+        self._until = -math.inf
+
+    def answer(self, request: Request, t: float) -> Response:
+        """Act on `request` at time `t` [s]; return the answer, whose data say why where the code is not 0."""
+        try:
+            code, data = self._act(request, t)
+        except ValueError as error:
+            code, data = BAD_PARAMETER, str(error)
+        return Response(request.id, request.api_id, code, data)
+
+    def twist(self, t: float) -> Twist:
+        """Return the velocity to follow at time `t` [s]; zero once the duration it was given for is over."""
+        return self._twist if t < self._until else Twist()
+
+    def fail(self, reason: str) -> None:
+        """Damp, and refuse to start again: the legs cannot be controlled for `reason`."""
+        self.failure = reason
+        self._enter(self.api.damp)
+
+    def _act(self, request: Request, t: float) -> tuple[int, str]:
+        api = self.api
+        if request.api_id == GET_VERSION:
+            return OK, api.version
+        if request.api_id == api.get_fsm_id:
+            return OK, encode({"data": self.state})
+        if request.api_id == api.set_fsm_id:
+            wanted = decode_int(request.parameter)
+            if not self._reachable(wanted):
+                return api.invalid_fsm_id, self.failure
+            self._enter(wanted)
+            return OK, ""
+        if request.api_id == api.set_velocity:
+            velocity, duration = decode_velocity(request.parameter)
+            if self.state != api.start:
+                return api.not_available, self.failure
+            self._twist, self._until = Twist(*velocity), t + duration
+            return OK, ""
+        return NOT_IMPLEMENTED, ""
+
+    def _reachable(self, state: int) -> bool:
+        api = self.api
+        if state in (api.zero_torque, api.damp):
+            return True
+        if state == api.stand_up:
+            return self.state in (api.damp, api.stand_up) and not self.failure
+        return state == api.start and (
+            self.state == api.start or (self.state == api.stand_up and self.standing)
+        )
+
+    def _enter(self, state: int) -> None:
+        if state != self.state:
+            self.standing = False
+            self._until = -math.inf
+        self.state = state

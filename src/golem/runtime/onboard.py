@@ -1,0 +1,107 @@
+"""The twin's on-board computer: the vendor's loco service on the bus, and the legs it controls itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from golem.capabilities.legs.base import STANDING, LegCommand
+from golem.capabilities.legs.hold import STANCES, Hold, HoldConfig
+from golem.capabilities.legs.locomotion import Locomotion
+from golem.capabilities.legs.vendor import damp
+from golem.errors import ModuleFault
+from golem.middleware import topics
+from golem.middleware.bus import Bus, News
+from golem.middleware.unitree_api import LocoApi, Request, Response, request_topic, response_topic
+from golem.robots.onboard.loco_service import LocoService
+from golem.runtime.executor import TICK
+from golem.runtime.legs import Legs
+from golem.types import LEGS, BaseEstimate, LowState
+
+ONBOARD_LEGS = "onboard/legs"
+"""`LegCommand` of the on-board controller."""
+ANSWER = 0.004
+"""Time a call takes to be answered [s] [own: two servo periods, so that no client can count on an answer at once]."""
+STANCE = "crouch"
+"""Where the stand-up state ends."""
+
+
+class BusOnboard:
+    """The on-board computer behind the bus; see `vendor.Onboard`."""
+
+    def __init__(self, bus: Bus) -> None:
+        """Speak over `bus`."""
+        self._bus = bus
+        self._news: dict[str, News[Response]] = {}
+
+    def send(self, service: str, request: Request) -> None:
+        """Send a request; see `vendor.Onboard`."""
+        if service not in self._news:
+            self._news[service] = News(self._bus, response_topic(service), Response)
+        self._bus.publish(request_topic(service), request, 0.0)  # no latency: the time has no meaning
+
+    def receive(self, service: str) -> Response | None:
+        """Return a new response; see `vendor.Onboard`."""
+        return self._news[service].read() if service in self._news else None
+
+    def legs(self) -> LegCommand | None:
+        """Return the on-board controller's targets; see `vendor.Onboard`."""
+        return self._bus.latest(ONBOARD_LEGS, LegCommand)
+
+
+class LocoServiceNode:
+    """Answers calls, and controls the legs on board in the state that was called for.
+
+    In the start state the robot is controlled by any lower body, under a base layer of its own. A controller that fails
+    is not replaced: the robot damps, and the service refuses to go on.
+    """
+
+    period = TICK
+
+    def __init__(self, bus: Bus, api: LocoApi, legs: Legs) -> None:
+        """Serve `api` on `bus`, with `legs` for the start state."""
+        self._bus, self._legs = bus, legs
+        self._service = LocoService(api)
+        self._state = self._service.state
+        self._hold = Hold(HoldConfig(stance=STANCE, speed=1.0))
+        self._locomotion = Locomotion(legs.controller)
+        self._requests = News(bus, request_topic(api.service), Request)
+
+    def step(self, t: float) -> None:
+        """Answer a call, and publish what the legs are told."""
+        service = self._service
+        request = self._requests.read()
+        if request is not None:
+            self._bus.publish(response_topic(service.api.service), service.answer(request, t), t, ANSWER)
+        state = self._bus.latest(topics.LOW_STATE, LowState)
+        base = self._bus.latest(topics.BASE, BaseEstimate)
+        if state is None or base is None:
+            return
+        try:
+            command = self._control(state, base, t)
+        except ModuleFault as fault:
+            service.fail(str(fault))
+            command = damp(state)
+        self._bus.publish(ONBOARD_LEGS, command, t)
+
+    def _control(self, state: LowState, base: BaseEstimate, t: float) -> LegCommand:
+        """Return what the legs are told in the present state of the service."""
+        service, guard = self._service, self._legs.guard
+        entered, self._state = service.state != self._state, service.state
+        if service.state == service.api.start:
+            if entered:
+                guard.call(self._locomotion.reset, state)
+            command = guard.call(self._locomotion.step, state, base, service.twist(t), TICK)
+            return self._legs.check(command)
+        if service.state == service.api.stand_up:
+            if entered:
+                self._hold.reset(state)
+            command = self._hold.step(state, base, STANDING, TICK)
+            service.standing = bool(np.allclose(command.q, np.tile(STANCES[STANCE], 2)))
+            # The legs carry the robot: their own weight is not what the motors have to bear.
+            return replace(command, tau=np.zeros(LEGS.stop))
+        if service.state == service.api.damp:
+            return damp(state)
+        zero = np.zeros(LEGS.stop)
+        return LegCommand(state.q[LEGS].copy(), zero, zero, zero)

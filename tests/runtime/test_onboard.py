@@ -1,0 +1,111 @@
+"""The vendor's way of moving the legs, end to end: client, bus, on-board service, motor control, safety gate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from golem.capabilities.legs.base import LegCommand
+from golem.capabilities.legs.hold import STANCES
+from golem.errors import ModuleFault
+from golem.hardware.safety.base import GateState
+from golem.middleware import topics
+from golem.middleware.bus import Bus
+from golem.middleware.topics import LegStatus
+from golem.middleware.unitree_api import LOCO_APIS, Request, Response, encode, request_topic, response_topic
+from golem.runtime.assembly import Running, build
+from golem.runtime.guard import Guard
+from golem.runtime.legs import Legs
+from golem.runtime.onboard import ANSWER, BusOnboard, LocoServiceNode
+from golem.stack import Choice, Stack
+from golem.types import LEGS, LowState
+
+API = LOCO_APIS["h1"]
+FAILING = """
+from golem.capabilities.legs.hold import Hold
+
+class Failing(Hold):
+    def step(self, state, base, motion, dt):
+        raise RuntimeError("the network is gone")
+"""
+
+
+@contextmanager
+def hanging(**choices: Choice) -> Iterator[Running]:
+    """A tethered stack whose legs the vendor's controller moves."""
+    changed: dict[str, Any] = {"lower_body": Choice("vendor"), **choices}
+    running, robot = build(Stack(profile="ideal", **changed), seed=0)
+    try:
+        yield running
+    finally:
+        robot.close()
+
+
+def legs(running: Running) -> LegStatus:
+    status = running.bus.latest(topics.LEG_STATUS, LegStatus)
+    assert status is not None
+    return status
+
+
+def test_the_onboard_controller_moves_the_legs() -> None:
+    with hanging(onboard=Choice("hold", {"stance": "straight", "speed": 2.0})) as running:
+        running.executor.run(3.0)
+        state = running.bus.latest(topics.LOW_STATE, LowState)
+        safety = running.safety
+        assert state is not None and safety is not None
+        assert safety.state is GateState.ACTIVE
+        assert legs(running).fault is None
+        # Hanging free without gravity compensation, which vendor legs do not ask for, they sag a little.
+        np.testing.assert_allclose(state.q[LEGS], np.tile(STANCES["straight"], 2), atol=0.1)
+
+
+def test_an_onboard_controller_that_fails_leaves_the_legs_to_the_fallback(tmp_path: Path) -> None:
+    path = tmp_path / "failing.py"
+    path.write_text(FAILING)
+    with hanging(onboard=Choice(f"{path}:Failing"), fallback=Choice("hold")) as running:
+        running.executor.run(2.0)
+        fault = legs(running).fault
+        assert fault is not None
+        assert "vendor" in fault and "refused set_velocity" in fault and "the network is gone" in fault
+        assert legs(running).controller == "hold"
+
+
+def test_a_robot_with_another_service_is_a_fault_that_says_which() -> None:
+    other = Choice("vendor", {"robot": "g1"})
+    with hanging(lower_body=other, onboard=Choice("hold"), fallback=Choice("hold")) as running:
+        running.executor.run(1.6)
+        fault = legs(running).fault
+        assert fault is not None and "'sport' service did not answer get_fsm_id()" in fault
+        assert legs(running).controller == "hold"
+
+
+class Silent:
+    """Legs whose controller must not be called."""
+
+    rate, latency = 50.0, 0.0
+
+    def __getattr__(self, name: str) -> Any:
+        from golem.capabilities.legs.hold import Hold
+
+        return getattr(Hold(), name)
+
+    def step(self, *_: object) -> LegCommand:
+        raise ModuleFault("lower_body", "silent", "called before the start")
+
+
+def test_calls_are_answered_later_on_the_bus() -> None:
+    bus = Bus()
+    node = LocoServiceNode(bus, API, Legs(Silent(), Guard("lower_body", "silent")))  # type: ignore[arg-type]
+    client = BusOnboard(bus)
+    assert client.receive(API.service) is None and client.legs() is None
+    client.send(API.service, Request(1, API.set_fsm_id, encode({"data": API.damp})))
+    node.step(0.0)
+    assert client.receive(API.service) is None
+    bus.deliver(ANSWER)
+    assert client.receive(API.service) == Response(1, API.set_fsm_id)
+    assert client.receive(API.service) is None
+    assert set(bus.topics()) == {request_topic(API.service), response_topic(API.service)}
