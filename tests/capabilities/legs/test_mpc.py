@@ -23,7 +23,7 @@ def test_is_a_lower_body_that_stands() -> None:
     assert legs.latency == MPCConfig().latency
 
 
-PUSH = (0.3, 0.2, np.array([-20.0, 0.0, 0.0]))
+PUSH = (0.2, 0.2, np.array([-40.0, 0.0, 0.0]))
 
 
 def test_stands_through_a_light_push_with_a_noisy_estimate() -> None:

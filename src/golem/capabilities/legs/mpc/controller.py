@@ -42,7 +42,7 @@ class MPCConfig:
     horizon: float = 1.0
     timestep: float = 0.02
     rate: float = 50.0
-    plan_rate: float = 25.0
+    plan_rate: float = 50.0
     latency: float = 0.02
     threads: int = 2
 
@@ -85,10 +85,10 @@ class MPC:
         self.latency = c.latency
         self.envelope = Envelope()
         self.gait = GaitConfig(start="never")
-        self._posture: Array = np.tile(STANCES[c.stance], 2)
         self._kp: Array = np.tile(c.kp, 2)
         self._kd: Array = np.tile(c.kd, 2)
-        self._model = PlanningModel(self._posture, self._kp, self._kd, c.timestep, c.threads)
+        posture = np.tile(STANCES[c.stance], 2)
+        self._model = PlanningModel(posture, self._kp, self._kd, c.timestep, c.threads)
         self.planner = Planner(c.planner, c.horizon, self._model.lower, self._model.upper)
         self._times: Array = c.timestep * np.arange(round(c.horizon / c.timestep), dtype=np.float64)
         self._committed = int(np.count_nonzero(self._times < c.latency - 1e-9))
@@ -117,5 +117,5 @@ class MPC:
         targets = self.planner.targets(self._times, knots)
         targets[:, : self._committed] = targets[0, : self._committed]
         runs = self._model.rollout(targets)
-        costs = cost(self.config.cost, runs, self._model.stance, self._posture, self._model.torque)
+        costs = cost(self.config.cost, runs, self._model.stance, self._model.torque)
         self.planner.update(knots, costs)

@@ -22,7 +22,7 @@ class CostConfig:
         capture: capture point against the middle of the feet, 5 cm.
         feet: feet against where they belong relative to each other, 5 cm.
         effort: motor torques against the motors' bounds, mean over the motors.
-        posture: leg joints against the reference posture, 0.1 rad, mean over the joints.
+        posture: leg joints against those of the stance, 0.1 rad, mean over the joints.
     """
 
     height: float = 1.0
@@ -34,14 +34,13 @@ class CostConfig:
     posture: float = 0.3
 
 
-def cost(config: CostConfig, runs: Trajectories, stance: Stance, posture: Array, torque: Array) -> Array:
+def cost(config: CostConfig, runs: Trajectories, stance: Stance, torque: Array) -> Array:
     """Return the (n,) costs of `runs`.
 
     Args:
         config: weights.
         runs: n rollouts of m steps.
         stance: the reference stance.
-        posture: (12,) the reference leg joints [rad].
         torque: (12,) bounds of the motor torques [N m].
     """
     capture, misplaced = balance_errors(runs.R, runs.com, runs.com_velocity, runs.soles, stance.feet)
@@ -53,7 +52,7 @@ def cost(config: CostConfig, runs: Trajectories, stance: Stance, posture: Array,
         + config.capture * _square(capture / 0.05)
         + config.feet * (misplaced / 0.05) ** 2
         + config.effort * _square(runs.torque / torque) / torque.size
-        + config.posture * _square((runs.q - posture) / 0.1) / posture.size
+        + config.posture * _square((runs.q - stance.posture) / 0.1) / torque.size
     )
     return total.mean(axis=-1)
 

@@ -24,6 +24,9 @@ from golem.types import LEGS, NUM_JOINTS, SIDES, UPPER, Array, BaseEstimate, Low
 
 NUM_LEGS = LEGS.stop - LEGS.start
 """Joints of both legs."""
+_HIP_PITCH, _ANKLE_PITCH = [1, 7], [4, 10]
+_BALANCE_STEPS = 4
+"""Newton steps to the balanced stance; each leaves about a tenth of the error."""
 _UPPER_BODY = "upper_body"
 _TORSO = "torso_link"
 _CORNERS: Array = np.array([[x, y, SOLE.z] for x in SOLE.x for y in SOLE.y])
@@ -42,14 +45,16 @@ per motor."""
 
 @dataclass(frozen=True, slots=True)
 class Stance:
-    """The robot standing still in the reference posture with its upper body as it is.
+    """The robot standing still, its CoM above the middle of its feet, with its upper body as it is.
 
     Attributes:
+        posture: (12,) leg joints: the reference posture, its hips and ankles turned until the CoM is there [rad].
         com_height: height of the CoM above the soles [m].
         feet: (2,) centre of the left sole relative to the right one, x ahead, y left [m].
         tau: (12,) leg torques that carry the robot there, half its weight under each foot [N m].
     """
 
+    posture: Array
     com_height: float
     feet: Array
     tau: Array
@@ -122,7 +127,7 @@ class PlanningModel:
         self._qpos = np.array([self._model.joint(n).qposadr[0] for n in JOINT_NAMES[LEGS]])
         self._qvel = np.array([self._model.joint(n).dofadr[0] for n in JOINT_NAMES[LEGS]])
         self._state = np.zeros(1 + self._model.nq + self._model.nv)
-        self.stance = Stance(1.0, np.zeros(2), np.zeros(NUM_LEGS))
+        self.stance = Stance(posture, 1.0, np.zeros(2), np.zeros(NUM_LEGS))
 
     def measure(self, state: LowState, base: BaseEstimate) -> None:
         """Take over the measured `state` and the estimated `base` as the start of the next rollouts.
@@ -174,24 +179,37 @@ class PlanningModel:
         model.body_ipos[body] = com
         model.body_iquat[body] = quat_of(axes)
         model.body_inertia[body] = moments
+        self.stance = self._balance()
+        model.actuator_biasprm[:, 0] = self.stance.tau
+
+    def _balance(self) -> Stance:
+        """Find the stance of the present upper body."""
+        model, data = self._model, self._data
         mujoco.mj_resetData(model, data)
-        data.qpos[self._qpos] = self._posture
+        posture = self._posture.copy()
+        for _ in range(_BALANCE_STEPS):
+            data.qpos[self._qpos] = posture
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            soles = np.array([data.site(f"{side}_sole").xpos for side in SIDES])
+            com = data.subtree_com[1].copy()
+            lean = (com[0] - soles[:, 0].mean()) / (com[2] - soles[:, 2].mean())
+            posture[_HIP_PITCH] -= lean
+            posture[_ANKLE_PITCH] += lean
         mujoco.mj_forward(model, data)
-        soles = np.array([data.site(f"{side}_sole").xpos for side in SIDES])
         weight = np.array([0.0, 0.0, GRAVITY * model.body_subtreemass[1]])
         tau = data.qfrc_bias.copy()
         jacobian = np.zeros((3, model.nv))
         for side, sole in zip(SIDES, soles, strict=True):
             foot = model.body(f"{side}_ankle_roll_link").id
-            below = np.array([data.subtree_com[1, 0], sole[1], sole[2]])
-            mujoco.mj_jac(model, data, jacobian, None, below, foot)
+            mujoco.mj_jac(model, data, jacobian, None, np.array([com[0], sole[1], sole[2]]), foot)
             tau -= 0.5 * weight @ jacobian
-        self.stance = Stance(
-            com_height=float(data.subtree_com[1, 2] - soles[:, 2].mean()),
+        return Stance(
+            posture=data.qpos[self._qpos].copy(),
+            com_height=float(com[2] - soles[:, 2].mean()),
             feet=soles[0, :2] - soles[1, :2],
             tau=tau[self._qvel],
         )
-        model.actuator_biasprm[:, 0] = self.stance.tau
 
 
 class _UpperBody:

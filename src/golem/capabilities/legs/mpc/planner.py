@@ -36,7 +36,7 @@ class PlannerConfig:
 
     method: Method = "cem"
     samples: int = 16
-    knots: int = 5
+    knots: int = 4
     elite: float = 0.25
     noise: tuple[float, ...] = (0.03, 0.1, 0.06, 0.12, 0.2, 0.1)
     growth: float = 1.0
