@@ -328,6 +328,7 @@ class SafetyNode:
             self._bus.latest(topics.LOW_CMD_REQUEST, LowCommand),
             estop,
             Request.NONE if waiting else self.request,
+            self._bus.latest(topics.BASE, BaseEstimate),
         )
         result = self._gate.step(inputs)
         self._bus.publish(topics.LOW_CMD, result.command, t)

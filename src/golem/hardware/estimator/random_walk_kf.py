@@ -26,7 +26,7 @@ class RandomWalkKFConfig:
     filter: RandomWalkConfig = field(default_factory=RandomWalkConfig)
     feet: FeetConfig = field(default_factory=FeetConfig)
     height_lag: float = 0.1
-    stale_after: float = 0.3
+    stale_after: float = 0.2
 
 
 class RandomWalkKF:

@@ -13,7 +13,7 @@ import numpy as np
 
 from golem.hardware.estop.base import EstopFrame
 from golem.robots.model.limits import load_limits
-from golem.types import LEGS, NUM_JOINTS, Array, LowCommand, LowState
+from golem.types import LEGS, NUM_JOINTS, Array, BaseEstimate, LowCommand, LowState
 
 LIMIT_RATIO = 0.9
 """Share of the vendor's maxima that is used [paper]."""
@@ -52,6 +52,7 @@ class Reason(StrEnum):
     TORQUE = "joint_torque"
     BRAKING = "joint_braking_distance"
     TILT = "tilt"
+    BASE_STALE = "base_estimate_stale"
     COMMAND_MISSING = "command_never_seen"
     COMMAND_STALE = "command_stale"
     COMMAND_TIME = "command_time_invalid"
@@ -93,6 +94,9 @@ class SafetyLimits:
         tilt: angle between the torso's and the world's up that stops the robot [rad] [own].
         estop_age: age of the e-stop frame that counts as pressed [s]: five frames [board].
         state_age: age of the state that stops the robot [s]: 25 samples at 500 Hz [own].
+        base_age: time without a base estimate that is not stale, after which a robot that had one is stopped [s]
+            [own: the estimators call themselves stale after 0.2 s; together more than three times the longest time
+            without a planted foot on a floor like ice, 0.15 s, and no step or push recovery comes near].
         command_age: age of the command that stops the robot [s] [own].
         future: how far ahead of the clock a stamp may be [s] [own].
         samples: consecutive bad samples of position, velocity, braking distance or tilt that stop the robot [own].
@@ -120,6 +124,7 @@ class SafetyLimits:
     tilt: float = 0.6
     estop_age: float = 0.050
     state_age: float = 0.050
+    base_age: float = 0.300
     command_age: float = 0.100
     future: float = 0.005
     samples: int = 3
@@ -174,6 +179,7 @@ class GateInputs:
         command: newest command that arrived, or None.
         estop: newest frame of the emergency stop that arrived, or None.
         request: what the operator asks for.
+        base: newest estimate of the base that arrived, or None.
     """
 
     t: float
@@ -181,6 +187,7 @@ class GateInputs:
     command: LowCommand | None = None
     estop: EstopFrame | None = None
     request: Request = Request.NONE
+    base: BaseEstimate | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,6 +227,8 @@ class GateMemory:
         counters: consecutive bad samples.
         outgoing: last command, while active.
         request: request of the previous tick.
+        grounded: stamp of the newest base estimate that was not stale [s]; None before the first one since the
+            activation. A robot that hangs in a band with its feet in the air has none, and is not stopped for it.
     """
 
     t: float = -np.inf
@@ -233,6 +242,7 @@ class GateMemory:
     counters: Counters = field(default_factory=Counters)
     outgoing: Outgoing | None = None
     request: Request = Request.NONE
+    grounded: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

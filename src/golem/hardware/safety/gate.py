@@ -30,7 +30,7 @@ from golem.hardware.safety.base import (
 )
 from golem.hardware.safety.limiter import limit_command
 from golem.hardware.safety.monitor import Fault, examine, whole, whole_command
-from golem.types import NUM_JOINTS, Array, LowCommand, LowState
+from golem.types import NUM_JOINTS, Array, BaseEstimate, LowCommand, LowState
 
 
 def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateResult:
@@ -50,15 +50,15 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     estop, estop_fault = _estop(inputs.estop, memory.estop, t, limits)
     state, counters, state_fault = _state(inputs.state, memory, t, limits)
     command, command_fault = _command(inputs.command, memory.command, t, limits)
+    grounded, base_fault = _base(inputs.base, memory, t, limits)
     fault = (None if running else Fault(Reason.CLOCK)) or estop_fault or state_fault
     edge = inputs.request if inputs.request is not memory.request else Request.NONE
 
     mode, reason, detail, since = memory.mode, memory.reason, memory.detail, memory.since
     outgoing = memory.outgoing
     if mode is GateState.ACTIVE:
-        fault = (
-            fault or command_fault or (Fault(Reason.REQUESTED) if inputs.request is Request.STOP else None)
-        )
+        requested = Fault(Reason.REQUESTED) if inputs.request is Request.STOP else None
+        fault = fault or command_fault or base_fault or requested
         if fault is not None:
             mode, (reason, detail), since, outgoing = GateState.STOP1, fault, t, None
     elif mode in (GateState.STOP1, GateState.STOP0):
@@ -101,6 +101,7 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
             counters=counters,
             outgoing=outgoing,
             request=inputs.request,
+            grounded=grounded,
         ),
     )
 
@@ -174,6 +175,19 @@ def _state(
     if t - old.t > limits.state_age:
         return old, counters, Fault(Reason.STATE_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
     return old, counters, None
+
+
+def _base(
+    new: BaseEstimate | None, memory: GateMemory, t: float, limits: SafetyLimits
+) -> tuple[float | None, Fault | None]:
+    if memory.mode is not GateState.ACTIVE:
+        return None, None
+    old = memory.grounded
+    if new is not None and not new.stale and _stamped(new.t, t, limits) and (old is None or new.t > old):
+        old = new.t
+    if old is not None and t - old > limits.base_age:
+        return old, Fault(Reason.BASE_STALE, f"no foot measured the base for {(t - old) * 1e3:.0f} ms")
+    return old, None
 
 
 def _command(
