@@ -5,6 +5,7 @@ Only the chosen command is imported: help answers at once, and spawned workers i
 
 from __future__ import annotations
 
+import importlib
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -88,18 +89,23 @@ def _bench(words: list[str]) -> int:
 
 
 def _train(words: list[str]) -> int:
-    """Train a module from scratch: detector."""
-    if not words or words[0] != "detector":
-        raise unknown_name("thing to train", words[0] if words else "", ["detector"])
+    """Train a module from scratch: detector or legs."""
+    what = words[0] if words else ""
+    if what not in TRAINERS:
+        raise unknown_name("thing to train", what, TRAINERS)
     _prepare_graphics()
     from golem.errors import MissingExtra
 
     try:
-        from golem.training.detector.__main__ import main as train_detector
+        trainer = importlib.import_module(TRAINERS[what])
     except ModuleNotFoundError as error:
         raise MissingExtra(error.name or "torch", "train") from error
-    train_detector(words[1:])
+    trainer.main(words[1:])
     return 0
+
+
+TRAINERS = {"detector": "golem.training.detector.__main__", "legs": "golem.training.legs.__main__"}
+"""What can be trained, and the module that does it."""
 
 
 def _doctor(words: list[str]) -> int:

@@ -38,7 +38,7 @@ class Difficulty:
     payload: float = 0.0
 
     def update(self, survival: float, rate: float) -> None:
-        """Move on where `survival` (share of episodes that reach their end) is high, step back where it is low.
+        """Move on while `survival` (mean length of an episode, as share of the whole) is high, else step back.
 
         ALMI's rule: up while the mean episode exceeds 80 % of its length, down twice as fast otherwise.
         """

@@ -1,4 +1,4 @@
-"""The game between the legs and the disturbances: commands in, observations and rewards out, for many robots at once."""
+"""The game between the legs and the disturbances: commands in, observations and rewards out, for many robots."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import Gait, GaitConfig
 from golem.capabilities.legs.observation import Layout, Signals, Term
 from golem.capabilities.legs.swing import swing_offset
+from golem.hardware.safety.base import SafetyLimits
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.training.legs.disturbances import Difficulty, Pushes, UpperBodyMotion
 from golem.training.legs.model import FEET_APART, STANCE, STEP
 from golem.training.legs.rewards import Rewards, Weights
 from golem.training.legs.world import Rows, World, WorldConfig
-from golem.types import Array
+from golem.types import LEGS, Array
 
 PERIOD = 0.02
 """Time between two actions [s]: 50 Hz, as ALMI."""
@@ -63,7 +64,7 @@ class EnvConfig:
     action_scale: float = 0.25
     swing: float = 0.28
     impulse: float = 100.0
-    gait: GaitConfig = field(default_factory=GaitConfig)
+    gait: GaitConfig = field(default_factory=lambda: GaitConfig(period=0.64))
     world: WorldConfig = field(default_factory=WorldConfig)
     weights: Weights = field(default_factory=Weights)
 
@@ -74,7 +75,7 @@ class Step:
 
     Attributes:
         reward: of the legs.
-        ended: fallen.
+        ended: fallen, or stopped by the safety gate.
         truncated: the episode's time was over.
         terms: mean of each reward term.
     """
@@ -93,6 +94,7 @@ class LegsEnv:
         layout: of the policy's observation.
         gait: the clocks.
         twist: (n, 3) present command.
+        age: (n,) time since each episode began [s].
     """
 
     def __init__(self, n: int, config: EnvConfig, seed: int, threads: int) -> None:
@@ -105,17 +107,18 @@ class LegsEnv:
         self.gait = Gait(config.gait, (n,))
         self.upper = UpperBodyMotion(n, self._rng)
         self._pushes = Pushes(n, config.impulse, self._rng)
-        self._rewards = Rewards(n, config.weights, config.gait, STANCE)
+        self._limits = SafetyLimits.from_profile()
+        self._rewards = Rewards(n, config.weights, config.gait, self._limits)
         self.twist: Array = np.zeros((n, 3))
         self._goal: Array = np.zeros((n, 3))
         self._left: Array = np.zeros(n)
-        self._time: Array = np.zeros(n)
+        self.age: Array = np.zeros(n)
         self._action: Array = np.zeros((n, 12))
         self._capture: Array = np.zeros((n, 2))
         self._misplaced: Array = np.zeros(n)
         self.reset(np.arange(n))
         # Episodes shall not end all at once.
-        self._time = self._rng.uniform(0.0, config.episode, n)
+        self.age = self._rng.uniform(0.0, config.episode, n)
         self.world.read()
         self._advance_gait(0.0)
 
@@ -130,7 +133,7 @@ class LegsEnv:
         mask[where] = True
         self.gait.reset(mask)
         self._rewards.reset(where)
-        self._time[where] = 0.0
+        self.age[where] = 0.0
         self._action[where] = 0.0
         self.twist[where] = 0.0
         self._command(where)
@@ -185,6 +188,7 @@ class LegsEnv:
         action = np.clip(action, -10.0, 10.0)
         stance = config.gait.stance
         target = STANCE + config.action_scale * action + swing_offset(self.gait.phases, stance, config.swing)
+        target = np.clip(target, self._limits.lower[LEGS], self._limits.upper[LEGS])
         self.world.step(
             target, self.upper.target, self._pushes.force, self._pushes.on_torso, round(dt / STEP)
         )
@@ -193,14 +197,17 @@ class LegsEnv:
             truth, self.twist, self.gait, action, self._action, self._capture, self._misplaced, dt
         )
         self._action = action
-        self._time += dt
+        self.age += dt
         low = truth.height - truth.clearance.mean(axis=1) < 0.6
-        ended = low | (truth.R[:, 2, 2] < np.cos(0.8)) | ~np.isfinite(truth.q).all(axis=1)
-        truncated = ~ended & (self._time >= config.episode)
+        tilted = truth.R[:, 2, 2] < np.cos(self._limits.tilt)
+        ended = low | tilted | self._rewards.stopped(truth) | ~np.isfinite(truth.q).all(axis=1)
+        truncated = ~ended & (self.age >= config.episode)
         self._left -= dt
         self._command(np.flatnonzero(self._left <= 0.0))
         most = np.array(config.accelerate) * dt
         self.twist = self.twist + np.clip(self._goal - self.twist, -most, most)
+        stopped = ~self._goal.any(axis=1) & (np.linalg.norm(self.twist, axis=1) < 0.1)
+        self.twist[stopped] = 0.0
         self._advance_gait(dt)
         return Step(reward, ended, truncated, terms)
 

@@ -10,10 +10,13 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from golem.training.legs.mirror import Mirror
 from golem.types import Array
+
+Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,7 @@ class Ppo:
         self._value[k] = self._evaluate(self._obs[k], self._known[k])
         return self._act[k].double().numpy()
 
-    def learn_of(self, reward: Array, ended: Array, truncated: Array) -> None:
+    def learn_of(self, reward: Array, ended: Bools, truncated: Bools) -> None:
         """Remember what the last actions led to; an episode that was merely cut goes on in the critic's eyes."""
         k = self._k
         cut = torch.from_numpy(ended | truncated)
@@ -149,7 +152,7 @@ class Ppo:
         for _ in range(c.epochs):
             order = torch.randperm(total, generator=self._generator)
             for part in order.chunk(c.batches):
-                loss, value_loss, kl = self._loss(*(x[part] for x in flat), old_std)
+                loss, value_loss, kl = self._loss([x[part] for x in flat], old_std)
                 self._adapt(kl)
                 self._optimiser.zero_grad(set_to_none=True)
                 loss.backward()
@@ -181,17 +184,9 @@ class Ppo:
     def _evaluate(self, observation: Tensor, known: Tensor) -> Tensor:
         return self.critic(torch.cat([observation, known], dim=-1)).squeeze(-1)
 
-    def _loss(
-        self,
-        obs: Tensor,
-        known: Tensor,
-        act: Tensor,
-        logp: Tensor,
-        advantage: Tensor,
-        target: Tensor,
-        old_mean: Tensor,
-        old_std: Tensor,
-    ) -> tuple[Tensor, float, float]:
+    def _loss(self, rows: list[Tensor], old_std: Tensor) -> tuple[Tensor, float, float]:
+        """Return the loss of a batch (in the order of `flat` in `update`), its value part, and the KL divergence."""
+        obs, known, act, logp, advantage, target, old_mean = rows
         c = self.config
         mean, log_std = self.actor(obs), self.actor.log_std
         ratio = (_log_prob(act, mean, log_std) - logp).exp()

@@ -9,11 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from golem.capabilities.legs.balance import heading_frame
 from golem.capabilities.legs.gait import Gait, GaitConfig
-from golem.robots.model.limits import load_limits
-from golem.training.legs.model import STAND_HEIGHT
+from golem.hardware.safety.base import SafetyLimits
+from golem.training.legs.model import STANCE, STAND_HEIGHT
 from golem.training.legs.world import Rows, Truth
 from golem.types import LEGS, Array
 
@@ -40,6 +41,7 @@ class Weights:
         torque, ankle_torque, acceleration, speed: squared, of the leg joints.
         smooth: change of the action squared.
         limits: how far joints are beyond 90 % of their range [rad].
+        fast: how much faster a joint is than three quarters of what stops the robot [rad/s].
         hips: yaw and roll of the hips squared [rad^2].
         slip: velocity of loaded soles squared.
         feet: misplacement of the feet beyond 4 cm while both are on the ground [m].
@@ -58,7 +60,7 @@ class Weights:
     contact: float = 0.4
     swing_height: float = -40.0
     upright: float = -3.0
-    height: float = -20.0
+    height: float = -40.0
     bounce: float = -1.0
     rock: float = -0.15
     torque: float = -1e-5
@@ -67,6 +69,7 @@ class Weights:
     speed: float = -1e-3
     smooth: float = -0.015
     limits: float = -5.0
+    fast: float = -1.0
     hips: float = -1.0
     slip: float = -0.4
     feet: float = -4.0
@@ -80,13 +83,11 @@ class Weights:
 class Rewards:
     """Rewards of `n` robots, with the running means they need."""
 
-    def __init__(self, n: int, weights: Weights, gait: GaitConfig, stance: Array) -> None:
-        """Begin at rest."""
-        limits = load_limits()
-        middle = 0.5 * (limits.lower + limits.upper)[LEGS]
-        half = 0.45 * (limits.upper - limits.lower)[LEGS]
-        self._lower, self._upper = middle - half, middle + half
-        self._weights, self._stance = weights, stance
+    def __init__(self, n: int, weights: Weights, gait: GaitConfig, limits: SafetyLimits) -> None:
+        """Begin at rest; `limits` are the safety gate's."""
+        self._limits = limits
+        self._lower, self._upper = limits.lower[LEGS], limits.upper[LEGS]
+        self._weights = weights
         self._share = gait.period / 2.0
         self._mean: Array = np.zeros((n, 3))
         self._speed: Array = np.zeros((n, 12))
@@ -99,6 +100,13 @@ class Rewards:
     def tracked_error(self, twist: Array) -> Array:
         """Return (n, 3): the mean velocity less the command, vx, vy [m/s], wz [rad/s]."""
         return self._mean - twist
+
+    def stopped(self, truth: Truth) -> NDArray[np.bool_]:
+        """Return (n,): whether the gate would stop the robot, for a joint too fast or too fast for its range."""
+        limits, q, dq = self._limits, truth.q[:, LEGS], truth.dq[:, LEGS]
+        end = q + dq * np.abs(dq) / (2.0 * limits.deceleration[LEGS])
+        beyond = (end > limits.state_upper[LEGS]) | (end < limits.state_lower[LEGS])
+        return np.any(beyond | (np.abs(dq) > limits.velocity[LEGS]), axis=1)
 
     def __call__(
         self,
@@ -149,11 +157,12 @@ class Rewards:
             "speed": np.square(speed).sum(axis=1),
             "smooth": np.square(action - last).sum(axis=1),
             "limits": beyond.sum(axis=1),
+            "fast": np.maximum(np.abs(speed) - 0.75 * self._limits.velocity[LEGS], 0.0).sum(axis=1),
             "hips": np.square(legs[:, _YAW_ROLL]).sum(axis=1),
             "slip": slip,
             "feet": np.maximum(misplaced - 0.04, 0.0) * stance.all(axis=1),
             "impact": np.maximum(truth.force - 800.0, 0.0).sum(axis=1),
-            "stand_posture": np.square(legs - self._stance).sum(axis=1) * rest,
+            "stand_posture": np.square(legs - STANCE).sum(axis=1) * rest,
             "stand_still": (np.square(truth.velocity[:, :2]).sum(axis=1) + np.square(wz)) * rest,
             "stand_center": np.exp(-np.square(capture).sum(axis=1) / 0.03**2) * rest,
             "stand_step": still * stepping,

@@ -23,6 +23,7 @@ from golem.types import Array
 
 CHECKPOINT = "checkpoint.pt"
 CURVE = "curve.csv"
+Adversary = Literal["none", "motions", "learned"]
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class TrainConfig:
     steps: float = 16e6
     robots: int = 512
     threads: int = 2
-    adversary: Literal["none", "motions", "learned"] = "learned"
+    adversary: Adversary = "learned"
     learned_from: float = 4e6
     rate: float = 0.004
     env: EnvConfig = field(default_factory=EnvConfig)
@@ -132,7 +133,7 @@ class _Run:
         self.updates += 1
         if meter.finished:
             share = min(1.0, meter.finished / 64.0)
-            self._survival += share * 0.5 * (meter.survived / meter.finished - self._survival)
+            self._survival += share * 0.5 * (meter.lasted / meter.finished - self._survival)
         env.difficulty.update(self._survival, config.rate)
         if config.adversary == "none":
             env.difficulty.amplitude = env.difficulty.speed = 0.0
@@ -214,7 +215,7 @@ class _Meter:
     """Sums over one update."""
 
     def __init__(self) -> None:
-        self.finished = self.survived = 0
+        self.finished, self.lasted = 0, 0.0
         self._falls = 0
         self._seconds = 0.0
         self._moving: list[float] = []
@@ -233,8 +234,9 @@ class _Meter:
     ) -> None:
         """Count one step of all robots."""
         self._falls += int(ended.sum())
-        self.survived += int(truncated.sum())
-        self.finished += int((ended | truncated).sum())
+        over = ended | truncated
+        self.lasted += float(env.age[over].sum() / env.config.episode)
+        self.finished += int(over.sum())
         self._seconds += 0.02 * env.n
         moving = np.abs(env.twist).max(axis=1) > 1e-6
         error = np.linalg.norm((env.heading_velocity() - env.twist)[:, :2], axis=1)

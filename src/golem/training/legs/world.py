@@ -2,12 +2,12 @@
 
 Two frames: the plane's, in which physics runs, and the level one, in which gravity points down. They differ by the
 slope of the episode, which is drawn by turning gravity. Roughness is drawn by moving the contact spheres of a foot that
-is in the air, as if it came down on a stone or an edge: it costs nothing, where a height field would double the physics.
+is in the air, as if it came down on a stone or an edge: unlike a height field it costs nothing.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -88,6 +88,7 @@ class Truth:
         com: (n, 3) centre of the nominal masses relative to base_link's origin [m].
         height: (n,) of base_link above the plane [m].
         torque: (n, 27) [N m].
+        q, dq: (n, 27) [rad], [rad/s].
     """
 
     R: Array
@@ -100,8 +101,8 @@ class Truth:
     com: Array
     height: Array
     torque: Array
-    q: Array = field(default_factory=lambda: np.zeros(0))
-    dq: Array = field(default_factory=lambda: np.zeros(0))
+    q: Array
+    dq: Array
 
 
 class World:
@@ -145,7 +146,7 @@ class World:
         self._contact = Contact(ContactConfig(), (n,))
 
     def reset(self, where: Rows, upper: Array, payload: float) -> None:
-        """Start the robots `where` anew: standing, upper body at `upper` (m, 15), payloads up to the share `payload`."""
+        """Start the robots `where` anew: standing, upper body at `upper` (m, 15), payload up to the share `payload`."""
         if not len(where):
             return
         self._randomise(where, payload)
@@ -169,7 +170,7 @@ class World:
     def step(
         self, legs: Array, upper: Array, force: Array, on_torso: NDArray[np.bool_], substeps: int
     ) -> None:
-        """Advance by `substeps` physics steps under leg targets (n, 12), upper-body targets (n, 15) and a push (n, 3)."""
+        """Advance by `substeps` physics steps under leg targets (n, 12), upper-body targets (n, 15) and a push."""
         self._xfrc[:, self.ids.torso, :3] = force * on_torso[:, None]
         self._xfrc[:, self.ids.base, :3] = force * ~on_torso[:, None]
         ctrl = self._ctrl

@@ -1,0 +1,74 @@
+"""`golem train legs run|export|curve`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import tyro
+
+from golem.training.legs.curve import draw_curves
+from golem.training.legs.train import CHECKPOINT, Adversary, TrainConfig
+from golem.training.legs.train import train as run_training
+
+RUNS = Path("runs/legs")
+
+
+def run(
+    out: Path = RUNS / "seed0",
+    seed: int = 0,
+    steps: float = 16e6,
+    adversary: Adversary = "learned",
+    robots: int = 512,
+    threads: int = 2,
+) -> None:
+    """Train a leg policy, or go on where a run was stopped.
+
+    Args:
+        out: folder of checkpoint and curve.
+        seed: of weights, episodes and noise.
+        steps: actions of all robots together.
+        adversary: what moves the upper body: none, motions (a curriculum), or learned (motions, then a policy as well).
+        robots: how many are simulated at once.
+        threads: of physics and networks.
+    """
+    config = TrainConfig(out, seed, steps, robots, threads, adversary)
+    print(run_training(config))
+
+
+def export(
+    checkpoint: Path = RUNS / "seed0" / CHECKPOINT, folder: Path = RUNS / "export", name: str = "almi"
+) -> None:
+    """Write a checkpoint as a network and its description, for `lower_body: {use: policy, file: ...}`.
+
+    Args:
+        checkpoint: of `run`.
+        folder: where to write NAME.onnx and NAME.yaml.
+        name: of the two files.
+    """
+    from golem.training.legs.export import export as write
+
+    print(*write(checkpoint, folder, name), sep="\n")
+
+
+def curve(runs: tyro.conf.Positional[tuple[Path, ...]], out: Path = RUNS / "curve.png") -> None:
+    """Draw the learning curves of several runs beside each other.
+
+    Args:
+        runs: folders of `run`.
+        out: the picture.
+    """
+    draw_curves(runs, out)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the command line."""
+    tyro.extras.subcommand_cli_from_dict(
+        {"run": run, "export": export, "curve": curve},
+        prog="golem train legs",
+        args=args,
+        description="Train the leg policy.",
+    )
+
+
+if __name__ == "__main__":
+    main()

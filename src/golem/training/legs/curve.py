@@ -1,0 +1,68 @@
+"""Draws learning curves."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from golem.training.legs.train import CURVE
+
+PANELS = (
+    ("falls", "falls per robot second", 1.0),
+    ("error_moving", "velocity error while walking [m/s]", 0.7),
+    ("push", "difficulty of the pushes (1: up to 100 N s)", 1.0),
+)
+"""Column, title and top of the axis of each panel."""
+SIZE = (420, 300)
+MARGIN = (50, 30, 14, 40)
+"""Left, top, right, bottom of a panel [px]."""
+COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
+
+
+def draw_curves(runs: Sequence[Path], out: Path) -> None:
+    """Draw what the run folders' curves say, one colour a run, over millions of steps.
+
+    Args:
+        runs: folders of training runs.
+        out: the PNG file.
+    """
+    curves = {run.name: _read(run / CURVE) for run in runs}
+    last = max(float(curve["steps"][-1]) for curve in curves.values())
+    image = Image.new("RGB", (SIZE[0] * len(PANELS), SIZE[1] + 20 * len(curves)), "white")
+    pen, font = ImageDraw.Draw(image), ImageFont.load_default(12)
+    left, top, right, bottom = MARGIN
+    width, height = SIZE[0] - left - right, SIZE[1] - top - bottom
+    for panel, (column, title, most) in enumerate(PANELS):
+        x0 = panel * SIZE[0] + left
+        pen.text((x0, 8), title, fill="black", font=font)
+        for k in range(6):
+            y = top + height * (1 - k / 5)
+            pen.line([(x0, y), (x0 + width, y)], fill="#dddddd")
+            pen.text((x0 - 6, y), f"{most * k / 5:.2g}", fill="black", font=font, anchor="rm")
+        for k in range(5):
+            x = x0 + width * k / 4
+            pen.text((x, top + height + 8), f"{last * k / 4e6:.1f}M", fill="black", font=font, anchor="ma")
+        for curve, colour in zip(curves.values(), COLOURS, strict=False):
+            # A mean over ten updates: single updates see few falls.
+            values = np.convolve(curve[column], np.full(10, 0.1), mode="valid")
+            steps = curve["steps"][-len(values) :]
+            points = [
+                (x0 + width * s / last, top + height * (1 - min(v / most, 1.0)))
+                for s, v in zip(steps, values, strict=True)
+            ]
+            pen.line(points, fill=colour, width=2)
+    for k, (name, colour) in enumerate(zip(curves, COLOURS, strict=False)):
+        y = SIZE[1] + 20 * k
+        pen.line([(left, y + 6), (left + 24, y + 6)], fill=colour, width=3)
+        pen.text((left + 32, y), name, fill="black", font=font)
+    image.save(out)
+
+
+def _read(path: Path) -> dict[str, np.ndarray]:
+    with path.open() as file:
+        rows = list(csv.DictReader(file))
+    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}

@@ -1,0 +1,83 @@
+# ruff: noqa: E402 (nothing of the trainer can be imported where torch is absent)
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch", reason="training needs the extra 'train'")
+
+from golem.training.legs.env import PERIOD, EnvConfig, LegsEnv
+from golem.training.legs.model import STANCE
+from golem.training.legs.world import WorldConfig
+
+NOBODY = np.arange(0)
+
+
+def run(seed: int, threads: int, steps: int = 10) -> tuple[np.ndarray, np.ndarray]:
+    env = LegsEnv(6, EnvConfig(), seed, threads)
+    rng = np.random.default_rng(1)
+    rewards = []
+    for _ in range(steps):
+        step = env.step(rng.normal(0.0, 0.5, (6, 12)), NOBODY, np.zeros((0, 15)))
+        env.restart(np.flatnonzero(step.ended | step.truncated))
+        rewards.append(step.reward)
+    return env.observe()[0], np.array(rewards)
+
+
+def test_the_same_seed_gives_the_same_episodes_on_any_number_of_threads() -> None:
+    one, two, other = run(0, 1), run(0, 2), run(1, 1)
+    np.testing.assert_array_equal(one[0], two[0])
+    np.testing.assert_array_equal(one[1], two[1])
+    assert not np.array_equal(one[0], other[0])
+
+
+def test_the_estimator_in_the_loop_follows_the_truth() -> None:
+    env = LegsEnv(16, EnvConfig(), 0, 1)
+    for _ in range(20):
+        env.step(np.zeros((16, 12)), NOBODY, np.zeros((0, 15)))
+    world = env.world
+    planted = (world.truth.force > 200.0).all(axis=1)
+    assert planted.sum() >= 4
+    error = np.linalg.norm(world.sensed.velocity - world.truth.velocity, axis=1)[planted]
+    assert 0.0 < np.median(error) < 0.08
+
+
+def test_a_robot_that_lies_down_ends_its_episode_and_starts_anew() -> None:
+    env = LegsEnv(4, EnvConfig(), 0, 1)
+    collapse = np.tile((np.tile([0.0, -1.0, 0.0, 2.0, -0.8, 0.0], 2) - STANCE) / 0.25, (4, 1))
+    for _ in range(150):
+        step = env.step(collapse, NOBODY, np.zeros((0, 15)))
+        if step.ended.any():
+            break
+    assert step.ended.any()
+    fallen = np.flatnonzero(step.ended)
+    env.restart(fallen)
+    assert (env.age[fallen] == 0.0).all()
+    np.testing.assert_allclose(env.world.truth.height[fallen], 0.97, atol=0.03)
+
+
+def test_commands_stay_inside_the_trained_envelope_and_change_slowly() -> None:
+    env = LegsEnv(32, EnvConfig(hold=(0.1, 0.2)), 0, 1)
+    most = np.array(env.config.accelerate) * PERIOD
+    before = env.twist.copy()
+    for _ in range(40):
+        step = env.step(np.zeros((32, 12)), NOBODY, np.zeros((0, 15)))
+        # On the way to a stop a command ends at the dead band of 0.1.
+        assert (np.abs(env.twist - before) <= np.maximum(most, 0.1 + most) + 1e-12).all()
+        env.restart(np.flatnonzero(step.ended | step.truncated))
+        before = env.twist.copy()
+    low, high = np.array([env.config.envelope.vx, env.config.envelope.vy, env.config.envelope.wz]).T
+    assert (env.twist >= low).all() and (env.twist <= high).all() and np.abs(env.twist).max() > 0.3
+
+
+def test_slope_turns_gravity_and_roughness_lifts_soles() -> None:
+    config = EnvConfig(world=WorldConfig(slope=0.1, roughness=0.02))
+    world = LegsEnv(32, config, 0, 1).world
+    sloped = np.abs(world.slope).sum(axis=1) > 0.0
+    assert 4 < sloped.sum() < 28
+    before = world._corners.copy()
+    world.shim(np.ones((32, 2), dtype=bool))
+    moved = np.abs(world._corners - before)
+    assert 0.0 < moved.max() <= 0.021
+    changed = np.unique(np.nonzero(moved)[1])
+    assert set(changed) <= set(world.ids.soles)

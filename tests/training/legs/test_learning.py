@@ -1,0 +1,128 @@
+# ruff: noqa: E402 (nothing of the trainer can be imported where torch is absent)
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="training needs the extra 'train'")
+pytest.importorskip("onnx", reason="export needs the extra 'train'")
+
+from golem.capabilities.legs.description import load_description
+from golem.capabilities.legs.network import load_network
+from golem.capabilities.legs.observation import Layout
+from golem.errors import ConfigError
+from golem.robots.model.leg_kinematics import leg_poses
+from golem.training.legs.curve import draw_curves
+from golem.training.legs.disturbances import Difficulty, Pushes, UpperBodyMotion
+from golem.training.legs.env import LAYOUT
+from golem.training.legs.export import export, load_actor
+from golem.training.legs.mirror import Mirror, leg_mirror
+from golem.training.legs.model import STANCE
+from golem.training.legs.ppo import Actor, Ppo, PpoConfig
+from golem.training.legs.train import CHECKPOINT, CURVE, TrainConfig, train
+
+
+def small(out: Path, seed: int = 0, updates: int = 2, **changes: object) -> TrainConfig:
+    return TrainConfig(out=out, seed=seed, robots=8, steps=8 * 24 * updates, threads=1, **changes)  # type: ignore[arg-type]
+
+
+def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(tmp_path: Path) -> None:
+    for name, seed in (("a", 0), ("b", 0), ("c", 1)):
+        train(small(tmp_path / name, seed, updates=10, learned_from=0.0))
+    a, b, c = (load_actor(tmp_path / name / CHECKPOINT).net[0].weight for name in "abc")
+    assert torch.equal(a, b) and not torch.equal(a, c)
+    with (tmp_path / "a" / CURVE).open() as file:
+        rows = list(csv.DictReader(file))
+    assert [int(float(row["steps"])) for row in rows] == [192 * k for k in range(1, 11)]
+    train(small(tmp_path / "a", updates=11, learned_from=0.0))
+    assert torch.load(tmp_path / "a" / CHECKPOINT, weights_only=True)["updates"] == 11
+    with pytest.raises(ConfigError, match="another configuration"):
+        train(small(tmp_path / "a", seed=5, updates=12))
+    draw_curves([tmp_path / name for name in "abc"], tmp_path / "curve.png")
+    assert (tmp_path / "curve.png").stat().st_size > 1000
+
+
+def test_the_exported_network_is_the_trained_one_and_its_description_fits(tmp_path: Path) -> None:
+    train(small(tmp_path / "run"))
+    export(tmp_path / "run" / CHECKPOINT, tmp_path, "mine")
+    description, path = load_description(tmp_path / "mine.yaml")
+    layout = description.layout()
+    network, actor = load_network(path, layout.size), load_actor(tmp_path / "run" / CHECKPOINT)
+    for observation in np.random.default_rng(0).normal(size=(3, layout.size)).astype(np.float32):
+        with torch.no_grad():
+            expected = actor(torch.from_numpy(observation)).numpy()
+        np.testing.assert_allclose(network(observation), expected, atol=1e-6)
+    np.testing.assert_allclose(description.q0()[:12], STANCE)
+
+
+def test_mirrors_are_involutions_and_the_policy_is_equivariant() -> None:
+    layout = Layout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
+    seen, legs = Mirror(layout.components), leg_mirror()
+    rng = np.random.default_rng(0)
+    observation, action = rng.normal(size=layout.size), rng.normal(size=12)
+    np.testing.assert_array_equal(seen(seen(observation)), observation)
+    np.testing.assert_array_equal(legs(legs(action)), action)
+    actor = Actor(seen, legs, (16, 16))
+    with torch.no_grad():
+        torch.nn.init.normal_(actor.net[-1].weight)
+        plain = actor(torch.from_numpy(observation).float()).numpy()
+        turned = actor(torch.from_numpy(seen(observation)).float()).numpy()
+    np.testing.assert_allclose(turned, legs(plain), atol=1e-6)
+
+
+def test_a_mirrored_leg_posture_puts_the_feet_where_the_mirror_shows_them() -> None:
+    q = np.random.default_rng(0).uniform(-0.4, 0.4, 12)
+    p, _ = leg_poses(q)
+    mirrored, _ = leg_poses(leg_mirror()(q))
+    np.testing.assert_allclose(mirrored[::-1] * [1.0, -1.0, 1.0], p, atol=1e-12)
+
+
+def test_ppo_learns_which_way_to_act() -> None:
+    mirror = Mirror([("joint_position", "left_knee_joint"), ("joint_position", "right_knee_joint")])
+    ppo = Ppo(Actor(mirror, mirror, (8,)), 1, 64, PpoConfig(steps=8, hidden=(8,)), 0)
+    rng = np.random.default_rng(0)
+    errors = []
+    for _ in range(40):
+        for _ in range(8):
+            seen = rng.normal(size=(64, 2))
+            action = ppo.act(seen, np.zeros((64, 1)))
+            error = np.square(action - seen).sum(axis=1)
+            ppo.learn_of(np.exp(-error), np.ones(64, dtype=bool), np.zeros(64, dtype=bool))
+        ppo.update(seen, np.zeros((64, 1)))
+        errors.append(error.mean())
+    assert np.mean(errors[-5:]) < 0.5 * np.mean(errors[:5])
+
+
+def test_difficulty_follows_survival_and_bounds_what_the_adversary_does() -> None:
+    difficulty = Difficulty()
+    before = difficulty.push
+    difficulty.update(0.9, 0.01)
+    assert difficulty.push == pytest.approx(before + 0.01)
+    difficulty.update(0.5, 0.01)
+    assert difficulty.push == pytest.approx(before - 0.01)
+
+    rng = np.random.default_rng(0)
+    motion = UpperBodyMotion(4, rng)
+    motion.reset(np.arange(4), 0.0)
+    start = motion.target.copy()
+    slow = Difficulty(amplitude=0.1, speed=0.2)
+    for _ in range(500):
+        motion.steer(np.array([1, 2]), np.full((2, 15), 9.0), slow, 0.02)
+    moved = np.abs(motion.target - start).max(axis=1)
+    assert moved[0] == moved[3] == 0.0 and 0.05 < moved[1:3].max() < 0.7
+
+
+def test_pushes_have_the_impulse_they_were_drawn_with_at_most() -> None:
+    pushes = Pushes(200, 50.0, np.random.default_rng(0))
+    pushes.reset(np.arange(200), 1.0)
+    impulse, largest = np.zeros((200, 2)), np.zeros(200)
+    for _ in range(2000):
+        pushes.step(1.0, 0.005)
+        quiet = ~pushes.force.any(axis=1)
+        impulse[quiet] = 0.0
+        impulse += pushes.force[:, :2] * 0.005
+        largest = np.maximum(largest, np.linalg.norm(impulse, axis=1))
+    assert 40.0 < largest.max() < 52.0
