@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
-import os
 import shlex
-import signal
 from collections.abc import Generator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -19,11 +14,12 @@ from tyro.conf import arg
 
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.evaluation.base import TrialSpec, make_rung, rung_target
+from golem.evaluation.pool import Workers
 from golem.evaluation.provenance import code_digest, commit, digest, versions
 from golem.evaluation.records import Provenance, RunFolder, TrialRecord, artefacts
 from golem.evaluation.report import render
 from golem.evaluation.summary import Summary, summarise
-from golem.evaluation.trials import SINGLE_THREAD, Finished, Refused, run_trial, start_worker
+from golem.evaluation.trials import Finished, Refused, run_trial
 
 
 @dataclass(frozen=True)
@@ -171,34 +167,15 @@ def _finished(
     """Run trials in `jobs` processes and yield them as they finish; closing it early kills what is in flight."""
     if not todo:
         return
-    before = set(multiprocessing.active_children())
-    with _environment(SINGLE_THREAD):
-        pool = ProcessPoolExecutor(
-            min(jobs, len(todo)), multiprocessing.get_context("spawn"), initializer=start_worker
-        )
-        pending: dict[Future[Finished | Refused], TrialSpec] = {}
-        try:
-            with _ctrl_c_held():
-                for spec in todo:
-                    future = pool.submit(run_trial, target, spec, artefacts(out, spec))
-                    pending[future] = spec
-            while pending:
-                for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                    yield pending.pop(future), _result(future)
-        except BrokenProcessPool:
-            raise GolemError(
-                "A worker process died (out of memory, or a crash in native code); finished trials are kept: "
-                "give the same command again to continue."
-            ) from None
-        finally:
-            pool.shutdown(wait=not pending, cancel_futures=True)
-            for process in set(multiprocessing.active_children()) - before:
-                process.terminate()
-                process.join()
+    workers: Workers[TrialSpec, Finished | Refused] = Workers(min(jobs, len(todo)))
+    with workers:
+        for spec in todo:
+            workers.submit(spec, run_trial, target, spec, artefacts(out, spec))
+        for spec, result in workers.finished():
+            yield spec, _trial(result)
 
 
-def _result(future: Future[Finished | Refused]) -> Finished:
-    result = future.result()
+def _trial(result: Finished | Refused) -> Finished:
     if isinstance(result, Finished):
         return result
     if result.trace is None:
@@ -206,28 +183,3 @@ def _result(future: Future[Finished | Refused]) -> Finished:
     raise RuntimeError(
         f"The rung itself failed, which is a fault of its code, not of a module.\n{result.trace}"
     )
-
-
-@contextlib.contextmanager
-def _ctrl_c_held() -> Generator[None, None, None]:
-    """Hold Ctrl-C back while workers are started: they inherit the mask, so that only the parent ever hears it."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextlib.contextmanager
-def _environment(variables: Mapping[str, str]) -> Generator[None, None, None]:
-    """Set environment variables for the processes started meanwhile: BLAS reads them before an initialiser runs."""
-    before = {name: os.environ.get(name) for name in variables}
-    os.environ.update(variables)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

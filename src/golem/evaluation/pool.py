@@ -1,0 +1,96 @@
+"""Worker processes: one thread each, deaf to Ctrl-C, ended with their parent."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Generator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from types import TracebackType
+from typing import Generic, ParamSpec, TypeVar
+
+from golem.errors import GolemError
+from golem.evaluation.trials import SINGLE_THREAD, start_worker
+
+K = TypeVar("K")
+R = TypeVar("R")
+P = ParamSpec("P")
+
+
+class Workers(Generic[K, R]):
+    """A pool of spawned processes; leaving it early kills what is in flight.
+
+    Work may be added while results are read.
+    """
+
+    def __init__(self, processes: int) -> None:
+        """Work in up to `processes` processes; they start with the first piece of work."""
+        self._before = set(multiprocessing.active_children())
+        self._stack = contextlib.ExitStack()
+        self._pool = ProcessPoolExecutor(
+            processes, multiprocessing.get_context("spawn"), initializer=start_worker
+        )
+        self._pending: dict[Future[R], K] = {}
+
+    def __enter__(self) -> Workers[K, R]:
+        self._stack.enter_context(_environment(SINGLE_THREAD))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the processes."""
+        self._pool.shutdown(wait=not self._pending, cancel_futures=True)
+        for process in set(multiprocessing.active_children()) - self._before:
+            process.terminate()
+            process.join()
+        self._stack.close()
+
+    def submit(self, key: K, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> None:
+        """Add one piece of work, called `key`."""
+        with _ctrl_c_held():
+            self._pending[self._pool.submit(function, *args, **kwargs)] = key
+
+    def finished(self) -> Generator[tuple[K, R], None, None]:
+        """Yield key and result of every piece of work as it finishes.
+
+        Raises:
+            GolemError: a process died.
+        """
+        try:
+            while self._pending:
+                for future in wait(self._pending, return_when=FIRST_COMPLETED).done:
+                    yield self._pending.pop(future), future.result()
+        except BrokenProcessPool:
+            raise GolemError(
+                "A worker process died (out of memory, or a crash in native code); finished trials are kept: "
+                "give the same command again to continue."
+            ) from None
+
+
+@contextlib.contextmanager
+def _ctrl_c_held() -> Generator[None, None, None]:
+    """Hold Ctrl-C back while workers are started: they inherit the mask, so that only the parent ever hears it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _environment(variables: Mapping[str, str]) -> Generator[None, None, None]:
+    """Set environment variables for the processes started meanwhile: BLAS reads them before an initialiser runs."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
