@@ -6,10 +6,9 @@ that stay where they are, and the stance's posture. `wbc_qp.StanceProgram` finds
 come closest. There is no plan, no integral and no stepping: once the capture point has left the soles, it leans against
 the fall as hard as friction and motors allow.
 
-While a hoist carries a part of the robot, the program must know: feet that push with the whole weight would throw the
-robot up, or stretch the legs if they hang free. The share of the hoist is what the IMU feels and the torques of the
-legs do not explain; it goes over to the feet no faster than they are seen to take it, and does not come back until the
-next reset.
+A robot in a hoist has nothing to push against with its whole weight. Feet that are found loaded get the torques at
+once; those that are not get them little by little, beside a posture hold that fades, and only half of them until the
+ground is felt. Once they have all of it, they keep it until the next reset.
 """
 
 from __future__ import annotations
@@ -32,6 +31,7 @@ from golem.capabilities.legs.wbc_qp import (
     Weights,
 )
 from golem.errors import ConfigError, GolemError, unknown_name
+from golem.robots.model.imu import base_rate
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
@@ -53,19 +53,21 @@ class WbcConfig:
         stance: posture to stand in, a name in `hold.STANCES`.
         com_ahead: where the centre of mass belongs, ahead of the middle of the soles [m].
         height_speed: how fast the pelvis moves from where it is to the stance's height [m/s].
-        com_gain, com_damping: spring [1/s^2] and damper [1/s] of the centre of mass.
+        com_gain, com_damping: spring [1/s^2] and damper [1/s] of the centre of mass along x, y and z. The vertical ones
+            are stiffer: what the hands carry is not in the model and pulls straight down.
         turn_gain, turn_damping: the same of the pelvis' orientation.
         posture_gain, posture_damping: the same of the leg joints.
         feet_damping: damper of the soles [1/s].
-        kd: damping in the motors of hip yaw, pitch, roll, knee, ankle pitch, roll [N m s/rad]; at the measured speed
-            the feed-forward cancels it, so that it only acts on what happens between two ticks.
+        kp: stiffness of the posture hold before the feet are loaded: hip yaw, pitch, roll, knee, ankle pitch, roll
+            [N m/rad]; those of `HoldConfig`.
+        kd: damping of the same motors [N m s/rad]. With loaded feet the feed-forward cancels it at the measured speed,
+            so that it only acts on what happens between two ticks.
         friction: coefficient the feet may rely on; the soles have 0.8, and the inscribed pyramid keeps less.
         sole_margin: how far the centre of pressure stays inside the edge of a sole [m].
         torque_profile: a profile of `robots.model.limits`.
         torque_ratio: share of those limits that is used. 0.85 is just below what the safety gate lets through.
         weights: of the tasks.
-        engage: shortest time in which the feet take over the whole weight from a hoist [s].
-        reach: share of the weight that the feet try to take beyond what they carry already.
+        engage: time in which feet that were not loaded get their torques [s].
         patience: ticks in a row without a solution for which the last one is kept.
         hands: whether the robot wears the MAGPIE hands.
         rate: ticks per second [Hz].
@@ -74,21 +76,21 @@ class WbcConfig:
     stance: str = "crouch"
     com_ahead: float = 0.0
     height_speed: float = 0.1
-    com_gain: float = 40.0
-    com_damping: float = 12.0
+    com_gain: tuple[float, float, float] = (40.0, 40.0, 100.0)
+    com_damping: tuple[float, float, float] = (12.0, 12.0, 20.0)
     turn_gain: float = 100.0
     turn_damping: float = 20.0
     posture_gain: float = 50.0
     posture_damping: float = 14.0
     feet_damping: float = 50.0
+    kp: tuple[float, ...] = (200.0, 200.0, 200.0, 300.0, 40.0, 40.0)
     kd: tuple[float, ...] = (2.0, 2.0, 2.0, 2.0, 1.0, 1.0)
     friction: float = 0.6
     sole_margin: float = 0.005
     torque_profile: str = "urdf"
     torque_ratio: float = 0.85
-    weights: Weights = field(default_factory=lambda: Weights(turn=0.02))
-    engage: float = 0.5
-    reach: float = 0.15
+    weights: Weights = field(default_factory=lambda: Weights(turn=0.002))
+    engage: float = 1.0
     patience: int = 5
     hands: bool = True
     rate: float = 500.0
@@ -110,7 +112,7 @@ class WbcReport:
         torque: (12,) of the leg motors [N m].
         at_limit: joints whose torque is at its bound.
         lifting: (2, 4) corners that do not push: a foot is about to tip about the others.
-        hoist: what a hoist is believed to carry [N].
+        share: of these torques that is commanded, less than 1 until the feet are loaded.
         iterations: of the solver.
         solved: False where the solver failed and the previous torque was kept.
     """
@@ -128,7 +130,7 @@ class WbcReport:
     torque: Array
     at_limit: tuple[str, ...]
     lifting: Array
-    hoist: float
+    share: float
     iterations: int
     solved: bool
 
@@ -145,32 +147,36 @@ class Wbc:
         """Build the model and the program.
 
         Raises:
-            ConfigError: unknown stance or torque profile, or not six values of kd.
+            ConfigError: unknown stance or torque profile, or not six values of kp and of kd.
         """
         self.config = c = config or WbcConfig()
         if c.stance not in STANCES:
             raise unknown_name("stance", c.stance, STANCES)
-        if len(c.kd) != NUM_LEGS // 2:
-            raise ConfigError("Wbc needs six values of kd: hip yaw, pitch, roll, knee, ankle pitch, roll.")
+        if len(c.kp) != NUM_LEGS // 2 or len(c.kd) != NUM_LEGS // 2:
+            raise ConfigError(
+                "Wbc needs six values of kp and of kd: hip yaw, pitch, roll, knee, ankle pitch, roll."
+            )
         self.rate = c.rate
         self.latency = 0.0
         self.envelope = Envelope()
         self.gait = GaitConfig(start="never")
         self._rest: Array = np.tile(np.asarray(STANCES[c.stance]), 2)
         self._rest_height = -float(sole_centers(*leg_poses(self._rest))[:, 2].mean())
-        self._kp, self._kd = np.zeros(NUM_LEGS), np.tile(c.kd, 2)
+        self._kp, self._kd = np.tile(c.kp, 2), np.tile(c.kd, 2)
         self._bound: Array = c.torque_ratio * load_limits(c.torque_profile).torque[LEGS]
+        self._com_gain, self._com_damping = np.array(c.com_gain), np.array(c.com_damping)
         self._dynamics = StanceDynamics(c.hands)
         self._program = StanceProgram(self._bound, c.friction, c.sole_margin, c.weights)
-        self._height: float | None = None
-        self._hoist = 0.0
+        self._hold: Array | None = None
+        self._height = 0.0
+        self._share = 0.0
         self._solution: Solution | None = None
         self._failures = 0
         self._asked: tuple[float, Array, Array, Tasks] | None = None
 
     def reset(self, state: LowState) -> None:
-        """Forget height, hoist and solution; the next tick takes them from its measurements."""
-        self._height = None
+        """Forget everything; the next tick takes posture, height and load of the feet from its measurements."""
+        self._hold = None
         self._solution = None
         self._failures = 0
         self._asked = None
@@ -183,27 +189,28 @@ class Wbc:
         """
         c, d = self.config, self._dynamics
         q, dq = state.q[LEGS], state.dq[LEGS]
-        rate = base_rate(state)
+        rate = base_rate(state.imu.gyro, state.q[_TORSO], state.dq[_TORSO])
         if not math.isfinite(sum(float(x.sum()) for x in (state.q, state.dq, rate, base.velocity))):
             raise StanceError("Wbc was given a joint, a rate or a base velocity that is not finite.")
         R = base.T_odom_base[:3, :3]
         d.update(R, base.velocity, rate, state.q, state.dq)
         middle = d.soles.mean(axis=0)
-        self._advance(state, -float(middle[2]), dt)
+        hold = self._advance(q, -float(middle[2]), float(base.contact.sum()), dt)
         level, goal = self._goal(middle)
         tasks = Tasks(
-            com=c.com_gain * (goal - d.com) - c.com_damping * d.com_velocity,
+            com=self._com_gain * (goal - d.com) - self._com_damping * d.com_velocity,
             turn=c.turn_gain * pin.log3(R.T @ level) - c.turn_damping * rate,
             feet=-c.feet_damping * d.soles_velocity,
             legs=c.posture_gain * (self._rest - q) - c.posture_damping * dq,
         )
-        solution = self._program.solve(d, tasks, self._hoist)
+        solution = self._program.solve(d, tasks)
         self._failures = self._failures + 1 if solution is None else 0
         self._solution = solution or self._solution
         if self._solution is None or self._failures > c.patience:
             raise StanceError(f"Wbc found no contact forces for {self._failures} ticks in a row.")
         self._asked = state.t, middle, goal, tasks
-        return LegCommand(q.copy(), self._kp.copy(), self._kd.copy(), self._solution.torque + self._kd * dq)
+        tau = self._share * (self._solution.torque + self._kd * dq)
+        return LegCommand(hold.copy(), (1.0 - self._share) * self._kp, self._kd.copy(), tau)
 
     @property
     def last(self) -> WbcReport | None:
@@ -215,7 +222,7 @@ class Wbc:
         forces = solution.forces
         pendulum = math.sqrt(max(float(d.com[2] - middle[2]), 0.1) / _G)
         given = forces.sum(axis=(0, 1)) / d.mass
-        given[2] += self._hoist / d.mass - _G
+        given[2] -= _G
         full = np.abs(solution.torque) > self._bound - 1e-3
         corners = d.soles[:, None] + np.einsum("fij,cj->fci", d.soles_R, self._program.corners)
         return WbcReport(
@@ -232,14 +239,13 @@ class Wbc:
             torque=solution.torque,
             at_limit=tuple(JOINT_NAMES[i] for i in np.flatnonzero(full)),
             lifting=np.einsum("fci,fi->fc", forces, d.soles_R[:, :, 2]) < 1e-3,
-            hoist=self._hoist,
+            share=self._share,
             iterations=solution.iterations,
             solved=self._failures == 0,
         )
 
     def _goal(self, middle: Array) -> tuple[Array, Array]:
         """Return the rotation that base_link shall have, and where the centre of mass belongs."""
-        assert self._height is not None
         d = self._dynamics
         ahead = d.soles_R[0, :2, 0] + d.soles_R[1, :2, 0]
         c, s = (ahead / np.linalg.norm(ahead)).tolist()
@@ -249,34 +255,20 @@ class Wbc:
         goal[2] += self._height + d.com[2]
         return level, goal
 
-    def _advance(self, state: LowState, height: float, dt: float) -> None:
-        """Move the wished height towards the stance's, and the weight from a hoist to the feet."""
-        c, weight = self.config, self._dynamics.mass * _G
-        first = self._height is None
-        if not first and self._hoist == 0.0 and self._height == self._rest_height:
-            return
-        wished = height if self._height is None else self._height
-        reach = c.height_speed * dt
-        self._height = wished + min(max(self._rest_height - wished, -reach), reach)
-        if not first and self._hoist == 0.0:
-            return
-        felt = self._dynamics.mass * _upward(state)
-        carried = felt - self._dynamics.load(state.tau[LEGS])
-        share = min(max(carried - c.reach * weight, 0.0), weight)
-        least = self._hoist - weight * dt / c.engage
-        self._hoist = share if first else min(max(share, least), self._hoist)
+    def _advance(self, q: Array, height: float, contact: float, dt: float) -> Array:
+        """Move the wished height to the stance's and the share of the torques to 1; return the posture to hold.
 
-
-def base_rate(state: LowState) -> Array:
-    """Return the (3,) angular velocity of base_link in its own axes: the IMU's, less the waist joint's [rad/s]."""
-    yaw = float(state.q[_TORSO])
-    c, s = math.cos(yaw), math.sin(yaw)
-    x, y, z = state.imu.gyro.tolist()
-    return np.array([c * x - s * y, s * x + c * y, z - float(state.dq[_TORSO])])
-
-
-def _upward(state: LowState) -> float:
-    """Return the upward component of the specific force that the IMU feels: g at rest [m/s^2]."""
-    w, x, y, z = state.imu.quat.tolist()
-    up = np.array([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z])
-    return float(up @ state.imu.acc) / (w * w + x * x + y * y + z * z)
+        Args:
+            q: (12,) measured leg joints [rad].
+            height: of the pelvis above the soles [m].
+            contact: probability of a contact, both feet summed.
+            dt: time since the previous tick [s].
+        """
+        loaded = contact > 0.5
+        if self._hold is None:
+            self._hold, self._height, self._share = q.copy(), height, float(loaded)
+        reach = self.config.height_speed * dt
+        self._height += min(max(self._rest_height - self._height, -reach), reach)
+        most = 1.0 if loaded else max(self._share, 0.5)
+        self._share = min(self._share + dt / self.config.engage, most)
+        return self._hold

@@ -37,6 +37,7 @@ _EDGES = 4
 _CORNERS = 4
 _RAYS = 2 * _CORNERS * _EDGES
 _SIZE = _RAYS + NUM_LEGS
+_OWN = (6 + np.arange(NUM_LEGS), _RAYS + np.arange(NUM_LEGS))
 _HALF = np.array([(SOLE.x[1] - SOLE.x[0]) / 2.0, (SOLE.y[1] - SOLE.y[0]) / 2.0])
 
 
@@ -117,19 +118,6 @@ class StanceDynamics:
             self.soles[i], self.soles_R[i] = place.translation, place.rotation
             rows = slice(6 * i, 6 * i + 6)
             self.drift[rows] = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL).vector
-
-    def load(self, torque: Array) -> float:
-        """Return the upward force on both feet that the leg motors' `torque` (12,) answers at rest [N]."""
-        total = 0.0
-        for i in range(2):
-            joints = slice(6 + 6 * i, 12 + 6 * i)
-            J = self.J[6 * i : 6 * i + 6, joints]
-            # Damped: a straight knee has no say in the force along the leg.
-            wrench = np.linalg.solve(
-                J @ J.T + 1e-4 * np.eye(6), J @ (self.h[joints] - torque[6 * i : 6 * i + 6])
-            )
-            total += float(self.soles_R[i, 2] @ wrench[:3])
-        return total
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,36 +201,30 @@ class StanceProgram:
         self._lower[:_RAYS] = 0.0
         self._upper = np.full(_SIZE + NUM_LEGS, np.inf)
         self._A = np.zeros((30, _SIZE))
-        self._A[18 + np.arange(NUM_LEGS), _RAYS + np.arange(NUM_LEGS)] = np.sqrt(weights.legs)
+        self._root = np.sqrt([weights.feet, weights.turn, weights.com, weights.legs])
+        self._A[18:, _RAYS:] = self._root[3] * np.eye(NUM_LEGS)
         self._b = np.zeros(30)
         self._diagonal = np.diag_indices(_RAYS)
         self._sense = np.zeros(_SIZE + NUM_LEGS, dtype=np.int32)
 
-    def solve(self, dynamics: StanceDynamics, tasks: Tasks, hoist: float = 0.0) -> Solution | None:
-        """Return the best compromise between `tasks`, or None where the solver fails.
-
-        Args:
-            dynamics: the robot at its measured state.
-            tasks: what is wanted of it.
-            hoist: upward force of a hoist on base_link [N].
-        """
+    def solve(self, dynamics: StanceDynamics, tasks: Tasks) -> Solution | None:
+        """Return the best compromise between `tasks`, or None where the solver fails."""
         w, A, b = self._weights, self._A, self._b
-        M, h, J = dynamics.M, dynamics.h.copy(), dynamics.J
-        h[:3] -= hoist * dynamics.R[2]
+        M, h, J = dynamics.M, dynamics.h, dynamics.J
         pushed = J.T @ self._G
         inverse = np.linalg.inv(M[:6, :6])
         # a = T x + t
         T = np.zeros((_FREE, _SIZE))
         T[:6, :_RAYS] = inverse @ pushed[:6]
         T[:6, _RAYS:] = -inverse @ M[:6, 6:]
-        T[6:, _RAYS:] = np.eye(NUM_LEGS)
+        T[_OWN] = 1.0
         t = np.zeros(_FREE)
         t[:6] = -inverse @ h[:6]
         # tau = K x + k
         K = M[6:] @ T
         K[:, :_RAYS] -= pushed[6:]
         k = M[6:] @ t + h[6:]
-        root = np.sqrt([w.feet, w.turn, w.com, w.legs])
+        root = self._root
         A[:12] = root[0] * (J @ T)
         b[:12] = root[0] * (tasks.feet - dynamics.drift - J @ t)
         A[12:15] = root[1] * T[3:6]
@@ -252,7 +234,7 @@ class StanceProgram:
             A[15:18, i * half : i * half + half] = (
                 root[2] / dynamics.mass * (dynamics.soles_R[i] @ self._force)
             )
-        b[15:18] = root[2] * (tasks.com - GRAVITY - np.array([0.0, 0.0, hoist / dynamics.mass]))
+        b[15:18] = root[2] * (tasks.com - GRAVITY)
         b[18:] = root[3] * tasks.legs
         H = A.T @ A
         H[self._diagonal] += w.force
