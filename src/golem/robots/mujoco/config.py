@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from golem.errors import ConfigError
 from golem.robots.model.contact import FOOT_FRICTION, Feet
 from golem.robots.mujoco.hoist import HoistConfig
 from golem.robots.worlds.layout import PackLayout
@@ -58,3 +59,20 @@ class MujocoConfig:
     payload: tuple[float, float] = (0.0, 0.0)
     latency: float = 0.0
     mjcf: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ConfigError: one of them is outside its range.
+        """
+        for name, value, least, most in (
+            ("slope", self.slope, 0.0, 0.5),
+            ("rubble", self.rubble, 0.0, 0.2),
+            ("friction", self.friction, 0.01, 5.0),
+            ("payload", self.payload[0], 0.0, 20.0),
+            ("payload", self.payload[1], 0.0, 20.0),
+            ("latency", self.latency, 0.0, 0.2),
+        ):
+            if not least <= value <= most:
+                raise ConfigError(f"The twin's {name} is from {least:g} to {most:g}, not {value:g}.")

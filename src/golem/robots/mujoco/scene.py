@@ -123,8 +123,8 @@ def foreign_robot(path: Path) -> mujoco.MjSpec:
             f"{JOINT_NAMES[0]} to {JOINT_NAMES[-1]} in the vendor's order."
         )
     base.joints[0].name = "base"
-    for sensor in spec.sensors:
-        spec.delete(sensor)
+    for element in (*spec.sensors, *spec.cameras):
+        spec.delete(element)
     for geom in spec.geoms:
         if geom.contype:
             geom.contype, geom.conaffinity, geom.group = contact.BODY, contact.WORLD, mjcf.COLLISION_GROUP

@@ -1,0 +1,70 @@
+"""The delay of the motor drives counts time, however the time is cut into calls."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from golem.robots.model.mjcf import robot_spec
+from golem.robots.mujoco.motors import Motors
+from golem.types import NUM_JOINTS, LowCommand
+
+ZERO = np.zeros(NUM_JOINTS)
+STEP = 0.002
+
+
+def torque(value: float) -> LowCommand:
+    return LowCommand(0.0, ZERO, ZERO, np.full(NUM_JOINTS, value), ZERO, ZERO)
+
+
+class Drive:
+    """Motors on a robot in empty space."""
+
+    def __init__(self, delay: float) -> None:
+        model = robot_spec(hands=False).compile()
+        self.data = mujoco.MjData(model)
+        self.motors = Motors(model, np.full(NUM_JOINTS, 100.0), ZERO, delay)
+
+    def advance(self, value: float, dt: float, step: float = STEP) -> list[float]:
+        """Give a command and let `dt` pass; returns the torque of every physics step."""
+        self.motors.give(torque(value), self.data.time)
+        out = []
+        for _ in range(round(dt / step)):
+            self.motors.drive(self.data)
+            out.append(float(self.motors.tau[0]))
+            self.data.time += step
+        return out
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.002, 0.006, 0.020])
+def test_every_command_acts_after_the_delay(delay: float) -> None:
+    drive, late = Drive(delay), round(delay / STEP)
+    seen = [drive.advance(float(i + 1), STEP)[0] for i in range(late + 20)]
+    assert seen == [1.0] * late + [float(i + 1) for i in range(20)]
+
+
+def test_a_long_call_takes_the_command_up_in_its_middle() -> None:
+    drive = Drive(0.006)
+    drive.advance(1.0, 0.020)
+    assert drive.advance(2.0, 0.020) == [1.0] * 3 + [2.0] * 7
+
+
+def test_fine_steps_delay_by_the_same_time() -> None:
+    drive = Drive(0.004)
+    drive.advance(1.0, 0.020)
+    assert drive.advance(2.0, 0.010, step=0.0005) == [1.0] * 8 + [2.0] * 12
+
+
+def test_of_commands_that_fall_due_together_the_newest_acts() -> None:
+    drive = Drive(0.003)
+    drive.advance(1.0, 0.020)
+    drive.motors.give(torque(2.0), drive.data.time)
+    drive.motors.give(torque(3.0), drive.data.time)
+    assert drive.advance(4.0, 0.006) == [1.0, 1.0, 4.0]
+
+
+def test_without_a_command_the_motors_are_limp() -> None:
+    drive = Drive(0.0)
+    drive.motors.drive(drive.data)
+    assert not drive.data.ctrl.any()

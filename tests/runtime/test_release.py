@@ -1,0 +1,69 @@
+"""A stack on the ground lets the band go by itself, when all is ready and not before."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from golem.robots.base import Banded
+from golem.runtime.assembly import Running, build, start_posture
+from golem.runtime.release import READY
+from golem.stack import Choice, Stack
+
+STANDING = Stack(
+    robot=Choice("mujoco", {"support": "ground", "world": "open"}),
+    lower_body=Choice("hold", {"stance": "crouch"}),
+    fallback=Choice("hold", {"stance": "crouch"}),
+    profile="ideal",
+)
+
+
+@pytest.fixture
+def stack() -> Iterator[tuple[Running, Banded]]:
+    """A running stack whose legs only hold the crouch, and its robot."""
+    running, robot = build(STANDING, seed=0)
+    yield running, robot
+    robot.close()
+
+
+def released_at(running: Running, robot: Banded, until: float) -> float | None:
+    while running.executor.t < until:
+        running.executor.step()
+        if not robot.banded:
+            return running.executor.t
+    return None
+
+
+def test_it_is_released_when_gate_servo_and_legs_are_ready(stack: tuple[Running, Banded]) -> None:
+    running, robot = stack
+    at = released_at(running, robot, 3.0)
+    assert at is not None and READY < at < READY + 0.1
+
+
+def test_nothing_moves_until_then(stack: tuple[Running, Banded]) -> None:
+    running, robot = stack
+    assert released_at(running, robot, READY - 0.05) is None
+    base = robot.truth.base()  # pyright: ignore[reportAttributeAccessIssue]
+    assert base.tilt < 0.02
+    assert base.T_world_base[2, 3] == pytest.approx(0.965, abs=0.01)
+
+
+def test_a_pressed_button_keeps_the_band(stack: tuple[Running, Banded]) -> None:
+    running, robot = stack
+    running.executor.run(0.5)
+    running.estop.press()
+    assert released_at(running, robot, READY + 1.0) is None
+
+
+def test_a_robot_that_hangs_is_never_released() -> None:
+    running, robot = build(Stack(profile="ideal"), seed=0)
+    running.executor.run(READY + 0.5)
+    assert robot.truth.base().T_world_base[2, 3] == pytest.approx(1.10, abs=0.01)
+    robot.close()
+
+
+def test_each_support_has_its_posture() -> None:
+    # Knees: slightly bent where the legs hang, a crouch where they carry.
+    assert start_posture()[3] == pytest.approx(0.36)
+    assert start_posture(on_ground=True)[3] == pytest.approx(0.8)
