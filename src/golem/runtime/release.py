@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from golem.capabilities.legs.base import LegCommand
 from golem.middleware import topics
 from golem.middleware.bus import Bus
@@ -28,7 +30,7 @@ class ReleaseNode:
         if not self._robot.banded:
             return
         legs = self._bus.latest(topics.LEG_COMMAND, LegCommand)
-        if not moving(self._bus) or legs is None or not legs.kp.any():
+        if not moving(self._bus) or legs is None or not (legs.kp.any() or np.any(legs.tau)):
             self._waiting_since = t
         elif t - self._waiting_since >= READY:
             self._guard.call(self._robot.release)
