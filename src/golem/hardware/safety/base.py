@@ -13,6 +13,7 @@ import numpy as np
 
 from golem.hardware.estop.base import EstopFrame
 from golem.robots.model.limits import load_limits
+from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, Array, BaseEstimate, LowCommand, LowState
 
 LIMIT_RATIO = 0.9
@@ -85,8 +86,9 @@ class SafetyLimits:
             the noise of the torque estimate must not stop the robot].
         slew: bound of the commanded position's rate [rad/s]: `velocity` for the legs, whose policies use distant
             targets as torques; 3 rad/s for torso and arms, three times what the controllers ask for [own].
-        deceleration: what each joint can surely be braked with [rad/s^2]: legs 40, torso and arms 20 [own: torque
-            left after gravity over the inertia of the stretched limb is 26 at the shoulder].
+        deceleration: what each joint can surely be braked with [rad/s^2]: hips and knees 40, torso and arms 20, ankles
+            150 [own: torque left after gravity over the inertia of the stretched limb is 26 at the shoulder; half of
+            the ankle roll's torque over rotor and foot, 0.11 kg m^2, is 155].
         damping: kd of the damping stop [N m s/rad]: at most 5, and at most `torque_command / velocity`, so that
             damping breaks no torque limit at any legal speed [own].
         kp_max, kd_max: bounds of the gains [authors].
@@ -149,6 +151,7 @@ class SafetyLimits:
         slew[LEGS] = velocity[LEGS]
         deceleration = np.full(NUM_JOINTS, 20.0)
         deceleration[LEGS] = 40.0
+        deceleration[[k for k, name in enumerate(JOINT_NAMES) if "ankle" in name]] = 150.0
         torque_command = 0.95 * torque
         new = cls(
             lower=middle - ratio * half,
