@@ -17,12 +17,14 @@ import pytest
 
 from golem import registry
 from golem.robots.mujoco.engine import MujocoRobot
+from golem.robots.mujoco.push import Pushes
 from golem.robots.mujoco.scene import Scene
+from golem.robots.mujoco.truth import Truth
 from golem.runtime.assembly import Running, build
 from golem.skills.base import Tick
 from golem.skills.pick import Pick, PickGoal
 from golem.skills.walk import Walk
-from golem.stack import Stack
+from golem.stack import Choice, Stack
 
 SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
 
@@ -40,8 +42,10 @@ INSIDERS = (
 )
 # The twin's robot is built from the same table as the model that the modules use.
 BUILDERS = (*INSIDERS, "robots/model")
+# A planner rolls out a model of its own, built from that table; which one it holds is checked below.
+PLANNERS = ("capabilities/legs/mpc/model.py",)
 SECRETS = {
-    "mujoco": BUILDERS,
+    "mujoco": (*BUILDERS, *PLANNERS),
     "golem.robots.mujoco": INSIDERS,
     # A realism profile says, among other things, how the screws of its worlds are drawn.
     "golem.robots.worlds": (*INSIDERS, "robots/sensors/profiles.py"),
@@ -101,8 +105,10 @@ def test_a_secret_import_is_found(leak: str, owner: str) -> None:
     assert secrets(leak, owner) != []
 
 
-TRUTH = (mujoco.MjData, mujoco.MjModel, mujoco.MjSpec, MujocoRobot, Scene, Running)
-"""What no module may reach; `Running` because it drives the robot."""
+HOLDERS = (MujocoRobot, Scene, Truth, Pushes, Running)
+"""Who holds the truth, or drives the robot; no module may reach them."""
+TRUTH = (mujoco.MjData, mujoco.MjModel, mujoco.MjSpec, *HOLDERS)
+"""The same and the simulation itself, for modules that have none of their own."""
 
 
 def referents(thing: Any, namespaces: set[int]) -> Iterator[Any]:
@@ -133,8 +139,12 @@ def referents(thing: Any, namespaces: set[int]) -> Iterator[Any]:
             yield referent
 
 
-def reachable(roots: Iterable[tuple[str, Any]]) -> list[str]:
-    """Return the ways from `roots` (name, object) to any `TRUTH`, each as names of types; empty if there is none."""
+def is_truth(thing: Any) -> bool:
+    return isinstance(thing, TRUTH)
+
+
+def reachable(roots: Iterable[tuple[str, Any]], secret: Callable[[Any], bool] = is_truth) -> list[str]:
+    """Return the ways from `roots` (name, object) to what is `secret`, each as names of types; empty if none is."""
     namespaces = {id(vars(module)) for module in list(sys.modules.values()) if hasattr(module, "__dict__")}
     seen: dict[int, Any] = {}
     queue = [(name, thing) for name, thing in roots]
@@ -144,7 +154,7 @@ def reachable(roots: Iterable[tuple[str, Any]]) -> list[str]:
         if id(thing) in seen:
             continue
         seen[id(thing)] = thing
-        if isinstance(thing, TRUTH):
+        if secret(thing):
             found.append(f"{way} -> {type(thing).__name__}")
             continue
         way = f"{way} -> {type(thing).__name__}" if len(way) < 400 else way
@@ -154,9 +164,9 @@ def reachable(roots: Iterable[tuple[str, Any]]) -> list[str]:
 
 
 class Inspected:
-    """A tether stack in the middle of a pick, with hold of every module it made."""
+    """A stack in the middle of a pick, with hold of every module it made."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, stack: Stack) -> None:
         self.roots: list[tuple[str, Any]] = []
         create = registry.create
 
@@ -168,7 +178,7 @@ class Inspected:
             return module
 
         monkeypatch.setattr(registry, "create", collect)
-        self.running, self.robot = build(Stack(), seed=0)
+        self.running, self.robot = build(stack, seed=0)
         skill = Pick(self.running.method)
         self.run = self.running.start(skill, PickGoal())
         self.running.executor.run(0.2)
@@ -188,8 +198,8 @@ class Inspected:
 
 @pytest.fixture
 def inspected(monkeypatch: pytest.MonkeyPatch) -> Iterator[Inspected]:
-    """A stack after 0.2 s of a pick."""
-    stack = Inspected(monkeypatch)
+    """A tether stack after 0.2 s of a pick."""
+    stack = Inspected(monkeypatch, Stack())
     yield stack
     stack.robot.close()
 
@@ -199,6 +209,26 @@ def test_no_module_holds_a_way_to_the_truth(inspected: Inspected) -> None:
     assert made >= set(registry.slots()) - {"robot"}
     assert inspected.running.bus.count("realsense/head") > 0
     assert reachable(inspected.roots) == []
+
+
+@pytest.mark.parametrize("legs", ["wbc", "mpc"])
+def test_no_module_of_a_standing_robot_does(legs: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    on_ground = Choice("mujoco", {"support": "ground"})
+    estimator = Choice("random_walk_kf")
+    stack = Stack(robot=on_ground, estimator=estimator, lower_body=Choice(legs), fallback=Choice("wbc"))
+    inspected = Inspected(monkeypatch, stack)
+    robot = inspected.robot
+
+    def secret(thing: Any) -> bool:
+        return isinstance(thing, HOLDERS) or thing is robot.data or thing is robot.scene.model
+
+    assert reachable(inspected.roots, secret) == []
+    # Only the planner has a simulation at all, and it is no view of the robot's.
+    simulations = [way.split(" -> ")[0] for way in reachable(inspected.roots)]
+    assert set(simulations) == ({"lower_body"} if legs == "mpc" else set())
+    inspected.module("lower_body").planted = robot.truth
+    assert any(way.endswith("Truth") for way in reachable(inspected.roots, secret))
+    robot.close()
 
 
 def closure(secret: Any) -> Callable[[], Any]:
@@ -234,6 +264,8 @@ LEAKS: dict[str, Callable[[MujocoRobot], Any]] = {
     "weak reference": weakref.ref,
     "array of objects": lambda robot: np.array([robot, None], dtype=object),
     "scene": lambda robot: robot.scene,
+    "truth": lambda robot: robot.truth,
+    "push": lambda robot: robot.push,
 }
 
 
