@@ -4,16 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.capabilities.legs.floor_plant import FloorPlant
+from tests.capabilities.legs.floor_plant import STEP, FloorPlant
 from tests.capabilities.legs.test_network import write_onnx
 
 from golem.capabilities.legs.almi import Almi, AlmiConfig
 from golem.capabilities.legs.base import STANDING, LowerBody, Motion
 from golem.capabilities.legs.description import SHIPPED
+from golem.capabilities.legs.locomotion import Locomotion
 from golem.capabilities.legs.policy import BadAction, Policy, PolicyConfig
 from golem.capabilities.legs.swing import swing_offset
 from golem.errors import ConfigError
-from golem.types import NUM_JOINTS, BaseEstimate, Imu, LowState, Twist
+from golem.types import NUM_JOINTS, UPPER, BaseEstimate, Imu, LowState, Twist
 
 PEERS = Path(__file__).resolve().parents[4] / "shared" / "h12" / "peers"
 BASE = BaseEstimate(0.0, np.eye(4))
@@ -122,8 +123,29 @@ def peer(name: str, network: str) -> Policy:
     return Policy(PolicyConfig(name, str(path)))
 
 
-def test_the_public_almi_checkpoint_stands() -> None:
-    legs = peer("almi_open", "almi_open/policy_lstm_12800.pt")
-    plant = FloorPlant(velocity_noise=0.0)
-    assert plant.run(legs, 5.0)
-    assert np.linalg.norm(plant.data.qpos[:2]) < 0.1
+@pytest.mark.parametrize(
+    ("name", "network", "stance", "still"),
+    [
+        ("almi_open", "almi_open/policy_lstm_12800.pt", "crouch", True),
+        ("unitree_rl_gym", "unitree_rl_gym/motion.pt", "stand", False),
+    ],
+)
+def test_the_public_checkpoints_stand(name: str, network: str, stance: str, still: bool) -> None:
+    legs = peer(name, network)
+    plant = FloorPlant(stance=stance, velocity_noise=0.0)
+    plant.q[UPPER] = legs.description.q0()[UPPER]
+    plant.place()
+    locomotion = Locomotion(legs)
+    locomotion.reset(plant.sense()[0])
+    track, stepping = [], set()
+    for k in range(round(4.0 / STEP)):
+        if k % 10 == 0:
+            command = locomotion.step(*plant.sense(), None, 10 * STEP)
+            stepping.add(bool(locomotion.gait.stepping))
+        plant.advance(command)
+        track.append(plant.data.qpos[:2].copy())
+    assert not plant.fallen
+    # ALMI's stands still; Unitree's never stops stepping, and wanders.
+    assert stepping == {not still}
+    wandered = np.ptp(np.array(track)[500:], axis=0).max()
+    assert wandered < 0.03 if still else 0.03 < wandered < 0.5
