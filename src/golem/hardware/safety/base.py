@@ -86,9 +86,10 @@ class SafetyLimits:
             the noise of the torque estimate must not stop the robot].
         slew: bound of the commanded position's rate [rad/s]: `velocity` for the legs, whose policies use distant
             targets as torques; 3 rad/s for torso and arms, three times what the controllers ask for [own].
-        deceleration: what each joint can surely be braked with [rad/s^2]: hips and knees 40, torso and arms 20, ankles
-            150 [own: torque left after gravity over the inertia of the stretched limb is 26 at the shoulder; half of
-            the ankle roll's torque over rotor and foot, 0.11 kg m^2, is 155].
+        deceleration: what each joint can surely be braked with [rad/s^2]: torso and arms 20 [own: torque left after
+            gravity over the inertia of the stretched limb is 26 at the shoulder], hip pitch and roll 40 [own: 68 with
+            the straight leg], hip yaw and knee 200, ankles 150 [own: half of the torque over what hangs below and the
+            rotor: 0.4, 0.4 and 0.11 kg m^2].
         damping: kd of the damping stop [N m s/rad]: at most 5, and at most `torque_command / velocity`, so that
             damping breaks no torque limit at any legal speed [own].
         kp_max, kd_max: bounds of the gains [authors].
@@ -151,7 +152,8 @@ class SafetyLimits:
         slew[LEGS] = velocity[LEGS]
         deceleration = np.full(NUM_JOINTS, 20.0)
         deceleration[LEGS] = 40.0
-        deceleration[[k for k, name in enumerate(JOINT_NAMES) if "ankle" in name]] = 150.0
+        for part, most in (("hip_yaw", 200.0), ("knee", 200.0), ("ankle", 150.0)):
+            deceleration[[k for k, name in enumerate(JOINT_NAMES) if part in name]] = most
         torque_command = 0.95 * torque
         new = cls(
             lower=middle - ratio * half,
