@@ -80,11 +80,16 @@ def _model(words: list[str]) -> int:
 
 
 def _bench(words: list[str]) -> int:
-    """Print every performance figure beside its reference."""
+    """Print every performance figure beside its reference; `bench push` and `bench legs` test the lower body."""
     _prepare_graphics()
-    from golem.evaluation.bench import BenchConfig, run_bench
+    if words[:1] == ["push"]:
+        from golem.evaluation.push_bench import PushBenchConfig, run_push_bench
 
-    run_bench(_parse(BenchConfig, "bench", words))
+        run_push_bench(_parse(PushBenchConfig, "bench push", words[1:]))
+    else:
+        from golem.evaluation.bench import BenchConfig, run_bench
+
+        run_bench(_parse(BenchConfig, "bench", words))
     return 0
 
 

@@ -9,8 +9,10 @@ succeed dip below zero: read the minimum together with the time below zero and t
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -166,10 +168,11 @@ class BalanceRecorder:
         quiet: for how long the robot has been standing still, both feet down, margin positive [s].
     """
 
-    def __init__(self, robot: MujocoRobot) -> None:
-        """Look at `robot`."""
+    def __init__(self, robot: MujocoRobot, memory: float = math.inf) -> None:
+        """Look at `robot`, and keep the samples of the last `memory` [s]."""
         self._truth = robot.truth
-        self._rows: list[tuple[float, ...]] = []
+        most = None if math.isinf(memory) else round(memory / PERIOD)
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=most)
         self._polygon: Array = _support(self._truth.soles())
         self._next = 0.0
         self.fallen = False
@@ -201,9 +204,10 @@ class BalanceRecorder:
             + (*self.contact, *(np.zeros(3) if force is None else force))
         )
 
-    def trace(self) -> BalanceTrace:
-        """Return what was sampled so far."""
-        rows = np.array(self._rows, dtype=np.float64).reshape(-1, 17)
+    def trace(self, last: float = math.inf) -> BalanceTrace:
+        """Return the samples of the `last` seconds that are kept."""
+        skipped = 0 if math.isinf(last) else max(0, len(self._rows) - round(last / PERIOD))
+        rows = np.array(list(islice(self._rows, skipped, None)), dtype=np.float64).reshape(-1, 17)
         rows[:, 7] = np.unwrap(rows[:, 7])
         return BalanceTrace(
             t=rows[:, 0],

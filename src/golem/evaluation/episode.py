@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from golem.errors import ConfigError
 from golem.evaluation.balance import BalanceRecorder
 from golem.evaluation.exercise import Exercise
-from golem.evaluation.pushes import Push
+from golem.evaluation.pushes import Push, Pusher
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.assembly import build
-from golem.runtime.executor import TICK
 from golem.skills.runner import FAULT
 from golem.stack import Choice, Stack, load_stack
 from golem.types import Array
@@ -88,7 +85,6 @@ class Episode:
     Attributes:
         running, robot: the stack and its twin.
         recorder: samples the twin's balance after every tick.
-        force: (3,) present force of the push in the world [N].
     """
 
     def __init__(self, stack: Stack, seed: int, exercise: Exercise) -> None:
@@ -105,14 +101,18 @@ class Episode:
             )
         self.robot = robot
         self.recorder = BalanceRecorder(robot)
-        self._push: tuple[Push, float, float] | None = None
-        self.force: Array = np.zeros(3)
+        self._pusher = Pusher(robot)
         self.running.start(exercise, None)
 
     @property
     def t(self) -> float:
         """Robot time [s]."""
         return self.running.executor.t
+
+    @property
+    def force(self) -> Array:
+        """(3,) present force of the push in the world [N]."""
+        return self._pusher.force
 
     @property
     def stopped(self) -> bool:
@@ -148,8 +148,7 @@ class Episode:
 
     def push(self, push: Push) -> None:
         """Begin `push` now; it goes on while the episode runs."""
-        self._push = (push, self.t, self.recorder.yaw)
-        self._drive()
+        self._pusher.begin(push, self.t, self.recorder.yaw)
 
     def close(self) -> None:
         """Release what the twin holds."""
@@ -157,16 +156,5 @@ class Episode:
 
     def _look(self) -> bool:
         self.recorder(self.t, self.force)
-        self._drive()
+        self._pusher.drive(self.t)
         return self.over
-
-    def _drive(self) -> None:
-        """Apply the push for the coming tick."""
-        if self._push is None:
-            return
-        push, start, yaw = self._push
-        elapsed = self.t - start + 0.5 * TICK
-        self.force = push.force(elapsed, yaw)
-        self.robot.push(self.force, push.body, None if push.point is None else np.array(push.point))
-        if elapsed > push.duration:
-            self._push = None

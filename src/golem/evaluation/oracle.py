@@ -39,8 +39,7 @@ class Oracle:
     def __init__(self, robot: MujocoRobot) -> None:
         """Look into `robot`."""
         self._robot = robot
-        self._T_odom_world = np.eye(4)
-        self._T_odom_world[2, 3] = -robot.config.hoist.height
+        self._T_odom_world = np.linalg.inv(robot.truth.T_world_odom)
         self._rig: CameraRig | None = None
 
     def screws_in_tray(self) -> list[str]:

@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 
 from golem.robots.model.table import BASE_LINK
+from golem.robots.mujoco.engine import MujocoRobot
+from golem.runtime.executor import TICK
 from golem.types import Array
 
 DIRECTIONS = ("front", "front_left", "left", "back_left", "back", "back_right", "right", "front_right")
@@ -76,3 +78,38 @@ def rod(direction: str, peak: float) -> Push:
 def shove(direction: str, impulse: float) -> Push:
     """Return a constant force on the torso for `SHOVE_TIME` that transfers `impulse` [N s]."""
     return Push("torso_link", None, direction, impulse / SHOVE_TIME, SHOVE_TIME, "constant")
+
+
+class Pusher:
+    """Pushes one twin, one push at a time.
+
+    Attributes:
+        force: (3,) present force in the world [N].
+    """
+
+    def __init__(self, robot: MujocoRobot) -> None:
+        """Push `robot`."""
+        self._robot = robot
+        self._push: tuple[Push, float, float] | None = None
+        self.force: Array = np.zeros(3)
+
+    def begin(self, push: Push, t: float, yaw: float) -> None:
+        """Begin `push` at time `t` [s], when the robot's heading is `yaw` [rad]; it replaces one that goes on."""
+        if self._push is not None:
+            self._apply(self._push[0], np.zeros(3))
+        self._push = (push, t, yaw)
+        self.drive(t)
+
+    def drive(self, t: float) -> None:
+        """Apply the push for the tick that begins at `t` [s]; call it at every tick."""
+        if self._push is None:
+            return
+        push, start, yaw = self._push
+        elapsed = t - start + 0.5 * TICK
+        self._apply(push, push.force(elapsed, yaw))
+        if elapsed > push.duration:
+            self._push = None
+
+    def _apply(self, push: Push, force: Array) -> None:
+        self.force = force
+        self._robot.push(force, push.body, None if push.point is None else np.array(push.point))

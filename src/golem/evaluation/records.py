@@ -148,7 +148,7 @@ def read_records(path: Path) -> list[TrialRecord]:
     except OSError as error:
         raise OutputError(f"Cannot read {path}: {error.strerror}.") from error
     records = []
-    for number, line in enumerate(text[: _whole(text)].splitlines(), start=1):
+    for number, line in enumerate(text[: whole_lines(text)].splitlines(), start=1):
         try:
             records.append(TrialRecord.parse(line.decode()))
         except ValueError as error:
@@ -156,7 +156,7 @@ def read_records(path: Path) -> list[TrialRecord]:
     return records
 
 
-def _whole(text: bytes) -> int:
+def whole_lines(text: bytes) -> int:
     """Return the length of `text` up to and with its last newline."""
     return text.rfind(b"\n") + 1
 
@@ -233,7 +233,7 @@ class RunFolder:
                     )
         for path in (self._trials, self._costs):
             if path.exists():
-                os.truncate(path, _whole(path.read_bytes()))
+                os.truncate(path, whole_lines(path.read_bytes()))
         return records
 
     def append(self, record: TrialRecord, finished: Finished) -> None:
@@ -248,8 +248,8 @@ class RunFolder:
                 picture = self.path / record.picture
                 picture.parent.mkdir(exist_ok=True)
                 picture.write_bytes(finished.outcome.picture)
-            _append(self._trials, record.line())
-            _append(self._costs, json.dumps(cost) + "\n")
+            append_line(self._trials, record.line())
+            append_line(self._costs, json.dumps(cost) + "\n")
         except OSError as error:
             raise OutputError(f"Cannot write to {self.path}: {error.strerror}.") from error
 
@@ -275,7 +275,7 @@ class RunFolder:
         return path
 
 
-def _append(path: Path, line: str) -> None:
+def append_line(path: Path, line: str) -> None:
     """Append one line in one write, and wait until the disk has it."""
     handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
     try:

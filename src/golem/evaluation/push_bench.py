@@ -1,0 +1,272 @@
+"""`golem bench push`: the largest push that each lower body survives, by direction and gait phase, side by side."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
+
+from tyro.conf import arg
+
+from golem.errors import ConfigError, ModuleFault, unknown_name
+from golem.evaluation.campaign import Done, Job, Result, robot_options, run_campaign, write_files
+from golem.evaluation.exercise import ArmMotion, Exercise
+from golem.evaluation.provenance import commit
+from golem.evaluation.pushes import DIRECTIONS, rod, shove
+from golem.evaluation.subject import Subject
+from golem.robots.sensors.profiles import load_profile
+from golem.types import Twist
+
+Kind = Literal["shove", "rod"]
+Phase = Literal["standing", "left_swing", "right_swing"]
+
+SURVIVED = 0.95
+"""Share of the trials of a level that has to be survived."""
+SETTLE = (2.0, 3.0)
+"""Range of the time before the push, standing or walking [s]."""
+WALK = Twist(vx=0.3)
+"""Twist of the trials in which the robot walks."""
+SWING = 0.15
+"""The push meets a swinging foot up to so long after it was lifted [s]."""
+PATIENCE = 4.0
+"""Time after the push that has to be survived [s]."""
+QUIET = 0.5
+"""Time of quiet standing after which nothing more can happen [s]."""
+
+
+@dataclass(frozen=True)
+class PushBenchConfig:
+    """Find the largest push each lower body survives: a shove of 0.2 s against the torso, or the rod at the pelvis.
+
+    Levels ascend until one is not survived in 95 % of its trials; a first level that fails descends instead.
+    """
+
+    method: tuple[str, ...] = ("almi",)
+    """Lower bodies: registered names, file.py:Class, or policy:DESCRIPTION:NETWORK."""
+    kind: Kind = "shove"
+    """shove: constant force on the torso for 0.2 s, levels in N s. rod: half a sine of 1 s at the pelvis, in N."""
+    phase: tuple[Phase, ...] = ("standing", "left_swing", "right_swing")
+    """When the push comes: standing, or walking while that foot is in the air."""
+    direction: tuple[str, ...] = DIRECTIONS
+    """Where the push drives the robot."""
+    n: Annotated[int, arg(aliases=("-n",))] = 20
+    """Trials per level."""
+    first: float = 10.0
+    """First level."""
+    step: float = 10.0
+    """Distance between levels."""
+    last: float = 200.0
+    """Highest level."""
+    profile: str = "bench"
+    """Realism of sensors and actuators: ideal, bench or field."""
+    latency: float = 0.02
+    """Delay of motor commands on top of the profile's [s]."""
+    robot: tuple[str, ...] = ()
+    """Further options of the twin, e.g. feet=box cone=elliptic mjcf=../h1_2.xml."""
+    seed: int = 0
+    """Seed; trial i of every method meets the same draws."""
+    out: Path = Path("runs/push-bench")
+    """Folder for jobs.jsonl, table.md and results.json; the same command continues an interrupted run."""
+    j: Annotated[int, arg(aliases=("-j",))] = 1
+    """Processes."""
+    json: bool = False
+    """Print the results as a last line of JSON."""
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """All trials of one cell of the table at one level.
+
+    Attributes:
+        subject: what is tested.
+        kind, phase, direction: the cell.
+        level: impulse [N s] of a shove, peak force [N] of the rod.
+        n, seed: trials.
+    """
+
+    subject: Subject
+    kind: str
+    phase: str
+    direction: str
+    level: float
+    n: int
+    seed: int
+
+    def run(self) -> Result:
+        """Return how many trials were run and survived; ends once enough are lost to fail."""
+        losses: dict[str, int] = {}
+        trials = 0
+        while trials < self.n and sum(losses.values()) <= allowed(self.n):
+            loss = self._trial(trials)
+            trials += 1
+            if loss is not None:
+                losses[loss] = losses.get(loss, 0) + 1
+        lost = sum(losses.values())
+        return {"trials": trials, "lost": lost, "losses": losses, "passed": lost <= allowed(self.n)}
+
+    def _trial(self, index: int) -> str | None:
+        """Return the stage in which trial `index` was lost, or None."""
+        draw = self.subject.draw("push-bench", self.seed, index)
+        times = draw.rng("times")
+        settle, late = times.uniform(*SETTLE), times.uniform(0.0, SWING)
+        standing = self.phase == "standing"
+        exercise = Exercise(ArmMotion(draw.rng("arms")), None if standing else lambda t: WALK)
+        try:
+            episode = self.subject.episode(self.seed, index, exercise)
+        except ModuleFault:
+            return "fault"
+        try:
+            episode.run(settle if standing else 2.0 * settle)
+            if not standing:
+                air = [self.phase != "left_swing", self.phase != "right_swing"]
+                episode.run(2.0, until=lambda: episode.recorder.contact.tolist() == air)
+                if not episode.over and episode.recorder.contact.tolist() != air:
+                    return "no step"
+                episode.run(late)
+            push = (shove if self.kind == "shove" else rod)(self.direction, self.level)
+            episode.push(push)
+            episode.run(push.duration)
+            episode.run(PATIENCE, until=lambda: standing and episode.recorder.quiet >= QUIET)
+            return None if episode.loss is None else episode.loss.stage
+        except ModuleFault:
+            return "fault"
+        finally:
+            episode.close()
+
+
+def allowed(n: int) -> int:
+    """Return how many of `n` trials a level may lose."""
+    return math.floor((1.0 - SURVIVED) * n + 1e-9)
+
+
+def run_push_bench(config: PushBenchConfig) -> list[dict[str, Any]]:
+    """Search every cell, write and print the table.
+
+    Returns:
+        One entry per cell, see `cells`.
+
+    Raises:
+        GolemError: an option is wrong, the folder cannot be written, or a method cannot run.
+        CampaignInterrupted: Ctrl-C.
+    """
+    _check(config)
+    robot = {"latency": config.latency, **robot_options(config.robot)}
+    subjects = [Subject.of(method, config.profile, robot) for method in config.method]
+    jobs = [
+        Level(subject, config.kind, phase, direction, config.first, config.n, config.seed)
+        for phase in config.phase
+        for direction in config.direction
+        for subject in subjects
+    ]
+
+    def then(job: Job, result: Result) -> Iterable[Job]:
+        assert isinstance(job, Level)
+        return following(job, result["passed"], config.first, config.step, config.last)
+
+    done = run_campaign(config.out, jobs, config.j, then)
+    found = cells(done)
+    text = table(found, config)
+    results = {"config": _jsonable(config), "commit": commit(), "cells": found}
+    write_files(config.out, {"table.md": text, "results.json": json.dumps(results, indent=1) + "\n"})
+    print(text)
+    if config.json:
+        print(json.dumps(results))
+    return found
+
+
+def following(job: Level, passed: bool, first: float, step: float, last: float) -> list[Level]:
+    """Return the level to try after `job`: up from the first as long as they pass, down if the first fails."""
+    if job.level < first:
+        level = None if passed else job.level - step
+    elif passed:
+        level = job.level + step
+    else:
+        level = first - step if job.level == first else None
+    if level is None or level < 1e-9 or level > last + 1e-9:
+        return []
+    return [Level(job.subject, job.kind, job.phase, job.direction, level, job.n, job.seed)]
+
+
+def cells(done: Sequence[Done]) -> list[dict[str, Any]]:
+    """Return one entry per cell: the largest level survived, the least that was not, and how that one was lost."""
+    found: dict[tuple[str, str, str], dict[str, Any]] = {}
+    for item in done:
+        job = item.job
+        assert isinstance(job, Level)
+        key = job.subject.method, job.phase, job.direction
+        cell = found.setdefault(
+            key,
+            {
+                "method": job.subject.method,
+                "phase": job.phase,
+                "direction": job.direction,
+                "survived": 0.0,
+                "failed": None,
+                "losses": {},
+                "n": job.n,
+                "trials": 0,
+            },
+        )
+        cell["trials"] += item.result["trials"]
+        if item.result["passed"]:
+            cell["survived"] = max(cell["survived"], job.level)
+        elif cell["failed"] is None or job.level < cell["failed"]:
+            cell["failed"], cell["losses"] = job.level, item.result["losses"]
+    return list(found.values())
+
+
+def table(found: Sequence[dict[str, Any]], config: PushBenchConfig) -> str:
+    """Return the results as a Markdown table with a row per method and phase."""
+    unit = "N s" if config.kind == "shove" else "N"
+    what = "shove of 0.2 s on the torso" if config.kind == "shove" else "half-sine push of 1 s at the pelvis"
+    words = " ".join(config.robot)
+    head = [
+        f"Largest {what} survived in >= {100 * SURVIVED:.0f} % of {config.n} trials [{unit}]; profile "
+        f"{config.profile}, latency {1e3 * config.latency:g} ms, seed {config.seed}{', ' + words if words else ''}.",
+        "",
+        "| lower body | phase | " + " | ".join(d.replace("_", " ") for d in config.direction) + " | least |",
+        "|---|---|" + "---|" * (len(config.direction) + 1),
+    ]
+    by_key = {(c["method"], c["phase"], c["direction"]): c for c in found}
+    rows: list[str] = []
+    for method in config.method:
+        for phase in config.phase:
+            chosen = [by_key[method, phase, direction] for direction in config.direction]
+            shown = [_cell(c) for c in chosen]
+            least = min(c["survived"] for c in chosen)
+            rows.append(f"| {Path(method).name} | {phase} | {' | '.join(shown)} | {least:g} |")
+    notes = [
+        "",
+        f"A level is lost with {allowed(config.n) + 1} of {config.n} trials, and ends there; `>=`: the highest level "
+        "tried was survived.",
+        "",
+    ]
+    return "\n".join([*head, *rows, *notes])
+
+
+def _cell(cell: dict[str, Any]) -> str:
+    if "no step" in cell["losses"] and not cell["survived"]:
+        return "does not walk"
+    return f"{'' if cell['failed'] is not None else '>= '}{cell['survived']:g}"
+
+
+def _check(config: PushBenchConfig) -> None:
+    load_profile(config.profile)
+    for name in config.direction:
+        if name not in DIRECTIONS:
+            raise unknown_name("direction", name, DIRECTIONS)
+    for phase in config.phase:
+        if phase not in get_args(Phase):
+            raise unknown_name("phase", phase, get_args(Phase))
+    for option, value in (("-n", config.n), ("--first", config.first), ("--step", config.step)):
+        if value <= 0:
+            raise ConfigError(f"{option} is {value:g}; it must be more than 0.")
+    if not config.method or len(set(config.method)) < len(config.method):
+        raise ConfigError("--method names one lower body or several different ones.")
+
+
+def _jsonable(config: PushBenchConfig) -> dict[str, Any]:
+    return {name: str(v) if isinstance(v, Path) else v for name, v in asdict(config).items()}

@@ -1,0 +1,47 @@
+"""What the leg benches test: one lower body on one plant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from golem.evaluation.base import TrialSpec
+from golem.evaluation.episode import Episode, episode_seed, legs_stack
+from golem.evaluation.exercise import Exercise
+from golem.evaluation.provenance import digest, user_files
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """One lower body on one plant; JSON-like.
+
+    Attributes:
+        method: lower body, see `episode.lower_body`.
+        profile: realism profile.
+        robot: options of the twin that differ from the standing stack's, e.g. `{"latency": 0.02}`.
+        files: hash of the files the method names.
+    """
+
+    method: str
+    profile: str
+    robot: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    files: str = ""
+
+    @classmethod
+    def of(cls, method: str, profile: str, robot: Mapping[str, Any]) -> Subject:
+        """Return the subject `method`, with the hash of its files.
+
+        Raises:
+            ConfigError: the standing stack cannot be read.
+        """
+        return cls(method, profile, dict(robot), digest(user_files(legs_stack(method, profile, robot=robot))))
+
+    def draw(self, test: str, seed: int, index: int) -> TrialSpec:
+        """Return the trial whose noise streams trial `index` of `test` draws from, whatever the method."""
+        return TrialSpec(test, self.method, self.profile, seed, index)
+
+    def episode(self, seed: int, index: int, exercise: Exercise, **robot: object) -> Episode:
+        """Begin trial `index`, with further options of the twin."""
+        stack = legs_stack(self.method, self.profile, robot={**self.robot, **robot})
+        return Episode(stack, episode_seed(seed, index), exercise)
