@@ -160,5 +160,7 @@ def test_the_twin_runs_legs_on_board_where_something_speaks_to_them() -> None:
     assert parse_stack("onboard: hold", "x").legs_on_board is None
     assert parse_stack("lower_body: vendor", "x").legs_on_board == Choice("almi")
     assert parse_stack("fallback: vendor", "x").legs_on_board == Choice("almi")
+    both = "lower_body: {use: handover, walk: {use: vendor}, stand: {use: almi}}"
+    assert parse_stack(both, "x").legs_on_board == Choice("almi")
     chosen = parse_stack("lower_body: vendor\nonboard: {use: policy, file: x.yaml}", "x")
     assert chosen.legs_on_board == Choice("policy", {"file": "x.yaml"})

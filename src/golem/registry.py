@@ -31,6 +31,7 @@ _IMPLEMENTATIONS: dict[str, dict[str, str]] = {
     "hand": {"magpie": "golem.hardware.hands.magpie:MagpieHand"},
     "lower_body": {
         "almi": "golem.capabilities.legs.almi:Almi",
+        "handover": "golem.capabilities.legs.handover:Handover",
         "hold": "golem.capabilities.legs.hold:Hold",
         "policy": "golem.capabilities.legs.policy:Policy",
         "mpc": "golem.capabilities.legs.mpc.controller:MPC",

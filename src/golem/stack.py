@@ -27,6 +27,12 @@ class Choice:
     use: str
     options: dict[str, Any] = field(default_factory=dict)
 
+    @property
+    def uses(self) -> tuple[str, ...]:
+        """Every implementation that is chosen: this one, and those its options name by `{use: NAME, ...}`."""
+        inner = (v["use"] for v in self.options.values() if isinstance(v, Mapping) and "use" in v)
+        return (self.use, *inner)
+
 
 @dataclass(frozen=True)
 class Stack:
@@ -66,7 +72,7 @@ class Stack:
     @property
     def legs_on_board(self) -> Choice | None:
         """The lower body of the twin's on-board controller; None where nothing speaks to that."""
-        spoken_to = "vendor" in (self.lower_body.use, self.legs_in_reserve.use)
+        spoken_to = "vendor" in (*self.lower_body.uses, *self.legs_in_reserve.uses)
         return self.onboard or Choice("almi") if spoken_to else None
 
     @property

@@ -11,14 +11,22 @@ from golem.types import LEGS, NUM_JOINTS, BaseEstimate, Imu, LowState
 
 
 class Recorder:
-    """A controller that asks for zero and remembers every motion and time step."""
+    """A controller that always says the same and remembers every state, motion and time step."""
 
     def __init__(
-        self, rate: float = 50.0, envelope: Envelope | None = None, gait: GaitConfig | None = None
+        self,
+        rate: float = 50.0,
+        envelope: Envelope | None = None,
+        gait: GaitConfig | None = None,
+        target: float = 0.0,
+        stiffness: float = 100.0,
+        silent: int = 0,
     ) -> None:
+        """Ask for joints at `target` with `stiffness`, after `silent` ticks of damping only."""
         self.rate, self.latency = rate, 0.0
         self.envelope = envelope or Envelope((-0.4, 0.8), (-0.3, 0.3), (-0.6, 0.6))
         self.gait = gait or GaitConfig()
+        self.target, self.stiffness, self.silent = target, stiffness, silent
         self.motions: list[Motion] = []
         self.steps: list[float] = []
         self.resets = 0
@@ -29,8 +37,8 @@ class Recorder:
     def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
         self.motions.append(motion)
         self.steps.append(dt)
-        zero = np.zeros(12)
-        return LegCommand(zero, zero, zero)
+        stiffness = self.stiffness if len(self.steps) > self.silent else 0.0
+        return LegCommand(np.full(12, self.target), np.full(12, stiffness), np.full(12, 2.0), np.zeros(12))
 
 
 def crouching() -> LowState:

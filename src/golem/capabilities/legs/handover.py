@@ -1,0 +1,186 @@
+"""Walks with one controller and stands with another, as the paper does: the vendor's walks, ALMI stands.
+
+The legs change hands while the robot stays in place and is healthy, and the targets are blended over a short time,
+because each controller has its own posture and gains. A controller that has to start first, such as the vendor's, gets
+them once it says something.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from golem import registry
+from golem.capabilities.legs.base import Envelope, LegCommand, Motion
+from golem.capabilities.legs.gait import GaitConfig
+from golem.capabilities.legs.pacing import Paced
+from golem.capabilities.legs.vendor import Onboard
+from golem.types import LEGS, Array, BaseEstimate, LowState, Twist
+
+ZERO = Twist()
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One of the two controllers.
+
+    Attributes:
+        use: its name, as in the slot `lower_body`.
+        options: its options.
+    """
+
+    use: str
+    options: dict[str, Any] = field(default_factory=dict[str, Any])
+
+
+@dataclass(frozen=True, slots=True)
+class HandoverConfig:
+    """Options of `Handover`. The gate's figures are those of correlllab/HAMS, whose robot changes policies with them.
+
+    Attributes:
+        walk, stand: the controller that follows twists, and the one in charge while there is none.
+        gyro: angular rate of the torso below which the robot is healthy [rad/s].
+        joint_speed: the same for each leg joint [rad/s].
+        lean: the same for the horizontal part of the unit vector of gravity, in the torso's frame.
+        speed: the same for the horizontal velocity of the base [m/s] [own].
+        calm: healthy time before the legs change hands [s]: five ticks of 50 Hz.
+        blend: time over which targets and gains go from one controller's to the other's [s] [own: half a step].
+    """
+
+    walk: Part
+    stand: Part
+    gyro: float = 1.0
+    joint_speed: float = 6.0
+    lean: float = 0.25
+    speed: float = 0.2
+    calm: float = 0.1
+    blend: float = 0.3
+
+
+class Handover:
+    """Two controllers that take turns; see `LowerBody`.
+
+    Attributes:
+        rate, latency: the higher of the two controllers' rates; each runs at its own. The longer latency.
+        envelope: that of the walking controller.
+        gait: the clock that the controller in charge wants.
+    """
+
+    def __init__(self, config: HandoverConfig, onboard: Onboard | None = None) -> None:
+        """Make both controllers; the standing one begins.
+
+        Args:
+            config: which ones.
+            onboard: the robot's own computer, for a controller that speaks to it.
+
+        Raises:
+            ConfigError, ModuleFault: one of them cannot be made; see `registry.create`.
+        """
+        self.config = config
+        parts = (config.walk, config.stand)
+        both = [registry.create("lower_body", p.use, p.options, onboard=onboard) for p in parts]
+        self._walk, self._stand = (Paced(controller) for controller in both)
+        self.rate: float = max(controller.rate for controller in both)
+        self.latency: float = max(controller.latency for controller in both)
+        self.envelope: Envelope = both[0].envelope
+        self._begin()
+
+    @property
+    def walking(self) -> bool:
+        """Whether the walking controller is in charge."""
+        return self._active is self._walk
+
+    def reset(self, state: LowState) -> None:
+        """Stand, from the measured `state` on."""
+        self._begin()
+        self._active.reset(state)
+
+    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+        """Run the controller in charge, after a change of hands where one is due; see `LowerBody.step`."""
+        self._healthy = self._healthy + dt if self._is_healthy(state, base) else 0.0
+        if not self._other_wanted(motion):
+            self._coming = None
+        elif self._coming is None and self._healthy > self.config.calm - 0.5 * dt:
+            self._coming = self._stand if self.walking else self._walk
+            self._coming.reset(state)
+        command = None if self._coming is None else self._coming.step(state, base, motion, dt)
+        if self._coming is not None and command is not None and _speaks(command):
+            self._take_over(self._coming)
+            self._old, self._blended = self._last, 0.0
+        else:
+            if not self.walking:
+                motion = Motion(ZERO, motion.phase, motion.stepping)
+            command = self._active.step(state, base, motion, dt)
+        self._last = self._mix(command, dt)
+        return self._last
+
+    def _take_over(self, controller: Paced) -> None:
+        self._active = controller
+        self.gait: GaitConfig = controller.controller.gait
+        self._coming: Paced | None = None
+
+    def _begin(self) -> None:
+        self._take_over(self._stand)
+        self._healthy = 0.0
+        self._old: LegCommand | None = None
+        self._last: LegCommand | None = None
+        self._blended = 0.0
+
+    def _mix(self, command: LegCommand, dt: float) -> LegCommand:
+        """Return `command`, blended with the last one of the controller that was in charge before."""
+        if self._old is None:
+            return command
+        self._blended += dt
+        share = self._blended / self.config.blend
+        if share >= 1.0:
+            self._old = None
+            return command
+        return _blend(self._old, command, share)
+
+    def _is_healthy(self, state: LowState, base: BaseEstimate) -> bool:
+        """Return whether the measured robot is calm, upright, in place, and not on one leg."""
+        config = self.config
+        w, x, y, z = state.imu.quat.tolist()
+        # Gravity in the torso's frame is minus the last row of its rotation.
+        lean = math.hypot(2.0 * (x * z - w * y), 2.0 * (y * z + w * x))
+        loaded = base.contact > 0.5
+        return (
+            float(np.abs(state.imu.gyro).max()) < config.gyro
+            and float(np.abs(state.dq[LEGS]).max()) < config.joint_speed
+            and lean < config.lean
+            and math.hypot(base.velocity[0], base.velocity[1]) < config.speed
+            and bool(loaded[0] == loaded[1])
+        )
+
+    def _other_wanted(self, motion: Motion) -> bool:
+        """Return whether `motion` is for the controller that is not in charge.
+
+        A twist is for the walking one. Without a twist it goes on until the clock has stopped; if its clock never does,
+        until both feet are down.
+        """
+        if not self.walking:
+            return motion.twist != ZERO
+        if motion.twist != ZERO:
+            return False
+        if not motion.stepping:
+            return True
+        return self.gait.start == "always" and bool((motion.phase < self.gait.stance).all())
+
+
+def _speaks(command: LegCommand) -> bool:
+    """Return whether a controller moves the legs: one that has yet to start only damps them."""
+    return bool(command.kp.any()) or (command.tau is not None and bool(command.tau.any()))
+
+
+def _blend(old: LegCommand, new: LegCommand, share: float) -> LegCommand:
+    """Return the command that is `share` of the way from `old` to `new`."""
+
+    def mix(a: Array, b: Array) -> Array:
+        return a + share * (b - a)
+
+    # Without a torque of their own the servo carries the legs; there is nothing in between.
+    tau = new.tau if old.tau is None or new.tau is None else mix(old.tau, new.tau)
+    return LegCommand(mix(old.q, new.q), mix(old.kp, new.kp), mix(old.kd, new.kd), tau)

@@ -1,0 +1,197 @@
+"""Walk with one controller, stand with another: who is in charge when, and how the legs change hands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.capabilities.legs.recorder import Recorder, crouching, still
+
+from golem.capabilities.legs.base import Envelope
+from golem.capabilities.legs.gait import GaitConfig
+from golem.capabilities.legs.handover import Handover, HandoverConfig, Part
+from golem.capabilities.legs.locomotion import Locomotion
+from golem.errors import ConfigError
+from golem.types import BaseEstimate, LowState, Twist
+
+DT = 0.02
+RECORDER = "tests.capabilities.legs.recorder:Recorder"
+
+
+class Robot:
+    """A base layer over both controllers, on a robot whose state is given."""
+
+    def __init__(self, walk: dict[str, object] | None = None, stand: dict[str, object] | None = None) -> None:
+        walker = Part(RECORDER, {"target": 1.0} | (walk or {}))
+        stander = Part(RECORDER, {"target": 0.0} | (stand or {}))
+        self.legs = Handover(HandoverConfig(walker, stander))
+        self.layer = Locomotion(self.legs)
+        self.state, self.base = crouching(), still()
+        self.layer.reset(self.state)
+        self.targets: list[float] = []
+
+    @property
+    def walk(self) -> Recorder:
+        return self.legs._walk.controller  # pyright: ignore
+
+    @property
+    def stand(self) -> Recorder:
+        return self.legs._stand.controller  # pyright: ignore
+
+    def run(self, seconds: float, twist: Twist | None = None, dt: float = DT) -> None:
+        """Let `seconds` pass under one twist."""
+        for _ in range(round(seconds / dt)):
+            command = self.layer.step(self.state, self.base, twist, dt)
+            self.targets.append(float(command.q[0]))
+
+
+def test_it_stands_with_one_walks_with_the_other_and_stands_again() -> None:
+    robot = Robot()
+    robot.run(1.0)
+    assert (len(robot.stand.motions), len(robot.walk.motions)) == (50, 0)
+    robot.run(2.0, Twist(0.5))
+    assert robot.legs.walking
+    assert robot.walk.resets == 1
+    assert robot.walk.motions[-1].twist == Twist(0.5)
+    robot.run(2.0, Twist())
+    assert not robot.legs.walking
+    assert robot.stand.resets == 2
+    assert robot.walk.motions[-1].stepping
+    assert not robot.stand.motions[50].stepping
+    # Nobody was asked for what is not his: no twist for the standing one, not one tick for both.
+    assert {m.twist for m in robot.stand.motions} == {Twist()}
+    assert len(robot.stand.motions) + len(robot.walk.motions) == 250
+
+
+def test_targets_go_over_smoothly() -> None:
+    robot = Robot()
+    robot.run(0.5)
+    robot.run(0.5, Twist(0.5))
+    steps = np.diff(robot.targets)
+    assert robot.targets[0] == 0.0
+    assert robot.targets[-1] == 1.0
+    assert steps.max() == pytest.approx(DT / 0.3)
+    assert (steps >= -1e-12).all()
+
+
+def rotating(state: LowState) -> LowState:
+    return replace(state, imu=replace(state.imu, gyro=np.array([0.0, 1.1, 0.0])))
+
+
+def kicking(state: LowState) -> LowState:
+    dq = state.dq.copy()
+    dq[3] = -6.5
+    return replace(state, dq=dq)
+
+
+def leaning(state: LowState) -> LowState:
+    angle = np.arcsin(0.27)
+    return replace(
+        state, imu=replace(state.imu, quat=np.array([np.cos(angle / 2), 0.0, np.sin(angle / 2), 0.0]))
+    )
+
+
+@pytest.mark.parametrize("upset", [rotating, kicking, leaning])
+def test_an_unhealthy_robot_keeps_its_controller(upset: Callable[[LowState], LowState]) -> None:
+    robot = Robot()
+    robot.run(0.5)
+    calm, robot.state = robot.state, upset(robot.state)
+    robot.run(0.5, Twist(0.5))
+    assert not robot.legs.walking
+    robot.state = calm
+    robot.run(4 * DT, Twist(0.5))
+    assert not robot.legs.walking
+    robot.run(DT, Twist(0.5))
+    assert robot.legs.walking
+
+
+@pytest.mark.parametrize(
+    "moved",
+    [
+        BaseEstimate(0.0, np.eye(4), velocity=np.array([0.15, -0.15, 0.0]), contact=np.ones(2)),
+        BaseEstimate(0.0, np.eye(4), contact=np.array([1.0, 0.1])),
+    ],
+    ids=["drifting", "on one leg"],
+)
+def test_it_does_not_change_hands_in_motion_or_on_one_leg(moved: BaseEstimate) -> None:
+    robot = Robot(walk={"gait": GaitConfig(start="never")})
+    robot.run(0.5)
+    robot.run(0.5, Twist(0.5))
+    robot.base = moved
+    robot.run(2.0, Twist())
+    assert robot.legs.walking
+    robot.base = still()
+    robot.run(0.2, Twist())
+    assert not robot.legs.walking
+
+
+def test_a_clock_that_never_stops_is_left_when_both_feet_are_down() -> None:
+    robot = Robot(walk={"gait": GaitConfig(start="always")}, stand={"gait": GaitConfig(start="command")})
+    robot.run(0.5)
+    robot.run(1.0, Twist(0.5))
+    robot.run(2.0, Twist())
+    assert not robot.legs.walking
+    last = robot.walk.motions[-1]
+    after = robot.stand.motions[26]
+    assert last.stepping
+    assert (after.phase < robot.walk.gait.stance).all()
+    assert not robot.stand.motions[-1].stepping
+
+
+def test_envelope_and_clock_are_those_of_the_controller_they_are_for() -> None:
+    narrow = Envelope((-0.1, 0.3), (0.0, 0.0), (0.0, 0.0))
+    slow = GaitConfig(period=1.3)
+    robot = Robot(walk={"envelope": narrow, "gait": slow}, stand={"gait": GaitConfig(start="never")})
+    assert robot.legs.envelope == narrow
+    assert robot.legs.gait.start == "never"
+    robot.run(1.0, Twist(0.5))
+    assert robot.legs.gait == slow
+    assert robot.walk.motions[-1].twist == Twist(0.3)
+    assert robot.walk.motions[-1].stepping
+
+
+def test_each_runs_at_its_own_rate() -> None:
+    robot = Robot(walk={"rate": 50.0}, stand={"rate": 500.0})
+    assert robot.legs.rate == 500.0
+    robot.run(0.5, dt=0.002)
+    robot.run(0.5, Twist(0.5), dt=0.002)
+    np.testing.assert_allclose(robot.stand.steps, 0.002)
+    assert len(robot.stand.steps) == pytest.approx(250, abs=2)
+    np.testing.assert_allclose(robot.walk.steps[1:], 0.02)
+
+
+def test_a_controller_that_has_yet_to_start_gets_the_legs_when_it_speaks() -> None:
+    robot = Robot(walk={"silent": 30})
+    robot.run(0.5)
+    robot.run(30 * DT, Twist(0.5))
+    assert not robot.legs.walking
+    assert len(robot.stand.motions) == 25 + 30
+    robot.run(DT, Twist(0.5))
+    assert robot.legs.walking
+    robot.run(0.4, Twist(0.5))
+    assert robot.targets[-1] == 1.0
+
+
+def test_a_controller_that_starts_too_slowly_is_left_alone_again() -> None:
+    robot = Robot(walk={"silent": 60})
+    robot.run(0.5, Twist(0.5))
+    robot.run(1.0, Twist())
+    assert not robot.legs.walking
+    assert len(robot.walk.motions) < 60
+    assert set(robot.targets) == {0.0}
+
+
+def test_a_reset_gives_the_legs_to_the_standing_one() -> None:
+    robot = Robot()
+    robot.run(1.0, Twist(0.5))
+    robot.layer.reset(robot.state)
+    robot.run(DT)
+    assert not robot.legs.walking
+    assert robot.targets[-1] == 0.0
+
+
+def test_an_unknown_controller_is_named() -> None:
+    with pytest.raises(ConfigError, match="Unknown lower_body implementation 'walkk'"):
+        Handover(HandoverConfig(Part("walkk"), Part("hold")))
