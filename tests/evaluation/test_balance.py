@@ -145,3 +145,11 @@ def test_samples_are_a_hundredth_of_a_second_apart(robot: MujocoRobot) -> None:
     seen = recorder.trace()
     assert np.diff(seen.t) == pytest.approx(np.full(10, PERIOD))
     assert seen.force[-1].tolist() == [0.0, 20.0, 0.0]
+
+
+def test_a_recorder_with_a_memory_forgets_the_rest(robot: MujocoRobot) -> None:
+    recorder = BalanceRecorder(robot, memory=0.2)
+    for i in range(50):
+        recorder(PERIOD * i)
+    assert recorder.trace().t == pytest.approx(PERIOD * np.arange(30, 50))
+    assert recorder.trace(last=0.05).t == pytest.approx(PERIOD * np.arange(45, 50))

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from golem.errors import ConfigError
 from golem.evaluation.balance import BalanceRecorder
-from golem.evaluation.exercise import Exercise
+from golem.evaluation.odometry import SimulatedOdometry
 from golem.evaluation.pushes import Push, Pusher
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.assembly import build
-from golem.skills.runner import FAULT
+from golem.skills.base import Skill, SkillResult
+from golem.skills.context import Context
+from golem.skills.runner import FAULT, SkillRun
 from golem.stack import Choice, Stack, load_stack
 from golem.types import Array
 
@@ -80,15 +83,15 @@ class Loss:
 
 
 class Episode:
-    """A robot that exercises while it is pushed and recorded.
+    """A robot that pursues a skill while it is pushed and recorded.
 
     Attributes:
         running, robot: the stack and its twin.
         recorder: samples the twin's balance after every tick.
     """
 
-    def __init__(self, stack: Stack, seed: int, exercise: Exercise) -> None:
-        """Build `stack` for the twin's seed and begin the exercise.
+    def __init__(self, stack: Stack, seed: int) -> None:
+        """Build `stack` for the twin's seed.
 
         Raises:
             ConfigError: the stack's robot is not the twin, or a name or an option is wrong.
@@ -102,7 +105,21 @@ class Episode:
         self.robot = robot
         self.recorder = BalanceRecorder(robot)
         self._pusher = Pusher(robot)
-        self.running.start(exercise, None)
+        self._odometry: SimulatedOdometry | None = None
+        self._skill: SkillRun | None = None
+
+    def start(self, skill: Skill[Context, Any], goal: object = None) -> None:
+        """Begin a skill; it advances while the episode runs."""
+        self._skill = self.running.start(skill, goal)
+
+    def locate(self, odometry: SimulatedOdometry) -> None:
+        """Let `odometry` publish where the robot is, from now on."""
+        self._odometry = odometry
+
+    @property
+    def result(self) -> SkillResult | None:
+        """How the skill ended; None while it runs."""
+        return None if self._skill is None else self._skill.result
 
     @property
     def t(self) -> float:
@@ -156,5 +173,7 @@ class Episode:
 
     def _look(self) -> bool:
         self.recorder(self.t, self.force)
+        if self._odometry is not None:
+            self._odometry(self.t)
         self._pusher.drive(self.t)
         return self.over

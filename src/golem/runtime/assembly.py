@@ -11,7 +11,7 @@ import numpy as np
 from golem import registry
 from golem.capabilities.arms.base import UpperBody
 from golem.capabilities.arms.postures import POSTURES
-from golem.capabilities.legs.base import LowerBody
+from golem.capabilities.legs.base import Envelope, LowerBody
 from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.localization.base import Localizer
 from golem.capabilities.navigation.base import Navigator
@@ -141,6 +141,11 @@ class Running:
     def safety(self) -> GateResult | None:
         """The newest verdict of the safety gate."""
         return self.bus.latest(topics.SAFETY, GateResult)
+
+    @property
+    def envelope(self) -> Envelope:
+        """The twists that the leg controller in charge can follow."""
+        return self._legs.envelope
 
     def request(self, request: Request) -> None:
         """Ask something of the safety gate as an operator does: activate, stop, reset; it decides."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from golem.capabilities.legs.base import LegCommand, LowerBody
+from golem.capabilities.legs.base import Envelope, LegCommand, LowerBody
 from golem.capabilities.legs.locomotion import Locomotion
 from golem.errors import ModuleFault
 from golem.middleware import topics
@@ -84,6 +84,11 @@ class LowerBodyNode:
         self._overruns = 0
         self.realtime = False
         self.period = 1.0 / max(legs.rate, fallback.rate)
+
+    @property
+    def envelope(self) -> Envelope:
+        """The twists that the controller in charge can follow."""
+        return self._legs.controller.envelope
 
     def recovering(self, t: float) -> bool:
         """Return whether at time `t` [s] the fallback has just taken over."""
