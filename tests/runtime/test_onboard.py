@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
-from golem.capabilities.legs.base import LegCommand
-from golem.capabilities.legs.hold import STANCES
-from golem.errors import ModuleFault
+from golem.capabilities.legs.description import SHIPPED
+from golem.capabilities.legs.hold import STANCES, Hold
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
 from golem.middleware.bus import Bus
@@ -21,8 +22,10 @@ from golem.runtime.assembly import Running, build
 from golem.runtime.guard import Guard
 from golem.runtime.legs import Legs
 from golem.runtime.onboard import ANSWER, BusOnboard, LocoServiceNode
-from golem.stack import Choice, Stack
-from golem.types import LEGS, LowState
+from golem.skills.base import SkillResult
+from golem.skills.context import Context
+from golem.stack import Choice, Stack, load_stack
+from golem.types import LEGS, LowState, Twist
 
 API = LOCO_APIS["h1"]
 FAILING = """
@@ -43,6 +46,18 @@ def hanging(**choices: Choice) -> Iterator[Running]:
         yield running
     finally:
         robot.close()
+
+
+class Drive:
+    """Walks ahead."""
+
+    name = "drive"
+
+    async def run(self, context: Context, goal: object) -> SkillResult:
+        """Send the twist as long as the skill runs."""
+        while True:
+            context.publish(topics.TWIST, Twist(0.3))
+            await context.tick()
 
 
 def legs(running: Running) -> LegStatus:
@@ -83,23 +98,9 @@ def test_a_robot_with_another_service_is_a_fault_that_says_which() -> None:
         assert legs(running).controller == "hold"
 
 
-class Silent:
-    """Legs whose controller must not be called."""
-
-    rate, latency = 50.0, 0.0
-
-    def __getattr__(self, name: str) -> Any:
-        from golem.capabilities.legs.hold import Hold
-
-        return getattr(Hold(), name)
-
-    def step(self, *_: object) -> LegCommand:
-        raise ModuleFault("lower_body", "silent", "called before the start")
-
-
 def test_calls_are_answered_later_on_the_bus() -> None:
     bus = Bus()
-    node = LocoServiceNode(bus, API, Legs(Silent(), Guard("lower_body", "silent")))  # type: ignore[arg-type]
+    node = LocoServiceNode(bus, API, Legs(Hold(), Guard("lower_body", "hold")))
     client = BusOnboard(bus)
     assert client.receive(API.service) is None and client.legs() is None
     client.send(API.service, Request(1, API.set_fsm_id, encode({"data": API.damp})))
@@ -109,3 +110,24 @@ def test_calls_are_answered_later_on_the_bus() -> None:
     assert client.receive(API.service) == Response(1, API.set_fsm_id)
     assert client.receive(API.service) is None
     assert set(bus.topics()) == {request_topic(API.service), response_topic(API.service)}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (SHIPPED / "almi.onnx").is_file(), reason="the weights are not trained yet")
+def test_a_robot_on_the_ground_is_brought_up_and_walks_by_remote_calls() -> None:
+    stack = replace(load_stack("stand", profile="bench"), lower_body=Choice("vendor"))
+    options = {**stack.robot.options, "world": "open"}
+    running, robot = build(replace(stack, robot=replace(stack.robot, options=options)), seed=0)
+    try:
+        running.executor.run(5.0)
+        assert not robot.banded
+        stood = robot.data.qpos[:3].copy()
+        running.start(Drive(), None)
+        running.executor.run(9.0)
+        safety = running.safety
+        assert safety is not None and safety.state is GateState.ACTIVE, safety
+        assert legs(running).fault is None
+        assert robot.data.qpos[2] > 0.9
+        assert robot.data.qpos[0] - stood[0] > 0.6  # 0.3 m/s for 4 s, slewed at both ends
+    finally:
+        robot.close()

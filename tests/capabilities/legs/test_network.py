@@ -64,24 +64,26 @@ def test_files_that_are_no_networks_are_refused(tmp_path: Path) -> None:
         load_network(tmp_path / "junk.onnx", 5)
 
 
-def test_a_torchscript_module_runs_and_forgets(tmp_path: Path) -> None:
+@pytest.mark.parametrize("own_reset", [True, False])
+def test_a_torchscript_module_runs_and_forgets(tmp_path: Path, own_reset: bool) -> None:
     torch = pytest.importorskip("torch")
 
-    class Counting(torch.nn.Module):
+    class Summing(torch.nn.Module):
         def __init__(self) -> None:
             super().__init__()
             self.register_buffer("seen", torch.zeros(1, 12))
 
         def forward(self, x):  # noqa: ANN001, ANN202  (TorchScript reads the annotations)
-            self.seen += x.sum()
-            return self.seen.clone()
+            self.seen = self.seen + x.sum()
+            return self.seen
 
+    class Clearing(Summing):
         @torch.jit.export
         def reset_memory(self):  # noqa: ANN202
             self.seen.zero_()  # pyright: ignore[reportAttributeAccessIssue]
 
     path = tmp_path / "net.pt"
-    torch.jit.script(Counting()).save(str(path))
+    torch.jit.script(Clearing() if own_reset else Summing()).save(str(path))
     network = load_network(path, 4)
     x = np.ones(4, dtype=np.float32)
     assert [network(x)[0], network(x)[0]] == [4.0, 8.0]

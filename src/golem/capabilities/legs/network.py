@@ -84,7 +84,8 @@ class OnnxNetwork:
 class TorchScriptNetwork:
     """A TorchScript module that takes (1, n) and returns (1, 12).
 
-    A module with a memory of its own resets it in a method `reset_memory`. Loading one sets torch to one thread for
+    A module with a memory of its own clears it in a method `reset_memory`; without one its buffers are put back to what
+    they were in the file. Loading one sets torch to one thread for
     the whole process, and to run modules as they are written: the optimiser would change the last bits of the outputs
     after the first calls.
     """
@@ -101,7 +102,8 @@ class TorchScriptNetwork:
             self._module: Any = torch.jit.load(str(path), map_location="cpu").eval()
         except RuntimeError as error:
             raise ConfigError(f"{path} is not a TorchScript module that torch can load.") from error
-        self._forget: Callable[[], None] = getattr(self._module, "reset_memory", lambda: None)
+        self._forget: Callable[[], None] = getattr(self._module, "reset_memory", self._restore)
+        self._buffers = {name: buffer.clone() for name, buffer in self._module.named_buffers()}
         try:
             out = self(np.zeros(size, dtype=np.float32))
         except RuntimeError as error:
@@ -116,8 +118,13 @@ class TorchScriptNetwork:
     def __call__(self, observation: Float32) -> Float32:
         """Return the action; see `Network`."""
         torch = self._torch
-        with torch.inference_mode(), torch.jit.optimized_execution(False):
+        with torch.no_grad(), torch.jit.optimized_execution(False):
             return self._module(torch.from_numpy(observation)[None]).numpy()[0]
+
+    def _restore(self) -> None:
+        """Put the buffers back to what they were in the file."""
+        for name, buffer in self._module.named_buffers():
+            buffer.copy_(self._buffers[name])
 
 
 LOADERS: dict[str, Callable[[Path, int], Network]] = {".onnx": OnnxNetwork, ".pt": TorchScriptNetwork}
