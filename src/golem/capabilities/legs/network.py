@@ -85,9 +85,7 @@ class TorchScriptNetwork:
     """A TorchScript module that takes (1, n) and returns (1, 12).
 
     A module with a memory of its own clears it in a method `reset_memory`; without one its buffers are put back to what
-    they were in the file. Loading one sets torch to one thread for
-    the whole process, and to run modules as they are written: the optimiser would change the last bits of the outputs
-    after the first calls.
+    they were in the file. Loading one sets torch to one thread for the whole process.
     """
 
     def __init__(self, path: Path, size: int) -> None:
@@ -118,7 +116,7 @@ class TorchScriptNetwork:
     def __call__(self, observation: Float32) -> Float32:
         """Return the action; see `Network`."""
         torch = self._torch
-        with torch.no_grad(), torch.jit.optimized_execution(False):
+        with torch.no_grad():
             return self._module(torch.from_numpy(observation)[None]).numpy()[0]
 
     def _restore(self) -> None:
