@@ -99,7 +99,7 @@ class SpectatorView:
         self._fancy = fancy
         self._rig: CameraRig | None = None
         self._moving = np.array([body for body in geometry.visual_geoms(self._model) if body], dtype=int)
-        self._origin = np.array([0.0, 0.0, robot.config.hoist.height])
+        self._origin = robot.truth.T_world_odom[:3, 3]
 
     @property
     def moving(self) -> list[str]:
@@ -115,8 +115,12 @@ class SpectatorView:
         """Return positions (n, 3) [m] and orientations (n, 4) wxyz of the moving bodies in the world."""
         return self._data.xpos[self._moving].copy(), self._data.xquat[self._moving].copy()
 
+    def position(self, body: str) -> Array:
+        """Return (3,) where a body is in the world [m]."""
+        return self._data.body(body).xpos.copy()
+
     def from_odom(self, point: Array) -> Array:
-        """Return (3,) a point of the odom frame in the world: odom is where the pelvis hung at the start."""
+        """Return (3,) a point of the odom frame in the world: odom is where the pelvis was at the start."""
         return np.asarray(point, dtype=float) + self._origin
 
     def picture(self, name: str) -> NDArray[np.uint8]:

@@ -87,6 +87,13 @@ def test_a_lifted_foot_feels_nothing() -> None:
     assert not forces[1].any() and forces[0, 2] > 0.0
 
 
+def test_odom_is_where_the_base_started(falling: MujocoRobot) -> None:
+    T = falling.truth.T_world_odom
+    np.testing.assert_array_equal(T[:3, :3], np.eye(3))
+    np.testing.assert_allclose(T[:3, 3], [0.0, 0.0, 0.965], atol=0.002)
+    assert np.linalg.norm(falling.truth.base().T_world_base - T) > 0.05
+
+
 def test_soles_have_the_size_of_a_foot(falling: MujocoRobot) -> None:
     for sole in falling.truth.soles():
         lengths = sorted({round(float(np.linalg.norm(a - b)), 6) for a in sole for b in sole})

@@ -36,13 +36,16 @@ class BaseTruth:
 
 
 class Truth:
-    """Reads a simulation; nothing is stored, every call describes the present state.
+    """Reads a simulation; every call describes the present state.
 
     Contacts, forces and centre of mass are those at the start of the last physics step.
+
+    Attributes:
+        T_world_odom: (4, 4) pose of the odom frame in the world: the base at the start, which is upright.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Read `data` of `model`, whose robot hangs on the free joint `base`."""
+        """Read `data` of `model`, whose robot moves on the free joint `base` and is where an episode starts."""
         self._model, self._data = model, data
         self._base = model.body(BASE_LINK).id
         joint = model.joint("base")
@@ -54,6 +57,7 @@ class Truth:
         for foot, body in enumerate(self._feet):
             part[model.geom_bodyid == body] = foot
         self._part: list[int] = part.tolist()
+        self.T_world_odom: Array = self.base().T_world_base
 
     def base(self) -> BaseTruth:
         """Return where base_link is and how it moves."""
