@@ -79,11 +79,11 @@ class LocoServiceNode:
         if state is None or base is None:
             return
         try:
-            command = self._control(state, base, t)
+            command, latency = self._control(state, base, t), self._legs.check_latency()
         except ModuleFault as fault:
             service.fail(str(fault))
-            command = damp(state)
-        self._bus.publish(ONBOARD_LEGS, command, t)
+            command, latency = damp(state), 0.0
+        self._bus.publish(ONBOARD_LEGS, command, t, latency)
 
     def _control(self, state: LowState, base: BaseEstimate, t: float) -> LegCommand:
         """Return what the legs are told in the present state of the service."""
