@@ -1,15 +1,16 @@
-"""A grasp method that returns nonsense is blamed by its own name, not as a fault of the skill."""
+"""A module that a skill calls and that returns nonsense is blamed by its own name, not as a fault of the skill."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from golem.capabilities.navigation.base import Course, PlanarPose
 from golem.errors import ModuleFault
 from golem.runtime.guard import Guard
-from golem.runtime.guarded import GuardedMethod
+from golem.runtime.guarded import GuardedMethod, GuardedNavigator
 from golem.skills.grasping.base import Grasp, OpenLoop, ServoStatus, ServoStep
-from golem.types import Array, Detection, LocalizedObject
+from golem.types import Array, Detection, LocalizedObject, Twist
 
 TARGET = LocalizedObject(
     Detection("screw", 0.9, np.zeros(4), np.zeros(2)), 0.0, np.zeros(3), np.zeros((0, 3))
@@ -57,3 +58,49 @@ def test_a_step_to_such_a_pose_is_the_methods_fault() -> None:
     assert law is not None
     with pytest.raises(ModuleFault, match="grasp_method: mine.py:Mine failed: .*not a rigid transform"):
         law.step(0.0, None, np.eye(4))
+
+
+HERE = PlanarPose(0.0, 0.0, 0.0)
+
+
+class Lost:
+    """A navigator that always says the same."""
+
+    def __init__(self, course: object) -> None:
+        self._course = course
+
+    def start(self, goal: PlanarPose) -> None:
+        if goal.x < 0.0:
+            raise ValueError("behind me")
+
+    def step(self, pose: PlanarPose, stepping: bool, dt: float) -> Course:
+        return self._course  # pyright: ignore
+
+
+def navigator(course: object) -> GuardedNavigator:
+    return GuardedNavigator(Lost(course), Guard("navigator", "mine.py:Mine"))
+
+
+def test_a_sound_course_passes() -> None:
+    course = Course(Twist(0.3), False, HERE)
+    assert navigator(course).step(HERE, False, 0.01) is course
+
+
+@pytest.mark.parametrize(
+    ("course", "reason"),
+    [
+        (None, "the course is a NoneType"),
+        (Course(Twist(0.1, float("nan")), False, HERE), "vy is nan"),
+        (Course(0.5, False, HERE), "twist is a float"),  # pyright: ignore
+        (Course(Twist(), 1, HERE), "arrived is a int"),  # pyright: ignore
+        (Course(Twist(), False, None), "left is a NoneType"),  # pyright: ignore
+    ],
+)
+def test_a_course_that_is_none_is_the_navigators_fault(course: object, reason: str) -> None:
+    with pytest.raises(ModuleFault, match=f"navigator: mine.py:Mine failed: {reason}"):
+        navigator(course).step(HERE, False, 0.01)
+
+
+def test_what_a_navigator_raises_is_its_fault() -> None:
+    with pytest.raises(ModuleFault, match="navigator: mine.py:Mine failed: ValueError: behind me"):
+        navigator(None).start(PlanarPose(-1.0, 0.0, 0.0))

@@ -41,12 +41,12 @@ class GoToConfig:
     face: float = 1.0
     pulse: float = 0.15
     smoothing: float = 0.3
-    coast: float = 0.3
+    coast: float = 0.2
     close: float = 0.015
     aligned: float = 0.015
-    accept: float = 0.04
+    accept: float = 0.03
     straight: float = 0.03
-    rest: float = 0.5
+    rest: float = 1.0
 
 
 class GoTo:

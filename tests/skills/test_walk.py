@@ -1,0 +1,148 @@
+"""Walking and standing as skills, over a base that follows every twist exactly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Coroutine
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from golem.capabilities.navigation.base import PlanarPose
+from golem.capabilities.navigation.goto import GoTo
+from golem.middleware import topics
+from golem.middleware.bus import Bus
+from golem.middleware.topics import LegStatus, Odometry
+from golem.robots.model.kinematics import Kinematics
+from golem.skills.base import Feedback, SkillResult
+from golem.skills.context import Context
+from golem.skills.runner import SkillRun
+from golem.skills.walk import Stand, StandGoal, Walk, WalkGoal
+from golem.types import Array, BaseEstimate, Twist
+
+PERIOD = 0.01
+
+
+def pose(x: float, y: float, yaw: float) -> Array:
+    T = np.eye(4)
+    T[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
+    T[:2, 3] = x, y
+    return T
+
+
+@dataclass
+class Ground:
+    """A robot that moves as its twist says, and locates itself by its estimator, by odometry, or not at all."""
+
+    start: PlanarPose = field(default_factory=lambda: PlanarPose(0.0, 0.0, 0.0))
+    reports: bool = True
+    stuck: bool = False
+    offset: float | None = None
+
+    def __post_init__(self) -> None:
+        self.bus = Bus()
+        self.context = Context(self.bus, Kinematics(), PERIOD)
+        self.pose = self.start
+        self.stages: list[str] = []
+        self._tick = 0
+        self._advance()
+
+    @property
+    def twist(self) -> Twist:
+        """What the legs were told last."""
+        return self.bus.latest(topics.TWIST, Twist) or Twist()
+
+    def run(self, coroutine: Coroutine[None, None, SkillResult], seconds: float = 60.0) -> SkillRun:
+        """Run a skill to its end, or for so many seconds."""
+        run = SkillRun("scripted", coroutine)
+        for _ in range(round(seconds / PERIOD)):
+            if run.result is not None:
+                break
+            self._advance()
+            run.step()
+            feedback = self.bus.latest(topics.FEEDBACK, Feedback)
+            if feedback is not None and self.stages[-1:] != [feedback.stage]:
+                self.stages.append(feedback.stage)
+        return run
+
+    def _advance(self) -> None:
+        self._tick += 1
+        t, twist = self._tick * PERIOD, self.twist
+        if not self.stuck:
+            self.pose = self.pose @ PlanarPose(twist.vx * PERIOD, twist.vy * PERIOD, twist.wz * PERIOD)
+        T = pose(self.pose.x, self.pose.y, self.pose.yaw)
+        if self.offset is not None:
+            self.bus.publish(topics.ODOMETRY, Odometry(t, T.copy()), t)
+            T[0, 3] += self.offset
+        self.bus.publish(topics.BASE, BaseEstimate(t, T), t)
+        moving = twist != Twist()
+        status = LegStatus(t, twist, twist, False, "", moving, np.array([0.0, 0.5]), "almi")
+        if self.reports:
+            self.bus.publish(topics.LEG_STATUS, status, t)
+        self.context.refresh(t)
+
+
+def outcome(run: SkillRun) -> SkillResult:
+    assert run.result is not None
+    return run.result
+
+
+def test_it_walks_to_a_pose_in_odom_and_stands() -> None:
+    ground = Ground(PlanarPose(0.3, -0.2, 0.5))
+    result = outcome(ground.run(Walk(GoTo()).run(ground.context, WalkGoal(1.5, 1.0, -0.4))))
+    assert (result.success, result.stage) == (True, "done")
+    assert result.timings["walk"] > 3.0
+    left = ground.pose.to(PlanarPose(1.5, 1.0, -0.4))
+    assert math.hypot(left.x, left.y) < 0.035
+    assert abs(left.yaw) < 0.035
+    assert ground.twist == Twist()
+    assert ground.stages == ["walk", "done"]
+
+
+def test_a_goal_in_the_base_frame_is_seen_from_where_the_robot_stands() -> None:
+    ground = Ground(PlanarPose(2.0, 1.0, math.pi / 2))
+    assert outcome(
+        ground.run(Walk(GoTo()).run(ground.context, WalkGoal(1.0, 0.0, 0.0, frame="base")))
+    ).success
+    left = ground.pose.to(PlanarPose(2.0, 2.0, math.pi / 2))
+    assert math.hypot(left.x, left.y) < 0.035
+
+
+def test_an_odometry_counts_more_than_the_base_estimate() -> None:
+    ground = Ground(offset=0.5)
+    assert outcome(ground.run(Walk(GoTo()).run(ground.context, WalkGoal(1.0, 0.0)))).success
+    assert ground.pose.x == pytest.approx(1.0, abs=0.035)
+
+
+def test_a_robot_that_does_not_get_there_gives_up_and_stands() -> None:
+    ground = Ground(stuck=True)
+    result = outcome(ground.run(Walk(GoTo()).run(ground.context, WalkGoal(1.0, 0.0, timeout=2.0))))
+    assert (result.success, result.stage, result.slot) == (False, "walk", "navigator")
+    assert "Not at the goal after 2 s: 1.00 m and 0 deg are left." in result.reason
+    assert ground.twist == Twist()
+
+
+def test_legs_that_do_not_report_are_named() -> None:
+    ground = Ground(reports=False)
+    result = outcome(ground.run(Walk(GoTo()).run(ground.context, WalkGoal(1.0, 0.0))))
+    assert (result.success, result.stage, result.slot) == (False, "walk", "lower_body")
+
+
+def test_a_cancelled_walk_stands() -> None:
+    ground = Ground()
+    run = ground.run(Walk(GoTo()).run(ground.context, WalkGoal(3.0, 0.0)), seconds=2.0)
+    assert ground.twist.vx > 0.1
+    run.cancel()
+    assert outcome(run).stage == "cancelled"
+    assert ground.twist == Twist()
+
+
+def test_it_stands_for_as_long_as_it_is_told() -> None:
+    ground = Ground()
+    run: Any = ground.run(Stand().run(ground.context, StandGoal(1.5)), seconds=1.4)
+    assert run.result is None
+    run = ground.run(Stand().run(ground.context, StandGoal(1.5)), seconds=1.6)
+    assert outcome(run).success
+    assert ground.twist == Twist()
