@@ -55,6 +55,14 @@ def _ladder(words: list[str]) -> int:
     return 0
 
 
+def _compare(words: list[str]) -> int:
+    """Compare two ladder runs on the same seeds, e.g. tether with stand."""
+    from golem.evaluation.compare import CompareConfig, run_compare
+
+    run_compare(_parse(CompareConfig, "compare", words))
+    return 0
+
+
 @dataclass(frozen=True)
 class ExportConfig:
     """Write the robot model to a file."""
@@ -130,6 +138,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "demo": _demo,
     "run": _run,
     "ladder": _ladder,
+    "compare": _compare,
     "model": _model,
     "bench": _bench,
     "train": _train,

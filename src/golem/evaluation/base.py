@@ -21,8 +21,10 @@ DONE = "done"
 """The stage of a trial that lost nothing."""
 
 RUNGS: dict[str, str] = {
-    "tether": "golem.evaluation.rungs.tether:Tether",
+    "tether": "golem.evaluation.rungs.pick:Tether",
+    "stand": "golem.evaluation.rungs.pick:Stand",
     "push": "golem.evaluation.rungs.push:PushRung",
+    "navigate-line": "golem.evaluation.rungs.navigate_line:NavigateLine",
 }
 """Rung name -> `module:Class`; the module is imported when the rung is used."""
 

@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -22,12 +24,14 @@ from golem.hardware.estop.base import EstopFrame
 from golem.hardware.safety.base import GateInputs, GateMemory, Request, SafetyLimits
 from golem.hardware.safety.gate import check
 from golem.hardware.servo.servo import Servo
+from golem.robots.mujoco.config import MujocoConfig, World
+from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime import nodes
 from golem.runtime.assembly import build, start_posture
 from golem.runtime.executor import TICK
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import load_stack
-from golem.types import UPPER, Array, Frame, Imu, LowState
+from golem.types import NUM_JOINTS, UPPER, Array, Frame, Imu, LowCommand, LowState
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ def run_bench(config: BenchConfig) -> list[Figure]:
     """
     if config.seed < 0:
         raise ConfigError(f"--seed is {config.seed}; it must be 0 or more.")
-    figures = [*_control(config), *_perception(config), *_robot(config)]
+    figures = [*_control(config), *_physics(config), *_perception(config), *_robot(config)]
     table = Table("figure", "median", "p99", "unit", "reference", title="GOLEM, CPU time of one thread")
     for f in figures:
         table.add_row(f.name, f"{f.median:.3g}", f"{f.p99:.3g}", f.unit, f.reference)
@@ -141,6 +145,24 @@ def _ik(name: str, ik: UpperBody, n: int, reference: str) -> Figure:
     return _figure(
         name, _timed(lambda i: ik.step(targets[i][0], targets[i][1], q, 0.01), n), 1e6, "us", reference
     )
+
+
+def _physics(config: BenchConfig) -> list[Figure]:
+    """One tick of the twin on its feet, motors and hands included, limbs that stop each other or not."""
+    q, zero = start_posture(on_ground=True), np.zeros(NUM_JOINTS)
+    stiff = LowCommand(0.0, q, zero, zero, np.full(NUM_JOINTS, 3000.0), np.full(NUM_JOINTS, 40.0))
+    worlds: tuple[World, ...] = ("open", "rubble", "pack")
+    figures: list[Figure] = []
+    for world, limbs in product(worlds, (False, True)):
+        options = MujocoConfig(support="ground", world=world, self_collision=limbs)
+        robot = MujocoRobot("ideal", config.seed, q, options)
+        robot.release()
+        tick = partial(robot.advance, stiff, {}, TICK)
+        times = _timed(lambda _, tick=tick: tick(), 500 if config.quick else 5000)
+        name = f"twin's tick, {world}{', limbs stop each other' if limbs else ''}"
+        figures.append(_figure(name, times, 1e6, "us", "2000 us of robot time"))
+        robot.close()
+    return figures
 
 
 def _perception(config: BenchConfig) -> list[Figure]:

@@ -43,6 +43,7 @@ MEASURES: dict[str, Measure] = {
     "goal_x": Measure("error at the goal along the line", "mm", 1e3),
     "goal_y": Measure("error at the goal across the line", "mm", 1e3),
     "goal_radial": Measure("error at the goal, radial", "mm", 1e3),
+    "odometry_error": Measure("odometry off the true pose", "mm", 1e3),
     "goal_yaw": Measure("heading error at the goal", "deg", _DEG),
 }
 """Series name -> how it is shown; a series that is not here is shown as it is."""

@@ -39,7 +39,7 @@ class Oracle:
     def __init__(self, robot: MujocoRobot) -> None:
         """Look into `robot`."""
         self._robot = robot
-        self._T_odom_world = np.linalg.inv(robot.truth.T_world_odom)
+        self._T_odom_world: Array = np.asarray(np.linalg.inv(robot.truth.T_world_odom), dtype=np.float64)
         self._rig: CameraRig | None = None
 
     def screws_in_tray(self) -> list[str]:

@@ -18,6 +18,7 @@ from golem.evaluation.provenance import commit
 from golem.evaluation.pushes import DIRECTIONS, rod, shove
 from golem.evaluation.subject import Subject
 from golem.robots.sensors.profiles import load_profile
+from golem.skills.runner import FAULT
 from golem.types import Twist
 
 Kind = Literal["shove", "rod"]
@@ -115,10 +116,11 @@ class Level:
         standing = self.phase == "standing"
         exercise = Exercise(ArmMotion(draw.rng("arms")), None if standing else lambda t: WALK)
         try:
-            episode = self.subject.episode(self.seed, index, exercise)
+            episode = self.subject.episode(self.seed, index)
         except ModuleFault:
-            return "fault"
+            return FAULT
         try:
+            episode.start(exercise)
             episode.run(settle if standing else 2.0 * settle)
             if not standing:
                 air = [self.phase != "left_swing", self.phase != "right_swing"]
@@ -132,7 +134,7 @@ class Level:
             episode.run(PATIENCE, until=lambda: standing and episode.recorder.quiet >= QUIET)
             return None if episode.loss is None else episode.loss.stage
         except ModuleFault:
-            return "fault"
+            return FAULT
         finally:
             episode.close()
 

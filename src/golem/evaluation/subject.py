@@ -8,7 +8,6 @@ from typing import Any
 
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.episode import Episode, episode_seed, legs_stack
-from golem.evaluation.exercise import Exercise
 from golem.evaluation.provenance import digest, user_files
 
 
@@ -41,7 +40,7 @@ class Subject:
         """Return the trial whose noise streams trial `index` of `test` draws from, whatever the method."""
         return TrialSpec(test, self.method, self.profile, seed, index)
 
-    def episode(self, seed: int, index: int, exercise: Exercise, **robot: object) -> Episode:
-        """Begin trial `index`, with further options of the twin."""
+    def episode(self, seed: int, index: int, **robot: object) -> Episode:
+        """Return the robot of trial `index`, with further options of the twin."""
         stack = legs_stack(self.method, self.profile, robot={**self.robot, **robot})
-        return Episode(stack, episode_seed(seed, index), exercise)
+        return Episode(stack, episode_seed(seed, index))

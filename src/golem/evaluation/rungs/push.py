@@ -63,8 +63,9 @@ class PushRung:
         """Run one trial; see `Rung`."""
         stack = legs_stack(spec.method, spec.profile, spec.overrides)
         push, settle = draw(spec.rng("push"))
-        episode = Episode(stack, episode_seed(spec.seed, spec.index), Exercise(ArmMotion(spec.rng("arms"))))
+        episode = Episode(stack, episode_seed(spec.seed, spec.index))
         try:
+            episode.start(Exercise(ArmMotion(spec.rng("arms"))))
             strip = Strip(episode.robot, push.bearing)
             episode.run(settle)
             start = episode.t

@@ -9,7 +9,7 @@ import pytest
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.oracle import GraspTruth
-from golem.evaluation.rungs.tether import PAD_REACH, STRAIGHT, Tether, blame
+from golem.evaluation.rungs.pick import PAD_REACH, STRAIGHT, Tether, blame
 
 BAD_MODULES = """
 import numpy as np

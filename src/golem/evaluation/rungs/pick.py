@@ -1,4 +1,8 @@
-"""Rung `tether`: pick one loosened screw with the robot in its hoist; perception and manipulation without balance."""
+"""Rungs `tether` and `stand`: pick one loosened screw, in the hoist or on the robot's own feet.
+
+Both run the same trials: trial `i` of one seed has the same screws, calibration errors and noise on either rung, so
+that `golem compare` of two runs says what balancing costs.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +11,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from golem import registry
 from golem.errors import ConfigError
+from golem.evaluation.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
+from golem.evaluation.episode import episode_seed
 from golem.evaluation.oracle import GraspTruth, Oracle
 from golem.evaluation.provenance import user_files
 from golem.middleware import topics
@@ -23,6 +31,10 @@ from golem.skills.pick import TIMEOUT, Pick, PickConfig, PickGoal
 from golem.skills.runner import FAULT
 from golem.stack import Stack, load_stack
 
+STANDING = "stand"
+"""Name of the rung, and of the stack, whose robot balances."""
+STARTED = 1.5
+"""Time after which no band holds a robot that balances [s]."""
 SETTLE = 0.5
 """Robot time a dropped screw gets to come to rest [s]."""
 ABORTED = ("safety", FAULT, "timeout")
@@ -33,10 +45,14 @@ STRAIGHT = 0.087
 """Tilt beyond which an extraction counts as off axis [rad]: 5 deg."""
 
 
-class Tether:
-    """One screw per trial: seen, approached, grasped, pulled out, dropped in the tray."""
+class PickRung:
+    """One screw per trial: seen, approached, grasped, pulled out, dropped in the tray.
 
-    name = "tether"
+    Attributes:
+        name: of the rung, and of the shipped stack it runs.
+    """
+
+    name: str
     profiles = tuple(PROFILES)
 
     def methods(self) -> tuple[str, ...]:
@@ -45,11 +61,11 @@ class Tether:
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
-        stack = _stack(method, profile, overrides)
+        stack = self._stack(method, profile, overrides)
         classes = {slot: registry.load(slot, stack.choice(slot).use) for slot in registry.slots()}
         if not issubclass(classes["robot"], MujocoRobot):
             raise ConfigError(
-                f"Rung tether judges on the simulator's truth; robot: {stack.robot.use} is not the twin, 'mujoco'."
+                f"Rung {self.name} judges on the simulator's truth; robot: {stack.robot.use} is not the twin, 'mujoco'."
             )
         shared_context()
         return {
@@ -63,30 +79,57 @@ class Tether:
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
-        stack = _stack(spec.method, spec.profile, spec.overrides)
-        # Far enough apart that two ladders with neighbouring seeds share no scene.
-        running, robot = build(stack, seed=spec.seed * 1_000_003 + spec.index)
+        stack = self._stack(spec.method, spec.profile, spec.overrides)
+        running, robot = build(stack, episode_seed(spec.seed, spec.index))
         oracle = Oracle(robot)
         try:
-            watch = _Watch(running, oracle)
+            watch = _Watch(running, oracle, BalanceRecorder(robot) if self.balances else None)
             result = running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=watch)
             running.executor.run(running.executor.t + SETTLE)
+            if artefacts is not None and watch.recorder is not None:
+                watch.recorder.trace().save(artefacts / TRACE)
             return _judge(stack, result, oracle, watch)
         finally:
             oracle.close()
             robot.close()
 
+    @property
+    def balances(self) -> bool:
+        """Whether the robot stands on its own feet."""
+        return self.name == STANDING
+
+    def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
+        stack = load_stack(self.name, profile=profile).with_choice("grasp_method", method)
+        for slot, use in overrides.items():
+            stack = stack.with_choice(slot, use)
+        return stack
+
+
+class Tether(PickRung):
+    """The robot hangs in its hoist: perception and manipulation without balance."""
+
+    name = "tether"
+
+
+class Stand(PickRung):
+    """The robot balances while its arms work; the lower body can be replaced with `--use lower_body=...`."""
+
+    name = STANDING
+
 
 class _Watch:
     """Looks on after every tick and remembers the decisive moments."""
 
-    def __init__(self, running: Running, oracle: Oracle) -> None:
+    def __init__(self, running: Running, oracle: Oracle, recorder: BalanceRecorder | None) -> None:
         self._running, self._oracle = running, oracle
+        self.recorder = recorder
         self._news = News(running.bus, topics.FEEDBACK, Feedback)
         self.grasp: GraspTruth | None = None
         self.picture: bytes | None = None
 
     def __call__(self) -> None:
+        if self.recorder is not None:
+            self.recorder(self._running.executor.t)
         feedback = self._news.read()
         if feedback is None:
             return
@@ -97,17 +140,12 @@ class _Watch:
             self.picture = self._oracle.picture()
 
 
-def _stack(method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
-    stack = load_stack("tether", profile=profile).with_choice("grasp_method", method)
-    for slot, use in overrides.items():
-        stack = stack.with_choice(slot, use)
-    return stack
-
-
 def _judge(stack: Stack, result: SkillResult, oracle: Oracle, watch: _Watch) -> TrialOutcome:
     """Say whether a screw is in the tray, and if not, which module lost it."""
     truth = watch.grasp
     series = {} if truth is None else {f"grasp_{name}": value for name, value in asdict(truth).items()}
+    if watch.recorder is not None:
+        series |= balance(watch.recorder.trace())
     if oracle.screws_in_tray() and result.stage not in ABORTED:
         return TrialOutcome(True, DONE, None, result.reason, result.timings, series, watch.picture)
     # The skill may believe it succeeded: then the screw was lost between the pull and the tray.
@@ -121,6 +159,20 @@ def _judge(stack: Stack, result: SkillResult, oracle: Oracle, watch: _Watch) -> 
     )
     picture = watch.picture or oracle.picture()
     return TrialOutcome(False, stage, module, detail, result.timings, series, picture)
+
+
+def balance(trace: BalanceTrace) -> dict[str, float]:
+    """Return how a robot stood that worked; from `STARTED` on, since until then a band held it."""
+    stood = trace.window(STARTED)
+    if not len(stood.t):
+        return {}
+    return {
+        "margin_median": float(np.median(stood.margin)),
+        "margin_min": float(stood.margin.min()),
+        "below_zero": stood.below_zero,
+        "sway": stood.sway,
+        "steps": float(stood.steps),
+    }
 
 
 def blame(stage: str, slot: str | None, truth: GraspTruth | None) -> str | None:
