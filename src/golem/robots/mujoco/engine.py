@@ -62,7 +62,6 @@ class MujocoRobot:
             standing = standing_height(posture)
             layout = layout.raised(standing - hoist.height)
             hoist = replace(hoist, height=standing)
-            self.config = replace(self.config, layout=layout, hoist=hoist)
         self.scene: Scene = build_scene(self.config, layout, self.profile, seed)
         model = self.scene.model
         self.data = mujoco.MjData(model)
