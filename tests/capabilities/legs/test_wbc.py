@@ -162,6 +162,22 @@ def test_feet_that_feel_no_ground_get_half_of_their_torques_and_all_of_them_once
     np.testing.assert_allclose(torque(ticks(1, 1.0)), torque(stands), atol=0.5)
 
 
+def test_feet_that_creep_apart_are_drawn_together() -> None:
+    rolls = [2, 8]
+    q = crouching()
+    spread = q.copy()
+    spread[rolls] += [0.001, -0.001]
+    held = {}
+    for gain in (0.0, 2500.0):
+        legs = Wbc(WbcConfig(feet_gain=gain))
+        legs.reset(state(q))
+        first = torque(legs.step(state(q), still(), STANDING, 0.002))
+        held[gain] = torque(legs.step(state(spread), still(), STANDING, 0.002))[rolls] - first[rolls]
+    left, right = held[2500.0] - held[0.0]
+    assert left < -1.0
+    assert right == pytest.approx(-left, rel=0.05)
+
+
 def test_bad_measurements_and_options_are_named() -> None:
     legs = Wbc()
     broken = crouching()

@@ -2,7 +2,7 @@
 
 From the measured state alone follow four wishes, each a spring and a damper in acceleration: the centre of mass above
 the middle of the soles with the pelvis at the stance's height, an upright pelvis that faces where the feet point, soles
-that stay where they are, and the stance's posture. `wbc_qp.StanceProgram` finds contact forces and motor torques that
+that neither move nor creep, and the stance's posture. `wbc_qp.StanceProgram` finds contact forces and motor torques that
 come closest. There is no plan, no integral and no stepping: once the capture point has left the soles, it leans against
 the fall as hard as friction and motors allow.
 
@@ -14,7 +14,7 @@ ground is felt. Once they have all of it, they keep it until the next reset.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -39,6 +39,8 @@ from golem.types import LEGS, Array, BaseEstimate, LowState
 
 _TORSO = JOINT_INDEX["torso_joint"]
 _G = 9.81
+_SLIP = np.array([0.003, 0.003, 0.02])
+"""How far the feet may be from their places relative to each other, x, y [m] and yaw [rad]; further on these move."""
 
 
 class StanceError(GolemError):
@@ -57,7 +59,9 @@ class WbcConfig:
             are stiffer: what the hands carry is not in the model and pulls straight down.
         turn_gain, turn_damping: the same of the pelvis' orientation.
         posture_gain, posture_damping: the same of the leg joints.
-        feet_damping: damper of the soles [1/s].
+        feet_gain: spring of the soles' places relative to each other [1/s^2], and
+        feet_damping: damper of the soles [1/s]. Feet that stand creep otherwise: encoder errors become forces that
+            press them together, and no measurement but their distance tells.
         kp: stiffness of the posture hold before the feet are loaded: hip yaw, pitch, roll, knee, ankle pitch, roll
             [N m/rad]; those of `HoldConfig`.
         kd: damping of the same motors [N m s/rad]. With loaded feet the feed-forward cancels it at the measured speed,
@@ -82,6 +86,7 @@ class WbcConfig:
     turn_damping: float = 20.0
     posture_gain: float = 50.0
     posture_damping: float = 14.0
+    feet_gain: float = 2500.0
     feet_damping: float = 50.0
     kp: tuple[float, ...] = (200.0, 200.0, 200.0, 300.0, 40.0, 40.0)
     kd: tuple[float, ...] = (2.0, 2.0, 2.0, 2.0, 1.0, 1.0)
@@ -89,7 +94,7 @@ class WbcConfig:
     sole_margin: float = 0.005
     torque_profile: str = "urdf"
     torque_ratio: float = 0.85
-    weights: Weights = field(default_factory=lambda: Weights(turn=0.002))
+    weights: Weights = Weights()
     engage: float = 1.0
     patience: int = 5
     hands: bool = True
@@ -168,6 +173,7 @@ class Wbc:
         self._dynamics = StanceDynamics(c.hands)
         self._program = StanceProgram(self._bound, c.friction, c.sole_margin, c.weights)
         self._hold: Array | None = None
+        self._apart: Array | None = None
         self._height = 0.0
         self._share = 0.0
         self._solution: Solution | None = None
@@ -177,6 +183,7 @@ class Wbc:
     def reset(self, state: LowState) -> None:
         """Forget everything; the next tick takes posture, height and load of the feet from its measurements."""
         self._hold = None
+        self._apart = None
         self._solution = None
         self._failures = 0
         self._asked = None
@@ -200,7 +207,7 @@ class Wbc:
         tasks = Tasks(
             com=self._com_gain * (goal - d.com) - self._com_damping * d.com_velocity,
             turn=c.turn_gain * pin.log3(R.T @ level) - c.turn_damping * rate,
-            feet=-c.feet_damping * d.soles_velocity,
+            feet=c.feet_gain * self._creep(level) - c.feet_damping * d.soles_velocity,
             legs=c.posture_gain * (self._rest - q) - c.posture_damping * dq,
         )
         solution = self._program.solve(d, tasks)
@@ -254,6 +261,21 @@ class Wbc:
         goal = middle + self.config.com_ahead * level[:, 0]
         goal[2] += self._height + d.com[2]
         return level, goal
+
+    def _creep(self, level: Array) -> Array:
+        """Return the (12,) way back of both soles to their places relative to each other, in their own axes."""
+        d = self._dynamics
+        turn = math.atan2(*(d.soles_R[1, :2, :2].T @ d.soles_R[0, :2, 0])[::-1])
+        apart = np.append((level.T @ (d.soles[0] - d.soles[1]))[:2], turn)
+        if self._apart is None or self._share < 1.0:
+            self._apart = apart
+        error = np.minimum(np.maximum(self._apart - apart, -_SLIP), _SLIP)
+        self._apart = apart + error
+        back = 0.5 * (level[:, :2] @ error[:2])
+        out = np.zeros(12)
+        out[:3], out[6:9] = d.soles_R[0].T @ back, -(d.soles_R[1].T @ back)
+        out[5], out[11] = 0.5 * error[2], -0.5 * error[2]
+        return out
 
     def _advance(self, q: Array, height: float, contact: float, dt: float) -> Array:
         """Move the wished height to the stance's and the share of the torques to 1; return the posture to hold.

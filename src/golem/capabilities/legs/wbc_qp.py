@@ -147,7 +147,7 @@ class Weights:
     """
 
     com: float = 1.0
-    turn: float = 0.2
+    turn: float = 0.002
     feet: float = 100.0
     legs: float = 1e-3
     force: float = 1e-6
