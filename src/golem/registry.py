@@ -26,6 +26,7 @@ _IMPLEMENTATIONS: dict[str, dict[str, str]] = {
     "estimator": {
         "tether": "golem.hardware.estimator.tether:TetherEstimator",
         "random_walk_kf": "golem.hardware.estimator.random_walk_kf:RandomWalkKF",
+        "invariant_ekf": "golem.hardware.estimator.invariant_ekf:InvariantEKF",
     },
     "servo": {"pd_gravity": "golem.hardware.servo.servo:Servo"},
     "hand": {"magpie": "golem.hardware.hands.magpie:MagpieHand"},

@@ -9,6 +9,7 @@ import numpy as np
 from golem.hardware.estimator.contact import Contact, ContactConfig
 from golem.hardware.estimator.foot_force import FootForce, FootForceConfig
 from golem.robots.model.legs import Legs
+from golem.robots.model.spatial import skew
 from golem.robots.model.table import SOLE
 from golem.types import LEGS, Array, LowState
 
@@ -93,7 +94,7 @@ class Feet:
         self.rotations = legs.rotations
         lever = (legs.rotations @ self.local[..., None])[..., 0]
         self.points = legs.soles + lever
-        self.rates = legs.twists[:, :3] + turn[:, _YZX] * lever[:, _ZXY] - turn[:, _ZXY] * lever[:, _YZX]
+        self.rates = legs.twists[:, :3] + (skew(turn) @ lever[..., None])[..., 0]
 
     def _pressure(self, force: list[float], moment: list[float]) -> tuple[float, float, float]:
         normal = force[2]
@@ -107,17 +108,47 @@ class Feet:
         )
 
 
-_YZX, _ZXY = [1, 2, 0], [2, 0, 1]
+class LevelFloor:
+    """The height of base_link, above the feet that carry it and in odom, on a floor taken as level.
 
-
-def height_above(up: Array, points: Array, weight: Array) -> float:
-    """Return the height of base_link above the feet that carry it [m]; 0 where none does.
-
-    Args:
-        up: (3,) the vertical in base_link.
-        points: (2, 3) where the feet press on the ground, in base_link [m].
-        weight: (2,) how far each foot is to be believed; its square counts, so that one that is unloaded soon does not.
+    In odom it is the integral of the velocity, held to the planted feet: soles that give way under load, and every
+    footstep, would otherwise let it sink without end.
     """
-    share = weight * weight
-    total = float(share[0] + share[1])
-    return 0.0 if total == 0.0 else -float(share @ (points @ up)) / total
+
+    LAG = 0.1
+    """Time constant with which the height in odom follows the planted feet [s]."""
+
+    def __init__(self) -> None:
+        """Start at the height of odom's origin, above a floor not seen yet."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Start over."""
+        self._z = 0.0
+        self._floor: float | None = None
+
+    @property
+    def seen(self) -> bool:
+        """Whether a foot has carried the robot since the reset; before, nothing measured its velocity either."""
+        return self._floor is not None
+
+    def step(self, velocity: float, up: Array, feet: Feet, dt: float) -> tuple[float, float]:
+        """Return the height above the feet that carry the robot, 0 where none does, and z of base_link in odom [m].
+
+        Args:
+            velocity: vertical velocity of base_link [m/s].
+            up: (3,) the vertical in base_link.
+            feet: at the present sample.
+            dt: time since the previous one [s].
+        """
+        # Squares: a foot that is being unloaded soon counts little.
+        share = feet.weight * feet.weight
+        total = float(share[0] + share[1])
+        self._z += velocity * dt
+        if total == 0.0:
+            return 0.0, self._z
+        height = -float(share @ (feet.points @ up)) / total
+        if self._floor is None:
+            self._floor = self._z - height
+        self._z += dt / (self.LAG + dt) * (self._floor + height - self._z)
+        return height, self._z

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from golem.hardware.estimator.attitude import Attitude, base_rate
-from golem.hardware.estimator.feet import Feet, FeetConfig, height_above
+from golem.hardware.estimator.feet import Feet, FeetConfig, LevelFloor
 from golem.hardware.estimator.random_walk import RandomWalk, RandomWalkConfig, base_velocity
 from golem.types import BaseEstimate, LowState
 
@@ -19,21 +19,19 @@ class RandomWalkKFConfig:
     Attributes:
         filter: noise and gates of the velocity filter.
         feet: how contacts are found.
-        height_lag: time constant with which the height follows the planted feet, by velocity in between [s].
-        stale_after: time without a believed foot after which the estimate is stale [s].
+        stale_after: time without a believed foot after which the estimate is stale [s]; before the first one it always
+            is.
     """
 
     filter: RandomWalkConfig = field(default_factory=RandomWalkConfig)
     feet: FeetConfig = field(default_factory=FeetConfig)
-    height_lag: float = 0.1
     stale_after: float = 0.2
 
 
 class RandomWalkKF:
     """A random-walk Kalman filter on the velocity of base_link; see `BaseEstimator` and `random_walk`.
 
-    The horizontal position is integrated open loop. The height follows the planted feet, on a floor taken as level:
-    z of odom is the height above that floor, less the one at the start.
+    The horizontal position is integrated open loop; for the height see `LevelFloor`.
     """
 
     def __init__(self, config: RandomWalkKFConfig | None = None) -> None:
@@ -42,16 +40,16 @@ class RandomWalkKF:
         self._attitude = Attitude()
         self._feet = Feet(self.config.feet)
         self._filter = RandomWalk(self.config.filter)
-        self._position = np.zeros(3)
-        self._floor: float | None = None
+        self._floor = LevelFloor()
+        self._xy = np.zeros(2)
 
     def reset(self, state: LowState) -> None:
         """Start at rest above the origin of odom, heading zero."""
         self._attitude.reset(state)
         self._feet.reset()
         self._filter.reset()
-        self._position = np.zeros(3)
-        self._floor = None
+        self._floor.reset()
+        self._xy = np.zeros(2)
 
     def step(self, state: LowState, dt: float) -> BaseEstimate:
         """Fuse one measurement; see `BaseEstimator`."""
@@ -61,21 +59,16 @@ class RandomWalkKF:
         feet.step(state, R[2], omega, dt)
         measured = base_velocity(R, omega, feet.points, feet.rates)
         velocity = self._filter.step(measured, feet.weight, dt)
-        self._position = self._position + velocity * dt
-        height = height_above(R[2], feet.points, feet.weight)
-        if height:
-            if self._floor is None:
-                self._floor = float(self._position[2]) - height
-            share = dt / (self.config.height_lag + dt)
-            self._position[2] += share * (self._floor + height - self._position[2])
+        self._xy = self._xy + velocity[:2] * dt
+        height, z = self._floor.step(float(velocity[2]), R[2], feet, dt)
         T = np.eye(4)
         T[:3, :3] = R
-        T[:3, 3] = self._position
+        T[:2, 3], T[2, 3] = self._xy, z
         return BaseEstimate(
             t=state.t,
             T_odom_base=T,
             velocity=velocity,
             height=height,
             contact=feet.contact,
-            stale=bool(self._filter.unmeasured > self.config.stale_after),
+            stale=bool(not self._floor.seen or self._filter.unmeasured > self.config.stale_after),
         )

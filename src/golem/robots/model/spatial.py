@@ -57,6 +57,16 @@ def transform(xyz: Sequence[float] | Array, rotation: Array | None = None) -> Ar
     return out
 
 
+def skew(v: Array) -> Array:
+    """Return the (..., 3, 3) matrices of the cross product with `v` (..., 3): `skew(a) @ b` is a x b."""
+    return (v @ _LEVI_CIVITA).reshape(*v.shape, 3)
+
+
+_LEVI_CIVITA: Array = np.zeros((3, 9))
+"""Entry (j, 3 i + k) is the sign of the permutation (i, j, k)."""
+_LEVI_CIVITA[[0, 0, 1, 1, 2, 2], [7, 5, 2, 6, 3, 1]] = (1.0, -1.0, 1.0, -1.0, 1.0, -1.0)
+
+
 @dataclass(frozen=True, slots=True)
 class Inertial:
     """Mass properties of a rigid body in some frame.

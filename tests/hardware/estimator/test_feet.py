@@ -1,0 +1,67 @@
+"""Forces under the feet from joint torques, against MuJoCo's contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from golem.hardware.estimator.attitude import Attitude, base_rate
+from golem.hardware.estimator.feet import Feet, FeetConfig
+from golem.types import LowState
+
+DT = 0.002
+
+
+def sense(feet: Feet, state: LowState) -> None:
+    feet.step(state, Attitude().rotation(state)[2], base_rate(state), DT)
+
+
+def test_the_torques_of_a_standing_robot_carry_its_weight(world: Callable[..., Any]) -> None:
+    standing, feet = world(yaw=1.0), Feet(FeetConfig())
+    forces, totals = [], []
+    for _ in range(700):
+        sense(feet, standing.advance())
+        totals.append(feet.force.sum())
+        forces.append(feet.force - standing.forces())
+    weight = 9.81 * float(standing.model.body_subtreemass[1])
+    assert np.mean(totals[300:]) == pytest.approx(weight, rel=0.02)
+    assert np.abs(forces[300:]).max() < 0.02 * weight
+
+
+def test_they_tell_left_from_right_while_the_weight_shifts(world: Callable[..., Any]) -> None:
+    shifting, feet = world(yaw=-2.0), Feet(FeetConfig())
+    estimated, true = [], []
+    for i in range(700):
+        shifting.exercise(i * DT)
+        sense(feet, shifting.advance())
+        estimated.append(feet.force)
+        true.append(shifting.forces())
+    error = np.array(estimated)[100:] - np.array(true)[100:]
+    assert np.ptp(np.array(true)[100:, 0]) > 50.0
+    assert np.sqrt((error**2).mean()) < 15.0
+    assert np.all(feet.contact > 0.5)
+
+
+def test_legs_that_swing_in_the_air_are_no_contact(world: Callable[..., Any]) -> None:
+    hanging, feet = world(), Feet(FeetConfig())
+    for i in range(1000):
+        hanging.exercise(1.5 * i * DT)
+        sense(feet, hanging.advance(hanging.hoist(1.1)))
+        if i > 200:
+            assert not feet.contact.any() and np.abs(feet.force).max() < FeetConfig().contact.touch
+
+
+def test_the_pressure_is_where_mujoco_has_it(world: Callable[..., Any]) -> None:
+    shifting, feet = world(yaw=1.0), Feet(FeetConfig())
+    errors, places = [], []
+    for i in range(600):
+        shifting.exercise(i * DT)
+        sense(feet, shifting.advance())
+        T = shifting.T
+        errors.append(T[:3, 3] + feet.points @ T[:3, :3].T - shifting.pressures())
+        places.append(feet.local)
+    assert np.ptp(np.array(places)[100:, :, 0]) > 0.02
+    assert np.abs(np.array(errors)[100:, :, :2]).max() < 0.01
