@@ -2,9 +2,9 @@
 
 From the measured state alone follow four wishes, each a spring and a damper in acceleration: the centre of mass above
 the middle of the soles with the pelvis at the stance's height, an upright pelvis that faces where the feet point, soles
-that neither move nor creep, and the stance's posture. `wbc_qp.StanceProgram` finds contact forces and motor torques that
-come closest. There is no plan, no integral and no stepping: once the capture point has left the soles, it leans against
-the fall as hard as friction and motors allow.
+that neither move nor creep, and the stance's posture. `wbc_qp.StanceProgram` finds the contact forces and the motor
+torques that come closest. There is no plan, no integral and no stepping: once the capture point has left the soles, it
+leans against the fall as hard as friction and motors allow.
 
 A robot in a hoist has nothing to push against with its whole weight. Feet that are found loaded get the torques at
 once; those that are not get them little by little, beside a posture hold that fades, and only half of them until the
