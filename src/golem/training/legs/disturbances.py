@@ -40,9 +40,9 @@ class Difficulty:
     def update(self, survival: float, rate: float) -> None:
         """Move on while `survival` (mean length of an episode, as share of the whole) is high, else step back.
 
-        ALMI's rule: up while the mean episode exceeds 80 % of its length, down twice as fast otherwise.
+        ALMI's rule with 70 instead of 80 %: up while episodes last, down twice as fast otherwise.
         """
-        change = rate if survival > 0.8 else -2.0 * rate
+        change = rate if survival > 0.7 else -2.0 * rate
         for name in ("amplitude", "speed", "push", "payload"):
             setattr(self, name, float(np.clip(getattr(self, name) + change, 0.05, 1.0)))
 

@@ -41,7 +41,7 @@ class PpoConfig:
     gamma: float = 0.99
     lam: float = 0.95
     clip: float = 0.2
-    entropy: float = 0.004
+    entropy: float = 0.002
     kl: float = 0.01
     rate: float = 1e-3
     hidden: tuple[int, ...] = (128, 128, 64)

@@ -49,7 +49,7 @@ class TrainConfig:
     threads: int = 2
     adversary: Adversary = "learned"
     learned_from: float = 4e6
-    rate: float = 0.004
+    rate: float = 0.006
     env: EnvConfig = field(default_factory=EnvConfig)
     ppo: PpoConfig = field(default_factory=PpoConfig)
 
