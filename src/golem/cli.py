@@ -94,6 +94,10 @@ def _bench(words: list[str]) -> int:
         from golem.evaluation.push_bench import PushBenchConfig, run_push_bench
 
         run_push_bench(_parse(PushBenchConfig, "bench push", words[1:]))
+    elif words[:1] == ["legs"]:
+        from golem.evaluation.leg_bench import LegBenchConfig, run_leg_bench
+
+        run_leg_bench(_parse(LegBenchConfig, "bench legs", words[1:]))
     else:
         from golem.evaluation.bench import BenchConfig, run_bench
 

@@ -192,7 +192,7 @@ def _perception(config: BenchConfig) -> list[Figure]:
 
 def _robot(config: BenchConfig) -> list[Figure]:
     """Robot seconds per CPU second of a whole tethered pick, with and without what cameras and detector took."""
-    with _stopwatch(nodes.CameraNode) as cameras, _stopwatch(nodes.LocalizerNode) as localizer:
+    with stopwatch(nodes.CameraNode) as cameras, stopwatch(nodes.LocalizerNode) as localizer:
         running, robot = build(load_stack("tether", profile="field"), config.seed)
         try:
             start = time.process_time()
@@ -209,18 +209,22 @@ def _robot(config: BenchConfig) -> list[Figure]:
 
 
 @contextmanager
-def _stopwatch(node: Any) -> Generator[list[float], None, None]:
-    """Collect the CPU seconds of every step of a class of nodes."""
+def stopwatch(
+    kind: type[Any], method: str = "step", clock: Callable[[], float] = time.process_time
+) -> Generator[list[float], None, None]:
+    """Collect the seconds that `clock` counts in every call of a method of a class."""
     spent: list[float] = []
-    step = node.step
+    original = getattr(kind, method)
 
-    def timed(self: Any, t: float) -> None:
-        start = time.process_time()
-        step(self, t)
-        spent.append(time.process_time() - start)
+    def timed(*arguments: Any) -> Any:
+        start = clock()
+        try:
+            return original(*arguments)
+        finally:
+            spent.append(clock() - start)
 
-    node.step = timed
+    setattr(kind, method, timed)
     try:
         yield spent
     finally:
-        node.step = step
+        setattr(kind, method, original)

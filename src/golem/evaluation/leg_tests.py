@@ -1,0 +1,248 @@
+"""What `golem bench legs` tests: standing, working, walking, stopping; one function per test, one robot per trial.
+
+A test takes subject, seed and index of the trial, and returns its figures in SI units. Trial `i` of every subject
+meets the same draws. A robot that is lost (fell, was stopped, or its controller failed) adds the figure `lost` = 1 and
+the stage in `LOST`; figures that were not reached are left out.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from golem.capabilities.legs.base import Envelope
+from golem.capabilities.legs.mpc.controller import MPC
+from golem.capabilities.navigation.base import PlanarPose
+from golem.evaluation.bench import stopwatch
+from golem.evaluation.episode import Episode, episode_seed, legs_stack
+from golem.evaluation.exercise import WIDE_AREA, ArmMotion, Exercise
+from golem.evaluation.odometry import SimulatedOdometry
+from golem.evaluation.pushes import DIRECTIONS, shove
+from golem.evaluation.subject import Subject
+from golem.skills.walk import Walk, WalkGoal
+from golem.stack import Choice
+from golem.types import Twist
+
+Figures = dict[str, float]
+LOST = "lost_in_"
+"""Prefix of the figure that counts a stage in which robots were lost."""
+SETTLE = 3.0
+"""Time before a test begins; no band holds the robot any more, and what its release set off has died away [s]."""
+MINUTE = 60.0
+"""Length of the tests of standing and of one piece of endurance [s]."""
+PAYLOAD = (1.0, 1.0)
+"""Mass in the left and the right hand while the arms sweep [kg]."""
+COMMAND, COUNTED = 7.0, 4.0
+"""How long one twist is commanded, and the last part of it that is counted [s]: whole gait cycles, nearly."""
+ROUGH = Twist(vx=0.4)
+"""Twist on slope and rubble."""
+ROUGH_TIME = 15.0
+"""Time it is commanded [s]: the ramp begins a metre ahead."""
+MAX_SHOVE = 30.0
+"""Largest push of the endurance test [N s]."""
+GOAL_DISTANCE = (1.8, 2.2)
+"""Distance of the goals of the test of stopping [m]."""
+GOAL_TURN = 0.6
+"""Largest turn to the final heading of such a goal [rad]."""
+GOAL_TIMEOUT = 40.0
+"""Time to stop at a goal [s]."""
+AFTER = 1.0
+"""Time after the skill's end until the pose is judged [s]."""
+PLANNED = 10.0
+"""Length of the test of the planner's rate [s]."""
+SAMPLES = (8, 12, 16, 24, 32)
+"""Samples per plan of the test of the planner's rate."""
+
+
+def quiet(subject: Subject, seed: int, index: int) -> Figures:
+    """Stand still for a minute: base range, sway, steps, margin."""
+    episode = subject.episode(seed, index)
+    try:
+        episode.run(SETTLE + MINUTE)
+        return _standing(episode) | _lost(episode)
+    finally:
+        episode.close()
+
+
+def arms(subject: Subject, seed: int, index: int) -> Figures:
+    """Stand for a minute while both arms sweep their workspace with a kilogram in each hand."""
+    episode = subject.episode(seed, index, payload=PAYLOAD)
+    try:
+        draw = subject.draw("legs/arms", seed, index)
+        episode.start(Exercise(ArmMotion(draw.rng("arms"), WIDE_AREA)))
+        episode.run(SETTLE + MINUTE)
+        return _standing(episode) | _lost(episode)
+    finally:
+        episode.close()
+
+
+def tracking(subject: Subject, seed: int, index: int) -> Figures:
+    """Walk with one twist of the declared envelope: error of the mean velocity over the last seconds, per axis."""
+    episode = subject.episode(seed, index)
+    try:
+        twist = command(
+            episode.running.envelope, subject.draw("legs/tracking", seed, index).rng("twist"), index
+        )
+        asked = np.array([twist.vx, twist.vy, twist.wz])
+        episode.start(Exercise(twist=lambda t: twist if t >= SETTLE else Twist()))
+        episode.run(SETTLE + COMMAND)
+        figures = dict(zip(("vx", "vy", "wz"), asked.tolist(), strict=True)) | _lost(episode)
+        if not episode.over:
+            walked = episode.recorder.trace().window(episode.t - COUNTED)
+            error = np.abs(walked.twist.mean(axis=0) - asked)
+            figures |= dict(zip(("error_vx", "error_vy", "error_wz"), error.tolist(), strict=True))
+            figures["error_speed"] = float(np.hypot(error[0], error[1]))
+        return figures
+    finally:
+        episode.close()
+
+
+def endurance(subject: Subject, seed: int, index: int) -> Figures:
+    """Walk at random for a minute, arms moving, shoved with up to 30 N s every few seconds."""
+    draw = subject.draw("legs/endurance", seed, index)
+    rng, shoves = draw.rng("twists"), draw.rng("shoves")
+    episode = subject.episode(seed, index)
+    try:
+        envelope = episode.running.envelope
+        script = [(0.0, Twist())]
+        while script[-1][0] < SETTLE + MINUTE:
+            still = rng.random() < 0.2
+            script.append((max(script[-1][0], SETTLE) + rng.uniform(3.0, 6.0), _random(envelope, rng, still)))
+        exercise = Exercise(ArmMotion(draw.rng("arms")), lambda t: [w for at, w in script if at <= t][-1])
+        episode.start(exercise)
+        episode.run(SETTLE)
+        count = 0
+        while episode.t < SETTLE + MINUTE and not episode.over:
+            episode.run(min(shoves.uniform(4.0, 8.0), SETTLE + MINUTE - episode.t))
+            if episode.t < SETTLE + MINUTE and not episode.over:
+                episode.push(shove(DIRECTIONS[shoves.integers(8)], shoves.uniform(0.0, MAX_SHOVE)))
+                count += 1
+        return {"seconds": episode.t - SETTLE, "pushes": float(count)} | _lost(episode)
+    finally:
+        episode.close()
+
+
+def slope(subject: Subject, seed: int, index: int) -> Figures:
+    """Walk ahead and up a ramp of 5 deg."""
+    return _rough(subject, seed, index, "slope")
+
+
+def rubble(subject: Subject, seed: int, index: int) -> Figures:
+    """Walk ahead over tiles of uneven height, up to 3 cm."""
+    return _rough(subject, seed, index, "rubble")
+
+
+def stopping(subject: Subject, seed: int, index: int) -> Figures:
+    """Walk to a pose 2 m away and stand there, by the base estimator with 1 cm and 1 deg of noise: the true error."""
+    draw = subject.draw("legs/stopping", seed, index)
+    rng = draw.rng("goal")
+    bearing, distance = rng.uniform(-math.pi, math.pi), rng.uniform(*GOAL_DISTANCE)
+    goal = PlanarPose(
+        distance * math.cos(bearing), distance * math.sin(bearing), rng.uniform(-GOAL_TURN, GOAL_TURN)
+    )
+    episode = subject.episode(seed, index)
+    try:
+        episode.locate(
+            SimulatedOdometry(episode.running.bus, episode.robot, "estimator", draw.rng("odometry"))
+        )
+        episode.run(SETTLE)
+        episode.start(
+            Walk(episode.running.navigator), WalkGoal(goal.x, goal.y, goal.yaw, "odom", GOAL_TIMEOUT)
+        )
+        episode.run(GOAL_TIMEOUT + 1.0, until=lambda: episode.result is not None)
+        episode.run(AFTER)
+        truth, result = episode.robot.truth, episode.result
+        figures = _lost(episode)
+        if episode.over or result is None:
+            return figures
+        left = goal.to(PlanarPose.of(np.linalg.inv(truth.T_world_odom) @ truth.base().T_world_base))
+        return figures | {
+            "arrived": float(result.success),
+            "error": math.hypot(left.x, left.y),
+            "error_x": left.x,
+            "error_y": left.y,
+            "error_yaw": left.yaw,
+            "seconds": result.timings.get("walk", GOAL_TIMEOUT),
+        }
+    finally:
+        episode.close()
+
+
+def plans(subject: Subject, seed: int, index: int) -> Figures:
+    """Stand for 10 s with an MPC of so many samples: plans per second on this machine's cores, and whether it stands.
+
+    In lock-step a plan is there after the latency the controller declares, however long it took; it stands in real time
+    where it stands and plans at least as often as it says. The subject's method does not matter, its plant does.
+    """
+    samples = SAMPLES[index % len(SAMPLES)]
+    stack = legs_stack("mpc", subject.profile, robot=subject.robot)
+    stack = replace(stack, lower_body=Choice("mpc", {"planner": {"samples": samples}}))
+    episode = Episode(stack, episode_seed(seed, index))
+    try:
+        with (
+            stopwatch(MPC, "plan", time.perf_counter) as wall,
+            stopwatch(MPC, "plan", time.process_time) as cpu,
+        ):
+            episode.run(SETTLE + PLANNED)
+        return {
+            "samples": float(samples),
+            "plans_per_second": 1.0 / float(np.median(wall)),
+            "cpu_per_plan": float(np.median(cpu)),
+        } | _lost(episode)
+    finally:
+        episode.close()
+
+
+def command(envelope: Envelope, rng: np.random.Generator, index: int) -> Twist:
+    """Return twist `index` of the test of tracking: the 26 ends, edges and corners of the envelope, then draws."""
+    axes = [(low, 0.0, high) for low, high in (envelope.vx, envelope.vy, envelope.wz)]
+    corners = [c for c in dict.fromkeys(itertools.product(*axes)) if any(c)]
+    return Twist(*corners[index]) if index < len(corners) else _random(envelope, rng, still=False)
+
+
+def _random(envelope: Envelope, rng: np.random.Generator, still: bool) -> Twist:
+    drawn = [float(rng.uniform(low, high)) for low, high in (envelope.vx, envelope.vy, envelope.wz)]
+    return Twist() if still else Twist(*drawn)
+
+
+def _rough(subject: Subject, seed: int, index: int, world: str) -> Figures:
+    episode = subject.episode(seed, index, world=world)
+    try:
+        episode.start(Exercise(twist=lambda t: ROUGH if t >= SETTLE else Twist()))
+        episode.run(SETTLE + ROUGH_TIME)
+        path = episode.recorder.trace().base
+        climbed, moved = path[-1, 2] - path[0, 2], np.hypot(*(path[-1] - path[0])[:2])
+        return {"distance": float(moved), "climbed": float(climbed)} | _lost(episode)
+    finally:
+        episode.close()
+
+
+def _standing(episode: Episode) -> Figures:
+    stood = episode.recorder.trace().window(SETTLE)
+    if not len(stood.t):
+        return {}
+    return {
+        "base_range": stood.base_range,
+        "sway": stood.sway,
+        "steps": float(stood.steps),
+        "margin_median": float(np.median(stood.margin)),
+        "margin_min": float(stood.margin.min()),
+        "never_negative": float(stood.margin.min() >= 0.0),
+        "share_not_negative": float((stood.margin >= 0.0).mean()),
+    }
+
+
+def _lost(episode: Episode) -> Figures:
+    loss = episode.loss
+    return {"lost": 0.0} if loss is None else {"lost": 1.0, f"{LOST}{loss.stage}": 1.0}
+
+
+TESTS: dict[str, Callable[[Subject, int, int], Figures]] = {
+    test.__name__: test for test in (quiet, arms, tracking, endurance, slope, rubble, stopping, plans)
+}
+"""Test by name."""
