@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
 from golem.robots.base import Banded
@@ -47,6 +48,28 @@ def test_nothing_moves_until_then(stack: tuple[Running, Banded]) -> None:
     base = robot.truth.base()  # pyright: ignore[reportAttributeAccessIssue]
     assert base.tilt < 0.02
     assert base.T_world_base[2, 3] == pytest.approx(0.965, abs=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("profile", ["ideal", "field"])
+def test_a_robot_that_can_balance_stands_from_the_first_second(profile: str) -> None:
+    stack = Stack(
+        robot=STANDING.robot,
+        estimator=Choice("random_walk_kf"),
+        lower_body=Choice("wbc"),
+        fallback=Choice("wbc"),
+        profile=profile,
+    )
+    running, robot = build(stack, seed=1)
+    start = robot.truth.base().T_world_base[:3, 3]
+    while running.executor.t < 6.0:
+        running.executor.step()
+        base = robot.truth.base()
+        assert base.tilt < 0.03
+        assert np.linalg.norm(base.T_world_base[:3, 3] - start) < 0.04
+    assert not robot.banded
+    assert not robot.data.xfrc_applied.any()
+    robot.close()
 
 
 def test_a_pressed_button_keeps_the_band(stack: tuple[Running, Banded]) -> None:
