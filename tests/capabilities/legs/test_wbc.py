@@ -14,10 +14,15 @@ from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.legs.wbc import StanceError, Wbc, WbcConfig
 from golem.capabilities.legs.wbc_qp import StanceDynamics, StanceProgram, Tasks, Weights
 from golem.errors import ConfigError
+from golem.middleware import topics
+from golem.middleware.topics import LegStatus
 from golem.robots.model import pinocchio_model
 from golem.robots.model.leg_kinematics import SOLE_CENTER
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import DOF
+from golem.robots.mujoco.engine import MujocoRobot
+from golem.runtime.assembly import build
+from golem.stack import Choice, load_stack
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, BaseEstimate, Imu, LowState
 
 FRICTION = 0.6
@@ -188,3 +193,20 @@ def test_bad_measurements_and_options_are_named() -> None:
         Wbc(WbcConfig(stance="croch"))
     with pytest.raises(ConfigError, match="six"):
         Wbc(WbcConfig(kd=(1.0, 2.0)))
+
+
+@pytest.mark.slow
+def test_stands_in_the_whole_stack_on_estimates_alone() -> None:
+    stack = load_stack("stand", profile="field")
+    robot = replace(stack.robot, options={**stack.robot.options, "world": "open"})
+    running, twin = build(replace(stack, lower_body=Choice("wbc"), fallback=Choice("hold"), robot=robot), 3)
+    assert isinstance(twin, MujocoRobot)
+    running.executor.run(3.5)
+    assert not twin.banded
+    start = twin.truth.base()
+    running.executor.run(5.5)
+    end = twin.truth.base()
+    legs = running.bus.latest(topics.LEG_STATUS, LegStatus)
+    assert legs is not None and (legs.controller, legs.fault) == ("wbc", None)
+    assert np.abs(end.T_world_base[:3, 3] - start.T_world_base[:3, 3]).max() < 0.005
+    assert end.tilt < 0.05
