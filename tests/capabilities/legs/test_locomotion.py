@@ -208,3 +208,13 @@ def test_after_a_hand_over_the_clock_goes_on_and_the_twist_is_zero(driver: Drive
     assert (first.phase[0] - before) % 1.0 == pytest.approx(DT / other.gait.period)
     driver.run(1.0, Twist(0.5))
     assert other.motions[-1].twist == Twist(0.1)
+
+
+def test_after_a_hand_over_the_targets_do_not_jump(driver: Driver) -> None:
+    driver.run(0.5)
+    driver.layer.hand_over(Recorder(target=1.0, stiffness=200.0), driver.state)
+    commands = [driver.layer.step(driver.state, driver.base, None, DT) for _ in range(10)]
+    q, kp = np.array([(c.q[0], c.kp[0]) for c in commands]).T
+    np.testing.assert_allclose(q[:7], np.arange(1, 8) * DT / LocomotionConfig().blend)
+    np.testing.assert_allclose(kp, 100.0 + 100.0 * q)
+    np.testing.assert_array_equal(q[7:], 1.0)

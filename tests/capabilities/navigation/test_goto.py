@@ -162,3 +162,10 @@ def test_it_turns_the_short_way_round_past_half_a_turn() -> None:
     go(GoTo(), walker, PlanarPose(0.0, 0.0, -3.0))
     assert all(t.wz >= 0.0 for t in walker.twists)
     assert len(walker.twists) < 400
+
+
+def test_a_robot_that_stops_badly_is_not_chased_for_ever() -> None:
+    goal = PlanarPose(1.0, 0.0, 0.0)
+    go(GoTo(), Walker(seed=2, noise=1.0, slip=6.0), goal, seconds=20.0)
+    with pytest.raises(AssertionError, match="not there after 20 s"):
+        go(GoTo(GoToConfig(widen=1.0)), Walker(seed=2, noise=1.0, slip=6.0), goal, seconds=20.0)

@@ -15,10 +15,11 @@ import numpy as np
 
 from golem import registry
 from golem.capabilities.legs.base import Envelope, LegCommand, Motion
+from golem.capabilities.legs.blend import Blend
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.pacing import Paced
 from golem.capabilities.legs.vendor import Onboard
-from golem.types import LEGS, Array, BaseEstimate, LowState, Twist
+from golem.types import LEGS, BaseEstimate, LowState, Twist
 
 ZERO = Twist()
 
@@ -86,6 +87,7 @@ class Handover:
         self.rate: float = max(controller.rate for controller in both)
         self.latency: float = max(controller.latency for controller in both)
         self.envelope: Envelope = both[0].envelope
+        self._blend = Blend(config.blend)
         self._begin()
 
     @property
@@ -109,13 +111,12 @@ class Handover:
         command = None if self._coming is None else self._coming.step(state, base, motion, dt)
         if self._coming is not None and command is not None and _speaks(command):
             self._take_over(self._coming)
-            self._old, self._blended = self._last, 0.0
+            self._blend.begin()
         else:
             if not self.walking:
                 motion = Motion(ZERO, motion.phase, motion.stepping)
             command = self._active.step(state, base, motion, dt)
-        self._last = self._mix(command, dt)
-        return self._last
+        return self._blend.step(command, dt)
 
     def _take_over(self, controller: Paced) -> None:
         self._active = controller
@@ -125,20 +126,7 @@ class Handover:
     def _begin(self) -> None:
         self._take_over(self._stand)
         self._healthy = 0.0
-        self._old: LegCommand | None = None
-        self._last: LegCommand | None = None
-        self._blended = 0.0
-
-    def _mix(self, command: LegCommand, dt: float) -> LegCommand:
-        """Return `command`, blended with the last one of the controller that was in charge before."""
-        if self._old is None:
-            return command
-        self._blended += dt
-        share = self._blended / self.config.blend
-        if share >= 1.0:
-            self._old = None
-            return command
-        return _blend(self._old, command, share)
+        self._blend.reset()
 
     def _is_healthy(self, state: LowState, base: BaseEstimate) -> bool:
         """Return whether the measured robot is calm, upright, in place, and not on one leg."""
@@ -173,14 +161,3 @@ class Handover:
 def _speaks(command: LegCommand) -> bool:
     """Return whether a controller moves the legs: one that has yet to start only damps them."""
     return bool(command.kp.any()) or (command.tau is not None and bool(command.tau.any()))
-
-
-def _blend(old: LegCommand, new: LegCommand, share: float) -> LegCommand:
-    """Return the command that is `share` of the way from `old` to `new`."""
-
-    def mix(a: Array, b: Array) -> Array:
-        return a + share * (b - a)
-
-    # Without a torque of their own the servo carries the legs; there is nothing in between.
-    tau = new.tau if old.tau is None or new.tau is None else mix(old.tau, new.tau)
-    return LegCommand(mix(old.q, new.q), mix(old.kp, new.kp), mix(old.kd, new.kd), tau)

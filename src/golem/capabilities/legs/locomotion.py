@@ -13,6 +13,7 @@ import numpy as np
 
 from golem.capabilities.legs.balance import balance_errors
 from golem.capabilities.legs.base import LegCommand, LowerBody, Motion
+from golem.capabilities.legs.blend import Blend
 from golem.capabilities.legs.gait import Gait
 from golem.capabilities.legs.pacing import Paced
 from golem.robots.model.imu import base_rate
@@ -34,12 +35,15 @@ class LocomotionConfig:
         dead_band: norm of (vx, vy, wz) below which a twist counts as zero [m/s, rad/s]: ALMI's (and the paper's) 0.1.
         acceleration: bounds on the change of vx, vy [m/s^2] and wz [rad/s^2] [own: full speed in less than a second].
         timeout: age of the newest twist from which it counts as zero [s]: whoever sent it may have died.
+        blend: time over which the targets go from one controller's to the next one's after a hand-over [s] [own: a
+            jump of the targets in the middle of a step drives a light foot beyond its speed limit].
         gate_rate: how often the gait clock runs at most [Hz]; controllers may be faster.
     """
 
     dead_band: float = 0.1
     acceleration: tuple[float, float, float] = (1.0, 1.0, 2.0)
     timeout: float = 0.5
+    blend: float = 0.15
     gate_rate: float = 100.0
 
 
@@ -60,6 +64,7 @@ class Locomotion:
         self.config = config or LocomotionConfig()
         self.gait = Gait(controller.gait)
         self._paced = Paced(controller)
+        self._blend = Blend(self.config.blend)
         self._kinematics = Kinematics()
         left, right = self._soles(np.zeros(NUM_JOINTS))
         # With both hips straight and level the distance of the feet does not depend on how far the knees are bent.
@@ -75,11 +80,13 @@ class Locomotion:
         """Stand, from the measured `state` on; a twist from before is void."""
         self._forget()
         self.gait.reset()
+        self._blend.reset()
         self._paced.reset(state)
 
     def hand_over(self, controller: LowerBody, state: LowState) -> None:
         """Give the legs to `controller` at the measured `state`, at zero twist; a step that was begun is finished."""
         self._forget()
+        self._blend.begin()
         self._paced = Paced(controller)
         self._paced.reset(state)
 
@@ -101,7 +108,7 @@ class Locomotion:
             self._until_gate = max(self._until_gate + 1.0 / self.config.gate_rate, 0.0)
             self._since_gate = 0.0
         motion = Motion(self.applied, self.gait.phases, bool(self.gait.stepping))
-        return self._paced.step(state, base, motion, dt)
+        return self._blend.step(self._paced.step(state, base, motion, dt), dt)
 
     def _forget(self) -> None:
         self.commanded = self.applied = ZERO

@@ -33,6 +33,7 @@ class GoToConfig:
         coast: time for which the robot goes on at its present velocity once it is told to stop [s].
         close, aligned: errors of the predicted stop at which it is told to [m], [rad].
         accept, straight: errors after the stop with which it stays [m], [rad].
+        widen: factor on these two with every time it started over: a robot that stops no better is not chased for ever.
         rest: time without a step after which the robot stands [s].
     """
 
@@ -46,6 +47,7 @@ class GoToConfig:
     aligned: float = 0.015
     accept: float = 0.03
     straight: float = 0.03
+    widen: float = 1.2
     rest: float = 1.0
 
 
@@ -71,15 +73,20 @@ class GoTo:
         self._filter(pose, dt)
         self._rested = 0.0 if stepping else self._rested + dt
         left, stop = self._at(0.0).to(self._goal), self._at(config.coast).to(self._goal)
+        stood = not (self._moving or self._turning)
+        # The filter takes a while to see that the robot has stopped.
+        blind = stood and 0.0 < self._rested < 0.5 * config.rest
         if self._moving:
             past = stop.x * left.x + stop.y * left.y <= 0.0
             self._moving = not past and math.hypot(stop.x, stop.y) > config.close
-        else:
-            self._moving = math.hypot(left.x, left.y) > config.accept
+        elif not blind:
+            self._moving = math.hypot(left.x, left.y) > self._slack * config.accept
         if self._turning:
             self._turning = stop.yaw * left.yaw > 0.0 and abs(stop.yaw) > config.aligned
-        else:
-            self._turning = abs(left.yaw) > config.straight
+        elif not blind:
+            self._turning = abs(left.yaw) > self._slack * config.straight
+        if stood and self._rested > 0.0 and (self._moving or self._turning):
+            self._slack *= config.widen
         if self._moving or self._turning:
             return Course(self._towards(left), False, left)
         return Course(ZERO, self._rested >= config.rest, left)
@@ -88,6 +95,7 @@ class GoTo:
         self._pose: Array | None = None
         self._velocity: Array = np.zeros(3)
         self._rested = 0.0
+        self._slack = 1.0
         self._moving = self._turning = True
 
     def _filter(self, pose: PlanarPose, dt: float) -> None:
