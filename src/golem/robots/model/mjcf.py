@@ -84,7 +84,7 @@ def _let_touch_itself(spec: mujoco.MjSpec, hands: bool) -> None:
         if spec.geom(box.name) is None:
             _add_shape(spec.body(box.link), box, 0, 0)
     for one, other in contact.self_pairs(hands):
-        # Without friction: what slides along a limb is of no interest, and every contact costs a third.
+        # Without friction: how limbs slide along each other is of no interest, and one solver row does instead of four.
         spec.add_pair(name=f"{one}-{other}", geomname1=one, geomname2=other, condim=1)
 
 

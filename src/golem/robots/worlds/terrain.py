@@ -42,12 +42,14 @@ def add_slope(spec: mujoco.MjSpec, angle: float) -> None:
     c, s = math.cos(angle), math.sin(angle)
     rise, run = length * s, length * c
     body = spec.worldbody.add_body(name="terrain", pos=[FLAT, 0.0, 0.0])
-    half = math.sin(angle / 2), math.cos(angle / 2)
-    # Each box is placed by the middle of its top, half its thickness below along its normal.
-    for x, tilt in ((run / 2, -1.0), (run * 1.5 + level, 1.0)):
-        center = (x + tilt * s * _THICK / 2 * -1.0, 0.0, rise / 2 - c * _THICK / 2)
-        _block(body, (length / 2, width / 2, _THICK / 2), center, quat=(half[1], 0.0, tilt * half[0], 0.0))
-    _block(body, (level / 2, width / 2, _THICK / 2), (run + level / 2, 0.0, rise - _THICK / 2))
+    half = _THICK / 2
+    # Each box lies half its thickness below the middle of its top, along its normal; up is a negative turn about y.
+    for x, turn in ((run / 2, -1.0), (run * 1.5 + level, 1.0)):
+        quat = (math.cos(angle / 2), 0.0, turn * math.sin(angle / 2), 0.0)
+        _block(
+            body, (length / 2, width / 2, half), (x - turn * s * half, 0.0, rise / 2 - c * half), quat=quat
+        )
+    _block(body, (level / 2, width / 2, half), (run + level / 2, 0.0, rise - half))
 
 
 def add_rubble(spec: mujoco.MjSpec, height: float, rng: np.random.Generator) -> None:
