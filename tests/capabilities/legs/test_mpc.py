@@ -13,7 +13,7 @@ from golem.capabilities.legs.mpc.planner import PlannerConfig
 from golem.errors import ConfigError
 from golem.types import Array
 
-QUICK = MPCConfig(threads=0)
+QUICK = MPCConfig(threads=0, plan_rate=25.0)
 
 
 def test_is_a_lower_body_that_stands() -> None:
@@ -52,7 +52,7 @@ def test_a_reset_repeats_everything_and_the_seed_changes_it() -> None:
 
 def test_between_plans_the_present_one_is_followed_to_where_the_command_arrives() -> None:
     plant = FloorPlant()
-    legs = MPC(replace(QUICK, plan_rate=25.0, rate=50.0, latency=0.02))
+    legs = MPC(replace(QUICK, rate=50.0, latency=0.02))
     state, base = plant.sense()
     legs.reset(state)
     legs.step(state, base, STANDING, 0.02)

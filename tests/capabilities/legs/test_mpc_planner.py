@@ -42,12 +42,26 @@ def test_predictive_sampling_never_gets_worse_and_takes_the_best() -> None:
     assert costs.min() <= costs[0]
 
 
-def test_cem_takes_the_mean_of_the_elite_and_ignores_what_is_not_finite() -> None:
-    tried = planner(PlannerConfig(samples=8, elite=0.25))
+@pytest.mark.parametrize(("present", "gain"), [(3.0, 1.0), (1.5, 0.4)])
+def test_cem_moves_to_the_mean_of_the_elite_but_slowly_while_the_plan_is_good(
+    present: float, gain: float
+) -> None:
+    tried = planner(PlannerConfig(samples=8, elite=0.25, gain=0.4))
     knots = tried.sample()
-    costs = np.array([3.0, np.nan, 1.0, 5.0, np.inf, 2.0, 9.0, 9.0])
-    tried.update(knots, costs)
-    np.testing.assert_allclose(tried.sample()[0], knots[[2, 5]].mean(axis=0))
+    tried.update(knots, np.full(8, np.nan))
+    np.testing.assert_array_equal(tried.sample()[0], knots[0])
+    tried.update(knots, np.array([present, np.nan, 1.0, 5.0, np.inf, 2.0, 9.0, 9.0]))
+    elite = [2, 5] if gain == 1.0 else [2, 0]
+    np.testing.assert_allclose(tried.sample()[0], gain * knots[elite].mean(axis=0) + (1.0 - gain) * knots[0])
+
+
+def test_some_samples_keep_the_full_noise() -> None:
+    tried = planner(PlannerConfig(samples=201, narrowest=0.1, wide=0.5))
+    for _ in range(20):
+        knots = tried.sample()
+        tried.update(knots, distance(knots))
+    spread = tried.sample()[1:] - tried.sample()[0]
+    assert spread[:100].std() > 1.3 * spread[100:].std()
 
 
 def test_a_shifted_plan_has_the_same_targets_earlier() -> None:
@@ -61,7 +75,7 @@ def test_a_shifted_plan_has_the_same_targets_earlier() -> None:
 
 
 def test_noise_narrows_to_the_elite_and_returns_with_a_reset() -> None:
-    config = PlannerConfig(samples=32, narrowest=0.1)
+    config = PlannerConfig(samples=32, narrowest=0.1, wide=0.0)
     tried = planner(config)
     first = tried.sample()
     for _ in range(20):

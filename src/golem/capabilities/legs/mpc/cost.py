@@ -30,7 +30,7 @@ class CostConfig:
     orientation: float = 1.0
     capture: float = 2.0
     feet: float = 0.3
-    effort: float = 0.3
+    effort: float = 3.0
     posture: float = 0.3
 
 

@@ -172,7 +172,7 @@ class PlanningModel:
 
     def _weld(self, q: Array) -> None:
         """Give the rigid upper body the inertia of the joints `q` (27,) [rad] and find the stance that goes with it."""
-        model, data, body = self._model, self._data, self._body
+        model, body = self._model, self._body
         _, com, inertia = self._upper.inertial(q)
         moments, axes = np.linalg.eigh(inertia)
         axes *= np.sign(np.linalg.det(axes))

@@ -28,19 +28,24 @@ class PlannerConfig:
         samples: rollouts per plan, the present plan among them.
         knots: knots of the spline.
         elite: share of the samples that CEM averages.
+        gain: share of the way to that average that CEM moves a plan which is among the elite itself, so that a robot
+            that stands well is not shaken by the sampling; a plan that is not goes all the way.
         noise: standard deviation of hip yaw, pitch, roll, knee, ankle pitch, roll that sampling starts from [rad].
         growth: ratio of the noise of the last knot to that of the first.
         narrowest: CEM fits the noise to the elite, but not below this share of `noise`.
+        wide: share of the samples that keep the full `noise` nevertheless: they find the way out after a push.
         seed: of the planner's own random numbers.
     """
 
     method: Method = "cem"
-    samples: int = 16
+    samples: int = 24
     knots: int = 4
-    elite: float = 0.25
-    noise: tuple[float, ...] = (0.03, 0.1, 0.06, 0.12, 0.2, 0.1)
+    elite: float = 0.17
+    gain: float = 0.3
+    noise: tuple[float, ...] = (0.015, 0.09, 0.06, 0.11, 0.3, 0.11)
     growth: float = 1.0
-    narrowest: float = 0.3
+    narrowest: float = 0.1
+    wide: float = 0.25
     seed: int = 0
 
 
@@ -100,19 +105,26 @@ class Planner:
     def sample(self) -> Array:
         """Return the knots (samples, knots, 12) to try; the first are those of the present plan."""
         noise = self._random.standard_normal((self._config.samples - 1, *self._plan.shape))
-        varied = np.clip(self._plan + self._deviation * noise, self._lower, self._upper)
+        wide = round(self._config.wide * len(noise))
+        noise[:wide] *= self._noise
+        noise[wide:] *= self._deviation
+        varied = np.clip(self._plan + noise, self._lower, self._upper)
         return np.concatenate([self._plan[None], varied])
 
     def update(self, knots: Array, costs: Array) -> None:
         """Move the plan towards the cheap ones of `knots` (samples, knots, 12), which cost `costs` (samples,).
 
-        Rollouts whose cost is not finite lose against all others.
+        Rollouts whose cost is not finite lose against all others; where there are no others the plan stays.
         """
+        if not np.isfinite(costs).any():
+            return
         config = self._config
         order = np.argsort(np.where(np.isfinite(costs), costs, np.inf), kind="stable")
         if config.method == "predictive_sampling":
             self._plan = knots[order[0]]
             return
-        elite = knots[order[: max(2, round(config.elite * config.samples))]]
-        self._plan = elite.mean(axis=0)
+        best = order[: max(2, round(config.elite * config.samples))]
+        elite = knots[best]
+        gain = config.gain if 0 in best else 1.0
+        self._plan = self._plan + gain * (elite.mean(axis=0) - self._plan)
         self._deviation = np.clip(elite.std(axis=0), config.narrowest * self._noise, self._noise)
