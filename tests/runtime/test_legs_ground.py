@@ -1,0 +1,85 @@
+"""A robot on its own feet whose leg controller dies: it stays on its feet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.runtime.test_legs import Drive
+
+from golem.capabilities.legs.almi import NAME
+from golem.capabilities.legs.description import SHIPPED
+from golem.hardware.safety.base import GateState
+from golem.middleware import topics
+from golem.middleware.topics import LegStatus
+from golem.runtime.assembly import Running, build
+from golem.skills.walk import Stand, StandGoal
+from golem.stack import Choice, load_stack
+from golem.types import Twist
+
+DYING = """
+from golem.capabilities.legs.{module} import {name}
+
+class Dying({name}):
+    def step(self, state, base, motion, dt):
+        if state.t > {end}:
+            raise RuntimeError("gone")
+        return super().step(state, base, motion, dt)
+"""
+trained = pytest.mark.skipif(
+    not (SHIPPED / f"{NAME}.yaml").is_file(), reason="needs the trained legs, which this installation lacks"
+)
+
+
+@contextmanager
+def standing(path: Path, text: str, fallback: str) -> Iterator[tuple[Running, Any]]:
+    """A stack on open ground whose legs are the class `Dying` of `text`."""
+    path.write_text(text)
+    stack = replace(
+        load_stack("stand", profile="ideal"),
+        robot=Choice("mujoco", {"support": "ground", "world": "open"}),
+        lower_body=Choice(f"{path}:Dying"),
+        fallback=Choice(fallback),
+    )
+    running, robot = build(stack, seed=0)
+    try:
+        yield running, robot
+    finally:
+        robot.close()
+
+
+def assert_it_stands_on(running: Running, robot: Any, fallback: str) -> None:
+    """Check that the robot stands by its fallback, now and two seconds later."""
+    for _ in range(2):
+        status = running.bus.latest(topics.LEG_STATUS, LegStatus)
+        assert status is not None
+        assert (status.controller, status.applied, status.stepping) == (fallback, Twist(), False)
+        assert running.safety is not None and running.safety.state is GateState.ACTIVE, running.safety
+        assert robot.data.qpos[2] > 0.85
+        running.executor.run(running.executor.t + 2.0)
+
+
+@pytest.mark.slow
+def test_legs_that_die_while_they_stand(tmp_path: Path) -> None:
+    text = DYING.format(module="wbc", name="Wbc", end=3.0)
+    with standing(tmp_path / "dying.py", text, "wbc") as (running, robot):
+        result = running.execute(Stand(), StandGoal(10.0), timeout=12.0)
+        assert (result.stage, result.slot) == ("fault", "lower_body")
+        assert "Dying failed: RuntimeError: gone" in result.reason
+        assert_it_stands_on(running, robot, "wbc")
+
+
+@trained
+@pytest.mark.slow
+def test_legs_that_die_in_the_middle_of_a_step(tmp_path: Path) -> None:
+    text = DYING.format(module="almi", name="Almi", end=4.13)
+    with standing(tmp_path / "dying.py", text, "almi") as (running, robot):
+        assert running.execute(Stand(), StandGoal(2.5), timeout=5.0).success
+        result = running.execute(Drive(Twist(0.5), seconds=6.0), None, timeout=10.0)
+        assert (result.stage, result.slot) == ("fault", "lower_body")
+        assert robot.data.qpos[0] > 0.2
+        assert_it_stands_on(running, robot, "almi")
