@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import os
+import sys
+import webbrowser
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from typing import Literal
 
 from tyro.conf import Positional
 
@@ -10,25 +15,36 @@ from golem.dashboard.live import LiveView
 from golem.errors import ConfigError
 from golem.middleware import topics
 from golem.middleware.bus import News
+from golem.robots.mujoco.config import World
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.assembly import Running, build
 from golem.skills.base import Feedback, SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
-from golem.stack import load_stack
+from golem.stack import Stack, load_stack
+
+
+def no_display() -> bool:
+    """Return whether this machine has no screen to open a browser on."""
+    return sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 @dataclass(frozen=True)
 class RunConfig:
-    """Run a stack file once: the robot picks one screw, in lock-step or with the live view."""
+    """Run a stack file: the robot picks one screw, or stands and does what you ask for in the live view."""
 
     stack: Positional[str] = "tether"
     """Path of a stack file, or the name of a shipped one."""
+    task: Literal["pick", "operate"] | None = None
+    """pick: one screw, then the run ends. operate: you drive, push and pick in the live view until Ctrl-C. Default:
+    operate where the robot stands on its feet, pick where it hangs."""
+    world: World | None = None
+    """World of the twin: pack, open, slope or rubble; default: the stack file's."""
     profile: str | None = None
     """Realism profile: ideal, bench or field; default: the stack file's."""
     seed: int = 0
     """Seed of the episode."""
     view: bool = False
-    """Show it live in the browser, paced by the wall clock."""
+    """Show a pick live in the browser, paced by the wall clock; operating always does."""
     port: int = 8080
     """Port of the live view."""
 
@@ -40,13 +56,17 @@ def run_stack(config: RunConfig) -> SkillResult:
         ConfigError: the stack file or an option is wrong.
         ModuleFault: a module broke its contract.
     """
-    running, robot = build(load_stack(config.stack, profile=config.profile), config.seed)
+    stack = load_stack(config.stack, profile=config.profile)
+    if config.world is not None:
+        robot = replace(stack.robot, options={**stack.robot.options, "world": config.world})
+        stack = replace(stack, robot=robot)
+    if (config.task or ("operate" if stack.on_ground else "pick")) == "operate":
+        return _operate(config, stack)
+    running, robot = build(stack, config.seed)
     narrator = Narrator(running)
     try:
         if config.view:
-            if not isinstance(robot, MujocoRobot):
-                raise ConfigError(f"--view shows the twin; robot: {running.stack.robot.use} is not 'mujoco'.")
-            with LiveView(running, robot, config.port) as view:
+            with LiveView(running, shown(running, robot), config.port) as view:
                 print(f"Live view: {view.url}   (Ctrl-C ends it)")
                 result = view.run(Pick(running.method), PickGoal(), watch=narrator)
         else:
@@ -57,6 +77,40 @@ def run_stack(config: RunConfig) -> SkillResult:
         f"{'Done' if result.success else 'Failed'} after {running.executor.t:.1f} s of robot time: {result.reason}"
     )
     return result
+
+
+def _operate(config: RunConfig, stack: Stack) -> SkillResult:
+    """Let the operator drive, push and pick in the live view until Ctrl-C."""
+    with ExitStack() as closing:
+        running, robot = build(stack, config.seed)
+        closing.callback(lambda: robot.close())
+        view = closing.enter_context(LiveView(running, shown(running, robot), config.port, restarts=True))
+        print(f"Open {view.url} to drive, push and pick. Ctrl-C ends it.", flush=True)
+        if not no_display():
+            webbrowser.open(view.url)
+        try:
+            while True:
+                if view.wait_for_pick():
+                    result = view.run(Pick(running.method), PickGoal(), watch=Narrator(running))
+                    print(result.reason, flush=True)
+                else:
+                    robot.close()
+                    running, robot = build(stack, config.seed)
+                    view.attach(running, robot)
+        except KeyboardInterrupt:
+            print()
+    return SkillResult(True, "done", None, "Ended by the operator.")
+
+
+def shown(running: Running, robot: object) -> MujocoRobot:
+    """Return the `robot` of a stack as the twin, which is what a viewer shows.
+
+    Raises:
+        ConfigError: it is none.
+    """
+    if not isinstance(robot, MujocoRobot):
+        raise ConfigError(f"The live view shows the twin; robot: {running.stack.robot.use} is not 'mujoco'.")
+    return robot
 
 
 class Narrator:

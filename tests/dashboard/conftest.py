@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from golem.runtime.assembly import Running, build
-from golem.stack import Stack
+from golem.stack import Choice, Stack, load_stack
 from golem.types import Frame, LocalizedObject
 
 
@@ -21,8 +22,25 @@ class Blind:
         return []
 
 
+BLIND = f"{__file__}:Blind"
+
+
 @pytest.fixture
 def twin() -> Iterator[tuple[Running, Any]]:
-    running, robot = build(Stack(profile="bench").with_choice("localizer", f"{__file__}:Blind"), 0)
+    running, robot = build(Stack(profile="bench").with_choice("localizer", BLIND), 0)
+    yield running, robot
+    robot.close()
+
+
+@pytest.fixture
+def standing() -> Stack:
+    """A robot on its feet in the empty hall."""
+    stack = load_stack("stand").with_choice("localizer", BLIND)
+    return replace(stack, robot=Choice("mujoco", {"support": "ground", "world": "open"}))
+
+
+@pytest.fixture
+def walker(standing: Stack) -> Iterator[tuple[Running, Any]]:
+    running, robot = build(standing, 0)
     yield running, robot
     robot.close()

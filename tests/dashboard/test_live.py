@@ -11,11 +11,31 @@ import pytest
 
 from golem.dashboard.live import LiveView
 from golem.dashboard.panel import Button
+from golem.dashboard.scene import BodyMesh, SpectatorView
 from golem.errors import ConfigError
+from golem.evaluation.balance import PERIOD
 from golem.hardware.safety.base import GateState, Reason
 from golem.middleware import topics
-from golem.runtime.assembly import Running
+from golem.middleware.topics import LegStatus
+from golem.runtime.assembly import Running, build
 from golem.skills.base import Feedback
+from golem.stack import Stack
+from golem.types import Twist
+
+MESHES: dict[int, list[BodyMesh]] = {}
+
+
+@pytest.fixture(autouse=True)
+def meshes_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    make = SpectatorView.meshes
+
+    def meshes(view: SpectatorView) -> list[BodyMesh]:
+        world = len(view.moving)
+        if world not in MESHES:
+            MESHES[world] = make(view)
+        return MESHES[world]
+
+    monkeypatch.setattr(SpectatorView, "meshes", meshes)
 
 
 @pytest.fixture
@@ -53,11 +73,11 @@ def test_bodies_cameras_and_target_follow(twin: tuple[Running, Any], view: LiveV
     view._busy = True
     robot.data.body("right_hand").xpos[:] = (1.0, 2.0, 3.0)
     view.update()
-    np.testing.assert_allclose(view._bodies["right_hand"].position, (1.0, 2.0, 3.0))
-    for marker in (view._target, view._target_label):
+    np.testing.assert_allclose(view._stage._bodies["right_hand"].position, (1.0, 2.0, 3.0))
+    for marker in (view._stage._target, view._stage._target_label):
         np.testing.assert_allclose(marker.position, (0.4, 0.0, robot.config.hoist.height - 0.04))
-    assert view._target.visible
-    assert set(view.panel._cameras) == {"right palm camera", "head camera"}
+    assert view._stage._target.visible
+    assert set(view.panel._pictures) == {"right palm camera", "head camera"}
     assert "&lt;b&gt;" in view.panel._status.content
 
 
@@ -99,3 +119,94 @@ def test_a_pick_can_be_asked_for_only_when_none_runs(twin: tuple[Running, Any], 
     view.panel.press(Button.PICK)
     view.wait_for_pick()
     assert not view._wanted  # taken
+
+
+@pytest.fixture
+def walk(walker: tuple[Running, Any], monkeypatch: pytest.MonkeyPatch) -> Iterator[LiveView]:
+    with LiveView(*walker, port=0, restarts=True) as view:
+        monkeypatch.setattr(view._server, "get_clients", lambda: {0: None})
+        monkeypatch.setattr(view, "_show_pictures", lambda: None)  # each is rendered on the CPU
+        monkeypatch.setattr(view, "_wait", lambda t: None)
+        yield view
+
+
+def run(view: LiveView, running: Running, seconds: float) -> None:
+    end = running.executor.t + seconds
+    view.idle(lambda: running.executor.t > end)
+
+
+def test_a_hanging_robot_has_neither_sliders_nor_pushes(view: LiveView) -> None:
+    assert view.panel.legs is None
+
+
+def test_the_sliders_drive_until_nobody_looks(
+    walker: tuple[Running, Any], walk: LiveView, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    running, legs = walker[0], walk.panel.legs
+    assert legs is not None
+    until_state(walk, running, GateState.ACTIVE)
+    run(walk, running, 0.1)
+    most = running.envelope.vx[1]
+    assert legs._sliders["vx"].max == most > 0.0
+    legs.twist = Twist(vx=9.0)
+    run(walk, running, 0.2)
+    heard = running.bus.latest(topics.LEG_STATUS, LegStatus)
+    assert heard is not None and heard.commanded == Twist(vx=most) and heard.applied.vx > 0.1
+    assert "ahead" in walk.panel._status.content
+    walk.panel.press(Button.STAND)
+    run(walk, running, 0.1)
+    assert legs.twist == Twist() == running.bus.latest(topics.TWIST, Twist)
+    legs.twist = Twist(wz=0.3)
+    monkeypatch.setattr(walk._server, "get_clients", dict)
+    run(walk, running, 0.1)
+    assert legs.twist == Twist() == running.bus.latest(topics.TWIST, Twist)
+
+
+def test_an_emergency_stop_takes_the_sliders_back(walker: tuple[Running, Any], walk: LiveView) -> None:
+    running, legs = walker[0], walk.panel.legs
+    assert legs is not None
+    until_state(walk, running, GateState.ACTIVE)
+    legs.twist = Twist(vy=0.2)
+    walk.panel.press(Button.PRESS)
+    until_state(walk, running, GateState.STOP1)
+    run(walk, running, 0.1)
+    assert legs.twist == Twist()
+
+
+def test_the_button_pushes_with_the_impulse_that_is_set(walker: tuple[Running, Any], walk: LiveView) -> None:
+    running, robot = walker
+    legs = walk.panel.legs
+    assert legs is not None
+    run(walk, running, 0.1)
+    before = robot.truth.com()[1][1]
+    legs._direction.value, legs._impulse.value = "left", 40.0
+    walk.panel.press(Button.PUSH)
+    run(walk, running, 0.1)
+    assert walk._pusher.force == pytest.approx([0.0, 200.0, 0.0], abs=2.0)
+    assert walk._stage._arrow.visible
+    assert robot.truth.com()[1][1] - before > 0.1  # 40 N s move 75 kg at 0.5 m/s, less what the band holds
+    run(walk, running, 1.0)
+    assert not walk._pusher.force.any() and not walk._stage._arrow.visible
+    pushed = walk._recorder.trace()
+    assert PERIOD * pushed.force[:, 1].sum() == pytest.approx(40.0, rel=0.06)
+
+
+def test_the_camera_stays_with_a_robot_that_moves(walker: tuple[Running, Any], walk: LiveView) -> None:
+    _, robot = walker
+    robot.data.body("pelvis").xpos[:2] = (2.0, -1.0)
+    walk._stage.show(10.0, None)
+    np.testing.assert_allclose(walk._stage._world.position, (-2.0, 1.0, 0.0), atol=1e-5)
+
+
+def test_starting_over_shows_the_new_episode(
+    standing: Stack, walker: tuple[Running, Any], walk: LiveView
+) -> None:
+    run(walk, walker[0], 0.3)
+    walk.panel.press(Button.RESTART)
+    assert not walk.wait_for_pick()
+    running, robot = build(standing, 0)
+    walk.attach(running, robot)
+    run(walk, running, 0.1)
+    assert len(walk._recorder.trace().t) == pytest.approx(11, abs=1)
+    assert "robot time 0.1 s" in walk.panel._status.content
+    robot.close()

@@ -1,7 +1,8 @@
 """The live view: the robot in a browser, in real time, with its cameras, its state and the operator's buttons.
 
-A viewer of the simulation, no module of the stack: it sees the simulator's scene through `dashboard.scene`, and acts
-on the robot only as an operator does, through the e-stop, requests to the safety gate, and skills.
+A viewer of the simulation, no module of the stack: it sees the simulator's scene through `dashboard.scene`. On the
+robot it acts as an operator does, through the e-stop, requests to the safety gate, twists and skills; and as the world
+does, with a push.
 """
 
 from __future__ import annotations
@@ -17,18 +18,24 @@ from typing import Any
 import cv2
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
+from golem.dashboard.balance import SPAN, balance_chart
 from golem.dashboard.panel import Button, Panel
 from golem.dashboard.scene import SpectatorView
+from golem.dashboard.stage import Stage
 from golem.dashboard.status import Timeline, camera_picture, read_status
 from golem.errors import ConfigError
+from golem.evaluation.balance import BalanceRecorder
+from golem.evaluation.pushes import Push, Pusher
 from golem.hardware.safety.base import GateState, Request
+from golem.middleware import topics
+from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.assembly import Running
 from golem.skills.base import Skill, SkillResult
 from golem.skills.context import Context
 from golem.skills.pick import TIMEOUT
+from golem.types import Twist
 
 PERIOD = 0.05
 """Time between two updates of the picture [s]."""
@@ -41,14 +48,23 @@ LAG = 0.25
 """Delay behind the wall clock that is made up for [s]; a machine that is slower falls behind for good."""
 PATIENCE = 0.5
 """Time within which the safety gate must have armed after a reset [s]."""
-TARGET_COLOUR = (255, 60, 160)
+CHART = (CAMERA_WIDTH, 84)
+"""Size of the chart of the CoM margin [px]."""
+SHOWN = 0.6
+"""Time for which the arrow of a push is shown at least [s]: the push itself is over in the blink of an eye."""
 
 
 class LiveView:
     """Shows one running stack and drives it in real time, in the calling thread."""
 
     def __init__(
-        self, running: Running, robot: MujocoRobot, port: int = 8080, host: str = "127.0.0.1"
+        self,
+        running: Running,
+        robot: MujocoRobot,
+        port: int = 8080,
+        host: str = "127.0.0.1",
+        *,
+        restarts: bool = False,
     ) -> None:
         """Start serving.
 
@@ -57,43 +73,44 @@ class LiveView:
             robot: its twin.
             port: TCP port; 0 takes a free one.
             host: address to listen at; the default is reachable from this machine only.
+            restarts: whether there is a button to start over, which makes `operate` return.
 
         Raises:
             ConfigError: the port cannot be had.
         """
-        self._running = running
-        self._view = SpectatorView(robot)
         self._server = _serve(host, port)
         self.url = f"http://{host}:{self._server.get_port()}"
-        self._panel = Panel(self._server)
-        self._timeline = Timeline()
-        self._build_scene(robot)
-        self._paused = self._busy = self._wanted = self._asking = False
-        self._revive_until: float | None = None
-        self._ended = 0.0
+        standing = running.stack.on_ground
+        picks = bool(robot.scene.names.screws)
+        self._panel = Panel(self._server, standing=standing, picks=picks, restarts=restarts)
+        self._view = SpectatorView(robot)
+        self._stage = Stage(self._server, self._view, standing=standing)
+        self._paused = self._busy = self._wanted = self._restart = False
         self._note = ""
-        self._next_update = 0.0
         self._next_camera = 0.0
+        self._factor = 1.0
+        self._watch(running, robot)
+
+    def attach(self, running: Running, robot: MujocoRobot) -> None:
+        """Show another episode of the same stack and seed from now on."""
+        self._view.close()
+        self._view = SpectatorView(robot)
+        self._stage.look(self._view)
+        self._watch(running, robot)
+
+    def _watch(self, running: Running, robot: MujocoRobot) -> None:
+        self._running = running
+        self._recorder = BalanceRecorder(robot, memory=SPAN)
+        self._recorder(running.executor.t)
+        self._pusher = Pusher(robot)
+        self._pushed: tuple[float, str] | None = None
+        self._timeline = Timeline()
+        self._revive_until: float | None = None
+        self._asking = False
+        self._ended = self._next_update = self._shown = 0.0
+        self._note = ""
         self._origin = time.perf_counter() - running.executor.t
         self._pace: tuple[float, float] = (time.perf_counter(), running.executor.t)
-        self._factor = 1.0
-
-    def _build_scene(self, robot: MujocoRobot) -> None:
-        scene = self._server.scene
-        scene.set_up_direction("+z")
-        scene.configure_environment_map("studio", environment_intensity=0.22)
-        scene.configure_default_lights(enabled=False)
-        scene.add_light_directional("/sun", intensity=1.9, cast_shadow=True, position=(1.6, -1.4, 4.0))
-        scene.add_light_directional("/fill", intensity=0.5, position=(2.0, 3.0, 2.0))
-        scene.set_background_image(_sky(), format="png")
-        camera = self._server.initial_camera
-        camera.position, camera.look_at, camera.fov = (2.1, 1.1, 1.95), (0.34, -0.04, 1.12), 0.75
-        self._bodies = {
-            mesh.name: scene.add_glb(f"/world/{mesh.name}", mesh.glb) for mesh in self._view.meshes()
-        }
-        self._target = scene.add_icosphere("/target", radius=0.012, color=TARGET_COLOUR, visible=False)
-        self._target_label = scene.add_label("/target_label", "target", visible=False)
-        self._move_bodies()
 
     @property
     def panel(self) -> Panel:
@@ -127,10 +144,12 @@ class LiveView:
         end = self._running.executor.t + patience
         self.idle(lambda: bool(self._server.get_clients()) or self._running.executor.t >= end)
 
-    def wait_for_pick(self) -> None:
-        """Let time pass until the operator asks for the next pick."""
-        self.idle(lambda: self._wanted)
-        self._wanted = False
+    def wait_for_pick(self) -> bool:
+        """Let time pass until the operator asks for the next pick; returns False if for starting over instead."""
+        self.idle(lambda: self._wanted or self._restart)
+        wanted = self._wanted
+        self._wanted = self._restart = False
+        return wanted
 
     def idle(self, stop: Callable[[], bool]) -> None:
         """Let time pass without a skill until `stop()` is true."""
@@ -144,9 +163,12 @@ class LiveView:
     def tick(self) -> None:
         """Keep pace with the wall clock, and every now and then the picture with the robot; call it every tick."""
         t = self._running.executor.t
+        self._recorder(t, self._pusher.force)
+        self._pusher.drive(t)
         if t >= self._next_update:
             self._next_update = t + PERIOD
             self._serve_buttons()
+            self._drive(t)
             self.update()
             while self._paused:
                 time.sleep(PERIOD)
@@ -171,13 +193,13 @@ class LiveView:
             self._pace = (now, t)
         if not self._server.get_clients():
             return
+        if self._recorder.fallen and not self._note:
+            self._note = "The robot fell, by the simulator's truth."
         status = read_status(self._running)
         with self._server.atomic():
-            self._move_bodies()
-            target = self._timeline.target if self._busy else None
-            self._target.visible = self._target_label.visible = target is not None
-            if target is not None:
-                self._target.position = self._target_label.position = self._view.from_odom(target)
+            self._stage.show(t - self._shown, self._timeline.target if self._busy else None)
+            self._show_push(t)
+        self._shown = t
         self._panel.show_status(
             status,
             self._timeline.durations(t if self._busy else self._ended),
@@ -189,16 +211,36 @@ class LiveView:
         )
         if now >= self._next_camera:
             self._next_camera = now + CAMERA_PERIOD
-            for camera, label in CAMERAS.items():
-                picture = camera_picture(self._running, self._view, camera)
-                height = round(CAMERA_WIDTH * picture.shape[0] / picture.shape[1])
-                picture = cv2.resize(picture, (CAMERA_WIDTH, height), interpolation=cv2.INTER_LINEAR)
-                self._panel.show_camera(label, np.asarray(picture, dtype=np.uint8))
+            self._show_pictures()
 
-    def _move_bodies(self) -> None:
-        for name, position, wxyz in zip(self._view.moving, *self._view.poses(), strict=True):
-            handle = self._bodies[name]
-            handle.position, handle.wxyz = position, wxyz
+    def _show_pictures(self) -> None:
+        if self._panel.legs is not None:
+            self._panel.show_picture("balance", balance_chart(self._recorder.trace(), CHART))
+        for camera, label in CAMERAS.items():
+            picture = camera_picture(self._running, self._view, camera)
+            height = round(CAMERA_WIDTH * picture.shape[0] / picture.shape[1])
+            picture = cv2.resize(picture, (CAMERA_WIDTH, height), interpolation=cv2.INTER_LINEAR)
+            self._panel.show_picture(label, np.asarray(picture, dtype=np.uint8))
+
+    def _show_push(self, t: float) -> None:
+        force = self._pusher.force
+        if force.any() and self._pushed is not None:
+            self._stage.show_push(force, self._pushed[1])
+        elif self._pushed is not None and t > self._pushed[0] + SHOWN:
+            self._pushed = None
+            self._stage.show_push(np.zeros(3), BASE_LINK)
+
+    def _drive(self, t: float) -> None:
+        """Say what the sliders say, as long as somebody holds them: else they go back to zero, and the robot stands."""
+        legs, gate = self._panel.legs, self._running.safety
+        if legs is None:
+            return
+        legs.limit(self._running.envelope)
+        active = gate is not None and gate.state is GateState.ACTIVE
+        if self._busy or not active or not self._server.get_clients():
+            legs.twist = Twist()
+        if not self._busy:
+            self._running.bus.publish(topics.TWIST, legs.twist, t)
 
     def _serve_buttons(self) -> None:
         """Do what was asked for. The safety gate has the last word on all that moves the robot."""
@@ -212,9 +254,20 @@ class LiveView:
                 self._revive_until = self._running.executor.t + PATIENCE
             elif button is Button.PICK:
                 self._wanted = not self._busy
+            elif button is Button.RESTART:
+                self._restart = not self._busy
+            elif button is Button.STAND and self._panel.legs is not None:
+                self._panel.legs.twist = Twist()
+            elif button is Button.PUSH and self._panel.legs is not None:
+                self._push(self._panel.legs.push)
             else:
                 self._paused = not self._paused
         self._revive()
+
+    def _push(self, push: Push) -> None:
+        t = self._running.executor.t
+        self._pusher.begin(push, t, self._recorder.yaw)
+        self._pushed = (t, push.body)
 
     def _revive(self) -> None:
         """Reset the gate, and activate it as soon as that has armed it."""
@@ -261,10 +314,3 @@ def _serve(host: str, port: int) -> viser.ViserServer:
     logging.getLogger("websockets").setLevel(logging.ERROR)
     with contextlib.redirect_stdout(io.StringIO()):  # its banner; our callers say where to look
         return viser.ViserServer(host=host, port=port, verbose=False)
-
-
-def _sky() -> NDArray[np.uint8]:
-    """Return a background that is light above and darker at the horizon."""
-    rows = np.linspace(0.0, 1.0, 256)[:, None, None]
-    colours = (1.0 - rows) * np.array([236.0, 241.0, 247.0]) + rows * np.array([150.0, 162.0, 178.0])
-    return np.broadcast_to(colours, (256, 4, 3)).astype(np.uint8)

@@ -10,6 +10,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from golem.dashboard.legs_panel import LegsPanel, legs_html
 from golem.dashboard.status import Status
 from golem.hardware.safety.base import GateState
 
@@ -33,13 +34,27 @@ class Button(StrEnum):
     REVIVE = "reset and activate"
     PICK = "pick the next screw"
     PAUSE = "pause"
+    RESTART = "start over"
+    STAND = "stop walking"
+    PUSH = "push the robot"
 
 
 class Panel:
-    """The panel of one server. Buttons are pressed in the server's threads; `pressed` hands them over."""
+    """The panel of one server. Buttons are pressed in the server's threads; `pressed` hands them over.
 
-    def __init__(self, server: viser.ViserServer) -> None:
-        """Build the panel of `server`."""
+    Attributes:
+        legs: the controls of a robot on its feet; None for one that hangs.
+    """
+
+    def __init__(self, server: viser.ViserServer, *, standing: bool, picks: bool, restarts: bool) -> None:
+        """Build the panel of `server`.
+
+        Args:
+            server: of the view.
+            standing: whether the robot stands on its feet.
+            picks: whether there is anything to pick.
+            restarts: whether the operator may start over.
+        """
         self._asked: queue.SimpleQueue[Button] = queue.SimpleQueue()
         gui = server.gui
         gui.configure_theme(
@@ -53,17 +68,23 @@ class Panel:
             self._stop = gui.add_button("Emergency stop", color="red", icon=viser.Icon.HAND_STOP)
             self._release = gui.add_button("Release emergency stop", visible=False)
             self._revive = gui.add_button("Reset and activate", visible=False)
-            self._next = gui.add_button("Pick the next screw", icon=viser.Icon.PLAYER_PLAY)
+            self._next = gui.add_button("Pick the next screw", icon=viser.Icon.PLAYER_PLAY, visible=picks)
             self._pause = gui.add_button("Pause", color="gray")
-        for handle, button in (
+            self._restart = gui.add_button("Start over", color="gray", visible=restarts)
+        self.legs = LegsPanel(gui) if standing else None
+        buttons = [
             (self._stop, Button.PRESS),
             (self._release, Button.RELEASE),
             (self._revive, Button.REVIVE),
             (self._next, Button.PICK),
             (self._pause, Button.PAUSE),
-        ):
+            (self._restart, Button.RESTART),
+        ]
+        if self.legs is not None:
+            buttons += [(self.legs.stop_button, Button.STAND), (self.legs.push_button, Button.PUSH)]
+        for handle, button in buttons:
             handle.on_click(lambda _, button=button: self._asked.put(button))
-        self._cameras: dict[str, viser.GuiImageHandle] = {}
+        self._pictures: dict[str, viser.GuiImageHandle] = {}
         self._gui = gui
         self._html = ""
 
@@ -78,11 +99,11 @@ class Panel:
             buttons.append(self._asked.get_nowait())
         return buttons
 
-    def show_camera(self, label: str, picture: NDArray[np.uint8]) -> None:
-        """Show (height, width, 3) RGB of a camera."""
-        handle = self._cameras.get(label)
+    def show_picture(self, label: str, picture: NDArray[np.uint8]) -> None:
+        """Show (height, width, 3) RGB, of a camera or a chart."""
+        handle = self._pictures.get(label)
         if handle is None:
-            self._cameras[label] = self._gui.add_image(picture, label=label, format="jpeg", jpeg_quality=80)
+            self._pictures[label] = self._gui.add_image(picture, label=label, format="jpeg", jpeg_quality=80)
         else:
             handle.image = picture
 
@@ -101,7 +122,7 @@ class Panel:
             paused: whether time stands still.
             busy: whether a skill runs.
         """
-        html = _status_html(status, stages, factor, note, paused)
+        html = _status_html(status, stages, factor, note, paused, self.legs is not None)
         if html != self._html:
             self._html = html
             self._status.content = html
@@ -114,15 +135,21 @@ class Panel:
             if handle.visible != visible:
                 handle.visible = visible
         idle = not busy and status.safety is GateState.ACTIVE
-        if self._next.disabled == idle:
-            self._next.disabled = not idle
+        for handle, enabled in ((self._next, idle), (self._restart, not busy)):
+            if handle.disabled == enabled:
+                handle.disabled = not enabled
         word = "Resume" if paused else "Pause"
         if self._pause.label != word:
             self._pause.label = word
 
 
 def _status_html(
-    status: Status, stages: list[tuple[str, float]], factor: float, note: str, paused: bool
+    status: Status,
+    stages: list[tuple[str, float]],
+    factor: float,
+    note: str,
+    paused: bool,
+    standing: bool,
 ) -> str:
     colour = SAFETY_COLOURS[status.safety]
     small = "font-size:12px;opacity:.75"
@@ -140,6 +167,7 @@ def _status_html(
     if stages:
         parts.append(f'<div><b style="font-size:16px">{escape(status.stage)}</b> {escape(status.text)}</div>')
         parts.append(_timeline_html(stages[-RECENT:]))
+    parts.append(legs_html(status) if standing else "")
     parts.append("</div>")
     return "".join(parts)
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from golem.dashboard.scene import SpectatorView
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
-from golem.middleware.topics import Sightings
+from golem.middleware.topics import LegStatus, Sightings
 from golem.runtime.assembly import Running
 from golem.skills.base import Feedback
-from golem.types import Array, Frame
+from golem.types import Array, BaseEstimate, Frame
 
 FRESH = 0.2
 """Age up to which a frame on the bus is shown [s]: three frame periods."""
@@ -37,6 +37,8 @@ class Status:
         stage, text: what the skill says; empty before the first.
         safety: state of the safety gate.
         reason: why the gate does not let commands through; empty when it does.
+        legs: what the base layer of the legs did; None before the first tick.
+        base: what the robot takes for its own motion; None before the first tick.
     """
 
     t: float
@@ -44,6 +46,8 @@ class Status:
     text: str
     safety: GateState
     reason: str
+    legs: LegStatus | None
+    base: BaseEstimate | None
 
 
 def read_status(running: Running) -> Status:
@@ -59,6 +63,8 @@ def read_status(running: Running) -> Status:
         "" if feedback is None else feedback.text,
         GateState.INIT if gate is None else gate.state,
         reason,
+        running.bus.latest(topics.LEG_STATUS, LegStatus),
+        running.bus.latest(topics.BASE, BaseEstimate),
     )
 
 
