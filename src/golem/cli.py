@@ -88,7 +88,7 @@ def _model(words: list[str]) -> int:
 
 
 def _bench(words: list[str]) -> int:
-    """Print every performance figure beside its reference; `bench push` and `bench legs` test the lower body."""
+    """Print every performance figure beside its reference; `bench push|legs|estimation` test robots on their feet."""
     _prepare_graphics()
     if words[:1] == ["push"]:
         from golem.evaluation.push_bench import PushBenchConfig, run_push_bench
@@ -98,6 +98,10 @@ def _bench(words: list[str]) -> int:
         from golem.evaluation.leg_bench import LegBenchConfig, run_leg_bench
 
         run_leg_bench(_parse(LegBenchConfig, "bench legs", words[1:]))
+    elif words[:1] == ["estimation"]:
+        from golem.evaluation.estimation import EstimationConfig, run_estimation
+
+        run_estimation(_parse(EstimationConfig, "bench estimation", words[1:]))
     else:
         from golem.evaluation.bench import BenchConfig, run_bench
 
