@@ -81,6 +81,7 @@ class LowerBodyNode:
         self._twists = News(bus, topics.TWIST, Twist)
         self._fault: ModuleFault | None = None
         self._failed_at = -RECOVERY
+        self._last: LegCommand | None = None
         self._overruns = 0
         self.realtime = False
         self.period = 1.0 / max(legs.rate, fallback.rate)
@@ -111,10 +112,11 @@ class LowerBodyNode:
             self._failed_at = t
             self._legs = self._fallback
             try:
-                self._legs.guard.call(self._locomotion.hand_over, self._legs.controller, state)
+                self._legs.guard.call(self._locomotion.hand_over, self._legs.controller, state, self._last)
                 command = self._control(state, base, None)
             except ModuleFault as second:
                 raise self._both(second) from second
+        self._last = command
         self._bus.publish(topics.LEG_COMMAND, command, t, self._legs.check_latency())
         self._report(t)
 

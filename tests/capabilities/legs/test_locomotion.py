@@ -199,7 +199,7 @@ def test_after_a_hand_over_the_clock_goes_on_and_the_twist_is_zero(driver: Drive
     driver.run(1.0, Twist(0.5))
     before = driver.controller.motions[-1].phase[0]
     other = Recorder(envelope=Envelope((-0.1, 0.1), (0.0, 0.0), (0.0, 0.0)))
-    driver.layer.hand_over(other, driver.state)
+    driver.layer.hand_over(other, driver.state, None)
     driver.run(DT)
     assert other.resets == 1
     first = other.motions[0]
@@ -211,8 +211,8 @@ def test_after_a_hand_over_the_clock_goes_on_and_the_twist_is_zero(driver: Drive
 
 
 def test_after_a_hand_over_the_targets_do_not_jump(driver: Driver) -> None:
-    driver.run(0.5)
-    driver.layer.hand_over(Recorder(target=1.0, stiffness=200.0), driver.state)
+    last = driver.layer.step(driver.state, driver.base, None, DT)
+    driver.layer.hand_over(Recorder(target=1.0, stiffness=200.0), driver.state, last)
     commands = [driver.layer.step(driver.state, driver.base, None, DT) for _ in range(10)]
     q, kp = np.array([(c.q[0], c.kp[0]) for c in commands]).T
     np.testing.assert_allclose(q[:7], np.arange(1, 8) * DT / LocomotionConfig().blend)

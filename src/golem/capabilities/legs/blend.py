@@ -15,24 +15,20 @@ class Blend:
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was commanded: the next command passes as it is."""
-        self._last: LegCommand | None = None
-        self._old: LegCommand | None = None
-        self._elapsed = 0.0
+        """Let the next command pass as it is."""
+        self.begin(None)
 
-    def begin(self) -> None:
-        """Lead over from the newest command, if there was one: from now on the commands are another controller's."""
-        self._old, self._elapsed = self._last, 0.0
+    def begin(self, old: LegCommand | None) -> None:
+        """Lead over from the command `old` to those of another controller; None lets them pass as they are."""
+        self._old, self._elapsed = old, 0.0
 
     def step(self, command: LegCommand, dt: float) -> LegCommand:
         """Return what the legs are told `dt` [s] after the previous tick instead of `command`."""
         self._elapsed += dt
-        if self._old is not None and self._elapsed < self._duration:
-            command = _mixed(self._old, command, self._elapsed / self._duration)
-        else:
+        if self._old is None or self._elapsed >= self._duration:
             self._old = None
-        self._last = command
-        return command
+            return command
+        return _mixed(self._old, command, self._elapsed / self._duration)
 
 
 def _mixed(old: LegCommand, new: LegCommand, share: float) -> LegCommand:

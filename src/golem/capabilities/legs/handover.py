@@ -111,12 +111,13 @@ class Handover:
         command = None if self._coming is None else self._coming.step(state, base, motion, dt)
         if self._coming is not None and command is not None and _speaks(command):
             self._take_over(self._coming)
-            self._blend.begin()
+            self._blend.begin(self._last)
         else:
             if not self.walking:
                 motion = Motion(ZERO, motion.phase, motion.stepping)
             command = self._active.step(state, base, motion, dt)
-        return self._blend.step(command, dt)
+        self._last = self._blend.step(command, dt)
+        return self._last
 
     def _take_over(self, controller: Paced) -> None:
         self._active = controller
@@ -126,6 +127,7 @@ class Handover:
     def _begin(self) -> None:
         self._take_over(self._stand)
         self._healthy = 0.0
+        self._last: LegCommand | None = None
         self._blend.reset()
 
     def _is_healthy(self, state: LowState, base: BaseEstimate) -> bool:

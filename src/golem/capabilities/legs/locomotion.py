@@ -83,10 +83,16 @@ class Locomotion:
         self._blend.reset()
         self._paced.reset(state)
 
-    def hand_over(self, controller: LowerBody, state: LowState) -> None:
-        """Give the legs to `controller` at the measured `state`, at zero twist; a step that was begun is finished."""
+    def hand_over(self, controller: LowerBody, state: LowState, last: LegCommand | None) -> None:
+        """Give the legs to `controller`, at zero twist; a step that was begun is finished.
+
+        Args:
+            controller: the controller that is in charge from now on.
+            state: measured joints and IMU.
+            last: the last sound command, from which the targets lead over to those of `controller`.
+        """
         self._forget()
-        self._blend.begin()
+        self._blend.begin(last)
         self._paced = Paced(controller)
         self._paced.reset(state)
 
