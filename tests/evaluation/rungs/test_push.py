@@ -1,0 +1,76 @@
+"""The push rung: draws that do not depend on the method, and trials that are judged on the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from golem.evaluation.balance import TRACE, BalanceTrace
+from golem.evaluation.base import TrialSpec
+from golem.evaluation.episode import Loss
+from golem.evaluation.pushes import DIRECTIONS, ROD_TIME, rod
+from golem.evaluation.rungs.push import LEAST_PEAK, PEAK, PushRung, draw, judge
+
+STIFF = f"{Path(__file__).parents[1] / 'leg_methods.py'}:Stiff"
+
+
+def spec(method: str = STIFF, index: int = 0) -> TrialSpec:
+    return TrialSpec("push", method, "ideal", 0, index)
+
+
+def test_pushes_are_drawn_like_the_papers_and_not_by_the_method() -> None:
+    draws = [draw(spec(index=i).rng("push")) for i in range(2000)]
+    peaks = np.array([push.peak for push, _ in draws])
+    assert peaks.mean() == pytest.approx(PEAK[0], abs=0.6)
+    assert peaks.std() == pytest.approx(PEAK[1], abs=0.5)
+    assert peaks.min() >= LEAST_PEAK
+    assert {push.direction for push, _ in draws} == set(DIRECTIONS)
+    assert draw(spec("other", 5).rng("push")) == draw(spec(index=5).rng("push"))
+
+
+def test_a_trial_is_recorded_and_depends_on_its_spec_alone(tmp_path: Path) -> None:
+    rung = PushRung()
+    first = rung.run(spec(), tmp_path / "first")
+    again = PushRung().run(spec(), None)
+    assert first == again
+    push, _ = draw(spec().rng("push"))
+    assert first.series["peak_force"] == pytest.approx(push.peak, rel=1e-3)
+    assert first.series["margin_before"] > 0.08
+    assert first.picture is not None and first.picture.startswith(b"\x89PNG"), "trial 0 is shown"
+    trace = BalanceTrace.load(tmp_path / "first" / TRACE)
+    pushed = trace.t[np.linalg.norm(trace.force, axis=1) > 0.0]
+    assert np.ptp(pushed) == pytest.approx(ROD_TIME, abs=0.03)
+
+
+def trace(margin: float) -> BalanceTrace:
+    n = 400
+    zeros = np.zeros((n, 3))
+    t = 0.01 * np.arange(n, dtype=np.float64)
+    margins = np.where((t > 2.2) & (t < 2.6), -0.04, margin)
+    return BalanceTrace(t, margins, zeros, zeros, np.zeros(n), zeros, np.ones((n, 2), bool), zeros)
+
+
+def test_standing_again_is_a_success_with_the_time_it_took() -> None:
+    outcome = judge(trace(0.1), 2.0, rod("left", 22.0), None, "mine")
+    assert outcome.success
+    assert outcome.timings["recovery"] == pytest.approx(0.6, abs=0.02)
+    assert outcome.series["margin_min"] == pytest.approx(-0.04)
+    assert outcome.series["below_zero"] == pytest.approx(0.4, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("margin", "loss", "stage"),
+    [(-0.02, None, "balance"), (0.1, Loss("fall", "The robot fell."), "fall")],
+    ids=["outside at the end", "fell"],
+)
+def test_what_was_lost_names_stage_and_lower_body(margin: float, loss: Loss | None, stage: str) -> None:
+    outcome = judge(trace(margin), 2.0, rod("left", 22.0), loss, "mine")
+    assert not outcome.success and outcome.stage == stage and outcome.module == "lower_body: mine"
+    assert "22 N to the left" in outcome.detail
+
+
+def test_a_robot_that_fell_before_the_push_is_not_blamed_on_it() -> None:
+    outcome = judge(trace(0.1), 9.0, rod("left", 22.0), Loss("fall", "The robot fell at 1.0 s."), "mine")
+    assert outcome.stage == "settle" and outcome.series == {}

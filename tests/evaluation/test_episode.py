@@ -1,0 +1,76 @@
+"""Real robots on their feet: who stands, who falls, who is stopped, and who is to blame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from golem.evaluation.episode import Episode, legs_stack, lower_body
+from golem.evaluation.exercise import WIDE_AREA, ArmMotion, Exercise
+from golem.evaluation.pushes import shove
+from golem.middleware import topics
+from golem.middleware.topics import LegStatus
+from golem.skills.runner import FAULT
+from golem.types import PalmTargets, Twist
+
+METHODS = Path(__file__).with_name("leg_methods.py")
+
+
+def episode(name: str) -> Episode:
+    return Episode(legs_stack(f"{METHODS}:{name}", "ideal"), 0)
+
+
+def test_a_method_is_a_lower_body_or_the_files_of_a_policy() -> None:
+    assert lower_body("wbc").use == "wbc" and lower_body("wbc").options == {}
+    assert lower_body("legs.py:Mine").use == "legs.py:Mine"
+    assert lower_body("policy:almi_open:net.pt").options == {"file": "almi_open", "network": "net.pt"}
+    assert lower_body("policy:mine.yaml").options == {"file": "mine.yaml"}
+
+
+def test_a_robot_that_stands_is_pushed_over_and_the_gate_stops_it() -> None:
+    robot = episode("Stiff")
+    try:
+        robot.run(2.0)
+        assert robot.loss is None and not robot.over
+        assert robot.recorder.quiet > 1.0
+        robot.push(shove("front", 80.0))
+        robot.run(3.0)
+        loss, seen = robot.loss, robot.recorder.trace()
+        assert loss is not None and loss.stage == "safety" and "tilt" in loss.detail
+        assert robot.t < 4.0, "a lost robot ends the run"
+        assert seen.margin[-1] < -0.1 < 0.08 < seen.window(1.5, 2.0).margin.min()
+        assert seen.force[:, 0].max() == pytest.approx(400.0) and not seen.force[-1].any()
+        assert seen.rpy[-1, 1] > 0.3, "pushed ahead, it leans ahead"
+    finally:
+        robot.close()
+
+
+def test_the_fallback_does_not_count_for_a_controller_that_failed() -> None:
+    robot = episode("Broken")
+    try:
+        robot.run(2.5)
+        loss = robot.loss
+        assert loss is not None and loss.stage == FAULT and "my bug" in loss.detail
+    finally:
+        robot.close()
+
+
+def test_an_exercise_moves_the_hands_through_the_work_area_and_commands_the_base() -> None:
+    motion = ArmMotion(np.random.default_rng(3), WIDE_AREA)
+    path = np.array([motion.positions(t) for t in np.arange(0.0, 60.0, 0.02)])
+    middle = np.array([[0.43, 0.22, 0.20], [0.43, -0.22, 0.20]])
+    assert (np.abs(path - middle) <= np.array(WIDE_AREA) + 1e-9).all()
+    assert (np.ptp(path, axis=0) > np.array(WIDE_AREA)).all(), "more than half of the area is used"
+    assert np.linalg.norm(np.diff(path, axis=0), axis=2).max() / 0.02 < 0.6
+    robot = episode("Stiff")
+    try:
+        robot.start(Exercise(motion, lambda t: Twist(vx=0.1 * t)))
+        robot.run(1.0)
+        targets = robot.running.bus.latest(topics.PALM_TARGETS, PalmTargets)
+        status = robot.running.bus.latest(topics.LEG_STATUS, LegStatus)
+        assert targets is not None and targets.left is not None and targets.right is not None
+        assert status is not None and 0.08 < status.commanded.vx < 0.1
+    finally:
+        robot.close()
