@@ -31,7 +31,7 @@ TWISTS = (
     Twist(0.3, -0.2, -0.3),
 )
 """What is walked, one segment after the other; the robot stands before and after."""
-SHOVE = 40.0
+SHOVE = 20.0
 """Impulse of the shoves of a pushed walk [N s], one per segment, half a second into it."""
 LOADED = 100.0
 """Force above which a foot truly carries load [N]."""

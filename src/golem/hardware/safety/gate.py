@@ -186,7 +186,7 @@ def _base(
     if new is not None and not new.stale and _stamped(new.t, t, limits) and (old is None or new.t > old):
         old = new.t
     if old is not None and t - old > limits.base_age:
-        return old, Fault(Reason.BASE_STALE, f"no foot measured the base for {(t - old) * 1e3:.0f} ms")
+        return old, Fault(Reason.BASE_STALE, f"for {(t - old) * 1e3:.0f} ms")
     return old, None
 
 
