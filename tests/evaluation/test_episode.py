@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from golem.evaluation.episode import Episode, legs_stack, lower_body
+from golem.evaluation import episode as episodes
+from golem.evaluation.episode import Episode, legs_stack, with_legs
 from golem.evaluation.exercise import WIDE_AREA, ArmMotion, Exercise
 from golem.evaluation.pushes import shove
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
 from golem.skills.runner import FAULT
+from golem.stack import Choice, Stack
 from golem.types import PalmTargets, Twist
 
 METHODS = Path(__file__).with_name("leg_methods.py")
@@ -23,16 +25,31 @@ def episode(name: str) -> Episode:
 
 
 def test_a_method_is_a_lower_body_or_the_files_of_a_policy() -> None:
-    assert lower_body("wbc").use == "wbc" and lower_body("wbc").options == {}
-    assert lower_body("legs.py:Mine").use == "legs.py:Mine"
-    assert lower_body("policy:almi_open:net.pt").options == {"file": "almi_open", "network": "net.pt"}
-    assert lower_body("policy:mine.yaml").options == {"file": "mine.yaml"}
+    stack = Stack()
+    assert with_legs(stack, "wbc").lower_body == Choice("wbc")
+    assert with_legs(stack, "legs.py:Mine").lower_body == Choice("legs.py:Mine")
+    files = {"file": "almi_open", "network": "net.pt"}
+    assert with_legs(stack, "policy:almi_open:net.pt").lower_body == Choice("policy", files)
+    assert with_legs(stack, "policy:mine.yaml").lower_body == Choice("policy", {"file": "mine.yaml"})
+    vendor = with_legs(stack, "vendor:almi_open:net.pt")
+    assert (vendor.lower_body, vendor.onboard) == (Choice("vendor"), Choice("policy", files))
+
+
+def test_a_robot_that_never_carries_its_weight_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(episodes, "READY", 1.0)
+    robot = episode("Limp")
+    try:
+        robot.stand(5.0)
+        assert robot.over and robot.t == pytest.approx(1.0)
+        assert robot.loss is not None and robot.loss.stage == "settle"
+    finally:
+        robot.close()
 
 
 def test_a_robot_that_stands_is_pushed_over_and_the_gate_stops_it() -> None:
     robot = episode("Stiff")
     try:
-        robot.run(2.0)
+        robot.stand(1.2)
         assert robot.loss is None and not robot.over
         assert robot.recorder.quiet > 1.0
         robot.push(shove("front", 80.0))
@@ -40,7 +57,9 @@ def test_a_robot_that_stands_is_pushed_over_and_the_gate_stops_it() -> None:
         loss, seen = robot.loss, robot.recorder.trace()
         assert loss is not None and loss.stage == "safety" and "tilt" in loss.detail
         assert robot.t < 4.0, "a lost robot ends the run"
-        assert seen.margin[-1] < -0.1 < 0.08 < seen.window(1.5, 2.0).margin.min()
+        robot.run(1.0)
+        assert robot.t < 4.0, "and it stays so"
+        assert seen.margin[-1] < -0.1 < 0.08 < seen.window(1.0, 1.2).margin.min()
         assert seen.force[:, 0].max() == pytest.approx(400.0) and not seen.force[-1].any()
         assert seen.rpy[-1, 1] > 0.3, "pushed ahead, it leans ahead"
     finally:

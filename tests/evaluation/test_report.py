@@ -100,6 +100,7 @@ def test_a_run_of_one_method_without_failures_has_a_report(fake: Callable[..., L
         (0, 16.7, [0, 5, 10, 15, 20]),
         (0, 0.9, [0, 0.2, 0.4, 0.6, 0.8, 1.0]),
         (-3, 3, [-3, -2, -1, 0, 1, 2, 3]),
+        (0, 0, [0, 0.2, 0.4, 0.6, 0.8, 1.0]),
     ],
 )
 def test_ticks_are_round_and_cover_the_values(low: float, high: float, expected: list[float]) -> None:

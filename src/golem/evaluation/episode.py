@@ -23,21 +23,27 @@ from golem.types import Array
 
 STACK = "stand"
 """The shipped stack whose robot stands on its own feet."""
-POLICY = "policy"
-"""The lower body that runs a policy file."""
+READY = 10.0
+"""Time in which a robot has to carry its weight, so that its band is let go [s]: the vendor's start-up takes some."""
+RUNS_FILES = ("policy", "vendor")
+"""Lower bodies that run the files of a policy: the adapter, and the vendor's service on board."""
 
 
-def lower_body(method: str) -> Choice:
-    """Return the lower body a method stands for.
+def with_legs(stack: Stack, method: str) -> Stack:
+    """Return `stack` with the lower body a method stands for.
 
     Args:
-        method: a registered name, a user's `file.py:Class` or `package.module:Class`, or `policy:DESCRIPTION` or
-            `policy:DESCRIPTION:NETWORK`, the files of a policy.
+        stack: any stack.
+        method: a registered name, a user's `file.py:Class` or `package.module:Class`, or the files of a policy as
+            `policy:DESCRIPTION` or `policy:DESCRIPTION:NETWORK`; `vendor:DESCRIPTION:NETWORK` runs them on board.
     """
     name, *files = method.split(":")
-    if name != POLICY or not files:
-        return Choice(method)
-    return Choice(name, dict(zip(("file", "network"), files, strict=False)))
+    if name not in RUNS_FILES or not files:
+        return replace(stack, lower_body=Choice(method))
+    policy = Choice("policy", dict(zip(("file", "network"), files, strict=False)))
+    if name == "vendor":
+        return replace(stack, lower_body=Choice(name), onboard=policy)
+    return replace(stack, lower_body=policy)
 
 
 def legs_stack(
@@ -49,13 +55,12 @@ def legs_stack(
     """Return the standing stack with the lower body `method`.
 
     Args:
-        method: see `lower_body`.
+        method: see `with_legs`.
         profile: realism profile.
         overrides: slot -> implementation that replaces the stack's own.
         robot: options of the twin that differ from the stack's own; without any, an open floor.
     """
-    stack = load_stack(STACK, profile=profile)
-    stack = replace(stack, lower_body=lower_body(method))
+    stack = with_legs(load_stack(STACK, profile=profile), method)
     options = {**stack.robot.options, "world": "open", **(robot or {})}
     stack = replace(stack, robot=replace(stack.robot, options=options))
     for slot, use in (overrides or {}).items():
@@ -73,8 +78,8 @@ class Loss:
     """How a robot was lost.
 
     Attributes:
-        stage: `fall`, `safety` (its gate stopped it, as an operator's e-stop would) or `fault` (the leg controller
-            broke its contract, and the fallback took over).
+        stage: `settle` (it never carried its weight), `fall`, `safety` (its gate stopped it, as an operator's e-stop
+            would) or `fault` (the leg controller broke its contract, and the fallback took over).
         detail: one sentence.
     """
 
@@ -107,6 +112,7 @@ class Episode:
         self._pusher = Pusher(robot)
         self._odometry: SimulatedOdometry | None = None
         self._skill: SkillRun | None = None
+        self._hangs = False
 
     def start(self, skill: Skill[Context, Any], goal: object = None) -> None:
         """Begin a skill; it advances while the episode runs."""
@@ -140,13 +146,15 @@ class Episode:
     @property
     def over(self) -> bool:
         """Whether the robot fell, was stopped, or lost its leg controller."""
-        return self.recorder.fallen or self.stopped or self._fault is not None
+        return self.recorder.fallen or self.stopped or self._hangs or self._fault is not None
 
     @property
     def loss(self) -> Loss | None:
         """How the robot was lost; None while it was not."""
         if self._fault is not None:
             return Loss(FAULT, self._fault)
+        if self._hangs:
+            return Loss("settle", f"The robot did not carry its weight within {READY:g} s.")
         if self.recorder.fallen:
             return Loss("fall", f"The robot fell at {self.t:.1f} s.")
         safety = self.running.safety
@@ -159,9 +167,16 @@ class Episode:
         legs = self.running.bus.latest(topics.LEG_STATUS, LegStatus)
         return None if legs is None else legs.fault
 
+    def stand(self, seconds: float) -> None:
+        """Let the robot take over its weight, then let `seconds` pass; one that never does so is lost."""
+        self.run(READY, until=lambda: not self.robot.banded)
+        self._hangs = self.robot.banded
+        self.run(seconds)
+
     def run(self, seconds: float, until: Callable[[], bool] = lambda: False) -> None:
         """Let up to `seconds` of robot time pass; a fall, a stop or `until()` ends it early."""
-        self.running.executor.run(self.t + seconds, lambda: self._look() or until())
+        if not self.over:
+            self.running.executor.run(self.t + seconds, lambda: self._look() or until())
 
     def push(self, push: Push) -> None:
         """Begin `push` now; it goes on while the episode runs."""

@@ -32,7 +32,7 @@ Figures = dict[str, float]
 LOST = "lost_in_"
 """Prefix of the figure that counts a stage in which robots were lost."""
 SETTLE = 3.0
-"""Time before a test begins; no band holds the robot any more, and what its release set off has died away [s]."""
+"""Time between a robot carrying its weight and the test [s]: what the release of its band set off has died away."""
 MINUTE = 60.0
 """Length of the tests of standing and of one piece of endurance [s]."""
 PAYLOAD = (1.0, 1.0)
@@ -63,8 +63,10 @@ def quiet(subject: Subject, seed: int, index: int) -> Figures:
     """Stand still for a minute: base range, sway, steps, margin."""
     episode = subject.episode(seed, index)
     try:
-        episode.run(SETTLE + MINUTE)
-        return _standing(episode) | _lost(episode)
+        episode.stand(SETTLE)
+        start = episode.t
+        episode.run(MINUTE)
+        return _standing(episode, start) | _lost(episode)
     finally:
         episode.close()
 
@@ -75,8 +77,10 @@ def arms(subject: Subject, seed: int, index: int) -> Figures:
     try:
         draw = subject.draw("legs/arms", seed, index)
         episode.start(Exercise(ArmMotion(draw.rng("arms"), WIDE_AREA)))
-        episode.run(SETTLE + MINUTE)
-        return _standing(episode) | _lost(episode)
+        episode.stand(SETTLE)
+        start = episode.t
+        episode.run(MINUTE)
+        return _standing(episode, start) | _lost(episode)
     finally:
         episode.close()
 
@@ -89,8 +93,9 @@ def tracking(subject: Subject, seed: int, index: int) -> Figures:
             episode.running.envelope, subject.draw("legs/tracking", seed, index).rng("twist"), index
         )
         asked = np.array([twist.vx, twist.vy, twist.wz])
-        episode.start(Exercise(twist=lambda t: twist if t >= SETTLE else Twist()))
-        episode.run(SETTLE + COMMAND)
+        episode.stand(SETTLE)
+        episode.start(Exercise(twist=lambda t: twist))
+        episode.run(COMMAND)
         figures = dict(zip(("vx", "vy", "wz"), asked.tolist(), strict=True)) | _lost(episode)
         if not episode.over:
             walked = episode.recorder.trace().window(episode.t - COUNTED)
@@ -110,19 +115,22 @@ def endurance(subject: Subject, seed: int, index: int) -> Figures:
     try:
         envelope = episode.running.envelope
         script = [(0.0, Twist())]
-        while script[-1][0] < SETTLE + MINUTE:
+        while script[-1][0] < MINUTE:
             still = rng.random() < 0.2
-            script.append((max(script[-1][0], SETTLE) + rng.uniform(3.0, 6.0), _random(envelope, rng, still)))
-        exercise = Exercise(ArmMotion(draw.rng("arms")), lambda t: [w for at, w in script if at <= t][-1])
+            script.append((script[-1][0] + rng.uniform(3.0, 6.0), _random(envelope, rng, still)))
+        exercise = Exercise(ArmMotion(draw.rng("arms")))
         episode.start(exercise)
-        episode.run(SETTLE)
+        episode.stand(SETTLE)
+        start = episode.t
+        # The exercise counts from its own begin.
+        exercise.twist = lambda t: [twist for at, twist in script if at <= episode.t - start][-1]
         count = 0
-        while episode.t < SETTLE + MINUTE and not episode.over:
-            episode.run(min(shoves.uniform(4.0, 8.0), SETTLE + MINUTE - episode.t))
-            if episode.t < SETTLE + MINUTE and not episode.over:
+        while episode.t < start + MINUTE - 1e-6 and not episode.over:
+            episode.run(min(shoves.uniform(4.0, 8.0), start + MINUTE - episode.t))
+            if episode.t < start + MINUTE - 1e-6 and not episode.over:
                 episode.push(shove(DIRECTIONS[shoves.integers(8)], shoves.uniform(0.0, MAX_SHOVE)))
                 count += 1
-        return {"seconds": episode.t - SETTLE, "pushes": float(count)} | _lost(episode)
+        return {"seconds": episode.t - start, "pushes": float(count)} | _lost(episode)
     finally:
         episode.close()
 
@@ -150,7 +158,9 @@ def stopping(subject: Subject, seed: int, index: int) -> Figures:
         episode.locate(
             SimulatedOdometry(episode.running.bus, episode.robot, "estimator", draw.rng("odometry"))
         )
-        episode.run(SETTLE)
+        episode.stand(SETTLE)
+        if episode.over:
+            return _lost(episode)
         episode.start(
             Walk(episode.running.navigator), WalkGoal(goal.x, goal.y, goal.yaw, "odom", GOAL_TIMEOUT)
         )
@@ -188,7 +198,8 @@ def plans(subject: Subject, seed: int, index: int) -> Figures:
             stopwatch(MPC, "plan", time.perf_counter) as wall,
             stopwatch(MPC, "plan", time.process_time) as cpu,
         ):
-            episode.run(SETTLE + PLANNED)
+            episode.stand(SETTLE)
+            episode.run(PLANNED)
         return {
             "samples": float(samples),
             "plans_per_second": 1.0 / float(np.median(wall)),
@@ -213,8 +224,9 @@ def _random(envelope: Envelope, rng: np.random.Generator, still: bool) -> Twist:
 def _rough(subject: Subject, seed: int, index: int, world: str) -> Figures:
     episode = subject.episode(seed, index, world=world)
     try:
-        episode.start(Exercise(twist=lambda t: ROUGH if t >= SETTLE else Twist()))
-        episode.run(SETTLE + ROUGH_TIME)
+        episode.stand(SETTLE)
+        episode.start(Exercise(twist=lambda t: ROUGH))
+        episode.run(ROUGH_TIME)
         path = episode.recorder.trace().base
         climbed, moved = path[-1, 2] - path[0, 2], np.hypot(*(path[-1] - path[0])[:2])
         return {"distance": float(moved), "climbed": float(climbed)} | _lost(episode)
@@ -222,8 +234,8 @@ def _rough(subject: Subject, seed: int, index: int, world: str) -> Figures:
         episode.close()
 
 
-def _standing(episode: Episode) -> Figures:
-    stood = episode.recorder.trace().window(SETTLE)
+def _standing(episode: Episode, start: float) -> Figures:
+    stood = episode.recorder.trace().window(start)
     if not len(stood.t):
         return {}
     return {

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class PaperFigure:
-    """One entry of the GOLEM paper's table of grasp success.
+    """One success rate of the GOLEM paper.
 
     Attributes:
         label: task and environment, e.g. `"screw, real robot"`.
@@ -27,5 +27,10 @@ PAPER: dict[tuple[str, str], tuple[PaperFigure, ...]] = {
         PaperFigure("screw, simulation", 30),
         PaperFigure("screw, real robot", 29, time="75 ± 16 s from detection to grasp"),
     ),
+    ("stand", "centroid"): (PaperFigure("screw, simulation", 27), PaperFigure("screw, real robot", 0)),
+    ("stand", "visual_servo"): (PaperFigure("screw, simulation", 30), PaperFigure("screw, real robot", 26)),
+    # Its MPC, of which it gives no count, was stopped by the operator; the vendor's policy did not stand still.
+    ("push", "almi"): (PaperFigure("positive margin recovered, real robot", 14, 15),),
+    ("navigate-line", "vendor"): (PaperFigure("goal reached, real robot", 19, 20),),
 }
 """(rung, method) -> published figures."""

@@ -29,8 +29,10 @@ def digest(data: Mapping[str, Any]) -> str:
 def user_files(stack: Stack) -> dict[str, str]:
     """Return, for what a stack names that is a file, `slot/name` -> hash of its content."""
     found: dict[str, str] = {}
-    for slot in registry.slots():
-        choice = stack.choice(slot)
+    chosen = {slot: stack.choice(slot) for slot in registry.slots()} | {
+        name: choice for name, choice in (("fallback", stack.fallback), ("onboard", stack.onboard)) if choice
+    }
+    for slot, choice in chosen.items():
         named = {"use": choice.use.rpartition(":")[0], **choice.options}
         for name, value in named.items():
             if isinstance(value, str) and (path := Path(value).expanduser()).is_file():

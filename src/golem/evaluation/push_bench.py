@@ -27,7 +27,7 @@ Phase = Literal["standing", "left_swing", "right_swing"]
 SURVIVED = 0.95
 """Share of the trials of a level that has to be survived."""
 SETTLE = (2.0, 3.0)
-"""Range of the time before the push, standing or walking [s]."""
+"""Range of the time of standing before the push or before walking, and of walking before the push [s]."""
 WALK = Twist(vx=0.3)
 """Twist of the trials in which the robot walks."""
 SWING = 0.15
@@ -114,15 +114,17 @@ class Level:
         times = draw.rng("times")
         settle, late = times.uniform(*SETTLE), times.uniform(0.0, SWING)
         standing = self.phase == "standing"
-        exercise = Exercise(ArmMotion(draw.rng("arms")), None if standing else lambda t: WALK)
+        exercise = Exercise(ArmMotion(draw.rng("arms")))
         try:
             episode = self.subject.episode(self.seed, index)
         except ModuleFault:
             return FAULT
         try:
             episode.start(exercise)
-            episode.run(settle if standing else 2.0 * settle)
+            episode.stand(settle)
             if not standing:
+                exercise.twist = lambda t: WALK
+                episode.run(settle)
                 air = [self.phase != "left_swing", self.phase != "right_swing"]
                 episode.run(2.0, until=lambda: episode.recorder.contact.tolist() == air)
                 if not episode.over and episode.recorder.contact.tolist() != air:

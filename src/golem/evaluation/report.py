@@ -18,8 +18,8 @@ from golem.evaluation.statistics import spread, wilson
 from golem.evaluation.summary import NO_MODULE, MethodSummary, Summary
 from golem.evaluation.svg import Dot, interval_bar, percent_axis, stacked, strips, trial_map
 
-HEADLINE_TIME = "detect_to_grasp"
-"""The time that the success table shows: from the detection of the target to the closed grasp."""
+HEADLINE_TIMES = {"detect_to_grasp": "detection<br>to grasp", "recovery": "recovery", "walk": "walk"}
+"""The times that the success table may show, the first that the trials have, and what it calls them."""
 
 
 def render(command: str, records: Sequence[TrialRecord], summary: Summary, folder: Path) -> str:
@@ -87,6 +87,7 @@ def _header(command: str, first: TrialRecord, summary: Summary) -> str:
 
 def _success(rung: str, summary: Summary) -> str:
     rows = []
+    time = next((name for name in HEADLINE_TIMES if any(name in m.times for m in summary.methods)), "")
     for i, m in enumerate(summary.methods):
         published = PAPER.get((rung, m.method), ())
         marks = [
@@ -102,21 +103,21 @@ def _success(rung: str, summary: Summary) -> str:
             f'<td class="rate num">{_percent(m.rate)} %<small>{m.successes} of {m.n}</small></td>'
             f'<td class="num">{_percent(m.interval.low)} to {_percent(m.interval.high)}</td>'
             f'<td class="plot">{interval_bar(m.rate, m.interval, i % 6, marks)}</td>'
-            f'<td class="num">{_headline_time(m)}</td></tr>'
+            f'<td class="num">{_headline_time(m, time)}</td></tr>'
         )
     table = (
         '<div class="scroll"><table class="rates"><tr><th class="who">method</th><th class="num">success</th>'
         f'<th class="num">95 %<br>interval</th><th class="plot">{percent_axis()}</th>'
-        f'<th class="num time">detection<br>to grasp</th></tr>{"".join(rows)}</table></div>'
+        f'<th class="num time">{HEADLINE_TIMES.get(time, "")}</th></tr>{"".join(rows)}</table></div>'
     )
-    note = "Simulated success rates with Wilson 95 % intervals; median and quartiles of robot time to the closed grasp."
+    note = "Simulated success rates with Wilson 95 % intervals; median and quartiles of robot time."
     if any((rung, m.method) in PAPER for m in summary.methods):
         note += " Grey circles: figures that the GOLEM paper published, not measured here."
     return _card("Success", table, note)
 
 
-def _headline_time(m: MethodSummary) -> str:
-    time = m.times.get(HEADLINE_TIME)
+def _headline_time(m: MethodSummary, name: str) -> str:
+    time = m.times.get(name)
     if time is None:
         return "-"
     return f"{time.median:.1f} s<small>{time.q1:.1f} to {time.q3:.1f}</small>"
@@ -214,9 +215,10 @@ def _times(grouped: Mapping[str, Sequence[TrialRecord]]) -> str:
 
 def _measures(grouped: Mapping[str, Sequence[TrialRecord]]) -> str:
     """Return a table of what the rung measured: median and quartiles per method."""
-    names = dict.fromkeys(name for rows in grouped.values() for r in rows for name in r.series)
-    if not names:
+    measured = dict.fromkeys(name for rows in grouped.values() for r in rows for name in r.series)
+    if not measured:
         return ""
+    names = [*(name for name in MEASURES if name in measured), *sorted(measured.keys() - MEASURES.keys())]
     lines: list[str] = []
     for name in names:
         measure = MEASURES.get(name, Measure(name.replace("_", " ")))
@@ -294,7 +296,7 @@ def _lost_trials(records: Sequence[TrialRecord]) -> str:
 
 def _reading(rung: str) -> str:
     paper = (
-        "<p>The paper's figures were obtained on the authors' robot and in their simulator, with n = 30 each. They "
+        "<p>The paper's figures were obtained on the authors' robot and in their simulator. They "
         "stand beside ours for orientation; a simulated rate is no prediction of a rate on the robot.</p>"
         if any(key[0] == rung for key in PAPER)
         else ""

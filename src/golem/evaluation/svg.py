@@ -63,8 +63,9 @@ def svg(width: float, height: float, content: str, label: str) -> str:
 
 
 def ticks(low: float, high: float, about: int = 6) -> list[float]:
-    """Return round numbers, steps of 1, 2 or 5 times a power of ten, that cover `low` to `high`."""
-    span = max(high - low, 1e-9)
+    """Return round numbers, steps of 1, 2 or 5 times a power of ten, that cover `low` to `high`; at least two."""
+    high = high if high - low > 1e-9 else low + 1.0
+    span = high - low
     power = 10.0 ** math.floor(math.log10(span / about))
     step = next(s * power for s in (1, 2, 5, 10) if span / (s * power) <= about)
     return [i * step for i in range(math.floor(low / step), math.ceil(high / step) + 1)]

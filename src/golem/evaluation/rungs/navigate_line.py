@@ -75,8 +75,10 @@ class NavigateLine:
             )
             episode.locate(odometry)
             strip = Strip(episode.robot, 0.0)
-            episode.run(SETTLE)
-            episode.start(Walk(episode.running.navigator), WalkGoal(DISTANCE, 0.0, 0.0, "odom", TIMEOUT))
+            episode.stand(SETTLE)
+            if not episode.over:
+                goal = WalkGoal(DISTANCE, 0.0, 0.0, "odom", TIMEOUT)
+                episode.start(Walk(episode.running.navigator), goal)
             for _ in range(PICTURES - 1):
                 strip.keep(episode.t, np.zeros(3))
                 episode.run(DISTANCE / PICTURES / 0.4, until=lambda: episode.result is not None)

@@ -23,8 +23,8 @@ PEAK = (22.1, 6.9)
 """Mean and deviation of the rod's peak force [N], from the paper's ALMI trials."""
 LEAST_PEAK = 5.0
 """Peak below which a draw is raised to it [N]."""
-SETTLE = (2.5, 3.5)
-"""Range of the time before the push [s]; the arms are then in motion."""
+SETTLE = (2.0, 3.0)
+"""Range of the time between standing and the push [s]; the arms are then in motion."""
 MOMENTS = (0.5, 0.5, 0.4, 0.6)
 """Times between the moments of the strip of pictures, from the begin of the push on [s]."""
 PATIENCE = 5.0
@@ -44,7 +44,7 @@ class PushRung:
     profiles = tuple(PROFILES)
 
     def methods(self) -> tuple[str, ...]:
-        """Return the registered lower bodies; `policy:FILE` and `vendor:FILE` name a policy file."""
+        """Return the registered lower bodies; `policy:DESCRIPTION:NETWORK` names a policy's files."""
         return registry.names("lower_body")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
@@ -67,7 +67,7 @@ class PushRung:
         try:
             episode.start(Exercise(ArmMotion(spec.rng("arms"))))
             strip = Strip(episode.robot, push.bearing)
-            episode.run(settle)
+            episode.stand(settle)
             start = episode.t
             episode.push(push)
             for seconds in MOMENTS:
@@ -120,5 +120,7 @@ def judge(trace: BalanceTrace, start: float, push: Push, loss: Loss | None, meth
         stage = loss.stage if series else "settle"
         detail = f"{loss.detail} It was {pushed} at {start:.1f} s."
         return TrialOutcome(False, stage, f"lower_body: {method}", detail, series=series)
-    timings = {"recovery": trace.recovery_time(start)}
+    recovery = trace.recovery_time(start)
+    # A robot that never lost its balance has none to recover.
+    timings = {"recovery": recovery} if recovery > 0.0 else {}
     return TrialOutcome(True, DONE, None, f"stands, {pushed}", timings, series)
