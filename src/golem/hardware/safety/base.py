@@ -102,8 +102,11 @@ class SafetyLimits:
             without a planted foot on a floor like ice, 0.15 s, and no step or push recovery comes near].
         command_age: age of the command that stops the robot [s] [own].
         future: how far ahead of the clock a stamp may be [s] [own].
-        samples: consecutive bad samples of position, velocity, braking distance or tilt that stop the robot [own].
-        torque_samples: the same for torque, which peaks in every impact [own].
+        samples: consecutive bad samples of position, speed, braking distance or tilt that stop the robot [own].
+        leg_samples: the same for speed and braking distance of the legs, which peak at every touch-down, and whose
+            stop is a fall [own].
+        torque_samples: the same for torque [own: the gate predicts it from a state as old as the command is late, and
+            a push is over before 50 ms at the motor's own limit harm it].
         gross: multiple of the velocity limit, and violation of the position range [rad], that no sensor noise
             explains and that one sample of suffices [own].
         damping_time: how long STOP1 damps before STOP0 [s] [own: arms have sunk after 2 s].
@@ -131,7 +134,8 @@ class SafetyLimits:
     command_age: float = 0.100
     future: float = 0.005
     samples: int = 3
-    torque_samples: int = 10
+    leg_samples: int = 10
+    torque_samples: int = 25
     gross: float = 3.0
     damping_time: float = 3.0
     longest_tick: float = 0.010
@@ -201,8 +205,10 @@ class Counters:
 
     position: int = 0
     velocity: int = 0
+    leg_velocity: int = 0
     torque: int = 0
     braking: int = 0
+    leg_braking: int = 0
     tilt: int = 0
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from golem.hardware.safety.base import Counters, Reason, SafetyLimits
 from golem.robots.model.table import JOINT_NAMES
-from golem.types import NUM_JOINTS, Array, LowCommand, LowState
+from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand, LowState
 
 _ABSURD = 1e6
 """No joint position, speed, torque or gain has a number this large; below it nothing here can overflow."""
@@ -75,9 +75,10 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
     rest = q + dq * speed / (limits.deceleration + limits.deceleration)
     angle = tilt(state.imu.quat)
     count = np.count_nonzero
-    fast = count(speed > limits.velocity)
+    quick = speed > limits.velocity
+    beyond_range = (rest > limits.state_upper) | (rest < limits.state_lower)
+    fast, over = count(quick), count(beyond_range)
     strong = count(load > limits.torque)
-    over = count(rest > limits.state_upper) + count(rest < limits.state_lower)
     out = count(q > limits.state_upper) + count(q < limits.state_lower)
     tilted = angle > limits.tilt
     if not (fast or strong or over or out or tilted):
@@ -85,20 +86,22 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
 
     new = Counters(
         position=counters.position + 1 if out else 0,
-        velocity=counters.velocity + 1 if fast else 0,
+        velocity=counters.velocity + 1 if quick[UPPER].any() else 0,
+        leg_velocity=counters.leg_velocity + 1 if quick[LEGS].any() else 0,
         torque=counters.torque + 1 if strong else 0,
-        braking=counters.braking + 1 if over else 0,
+        braking=counters.braking + 1 if beyond_range[UPPER].any() else 0,
+        leg_braking=counters.leg_braking + 1 if beyond_range[LEGS].any() else 0,
         tilt=counters.tilt + 1 if tilted else 0,
     )
     outside = np.maximum(q - limits.state_upper, limits.state_lower - q)
     beyond = np.maximum(rest - limits.state_upper, limits.state_lower - rest)
     ratio = speed / limits.velocity
-    n = limits.samples
+    n, legs = limits.samples, limits.leg_samples
     if out and (new.position >= n or outside.max() > limits.gross):
         return new, Fault(Reason.POSITION, _worst(outside, lambda i: f"at {q[i]:.3f} rad"))
-    if fast and (new.velocity >= n or ratio.max() > limits.gross):
+    if fast and (new.velocity >= n or new.leg_velocity >= legs or ratio.max() > limits.gross):
         return new, Fault(Reason.VELOCITY, _worst(ratio, lambda i: f"at {dq[i]:.2f} rad/s"))
-    if new.braking >= n:
+    if new.braking >= n or new.leg_braking >= legs:
         return new, Fault(
             Reason.BRAKING, _worst(beyond, lambda i: f"at {q[i]:.3f} rad with {dq[i]:.2f} rad/s")
         )
