@@ -200,8 +200,7 @@ class LegsEnv:
         self.age += dt
         low = truth.height - truth.clearance.mean(axis=1) < 0.6
         tilted = truth.R[:, 2, 2] < np.cos(self._limits.tilt)
-        stopped = self._rewards.stopped(truth, 2.0 - self.difficulty.push)
-        ended = low | tilted | stopped | ~np.isfinite(truth.q).all(axis=1)
+        ended = low | tilted | self._rewards.stopped(truth) | ~np.isfinite(truth.q).all(axis=1)
         truncated = ~ended & (self.age >= config.episode)
         self._left -= dt
         self._command(np.flatnonzero(self._left <= 0.0))
