@@ -9,13 +9,15 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from golem.hardware.estimator.attitude import Attitude, base_rate
+from golem.hardware.estimator.attitude import TORSO, Attitude, GyroBias
 from golem.hardware.estimator.feet import Feet, FeetConfig
 from golem.hardware.estimator.random_walk import base_velocity
+from golem.robots.model.imu import base_rate
 from golem.robots.model.spatial import rotation_rpy
 from golem.robots.model.table import FRAMES
-from golem.types import NUM_JOINTS, Array
+from golem.types import NUM_JOINTS, Array, Imu, LowState
 
 
 @pytest.fixture
@@ -48,7 +50,9 @@ def test_rotation_and_rate_are_mujocos(seed: int, tumbling: Callable[[int], Any]
     world = tumbling(seed)
     attitude, state, R = Attitude(), world.state(), world.T[:3, :3]
     np.testing.assert_allclose(attitude.rotation(state), R, atol=1e-9)
-    np.testing.assert_allclose(base_rate(state), world.data.qvel[3:6], atol=1e-9)
+    np.testing.assert_allclose(
+        base_rate(state.imu.gyro, state.q[TORSO], state.dq[TORSO]), world.data.qvel[3:6], atol=1e-9
+    )
     attitude.reset(state)
     heading = math.atan2(R[1, 0], R[0, 0])
     np.testing.assert_allclose(attitude.rotation(state), about_z(-heading) @ R, atol=1e-9)
@@ -60,7 +64,7 @@ def test_a_foot_implies_the_velocity_of_the_base_less_its_own(
 ) -> None:
     world = tumbling(seed)
     state, R = world.state(), world.T[:3, :3]
-    feet, omega = Feet(FeetConfig()), base_rate(state)
+    feet, omega = Feet(FeetConfig()), base_rate(state.imu.gyro, state.q[TORSO], state.dq[TORSO])
     feet.step(state, R[2], omega, 0.002)
     implied = base_velocity(R, omega, feet.points, feet.rates)
     for k, body in enumerate(world.feet):
@@ -69,3 +73,19 @@ def test_a_foot_implies_the_velocity_of_the_base_less_its_own(
         mujoco.mj_jac(world.model, world.data, jacobian, None, point, body)
         foot = jacobian @ world.data.qvel
         np.testing.assert_allclose(implied[k], world.velocity - foot, atol=1e-9)
+
+
+def test_the_bias_of_the_gyro_is_found_while_the_imu_turns_and_its_orientation_is_noisy() -> None:
+    rng, bias, true = np.random.default_rng(0), GyroBias(), np.array([0.002, -0.003, 0.001])
+    R, dt = Rotation.identity(), 0.002
+    values = []
+    for i in range(5000):
+        rate = np.array([0.5 * np.sin(i * dt), 0.3, -0.4 * np.cos(2.0 * i * dt)])
+        R = R * Rotation.from_rotvec(rate * dt)
+        noisy = R * Rotation.from_rotvec(5e-4 * rng.standard_normal(3))
+        # A quaternion and its negative are one orientation.
+        quat = noisy.as_quat()[[3, 0, 1, 2]] * (-1.0) ** i
+        zero = np.zeros(NUM_JOINTS)
+        values.append(bias.step(LowState(i * dt, zero, zero, zero, Imu(quat, rate + true, zero[:3])), dt))
+    np.testing.assert_allclose(values[1500:], np.tile(true, (3500, 1)), atol=1e-3)
+    np.testing.assert_allclose(values[-1], true, atol=3e-4)

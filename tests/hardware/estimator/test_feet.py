@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.hardware.estimator.attitude import Attitude, base_rate
+from golem.hardware.estimator.attitude import TORSO, Attitude
 from golem.hardware.estimator.feet import Feet, FeetConfig
+from golem.robots.model.imu import base_rate
 from golem.types import LowState
 
 DT = 0.002
 
 
 def sense(feet: Feet, state: LowState) -> None:
-    feet.step(state, Attitude().rotation(state)[2], base_rate(state), DT)
+    omega = base_rate(state.imu.gyro, state.q[TORSO], state.dq[TORSO])
+    feet.step(state, Attitude().rotation(state)[2], omega, DT)
 
 
 def test_the_torques_of_a_standing_robot_carry_its_weight(world: Callable[..., Any]) -> None:

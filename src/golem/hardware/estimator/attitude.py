@@ -1,4 +1,4 @@
-"""Orientation and angular rate of base_link from the torso's IMU, the waist joint between them undone."""
+"""Orientation of base_link from the torso's IMU, the waist joint between them undone, and the bias of its gyro."""
 
 from __future__ import annotations
 
@@ -47,9 +47,42 @@ class Attitude:
         )
 
 
-def base_rate(state: LowState) -> Array:
-    """Return the (3,) angular rate of base_link, in base_link [rad/s]: the gyro's, less the torso joint's."""
-    torso = float(state.q[TORSO])
-    c, s = math.cos(torso), math.sin(torso)
-    x, y, z = state.imu.gyro.tolist()
-    return np.array([c * x - s * y, s * x + c * y, z - float(state.dq[TORSO])])
+class GyroBias:
+    """The bias of the gyro: how much faster it turns than the IMU's own orientation, which does not run away.
+
+    Uncorrected, 0.1 deg/s under a base 0.95 m above its soles are 1.6 mm/s by which a standing robot seems to move.
+
+    Attributes:
+        value: (3,) estimate, axes of the IMU [rad/s].
+    """
+
+    MEMORY = 10.0
+    """Time over which the difference is averaged, once so much has passed [s]."""
+    START = 1.0
+    """Time over which it is averaged at first [s]: the noise of one orientation counts over it."""
+
+    def __init__(self) -> None:
+        """Start without a bias."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget."""
+        self.value: Array = np.zeros(3)
+        self._before: list[float] | None = None
+        self._elapsed = 0.0
+
+    def step(self, state: LowState, dt: float) -> Array:
+        """Take the sample `state`, `dt` [s] after the previous one, and return `value`."""
+        w, x, y, z = state.imu.quat.tolist()
+        if self._before is not None:
+            # Vector part of q_before^-1 q: half the turn, in the IMU's axes.
+            a, b, c, d = self._before
+            turn = np.array(
+                [a * x - b * w - c * z + d * y, a * y - c * w - d * x + b * z, a * z - d * w - b * y + c * x]
+            )
+            sign = 1.0 if a * w + b * x + c * y + d * z >= 0.0 else -1.0
+            self._elapsed += dt
+            share = dt / min(max(self._elapsed, self.START), self.MEMORY)
+            self.value = self.value + share * (state.imu.gyro - (2.0 * sign / dt) * turn - self.value)
+        self._before = [w, x, y, z]
+        return self.value

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from golem.hardware.estimator.attitude import TORSO, Attitude, base_rate
+from golem.hardware.estimator.attitude import TORSO, Attitude
 from golem.hardware.estimator.feet import Feet, FeetConfig, LevelFloor
 from golem.hardware.estimator.invariant import InvariantConfig, InvariantFilter
+from golem.robots.model.imu import base_rate
 from golem.robots.model.spatial import skew
 from golem.robots.model.table import FRAMES
 from golem.types import Array, BaseEstimate, LowState
@@ -69,7 +70,8 @@ class InvariantEKF:
         filter, feet = self._filter, self._feet
         waist = _waist(state)
         up = waist @ filter.R[2]
-        feet.step(state, up, base_rate(state), dt)
+        omega = base_rate(state.imu.gyro - filter.bias[0], state.q[TORSO], state.dq[TORSO])
+        feet.step(state, up, omega, dt)
         filter.predict(state.imu.gyro, state.imu.acc, feet.weight, dt)
 
         points = feet.points @ waist - _IMU

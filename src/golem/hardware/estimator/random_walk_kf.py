@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from golem.hardware.estimator.attitude import Attitude, base_rate
+from golem.hardware.estimator.attitude import TORSO, Attitude, GyroBias
 from golem.hardware.estimator.feet import Feet, FeetConfig, LevelFloor
 from golem.hardware.estimator.random_walk import RandomWalk, RandomWalkConfig, base_velocity
+from golem.robots.model.imu import base_rate
 from golem.types import BaseEstimate, LowState
 
 
@@ -38,6 +39,7 @@ class RandomWalkKF:
         """Start at rest."""
         self.config = config or RandomWalkKFConfig()
         self._attitude = Attitude()
+        self._bias = GyroBias()
         self._feet = Feet(self.config.feet)
         self._filter = RandomWalk(self.config.filter)
         self._floor = LevelFloor()
@@ -46,6 +48,7 @@ class RandomWalkKF:
     def reset(self, state: LowState) -> None:
         """Start at rest above the origin of odom, heading zero."""
         self._attitude.reset(state)
+        self._bias.reset()
         self._feet.reset()
         self._filter.reset()
         self._floor.reset()
@@ -55,7 +58,8 @@ class RandomWalkKF:
         """Fuse one measurement; see `BaseEstimator`."""
         R = self._attitude.rotation(state)
         feet = self._feet
-        omega = base_rate(state)
+        gyro = state.imu.gyro - self._bias.step(state, dt)
+        omega = base_rate(gyro, state.q[TORSO], state.dq[TORSO])
         feet.step(state, R[2], omega, dt)
         measured = base_velocity(R, omega, feet.points, feet.rates)
         velocity = self._filter.step(measured, feet.weight, dt)
