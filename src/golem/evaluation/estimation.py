@@ -7,10 +7,12 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from typing import Annotated
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from tyro.conf import arg
 
 from golem import registry
 from golem.errors import ConfigError, GolemError
@@ -39,8 +41,8 @@ class EstimationConfig:
     """Estimators: registered names, file.py:Class or package.module:Class."""
     method: str = "almi"
     """The lower body that walks."""
-    n: int = 3
-    """Walks of 33 s."""
+    n: Annotated[int, arg(aliases=("-n",))] = 3
+    """Walks of 33 s, each without and with pushes."""
     profile: str = "field"
     """Realism of the sensors: ideal, bench or field."""
     seed: int = 0
