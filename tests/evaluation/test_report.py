@@ -2,12 +2,17 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable
+from dataclasses import replace
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 
+from golem.evaluation.balance import TRACE, BalanceTrace
 from golem.evaluation.ladder import LadderConfig, LadderResult, run_ladder
 from golem.evaluation.paper import PAPER
+from golem.evaluation.records import artefacts
+from golem.evaluation.report import render
 from golem.evaluation.svg import ticks
 
 VOID = {"meta", "img", "br"}
@@ -105,3 +110,21 @@ def test_a_run_of_one_method_without_failures_has_a_report(fake: Callable[..., L
 )
 def test_ticks_are_round_and_cover_the_values(low: float, high: float, expected: list[float]) -> None:
     assert ticks(low, high) == pytest.approx(expected)
+
+
+def test_series_and_margins_are_shown_where_a_rung_has_them(
+    fake: Callable[..., LadderConfig],
+) -> None:
+    result = run_ladder(fake("sure", "good", n=2))
+    kept = replace(result.records[0], series={"margin_min": -0.05, "own_figure": 3.0})
+    n = 100
+    zeros = np.zeros((n, 3))
+    t = 0.01 * np.arange(n, dtype=np.float64)
+    trace = BalanceTrace(t, np.full(n, 0.1), zeros, zeros, np.zeros(n), zeros, np.ones((n, 2), bool), zeros)
+    trace.save(artefacts(result.config.out, kept) / TRACE)
+    html = render("golem ladder", [kept, *result.records[1:]], result.summary, result.config.out)
+    page = Page()
+    page.feed(html)
+    assert page.open == []
+    assert "least CoM margin" in page.words and "-50" in page.words and "own figure" in page.words
+    assert html.count("<polyline") == 1

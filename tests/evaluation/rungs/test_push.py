@@ -73,4 +73,4 @@ def test_what_was_lost_names_stage_and_lower_body(margin: float, loss: Loss | No
 
 def test_a_robot_that_fell_before_the_push_is_not_blamed_on_it() -> None:
     outcome = judge(trace(0.1), 9.0, rod("left", 22.0), Loss("fall", "The robot fell at 1.0 s."), "mine")
-    assert outcome.stage == "settle" and outcome.series == {}
+    assert outcome.stage == "settle" and outcome.series == {} and "not pushed yet" in outcome.detail

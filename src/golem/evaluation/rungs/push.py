@@ -117,9 +117,11 @@ def judge(trace: BalanceTrace, start: float, push: Push, loss: Loss | None, meth
     if loss is None and series["margin_final"] <= 0.0:
         loss = Loss("balance", f"The CoM margin ends at {1e3 * series['margin_final']:.0f} mm.")
     if loss is not None:
-        stage = loss.stage if series else "settle"
+        module = f"lower_body: {method}"
+        if not series:
+            return TrialOutcome(False, "settle", module, f"{loss.detail} It was not pushed yet.")
         detail = f"{loss.detail} It was {pushed} at {start:.1f} s."
-        return TrialOutcome(False, stage, f"lower_body: {method}", detail, series=series)
+        return TrialOutcome(False, loss.stage, module, detail, series=series)
     recovery = trace.recovery_time(start)
     # A robot that never lost its balance has none to recover.
     timings = {"recovery": recovery} if recovery > 0.0 else {}
