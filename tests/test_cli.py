@@ -13,7 +13,7 @@ from golem import cli
 BROKEN = {
     "no command": ([], None),
     "command": (["ladr"], "Did you mean 'ladder'?"),
-    "rung": (["ladder", "--rung", "teter"], "valid: tether. Did you mean 'tether'?"),
+    "rung": (["ladder", "--rung", "teter"], "valid: navigate-line, push, stand, tether. Did you mean 'tether'?"),
     "method": (["ladder", "--method", "centriod"], "Did you mean 'centroid'?"),
     "method file": (["ladder", "--method", "x.py:Mine"], "does not exist"),
     "profile": (["ladder", "--profile", "feild"], "valid: bench, field, ideal"),
@@ -21,7 +21,7 @@ BROKEN = {
     "slot": (["ladder", "--use", "upperbody=diff_ik"], "Did you mean 'upper_body'?"),
     "implementation": (["ladder", "--use", "upper_body=difik"], "Did you mean 'diff_ik'?"),
     "use": (["ladder", "--use", "upper_body"], "slot=implementation"),
-    "stack": (["run", "nowhere"], "one of: tether"),
+    "stack": (["run", "nowhere"], "one of: stand, tether"),
     "run seed": (["run", "--seed", "-1"], "The seed is -1; it must be 0 or more"),
     "bench seed": (["bench", "--seed", "-1"], "--seed is -1; it must be 0 or more"),
     "run profile": (["run", "--profile", "feild"], "Did you mean 'field'?"),
