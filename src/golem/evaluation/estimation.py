@@ -57,7 +57,7 @@ class EstimationRow:
 
     Attributes:
         estimator, condition: what was judged.
-        standing, walking: root mean square of the velocity's error vector [m/s].
+        standing, walking: root mean square of the velocity's error vector [m/s]; None where it never did.
         drift: horizontal error at the end over the distance walked, mean over the walks.
         yaw: root mean square of the error of the heading's change at the end [rad].
         gap: longest time without a believed foot after the start [s].
@@ -67,8 +67,8 @@ class EstimationRow:
 
     estimator: str
     condition: str
-    standing: float
-    walking: float
+    standing: float | None
+    walking: float | None
     drift: float
     yaw: float
     gap: float
@@ -185,9 +185,9 @@ def _longest(flags: Array) -> int:
 
 
 def _row(use: str, condition: str, tracks: Sequence[_Track]) -> EstimationRow:
-    def rms(parts: Sequence[Array]) -> float:
+    def rms(parts: Sequence[Array]) -> float | None:
         squares = np.concatenate(parts)
-        return math.sqrt(squares.mean()) if len(squares) else math.nan
+        return math.sqrt(squares.mean()) if len(squares) else None
 
     ticks = np.concatenate([track.ticks for track in tracks]) * 1e6
     return EstimationRow(
@@ -196,7 +196,7 @@ def _row(use: str, condition: str, tracks: Sequence[_Track]) -> EstimationRow:
         standing=rms([track.standing for track in tracks]),
         walking=rms([track.walking for track in tracks]),
         drift=float(np.mean([track.error / track.distance for track in tracks])),
-        yaw=rms([np.array([track.yaw**2]) for track in tracks]),
+        yaw=math.sqrt(np.mean([track.yaw**2 for track in tracks])),
         gap=max(track.gap for track in tracks),
         tick=float(np.median(ticks)),
         tick_p99=float(np.quantile(ticks, 0.99)),
@@ -209,8 +209,7 @@ def _table(rows: Sequence[EstimationRow], title: str) -> Table:
     table = Table("estimator", "condition", *columns, title=title)
     for row in rows:
         figures = (
-            f"{row.standing:.4f}",
-            f"{row.walking:.4f}",
+            *("-" if rms is None else f"{rms:.4f}" for rms in (row.standing, row.walking)),
             f"{row.drift:.4f}",
             f"{math.degrees(row.yaw):.2f}",
             f"{1e3 * row.gap:.0f}",
