@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from golem.capabilities.legs.balance import heading_frame
 from golem.capabilities.legs.gait import Gait, GaitConfig
@@ -20,9 +19,6 @@ from golem.types import LEGS, Array
 
 _YAW_ROLL = np.array([0, 2, 6, 8])
 _ANKLES = np.array([4, 5, 10, 11])
-TOLERANCE = 2.0
-"""Speeds are divided by it before they are compared with what stops the robot: the gate forgives 20 ms, and one sample
-of a 10 ms physics peaks at every touch-down. With 1 the legs learned nothing beside soft steps."""
 CLEARANCE = 0.08
 """Height of the sole in the middle of its swing [m]."""
 
@@ -103,13 +99,6 @@ class Rewards:
     def tracked_error(self, twist: Array) -> Array:
         """Return (n, 3): the mean velocity less the command, vx, vy [m/s], wz [rad/s]."""
         return self._mean - twist
-
-    def stopped(self, truth: Truth) -> NDArray[np.bool_]:
-        """Return (n,): whether the gate would stop the robot, for a joint too fast or too fast for its range."""
-        limits, q, dq = self._limits, truth.q[:, LEGS], truth.dq[:, LEGS] / TOLERANCE
-        end = q + dq * np.abs(dq) / (2.0 * limits.deceleration[LEGS])
-        beyond = (end > limits.state_upper[LEGS]) | (end < limits.state_lower[LEGS])
-        return np.any(beyond | (np.abs(dq) > limits.velocity[LEGS]), axis=1)
 
     def __call__(
         self,
