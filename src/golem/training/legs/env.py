@@ -116,11 +116,12 @@ class LegsEnv:
         self._action: Array = np.zeros((n, 12))
         self._capture: Array = np.zeros((n, 2))
         self._misplaced: Array = np.zeros(n)
-        self.reset(np.arange(n))
-        # Episodes shall not end all at once.
-        self.age = self._rng.uniform(0.0, config.episode, n)
-        self.world.read()
-        self._advance_gait(0.0)
+        self.begin()
+
+    def begin(self) -> None:
+        """Start every robot, each somewhere in its episode, so that they do not all end at once."""
+        self.restart(np.arange(self.n))
+        self.age = self._rng.uniform(0.0, self.config.episode, self.n)
 
     def reset(self, where: Rows) -> None:
         """Start the robots `where` anew."""

@@ -180,8 +180,7 @@ class _Run:
         self._survival = saved["survival"]
         for name, value in saved["difficulty"].items():
             setattr(self.env.difficulty, name, value)
-        self.env.reset(np.arange(self.config.robots))
-        self.env.restart(np.arange(self.config.robots))
+        self.env.begin()
         self._obs, self._known = self.env.observe()
 
     def _write(self) -> None:
