@@ -27,7 +27,7 @@ BROKEN = {
     "run profile": (["run", "--profile", "feild"], "Did you mean 'field'?"),
     "format": (["model", "export", "--format", "step", "--out", "x"], "valid: mjcf, urdf"),
     "model": (["model", "import"], "valid: export"),
-    "train": (["train", "legs"], "valid: detector"),
+    "train": (["train", "arms"], "valid: detector, legs"),
 }
 
 
