@@ -75,7 +75,7 @@ class Step:
 
     Attributes:
         reward: of the legs.
-        ended: fallen, or tilted as far as the safety gate lets it.
+        ended: fallen, or stopped by the safety gate.
         truncated: the episode's time was over.
         terms: mean of each reward term.
     """
@@ -201,7 +201,7 @@ class LegsEnv:
         self.age += dt
         low = truth.height - truth.clearance.mean(axis=1) < 0.6
         tilted = truth.R[:, 2, 2] < np.cos(self._limits.tilt)
-        ended = low | tilted | ~np.isfinite(truth.q).all(axis=1)
+        ended = low | tilted | self.world.stopped | ~np.isfinite(truth.q).all(axis=1)
         truncated = ~ended & (self.age >= config.episode)
         self._left -= dt
         self._command(np.flatnonzero(self._left <= 0.0))

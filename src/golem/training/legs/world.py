@@ -17,10 +17,13 @@ from numpy.typing import NDArray
 from golem.capabilities.legs.balance import GRAVITY
 from golem.hardware.estimator.contact import Contact, ContactConfig
 from golem.hardware.estimator.random_walk import RandomWalk, RandomWalkConfig
+from golem.hardware.safety.base import SafetyLimits
 from golem.training.legs.model import STANCE, STAND_HEIGHT, STEP, build_model
 from golem.types import LEGS, NUM_JOINTS, Array
 
 Rows = NDArray[np.intp]
+SERVO_PERIOD = 0.002
+"""Time between two samples of the safety gate [s]."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +116,7 @@ class World:
         payload: (n, 2) mass in each hand [kg].
         friction: (n,) of the soles.
         slope: (n, 2) tilt of gravity about y and x [rad].
+        stopped: (n,) whether the safety gate would have stopped the robot in the last `step` for the speed of a leg.
     """
 
     def __init__(self, n: int, config: WorldConfig, rng: np.random.Generator, threads: int) -> None:
@@ -144,6 +148,11 @@ class World:
         self.slope: Array = np.zeros((n, 2))
         self._filter = RandomWalk(RandomWalkConfig(), (n,))
         self._contact = Contact(ContactConfig(), (n,))
+        self._limits = SafetyLimits.from_profile()
+        # The gate's rule in physics steps: what persists for 20 ms.
+        self._patience = round(self._limits.leg_samples * SERVO_PERIOD / STEP)
+        self._bad: NDArray[np.int64] = np.zeros((n, 2), dtype=np.int64)
+        self.stopped: NDArray[np.bool_] = np.zeros(n, dtype=bool)
 
     def reset(self, where: Rows, upper: Array, payload: float) -> None:
         """Start the robots `where` anew: standing, upper body at `upper` (m, 15), payload up to the share `payload`."""
@@ -166,6 +175,7 @@ class World:
         mask[where] = True
         self._filter.reset(mask)
         self._contact.reset(mask)
+        self._bad[where] = 0
 
     def step(
         self, legs: Array, upper: Array, force: Array, on_torso: NDArray[np.bool_], substeps: int
@@ -175,11 +185,13 @@ class World:
         self._xfrc[:, self.ids.base, :3] = force * ~on_torso[:, None]
         ctrl = self._ctrl
         ctrl[:, LEGS.stop : NUM_JOINTS] = upper - self._offset[:, LEGS.stop :]
+        self.stopped[:] = False
         for k in range(substeps):
             late = (self._delay > k)[:, None]
             ctrl[:, LEGS] = np.where(late, self._previous, legs) - self._offset[:, LEGS]
             self._batch.step(nstep=1, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
             self._estimate()
+            self._judge()
         self._previous = legs.copy()
         self.read()
 
@@ -193,6 +205,17 @@ class World:
         force = self._sensors[:, self.ids.touch] * self._force_scale
         _, weight = self._contact.step(force, STEP)
         self._filter.step(np.einsum("nij,nkj->nki", self._to_level, measured), weight, STEP)
+
+    def _judge(self) -> None:
+        """Apply the safety gate's limits of leg speed and braking distance to the present physics step."""
+        limits = self._limits
+        q, dq = self._qpos[:, 7 : 7 + LEGS.stop], self._qvel[:, 6 : 6 + LEGS.stop]
+        rest = q + dq * np.abs(dq) / (2.0 * limits.deceleration[LEGS])
+        fast = np.any(np.abs(dq) > limits.velocity[LEGS], axis=1)
+        beyond = np.any((rest > limits.state_upper[LEGS]) | (rest < limits.state_lower[LEGS]), axis=1)
+        now = np.stack([fast, beyond], axis=1)
+        self._bad = np.where(now, self._bad + 1, 0)
+        self.stopped |= np.any(self._bad >= self._patience, axis=1)
 
     def read(self) -> None:
         """Fill `truth` and `sensed` from the present state."""
