@@ -13,7 +13,10 @@ from golem import cli
 BROKEN = {
     "no command": ([], None),
     "command": (["ladr"], "Did you mean 'ladder'?"),
-    "rung": (["ladder", "--rung", "teter"], "valid: navigate-line, push, stand, tether. Did you mean 'tether'?"),
+    "rung": (
+        ["ladder", "--rung", "teter"],
+        "valid: navigate-line, push, stand, tether. Did you mean 'tether'?",
+    ),
     "method": (["ladder", "--method", "centriod"], "Did you mean 'centroid'?"),
     "method file": (["ladder", "--method", "x.py:Mine"], "does not exist"),
     "profile": (["ladder", "--profile", "feild"], "valid: bench, field, ideal"),

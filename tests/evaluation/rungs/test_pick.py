@@ -126,5 +126,5 @@ def test_a_file_in_the_home_folder_may_be_named_by_the_tilde(
     monkeypatch.setenv("HOME", str(tmp_path))
     (tmp_path / "mine.py").write_text("class Arms:\n    pass\n")
     assert rung.config("centroid", "ideal", {"upper_body": "~/mine.py:Arms"})["user_files"].keys() == {
-        "upper_body"
+        "upper_body/use"
     }
