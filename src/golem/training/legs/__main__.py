@@ -20,6 +20,7 @@ def run(
     adversary: Adversary = "learned",
     robots: int = 512,
     threads: int = 2,
+    start: Path | None = None,
 ) -> None:
     """Train a leg policy, or go on where a run was stopped.
 
@@ -30,8 +31,9 @@ def run(
         adversary: what moves the upper body: none, motions (a curriculum), or learned (motions, then a policy as well).
         robots: how many are simulated at once.
         threads: of physics and networks.
+        start: checkpoint of another run to begin with.
     """
-    config = TrainConfig(out, seed, steps, robots, threads, adversary)
+    config = TrainConfig(out, seed, steps, robots, threads, adversary, start=start)
     print(run_training(config))
 
 

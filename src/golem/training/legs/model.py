@@ -26,8 +26,9 @@ STANCE: Array = np.tile(STANCES["crouch"], 2)
 """(12,) standing posture of the legs [rad]."""
 KP: Array = np.tile([200.0, 200.0, 200.0, 300.0, 40.0, 40.0], 2)
 """(12,) stiffness of the legs [N m/rad]; ALMI-Open's."""
-KD: Array = np.tile([2.5, 2.5, 2.5, 4.0, 2.0, 2.0], 2)
-"""(12,) damping of the legs [N m s/rad]; HAMS walk.yaml has the ankle's 2, ALMI-Open 2 to 4 elsewhere."""
+KD: Array = np.tile([2.5, 2.5, 2.5, 4.0, 4.0, 4.0], 2)
+"""(12,) damping of the legs [N m s/rad]; ALMI-Open's at hips and knees, twice its 2 at the ankles, which it leaves
+underdamped: they exceed the speed at which the safety gate stops the robot."""
 _SOLES = sole_centers(*leg_poses(STANCE))
 STAND_HEIGHT = float(-_SOLES[:, 2].mean())
 """Height of base_link above the soles in the standing posture [m]."""

@@ -33,6 +33,7 @@ class Weights:
         alive: not fallen.
         contact: feet on the ground when their phase says so, and off it when not.
         swing_height: error of the height of a swinging sole [m^2].
+        flat: tilt of soles in the air, 1 - cos: a foot that lands on an edge slaps down faster than the gate allows.
         upright: horizontal part of gravity in base_link, squared.
         height: error of the base's height above the soles [m^2].
         bounce: vertical velocity squared.
@@ -58,6 +59,7 @@ class Weights:
     alive: float = 0.5
     contact: float = 0.4
     swing_height: float = -40.0
+    flat: float = -15.0
     upright: float = -3.0
     height: float = -40.0
     bounce: float = -1.0
@@ -139,6 +141,7 @@ class Rewards:
             "alive": np.ones(len(twist)),
             "contact": (loaded == stance).mean(axis=1),
             "swing_height": (np.square(high) * ~stance).sum(axis=1),
+            "flat": ((1.0 - truth.sole_up) * ~loaded).sum(axis=1),
             "upright": np.square(truth.R[:, 2, :2]).sum(axis=1),
             "height": np.square(level - STAND_HEIGHT),
             "bounce": np.square(truth.velocity[:, 2]),

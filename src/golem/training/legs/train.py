@@ -36,6 +36,7 @@ class TrainConfig:
         steps: actions of all robots together, e.g. 12e6.
         robots: how many are simulated at once.
         threads: of the physics and of the networks.
+        start: checkpoint of another run whose networks this one begins with.
         adversary: what moves the upper body: `none` (it rests in random postures), `motions` (the curriculum), or
             `learned` (motions, and a policy that moves half of the robots once `learned_from` steps are done).
         learned_from: steps after which the learned adversary begins.
@@ -49,6 +50,7 @@ class TrainConfig:
     threads: int = 2
     adversary: Adversary = "learned"
     learned_from: float = 4e6
+    start: Path | None = None
     rate: float = 0.006
     env: EnvConfig = field(default_factory=EnvConfig)
     ppo: PpoConfig = field(default_factory=PpoConfig)
@@ -73,6 +75,8 @@ def train(config: TrainConfig) -> Path:
     path = config.out / CHECKPOINT
     if path.exists():
         run.load(path)
+    elif config.start is not None:
+        run.begin_with(config.start)
     while run.steps < config.steps:
         run.update()
         if run.updates % 20 == 0:
@@ -182,6 +186,12 @@ class _Run:
             setattr(self.env.difficulty, name, value)
         self.env.begin()
         self._obs, self._known = self.env.observe()
+
+    def begin_with(self, path: Path) -> None:
+        """Take over the networks of a checkpoint, and nothing else."""
+        saved = torch.load(path, weights_only=True)
+        self.legs.load(saved["legs"])
+        self.upper.load(saved["upper"])
 
     def _write(self) -> None:
         """Append what was logged to the curve, and print the newest row."""

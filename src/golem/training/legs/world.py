@@ -87,6 +87,7 @@ class Truth:
         soles: (n, 2, 3) centres of the soles relative to base_link's origin [m].
         clearance: (n, 2) height of the soles above the plane [m].
         sole_velocity: (n, 2, 3) [m/s].
+        sole_up: (n, 2) cosine of the angle between each sole and the plane.
         force: (n, 2) normal force on each foot [N].
         com: (n, 3) centre of the nominal masses relative to base_link's origin [m].
         height: (n,) of base_link above the plane [m].
@@ -100,6 +101,7 @@ class Truth:
     soles: Array
     clearance: Array
     sole_velocity: Array
+    sole_up: Array
     force: Array
     com: Array
     height: Array
@@ -128,7 +130,8 @@ class World:
         self._qpos, self._qvel = b.bind("qpos"), b.bind("qvel")
         self._ctrl, self._xfrc = b.bind("ctrl"), b.bind("xfrc_applied")
         self._sensors, self._xipos = b.bind("sensordata"), b.bind("xipos")
-        self._sites, self._torque = b.bind("site_xpos"), b.bind("actuator_force")
+        self._sites, self._site_axes = b.bind("site_xpos"), b.bind("site_xmat")
+        self._torque = b.bind("actuator_force")
         self._gravity, self._mass = b.expand("opt.gravity"), b.expand("body_mass")
         self._friction, self._corners = b.expand("geom_friction"), b.expand("geom_pos")
         self._gain, self._bias = b.expand("actuator_gainprm"), b.expand("actuator_biasprm")
@@ -237,6 +240,7 @@ class World:
             soles=level(sites - position),
             clearance=sites[:, :, 2].copy(),
             sole_velocity=level(soles_v),
+            sole_up=self._site_axes[:, self._sole_sites, 8],
             force=self._sensors[:, self.ids.touch],
             com=level(com),
             height=self._qpos[:, 2].copy(),
