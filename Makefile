@@ -7,7 +7,7 @@ BIN := .venv/bin
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | expand -t 12
 
-demo: venv  ## pull loosened screws from the pack in the twin, tethered
+demo: venv  ## the standing robot pulls loosened screws from the pack in the twin
 	$(BIN)/golem demo
 
 test: lint  ## lint, types and the fast tests

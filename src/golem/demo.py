@@ -1,10 +1,9 @@
-"""`golem demo`: the tethered robot pulls loosened screws from the pack, before your eyes or into a film."""
+"""`golem demo`: the robot, on its own feet, pulls loosened screws from the pack, before your eyes or into a film."""
 
 from __future__ import annotations
 
 import json
 import os
-import sys
 import time
 import webbrowser
 from collections.abc import Callable
@@ -15,15 +14,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.dashboard.film import SHOTS, Film
+from golem.dashboard.balance import balance_figures, balance_section
+from golem.dashboard.film import Film, shots
 from golem.dashboard.live import LiveView
 from golem.dashboard.page import PickRecord, render_page
 from golem.dashboard.scene import SpectatorView
 from golem.dashboard.status import Timeline
 from golem.errors import ConfigError, OutputError
+from golem.evaluation.balance import BalanceRecorder
 from golem.evaluation.oracle import Oracle
+from golem.evaluation.pushes import Pusher, shove
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.run import Narrator
+from golem.run import Narrator, no_display, shown
 from golem.runtime.assembly import Running, build
 from golem.skills.base import SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
@@ -36,18 +38,23 @@ PULLED = 0.8
 """Time into the extraction at which the report's picture is taken [s]: the screw is out of its bore."""
 
 
-def no_display() -> bool:
-    """Return whether this machine has no screen to open a browser on."""
-    return sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+SHOVE = shove("back", 25.0)
+"""The push at the film's end."""
+RECOVERY = 5.0
+"""Time after its begin at which the robot must stand again [s]."""
+QUIET = 0.5
+"""Time of standing quietly that shows that it does [s]."""
 
 
 @dataclass(frozen=True)
 class DemoConfig:
-    """The robot, held by a hoist, pulls loosened screws from a battery pack and drops them in a tray."""
+    """The robot stands before a battery pack, pulls loosened screws out of it and drops them in a tray."""
 
+    stack: str = "stand"
+    """Path of a stack file, or the name of a shipped one; with `tether` the robot hangs from a hoist."""
     headless: bool = field(default_factory=no_display)
     """Write a film instead of opening the live view; the default where there is no display."""
-    screws: int = 3
+    screws: int = 2
     """How many screws shall be in the tray at the end; tried up to twice as often."""
     profile: str = "bench"
     """Realism profile: ideal, bench or field."""
@@ -64,7 +71,8 @@ class DemoResult:
     """How it went.
 
     Attributes:
-        success: whether as many screws as asked for are in the tray, by the simulator's truth.
+        success: whether as many screws as asked for are in the tray and the robot never fell, by the simulator's
+            truth, and whether it stood again after the push at the film's end.
         picks: each attempt.
         screws: the screws in the tray.
         films: the films, the GIF first; empty with the live view.
@@ -85,6 +93,9 @@ class Demo:
         """Demonstrate what `config` says with a built stack."""
         self._config, self._running, self._robot = config, running, robot
         self._oracle = Oracle(robot)
+        self._pusher = Pusher(robot)
+        self._pushed_at: float | None = None
+        self.recorder = BalanceRecorder(robot)
         self._started = time.perf_counter()
         self._timeline = Timeline()
         self.picks: list[PickRecord] = []
@@ -99,9 +110,34 @@ class Demo:
         return len(self.in_tray()) >= self._config.screws
 
     def over(self) -> bool:
-        """Return whether there is nothing left to try: reached, too many attempts, or the robot was stopped."""
+        """Return whether there is nothing left to try: reached, too many attempts, or the robot was lost."""
+        return self.reached() or self.lost() or len(self.picks) >= 2 * self._config.screws
+
+    def lost(self) -> bool:
+        """Return whether the robot fell or was stopped."""
         stopped = bool(self.picks) and self.picks[-1].stage == "safety"
-        return self.reached() or stopped or len(self.picks) >= 2 * self._config.screws
+        return stopped or self.recorder.fallen
+
+    def push(self, watch: Callable[[], None]) -> None:
+        """Push the robot, and watch until it stands again or it is clear that it does not."""
+        executor = self._running.executor
+        start = self._pushed_at = executor.t
+        print(f"Now a push: {SHOVE.impulse:.0f} N s to the {SHOVE.direction}.", flush=True)
+        self._pusher.begin(SHOVE, start, self.recorder.yaw)
+
+        def over() -> bool:
+            watch()
+            stands = self.recorder.quiet >= QUIET and executor.t > start + 2.0
+            return stands or self.recorder.fallen
+
+        executor.run(start + RECOVERY, over)
+        steps = self.recorder.trace().window(start).steps
+        how = f"with {steps} steps" if steps else "without a step"
+        print(f"It stands again, {how}." if self.stands() else "It does not stand again.", flush=True)
+
+    def stands(self) -> bool:
+        """Return whether the robot stands quietly now."""
+        return not self.recorder.fallen and self.recorder.quiet >= QUIET
 
     def pick(self, execute: Callable[[], SkillResult]) -> None:
         """Let the robot pick once, and judge it."""
@@ -129,12 +165,16 @@ class Demo:
         print(f"Pick {len(self.picks)}: {what} ({len(self.in_tray())} of {self._config.screws}).", flush=True)
 
     def tick(self) -> None:
-        """Follow the stages, and take the report's picture when the first screw comes out."""
+        """Follow balance and stages, and take the report's picture when the first screw comes out."""
+        self.recorder(self._running.executor.t, self._pusher.force)
+        self._pusher.drive(self._running.executor.t)
         self._timeline.update(self._running)
         stages = self._timeline.stages
         if self.picture is None and stages and stages[-1][0] == "extract":
             if self._running.executor.t - stages[-1][1] > PULLED:
-                view = SpectatorView(self._robot, SHOTS, PICTURE_SIZE, fancy=self._config.headless)
+                view = SpectatorView(
+                    self._robot, shots(self._robot), PICTURE_SIZE, fancy=self._config.headless
+                )
                 self.picture = view.picture("close")
                 view.close()
 
@@ -143,33 +183,52 @@ class Demo:
         config, screws, folder = self._config, self.in_tray(), self._config.out
         robot_time, wall = self._running.executor.t, time.perf_counter() - self._started
         tries = f"{len(self.picks)} pick{'' if len(self.picks) == 1 else 's'}"
+        standing = self._running.stack.on_ground
+        recovered = self._pushed_at is None or self.stands()
+        success = len(screws) >= config.screws and not self.recorder.fallen and recovered
         lead = (
             f"{len(screws)} of {config.screws} screws in the tray after {tries}, "
             f"{robot_time:.0f} s of robot time and {wall:.0f} s by the clock."
         )
+        if self.recorder.fallen:
+            lead += " The robot fell."
+        elif not recovered:
+            lead += f" A push of {SHOVE.impulse:.0f} N s brought it off balance."
+        elif standing:
+            lead += " It stood on its own feet all the time."
         facts = {
-            "stack": f"tether, digest {self._running.stack.digest()}",
+            "stack": f"{config.stack}, digest {self._running.stack.digest()}",
             "profile": config.profile,
             "seed": str(config.seed),
         }
-        page = render_page(lead, self.picks, self.picture, [film.name for film in films], facts)
+        balance = balance_figures(self.recorder.trace(), self._pushed_at) if standing else {}
+        page = render_page(
+            lead,
+            self.picks,
+            self.picture,
+            [film.name for film in films],
+            facts,
+            balance_section(self.recorder.trace(), self._pushed_at, balance) if standing else "",
+        )
         report = folder / "report.html"
         _write(report, page)
         figures = {
-            "success": len(screws) >= config.screws,
+            "success": success,
             "screws_in_tray": screws,
             "asked": config.screws,
             "picks": [asdict(pick) for pick in self.picks],
+            "fallen": self.recorder.fallen,
+            "balance": balance,
             "robot_time": round(robot_time, 3),
             "wall_time": round(wall, 1),
             **facts,
         }
         _write(folder / "demo.json", json.dumps(figures, indent=2) + "\n")
-        print(f"{'Done' if figures['success'] else 'Failed'}: {lead}")
+        print(f"{'Done' if success else 'Failed'}: {lead}")
         for film in films:
             print(f"Film:   {film}")
         print(f"Report: {report}", flush=True)
-        return DemoResult(len(screws) >= config.screws, self.picks, screws, films, report)
+        return DemoResult(success, self.picks, screws, films, report)
 
 
 def run_demo(config: DemoConfig) -> DemoResult:
@@ -183,16 +242,22 @@ def run_demo(config: DemoConfig) -> DemoResult:
     if config.screws < 1:
         raise ConfigError(f"--screws is {config.screws}; give a number from 1 on.")
     _prepare(config.out)
-    running, robot = build(load_stack("tether", profile=config.profile), config.seed)
+    running, built = build(load_stack(config.stack, profile=config.profile), config.seed)
     with ExitStack() as stack:
-        stack.callback(robot.close)
+        stack.callback(built.close)
+        robot = shown(running, built)
         loose = len(robot.scene.names.screws)
+        if not loose:
+            raise ConfigError(
+                f"The world of the stack '{config.stack}' has no screws; give one with 'world: pack'."
+            )
         if config.screws > loose:
             raise ConfigError(
                 f"--screws is {config.screws}, but only {loose} screws are loosened; give 1 to {loose}."
             )
         print(
-            f"The robot hangs from a hoist in front of a battery pack with {loose} loosened screws in reach.\n"
+            f"The robot {'stands on its own feet' if running.stack.on_ground else 'hangs from a hoist'} in front of "
+            f"a battery pack with {loose} loosened screws in reach.\n"
             f"It shall find {config.screws} of them in its cameras, pull them out and drop them in the tray "
             f"(profile {config.profile}, seed {config.seed}).",
             flush=True,
@@ -207,7 +272,7 @@ def run_demo(config: DemoConfig) -> DemoResult:
 
 def _filmed(config: DemoConfig, demo: Demo, running: Running, robot: MujocoRobot) -> DemoResult:
     """Demonstrate into a film, as fast as the machine can."""
-    film = Film(robot, fps=FPS)
+    film = Film(robot, fps=FPS, recorder=demo.recorder if running.stack.on_ground else None)
     narrator = Narrator(running)
 
     def watch() -> None:
@@ -221,6 +286,9 @@ def _filmed(config: DemoConfig, demo: Demo, running: Running, robot: MujocoRobot
             demo.pick(lambda: running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=watch))
         film.headline = f"{len(demo.in_tray())} of {config.screws} screws in the tray"
         film.frame(running)
+        if running.stack.on_ground and not demo.lost():
+            film.headline = f"A push of {SHOVE.impulse:.0f} N s"
+            demo.push(watch)
         print(f"Writing the film ({len(film)} pictures).", flush=True)
         return demo.write(film.save(config.out / "demo.gif"))
     finally:

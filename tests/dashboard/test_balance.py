@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from golem.dashboard.balance import BAD, GOOD, PUSHED, REACH, SPAN, balance_chart
+from golem.dashboard.balance import (
+    BAD,
+    GOOD,
+    PUSHED,
+    REACH,
+    SPAN,
+    balance_chart,
+    balance_figures,
+    balance_section,
+)
 from golem.evaluation.balance import PERIOD, BalanceTrace
 from golem.types import Array
 
@@ -65,3 +74,19 @@ def test_a_push_is_marked_where_it_was() -> None:
 @pytest.mark.parametrize("margin", [np.array([0.11]), np.array([-2.0, 2.0]), np.zeros(3)])
 def test_short_and_extreme_traces_are_drawn(margin: Array) -> None:
     assert balance_chart(trace(margin), SIZE).shape == (SIZE[1], SIZE[0], 3)
+
+
+def test_work_and_push_are_told_apart() -> None:
+    margin = np.full(500, 0.1)
+    margin[200:220] = -0.15
+    whole = trace(margin)
+    assert balance_figures(whole, None)["margin_min"] == -0.15
+    figures = balance_figures(whole, 1.95)
+    assert (figures["margin_min"], figures["push_margin_min"], figures["push_margin_final"]) == (
+        0.1,
+        -0.15,
+        0.1,
+    )
+    page = balance_section(whole, 1.95, figures)
+    assert "100 mm or more" in page and "Least margin -150 mm" in page and page.count("<svg") == 2
+    assert balance_section(whole, None, balance_figures(whole, None)).count("<svg") == 1

@@ -14,17 +14,24 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from golem.dashboard.balance import SPAN, balance_chart
 from golem.dashboard.scene import Shot, SpectatorView
 from golem.dashboard.status import CLASS_COLOURS, Status, camera_picture, read_status
 from golem.errors import OutputError
+from golem.evaluation.balance import BalanceRecorder
 from golem.hardware.safety.base import GateState
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.assembly import Running
 
-SHOTS = {
+HANGING = {
     "wide": Shot(look_at=(0.32, 0.04, 1.18), azimuth=-148.0, elevation=-17.0, distance=2.15),
     "close": Shot(look_at=(0.38, -0.07, 1.14), azimuth=-120.0, elevation=-13.0, distance=0.80),
 }
+STANDING = {
+    "wide": Shot(look_at=(0.30, 0.0, 0.84), azimuth=62.0, elevation=-11.0, distance=3.3),
+    "close": Shot(look_at=(0.38, -0.07, 0.99), azimuth=-120.0, elevation=-13.0, distance=0.80),
+}
+"""Cameras for a robot in the hoist, and for one on its feet: farther away, from where its legs are seen."""
 CLOSE_STAGES = ("descend", "servo", "grasp", "extract")
 """Stages that are filmed from near; the others are filmed wide."""
 OVERSAMPLING = 4 / 3
@@ -39,6 +46,8 @@ UNCHANGED = 255
 """Palette index of a GIF's transparent colour."""
 MAX_GIF = 8_000_000
 """Size above which a GIF is written again, smaller [bytes]."""
+CHART = (230, 64)
+"""Size of the chart of the CoM margin in a film of 540 lines [px]."""
 PANEL = (16, 20, 27)
 INK, MUTED, ACCENT = (240, 242, 245), (150, 160, 173), (255, 196, 0)
 SAFETY_COLOURS = {
@@ -50,6 +59,11 @@ SAFETY_COLOURS = {
 }
 
 
+def shots(robot: MujocoRobot) -> dict[str, Shot]:
+    """Return the cameras that show `robot` at work: `wide` and `close`."""
+    return STANDING if robot.config.support == "ground" else HANGING
+
+
 class Film:
     """Collects pictures of a running stack in robot time.
 
@@ -58,17 +72,24 @@ class Film:
         headline: words at the top of every picture from now on.
     """
 
-    def __init__(self, robot: MujocoRobot, size: tuple[int, int] = (960, 540), fps: float = 12.5) -> None:
+    def __init__(
+        self,
+        robot: MujocoRobot,
+        size: tuple[int, int] = (960, 540),
+        fps: float = 12.5,
+        recorder: BalanceRecorder | None = None,
+    ) -> None:
         """Film `robot`.
 
         Args:
             robot: the twin.
             size: width and height of the film [px].
             fps: pictures per second of robot time.
+            recorder: whoever samples its balance; its CoM margin is then in the picture.
         """
-        self._size, self.fps = size, fps
+        self._size, self.fps, self._recorder = size, fps, recorder
         rendered = (round(size[0] * OVERSAMPLING), round(size[1] * OVERSAMPLING))
-        self._view = SpectatorView(robot, SHOTS, rendered)
+        self._view = SpectatorView(robot, shots(robot), rendered)
         self._frames: list[NDArray[np.uint8]] = []
         self._fonts = {k: ImageFont.load_default(size=round(k * size[1] / 540)) for k in (13, 15, 19)}
         self._due = 0.0
@@ -120,6 +141,11 @@ class Film:
             top = y - 2
         top = height - bar
         draw.rectangle((0, top, width, height), fill=PANEL)
+        if self._recorder is not None:
+            chart = balance_chart(
+                self._recorder.trace(last=SPAN), (round(CHART[0] * unit), round(CHART[1] * unit))
+            )
+            image.paste(Image.fromarray(chart), (edge, top - edge - chart.shape[0]))
         middle = top + bar / 2
         draw.text((14 * unit, middle), status.stage, fill=ACCENT, font=self._fonts[19], anchor="lm")
         draw.text((120 * unit, middle), status.text, fill=INK, font=self._fonts[15], anchor="lm")

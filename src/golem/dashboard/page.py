@@ -37,7 +37,7 @@ class PickRecord:
 
 def render_page(
     lead: str, picks: Sequence[PickRecord], picture: NDArray[np.uint8] | None, films: Sequence[str],
-    facts: dict[str, str],
+    facts: dict[str, str], balance: str = "",
 ) -> str:  # fmt: skip
     """Return the report as HTML that needs no other file but the films.
 
@@ -47,6 +47,7 @@ def render_page(
         picture: (height, width, 3) RGB, or None.
         films: names of the films beside the report.
         facts: provenance.
+        balance: HTML of the section on how the robot balanced; empty for one that hung.
     """
     body = [
         f'<header><p class="kicker">GOLEM demonstration</p><h1>Loosened screws, pulled from the pack</h1>'
@@ -59,6 +60,7 @@ def render_page(
             f'<figure><img alt="The robot pulls a screw." src="data:image/jpeg;base64,{data}"></figure>'
         )
     body.append(f'<h2>Picks</h2><section class="card"><div class="scroll">{_table(picks)}</div></section>')
+    body.append(balance)
     if films:
         shown = next((name for name in films if name.endswith(".mp4")), None)
         still = next((name for name in films if name.endswith(".gif")), None)

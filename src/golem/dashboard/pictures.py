@@ -12,11 +12,12 @@ from golem.dashboard.film import Film
 from golem.dashboard.scene import Shot, SpectatorView
 from golem.dashboard.status import Timeline
 from golem.errors import GolemError
+from golem.evaluation.balance import BalanceRecorder
 from golem.runtime.assembly import build
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import Stack, load_stack
 
-PULL = Shot(look_at=(0.36, -0.03, 1.26), azimuth=-138.0, elevation=-15.0, distance=1.52, fovy=45.0)
+PULL = Shot(look_at=(0.30, 0.0, 0.90), azimuth=55.0, elevation=-12.0, distance=2.6, fovy=45.0)
 PULLED = 1.15
 """Time into the extraction at which the picture is taken [s]: the screw is out, and still above its bore."""
 
@@ -36,13 +37,15 @@ def take(folder: Path, stack: Stack, seed: int = 0) -> list[Path]:
         GolemError: a pick failed.
     """
     running, robot = build(stack, seed)
-    film = Film(robot, fps=10.0)
+    recorder = BalanceRecorder(robot)
+    film = Film(robot, fps=10.0, recorder=recorder)
     timeline = Timeline()
     picture = folder / "pull.png"
     taken = False
 
     def watch() -> None:
         nonlocal taken
+        recorder(running.executor.t)
         film.tick(running)
         timeline.update(running)
         stage, since = timeline.stages[-1] if timeline.stages else ("", 0.0)
@@ -58,7 +61,7 @@ def take(folder: Path, stack: Stack, seed: int = 0) -> list[Path]:
             raise GolemError(f"No picture: {result.reason}")
 
     try:
-        pick(lambda: None)
+        pick(lambda: recorder(running.executor.t))
         timeline = Timeline.of(running)
         pick(watch)
         gif, *rest = film.save(folder / "pick.gif")
@@ -71,4 +74,4 @@ def take(folder: Path, stack: Stack, seed: int = 0) -> list[Path]:
 
 
 if __name__ == "__main__":
-    print(*take(Path(sys.argv[1]), load_stack("tether")), sep="\n")
+    print(*take(Path(sys.argv[1]), load_stack("stand")), sep="\n")
