@@ -98,11 +98,11 @@ def test_ppo_learns_which_way_to_act() -> None:
 
 def test_difficulty_follows_survival_and_bounds_what_the_adversary_does() -> None:
     difficulty = Difficulty()
-    before = difficulty.push
+    before = difficulty.amplitude
     difficulty.update(0.9, 0.01)
-    assert difficulty.push == pytest.approx(before + 0.01)
+    assert difficulty.amplitude == pytest.approx(before + 0.01)
     difficulty.update(0.5, 0.01)
-    assert difficulty.push == pytest.approx(before - 0.01)
+    assert difficulty.amplitude == pytest.approx(before - 0.01)
 
     rng = np.random.default_rng(0)
     motion = UpperBodyMotion(4, rng)

@@ -23,7 +23,7 @@ TOP_SPEED = 2.5
 
 @dataclass
 class Difficulty:
-    """How hard the disturbances are, 0 to 1 each; raised while the robot stays up, lowered while it falls.
+    """How hard the disturbances are, 0 to 1 each.
 
     Attributes:
         amplitude: share of the joint ranges that upper-body targets use.
@@ -38,12 +38,12 @@ class Difficulty:
     payload: float = 0.0
 
     def update(self, survival: float, rate: float) -> None:
-        """Move on while `survival` (mean length of an episode, as share of the whole) is high, else step back.
+        """Let the upper body move on while `survival` (mean length of an episode, as share of the whole) is high, else step back.
 
         ALMI's rule with 70 instead of 80 %: up while episodes last, down twice as fast otherwise.
         """
         change = rate if survival > 0.7 else -2.0 * rate
-        for name in ("amplitude", "speed", "push", "payload"):
+        for name in ("amplitude", "speed", "payload"):
             setattr(self, name, float(np.clip(getattr(self, name) + change, 0.05, 1.0)))
 
 

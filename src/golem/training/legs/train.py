@@ -40,7 +40,9 @@ class TrainConfig:
         adversary: what moves the upper body: `none` (it rests in random postures), `motions` (the curriculum), or
             `learned` (motions, and a policy that moves half of the robots once `learned_from` steps are done).
         learned_from: steps after which the learned adversary begins.
-        rate: change of the difficulties per update.
+        rate: change of the upper body's difficulties per update.
+        push_ramp: steps after which pushes have their full range. It grows whether or not the robot survives: tied to
+            survival it went up and down below half, and the legs learned to take no more than that.
     """
 
     out: Path = Path("runs/legs/seed0")
@@ -52,6 +54,7 @@ class TrainConfig:
     learned_from: float = 4e6
     start: Path | None = None
     rate: float = 0.006
+    push_ramp: float = 8e6
     env: EnvConfig = field(default_factory=EnvConfig)
     ppo: PpoConfig = field(default_factory=PpoConfig)
 
@@ -139,6 +142,7 @@ class _Run:
             share = min(1.0, meter.finished / 64.0)
             self._survival += share * 0.5 * (meter.lasted / meter.finished - self._survival)
         env.difficulty.update(self._survival, config.rate)
+        env.difficulty.push = float(np.clip(self.steps / config.push_ramp, 0.05, 1.0))
         if config.adversary == "none":
             env.difficulty.amplitude = env.difficulty.speed = 0.0
         self._cpu += time.process_time() - began
