@@ -195,7 +195,7 @@ class Demo:
         elif not recovered:
             lead += f" A push of {SHOVE.impulse:.0f} N s brought it off balance."
         elif standing:
-            lead += " It stood on its own feet all the time."
+            lead += " It stood on its own feet from the release of its band on."
         facts = {
             "stack": f"{config.stack}, digest {self._running.stack.digest()}",
             "profile": config.profile,
