@@ -38,7 +38,7 @@ class Difficulty:
     payload: float = 0.0
 
     def update(self, survival: float, rate: float) -> None:
-        """Let the upper body move on while `survival` (mean length of an episode, as share of the whole) is high, else step back.
+        """Make the upper body harder while `survival` (mean share of an episode that is lasted) is high, else easier.
 
         ALMI's rule with 70 instead of 80 %: up while episodes last, down twice as fast otherwise.
         """
