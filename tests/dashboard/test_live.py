@@ -184,7 +184,9 @@ def test_the_button_pushes_with_the_impulse_that_is_set(walker: tuple[Running, A
     run(walk, running, 0.1)
     assert walk._pusher.force == pytest.approx([0.0, 200.0, 0.0], abs=2.0)
     assert walk._stage._arrow.visible
-    assert robot.truth.com()[1][1] - before > 0.05  # 40 N s move 75 kg at 0.5 m/s, less what legs and band hold
+    assert (
+        robot.truth.com()[1][1] - before > 0.05
+    )  # 40 N s move 75 kg at 0.5 m/s, less what legs and band hold
     run(walk, running, 1.0)
     assert not walk._pusher.force.any() and not walk._stage._arrow.visible
     pushed = walk._recorder.trace()
