@@ -63,10 +63,7 @@ def quiet(subject: Subject, seed: int, index: int) -> Figures:
     """Stand still for a minute: base range, sway, steps, margin."""
     episode = subject.episode(seed, index)
     try:
-        episode.stand(SETTLE)
-        start = episode.t
-        episode.run(MINUTE)
-        return _standing(episode, start) | _lost(episode)
+        return _minute(episode)
     finally:
         episode.close()
 
@@ -77,12 +74,17 @@ def arms(subject: Subject, seed: int, index: int) -> Figures:
     try:
         draw = subject.draw("legs/arms", seed, index)
         episode.start(Exercise(ArmMotion(draw.rng("arms"), WIDE_AREA)))
-        episode.stand(SETTLE)
-        start = episode.t
-        episode.run(MINUTE)
-        return _standing(episode, start) | _lost(episode)
+        return _minute(episode)
     finally:
         episode.close()
+
+
+def _minute(episode: Episode) -> Figures:
+    """Let the robot stand for a minute once it has settled; return how it stood."""
+    episode.stand(SETTLE)
+    start = episode.t
+    episode.run(MINUTE)
+    return _standing(episode, start) | _lost(episode)
 
 
 def tracking(subject: Subject, seed: int, index: int) -> Figures:

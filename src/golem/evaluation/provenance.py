@@ -8,12 +8,14 @@ import json
 import platform
 import subprocess
 from collections.abc import Mapping
+from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import golem
 from golem import registry
+from golem.robots.sensors.profiles import load_profile
 from golem.stack import Stack
 
 PACKAGES = ("golem-humanoid", "numpy", "scipy", "mujoco", "pin", "daqp", "onnxruntime")
@@ -24,6 +26,15 @@ def digest(data: Mapping[str, Any]) -> str:
     """Return 16 hex digits that identify JSON-like `data`, whatever the order of its keys."""
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def stack_facts(stack: Stack) -> dict[str, Any]:
+    """Return what a stack contributes to a trial's configuration: itself, its profile's numbers, its files' content."""
+    return {
+        "stack": asdict(stack),
+        "profile": asdict(load_profile(stack.profile)),
+        "user_files": user_files(stack),
+    }
 
 
 def user_files(stack: Stack) -> dict[str, str]:

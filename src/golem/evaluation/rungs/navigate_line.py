@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,11 @@ from golem.evaluation.balance import TRACE
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.episode import Episode, Loss, episode_seed, legs_stack
 from golem.evaluation.odometry import SimulatedOdometry
-from golem.evaluation.provenance import user_files
+from golem.evaluation.provenance import stack_facts
 from golem.evaluation.strip import Strip
 from golem.middleware import topics
 from golem.middleware.topics import Odometry
-from golem.robots.sensors.profiles import PROFILES, load_profile
+from golem.robots.sensors.profiles import PROFILES
 from golem.skills.walk import Walk, WalkGoal
 
 DISTANCE = 6.0
@@ -53,13 +53,10 @@ class NavigateLine:
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
-        stack = legs_stack(method, profile, overrides)
         return {
-            "stack": asdict(stack),
-            "profile": asdict(load_profile(profile)),
+            **stack_facts(legs_stack(method, profile, overrides)),
             "distance": DISTANCE,
             "tolerance": TOLERANCE,
-            "user_files": user_files(stack),
         }
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:

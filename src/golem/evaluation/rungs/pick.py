@@ -19,12 +19,12 @@ from golem.evaluation.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.episode import episode_seed
 from golem.evaluation.oracle import GraspTruth, Oracle
-from golem.evaluation.provenance import user_files
+from golem.evaluation.provenance import stack_facts
 from golem.middleware import topics
 from golem.middleware.bus import News
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
-from golem.robots.sensors.profiles import PROFILES, load_profile
+from golem.robots.sensors.profiles import PROFILES
 from golem.runtime.assembly import Running, build
 from golem.skills.base import Feedback, SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickConfig, PickGoal
@@ -69,12 +69,10 @@ class PickRung:
             )
         shared_context()
         return {
-            "stack": asdict(stack),
-            "profile": asdict(load_profile(profile)),
+            **stack_facts(stack),
             "goal": asdict(PickGoal()),
             "skill": asdict(PickConfig()),
             "timeout": TIMEOUT,
-            "user_files": user_files(stack),
         }
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,10 @@ from golem.evaluation.balance import TRACE, BalanceTrace
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.episode import Episode, Loss, episode_seed, legs_stack
 from golem.evaluation.exercise import ArmMotion, Exercise
-from golem.evaluation.provenance import user_files
+from golem.evaluation.provenance import stack_facts
 from golem.evaluation.pushes import DIRECTIONS, Push, rod
 from golem.evaluation.strip import Strip
-from golem.robots.sensors.profiles import PROFILES, load_profile
+from golem.robots.sensors.profiles import PROFILES
 
 PEAK = (22.1, 6.9)
 """Mean and deviation of the rod's peak force [N], from the paper's ALMI trials."""
@@ -49,14 +49,11 @@ class PushRung:
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
-        stack = legs_stack(method, profile, overrides)
         return {
-            "stack": asdict(stack),
-            "profile": asdict(load_profile(profile)),
+            **stack_facts(legs_stack(method, profile, overrides)),
             "peak": PEAK,
             "settle": SETTLE,
             "patience": PATIENCE,
-            "user_files": user_files(stack),
         }
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.legs.balance import balance_errors, heading_frame
+from golem.capabilities.legs.balance import balance_errors
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import Gait, GaitConfig
 from golem.capabilities.legs.observation import Layout, Signals, Term
@@ -250,13 +250,3 @@ class LegsEnv:
         still = (rng.random(m) < self.config.standing) | (np.linalg.norm(twist, axis=1) < 0.1)
         self._goal[where] = np.where(still[:, None], 0.0, twist)
         self._left[where] = rng.uniform(*self.config.hold, m)
-
-    def heading_velocity(self) -> Array:
-        """Return the (n, 3) true velocity in the heading frame: vx, vy [m/s], wz [rad/s]."""
-        return heading_velocity(self.world.truth.R, self.world.truth.velocity, self.world.truth.rate)
-
-
-def heading_velocity(R: Array, velocity: Array, rate: Array) -> Array:
-    """Return (n, 3) vx, vy, wz from rotation (n, 3, 3), level velocity (n, 3) and body rate (n, 3)."""
-    planar = np.einsum("nji,nj->ni", heading_frame(R), velocity[:, :2])
-    return np.concatenate([planar, np.einsum("nj,nj->n", R[:, 2], rate)[:, None]], axis=1)

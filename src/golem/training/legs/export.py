@@ -29,10 +29,10 @@ DECLARED = Envelope((-0.4, 0.8), (-0.3, 0.3), (-0.6, 0.6))
 """The twists the shipped controller promises to follow; training commands a little more."""
 
 
-def load_actor(checkpoint: Path, hidden: tuple[int, ...] = PpoConfig().hidden) -> Actor:
+def load_actor(checkpoint: Path) -> Actor:
     """Return the trained actor of a checkpoint of `train`."""
     layout = Layout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
-    actor = Actor(Mirror(layout.components), leg_mirror(), hidden)
+    actor = Actor(Mirror(layout.components), leg_mirror(), PpoConfig().hidden)
     actor.load_state_dict(torch.load(checkpoint, weights_only=True)["legs"]["actor"])
     return actor.eval()
 

@@ -58,9 +58,9 @@ class Ids:
     sole_velocity: NDArray[np.intp]
 
 
-def build_model(self_collision: bool = True) -> tuple[mujoco.MjModel, Ids]:
+def build_model() -> tuple[mujoco.MjModel, Ids]:
     """Return the model and where things are in it: floor, robot, position servos in motor order."""
-    spec = mjcf.robot_spec(hands=True, self_collision=self_collision)
+    spec = mjcf.robot_spec(hands=True, self_collision=True)
     _strip(spec)
     _servos(spec)
     floor = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[50, 50, 1])

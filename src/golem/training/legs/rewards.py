@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.legs.balance import heading_frame
 from golem.capabilities.legs.gait import Gait, GaitConfig
 from golem.hardware.safety.base import SafetyLimits
 from golem.training.legs.model import STANCE, STAND_HEIGHT
@@ -115,9 +114,7 @@ class Rewards:
     ) -> tuple[Array, dict[str, float]]:
         """Return the reward (n,) of one period and the mean of each term."""
         w = self._weights
-        planar = np.einsum("nji,nj->ni", heading_frame(truth.R), truth.velocity[:, :2])
-        wz = np.einsum("nj,nj->n", truth.R[:, 2], truth.rate)
-        now = np.concatenate([planar, wz[:, None]], axis=1)
+        now = truth.heading_velocity()
         self._mean += (now - self._mean) * (dt / (self._share + dt))
         mean = np.square(self._mean - twist)
         error = np.square(now - twist)
@@ -158,7 +155,7 @@ class Rewards:
             "feet": np.maximum(misplaced - 0.04, 0.0) * stance.all(axis=1),
             "impact": np.maximum(truth.force - 800.0, 0.0).sum(axis=1),
             "stand_posture": np.square(legs - STANCE).sum(axis=1) * rest,
-            "stand_still": (np.square(truth.velocity[:, :2]).sum(axis=1) + np.square(wz)) * rest,
+            "stand_still": (np.square(truth.velocity[:, :2]).sum(axis=1) + np.square(now[:, 2])) * rest,
             "stand_center": np.exp(-np.square(capture).sum(axis=1) / 0.03**2) * rest,
             "stand_step": still * stepping,
         }

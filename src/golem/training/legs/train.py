@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from golem.errors import ConfigError, OutputError
 from golem.training.legs.disturbances import NUM_UPPER
-from golem.training.legs.env import EnvConfig, LegsEnv
+from golem.training.legs.env import PERIOD, EnvConfig, LegsEnv
 from golem.training.legs.mirror import Mirror, leg_mirror, upper_mirror
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
 from golem.training.legs.world import Rows
@@ -250,9 +250,9 @@ class _Meter:
         over = ended | truncated
         self.lasted += float(env.age[over].sum() / env.config.episode)
         self.finished += int(over.sum())
-        self._seconds += 0.02 * env.n
+        self._seconds += PERIOD * env.n
         moving = np.abs(env.twist).max(axis=1) > 1e-6
-        error = np.linalg.norm((env.heading_velocity() - env.twist)[:, :2], axis=1)
+        error = np.linalg.norm((env.world.truth.heading_velocity() - env.twist)[:, :2], axis=1)
         self._moving.append(float(error[moving].mean()) if moving.any() else 0.0)
         self._standing.append(float(error[~moving].mean()) if (~moving).any() else 0.0)
         self._stepping.append(float(env.gait.stepping[~moving].mean()) if (~moving).any() else 0.0)

@@ -14,7 +14,7 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
-from golem.capabilities.legs.balance import GRAVITY
+from golem.capabilities.legs.balance import GRAVITY, heading_frame
 from golem.hardware.estimator.contact import Contact, ContactConfig
 from golem.hardware.estimator.random_walk import RandomWalk, RandomWalkConfig
 from golem.hardware.safety.base import SafetyLimits
@@ -108,6 +108,11 @@ class Truth:
     torque: Array
     q: Array
     dq: Array
+
+    def heading_velocity(self) -> Array:
+        """Return the (n, 3) velocity in the heading frame: vx, vy [m/s], wz [rad/s]."""
+        planar = np.einsum("nji,nj->ni", heading_frame(self.R), self.velocity[:, :2])
+        return np.concatenate([planar, np.einsum("nj,nj->n", self.R[:, 2], self.rate)[:, None]], axis=1)
 
 
 class World:
