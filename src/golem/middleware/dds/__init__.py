@@ -1,0 +1,1 @@
+"""DDS transport of raw CDR: one contract (`base`), over Cyclone DDS (`participant`) or inside one process (`local`)."""
