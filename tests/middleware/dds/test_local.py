@@ -3,6 +3,7 @@ import pytest
 from golem.middleware.dds.base import ENCAPSULATION, LATCHED, SENSOR, DdsError, Qos, Reader
 from golem.middleware.dds.local import LocalDomain, LocalParticipant
 
+Pair = tuple[LocalParticipant, LocalParticipant]
 TYPE = "std_msgs::msg::dds_::String_"
 
 
@@ -15,12 +16,12 @@ def texts(reader: Reader) -> list[str]:
 
 
 @pytest.fixture
-def pair() -> tuple[LocalParticipant, LocalParticipant]:
+def pair() -> Pair:
     domain = LocalDomain(clock=lambda: 12.5)
     return domain.participant(), domain.participant()
 
 
-def test_a_sample_arrives_once_with_its_writer_and_time(pair):
+def test_a_sample_arrives_once_with_its_writer_and_time(pair: Pair) -> None:
     reader = pair[1].reader("rt/a", TYPE, Qos())
     writer = pair[0].writer("rt/a", TYPE, Qos())
     buffer = bytearray(sample("x"))
@@ -48,13 +49,15 @@ def test_a_sample_arrives_once_with_its_writer_and_time(pair):
         ("rt/a", "other", Qos(), Qos(), False),
     ],
 )
-def test_matching_is_by_topic_type_and_qos(pair, topic, type_name, offered, requested, match):
+def test_matching_is_by_topic_type_and_qos(
+    pair: Pair, topic: str, type_name: str, offered: Qos, requested: Qos, match: bool
+) -> None:
     writer, reader = pair[0].writer("rt/a", TYPE, offered), pair[1].reader(topic, type_name, requested)
     writer.write(sample("x"))
     assert (writer.matched(), reader.matched(), len(reader.take())) == (match, match, match)
 
 
-def test_a_late_reader_gets_the_history_it_asks_for(pair):
+def test_a_late_reader_gets_the_history_it_asks_for(pair: Pair) -> None:
     writer = pair[0].writer("rt/a", TYPE, Qos(transient_local=True, depth=2))
     for text in "abc":
         writer.write(sample(text))
@@ -64,7 +67,7 @@ def test_a_late_reader_gets_the_history_it_asks_for(pair):
 
 
 @pytest.mark.parametrize(("depth", "kept"), [(2, ["b", "c"]), (None, ["a", "b", "c"])])
-def test_a_reader_keeps_its_newest_samples(pair, depth, kept):
+def test_a_reader_keeps_its_newest_samples(pair: Pair, depth: int | None, kept: list[str]) -> None:
     reader = pair[1].reader("rt/a", TYPE, Qos(depth=depth))
     writer = pair[0].writer("rt/a", TYPE, Qos())
     for text in "abc":
@@ -72,7 +75,7 @@ def test_a_reader_keeps_its_newest_samples(pair, depth, kept):
     assert texts(reader) == kept
 
 
-def test_callbacks_do_not_nest(pair):
+def test_callbacks_do_not_nest(pair: Pair) -> None:
     order: list[str] = []
 
     def on_request() -> None:
@@ -88,7 +91,7 @@ def test_callbacks_do_not_nest(pair):
     assert order == ["request in", "request out", "reply ['reply']"]
 
 
-def test_a_callback_that_raises_does_not_silence_the_next(pair):
+def test_a_callback_that_raises_does_not_silence_the_next(pair: Pair) -> None:
     calls: list[int] = []
 
     def on_data() -> None:
@@ -104,7 +107,7 @@ def test_a_callback_that_raises_does_not_silence_the_next(pair):
     assert calls == [1, 1]
 
 
-def test_the_last_writer_to_leave_is_noticed_once(pair):
+def test_the_last_writer_to_leave_is_noticed_once(pair: Pair) -> None:
     reader = pair[1].reader("rt/a", TYPE, Qos())
     first, second = (pair[0].writer("rt/a", TYPE, Qos()) for _ in range(2))
     first.write(sample("x"))
@@ -116,7 +119,7 @@ def test_the_last_writer_to_leave_is_noticed_once(pair):
     assert reader.take() == [] and reader.matched() == 0
 
 
-def test_errors_are_sentences(pair):
+def test_errors_are_sentences(pair: Pair) -> None:
     writer = pair[0].writer("rt/a", TYPE, Qos())
     with pytest.raises(DdsError, match="cannot carry 'other' too"):
         pair[0].reader("rt/a", "other", Qos())

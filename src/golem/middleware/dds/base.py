@@ -167,8 +167,10 @@ class Participant(Protocol):
         """Create a reader.
 
         Args:
-            topic, type_name, user_data: as for a writer.
+            topic: name of the topic as on the wire.
+            type_name: name of its type as on the wire.
             qos: what it requests.
+            user_data: USER_DATA that peers see during discovery.
             on_data: called when there is something to take, one call at a time for all readers of the participant.
                 It must take, may write, and must not wait for another callback.
 
