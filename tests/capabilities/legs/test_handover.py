@@ -12,7 +12,8 @@ from tests.capabilities.legs.recorder import Recorder, crouching, still
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.handover import Handover, HandoverConfig, Part
-from golem.capabilities.legs.locomotion import Locomotion
+from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
+from golem.capabilities.legs.trim import TrimConfig
 from golem.errors import ConfigError
 from golem.types import BaseEstimate, LowState, Twist
 
@@ -27,7 +28,7 @@ class Robot:
         walker = Part(RECORDER, {"target": 1.0} | (walk or {}))
         stander = Part(RECORDER, {"target": 0.0} | (stand or {}))
         self.legs = Handover(HandoverConfig(walker, stander))
-        self.layer = Locomotion(self.legs)
+        self.layer = Locomotion(self.legs, LocomotionConfig(trim=TrimConfig(gain=0.0)))  # the plant stands still
         self.state, self.base = crouching(), still()
         self.layer.reset(self.state)
         self.targets: list[float] = []

@@ -14,6 +14,7 @@ from tests.capabilities.legs.recorder import Recorder, crouching, still
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
+from golem.capabilities.legs.trim import TrimConfig
 from golem.types import Array, Twist
 
 DT = 0.02
@@ -21,11 +22,11 @@ ZERO = Twist()
 
 
 class Driver:
-    """Runs a base layer over a robot that stands still."""
+    """Runs a base layer over a robot that stands still, by default without the correction this would call for."""
 
-    def __init__(self, controller: Recorder) -> None:
+    def __init__(self, controller: Recorder, trim: float = 0.0) -> None:
         self.controller, self.state, self.base = controller, crouching(), still()
-        self.layer = Locomotion(controller)
+        self.layer = Locomotion(controller, LocomotionConfig(trim=TrimConfig(gain=trim)))
         self.layer.reset(self.state)
 
     def run(self, seconds: float, twist: Twist | None = None, dt: float = DT) -> None:
@@ -218,3 +219,15 @@ def test_after_a_hand_over_the_targets_do_not_jump(driver: Driver) -> None:
     np.testing.assert_allclose(q[:7], np.arange(1, 8) * DT / LocomotionConfig().blend)
     np.testing.assert_allclose(kp, 100.0 + 100.0 * q)
     np.testing.assert_array_equal(q[7:], 1.0)
+
+
+def test_a_robot_that_lags_is_asked_for_more_within_bounds_and_for_nothing_when_it_shall_stand() -> None:
+    driver = Driver(Recorder(), trim=0.5)
+    driver.run(6.0, Twist(0.5, 0.0, 0.0))
+    most = TrimConfig().most[0]
+    assert driver.applied == Twist(0.5 + most, 0.0, 0.0)
+    assert driver.layer.applied == Twist(0.5, 0.0, 0.0)
+    driver.run(1.0, ZERO)
+    assert driver.applied == ZERO
+    driver.run(0.6, Twist(0.5, 0.0, 0.0))
+    assert driver.applied.vx < 0.5 + most  # begun anew

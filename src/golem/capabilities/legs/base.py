@@ -51,7 +51,8 @@ class Motion:
     """What the base layer asks of a controller at one tick.
 
     Attributes:
-        twist: velocity of base_link, inside the controller's envelope; exactly zero means stand.
+        twist: velocity to aim at: a twist inside the controller's envelope, and the base layer's small correction (see
+            `trim.TrimConfig.most`); exactly zero means stand.
         phase: (2,) gait phase of the left and the right leg, 0 to 1, a leg's stance first (see `gait.Gait`).
         stepping: whether the gait clock runs; while it does not, both feet belong on the ground.
     """

@@ -7,7 +7,7 @@ balance of the measured robot, and runs the controller at its own rate. The cont
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from golem.capabilities.legs.base import LegCommand, LowerBody, Motion
 from golem.capabilities.legs.blend import Blend
 from golem.capabilities.legs.gait import Gait
 from golem.capabilities.legs.pacing import Paced
+from golem.capabilities.legs.trim import Trim, TrimConfig
 from golem.robots.model.imu import base_rate
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.leg_kinematics import SOLE_CENTER
@@ -37,7 +38,8 @@ class LocomotionConfig:
         timeout: age of the newest twist from which it counts as zero [s]: whoever sent it may have died.
         blend: time over which the targets go from one controller's to the next one's after a hand-over [s] [own: a
             jump of the targets in the middle of a step drives a light foot beyond its speed limit].
-        gate_rate: how often the gait clock runs at most [Hz]; controllers may be faster.
+        gate_rate: how often gait clock and trim run at most [Hz]; controllers may be faster.
+        trim: how the twist is corrected by the estimated velocity.
     """
 
     dead_band: float = 0.1
@@ -45,6 +47,7 @@ class LocomotionConfig:
     timeout: float = 0.5
     blend: float = 0.15
     gate_rate: float = 100.0
+    trim: TrimConfig = field(default_factory=TrimConfig)
 
 
 class Locomotion:
@@ -53,7 +56,7 @@ class Locomotion:
     Attributes:
         config: options.
         commanded: the newest twist, as it came.
-        applied: the twist the controller gets.
+        applied: the twist the robot shall move at; the controller gets it with the trim's correction.
         clamped: whether the commanded twist lies outside the controller's envelope.
         reason: why the controller does not get the commanded twist; empty where it does, slewing aside.
         gait: the gait clock.
@@ -65,6 +68,7 @@ class Locomotion:
         self.gait = Gait(controller.gait)
         self._paced = Paced(controller)
         self._blend = Blend(self.config.blend)
+        self._trim = Trim(self.config.trim)
         self._kinematics = Kinematics()
         left, right = self._soles(np.zeros(NUM_JOINTS))
         # With both hips straight and level the distance of the feet does not depend on how far the knees are bent.
@@ -113,11 +117,12 @@ class Locomotion:
             self._clock(state, base, self._since_gate)
             self._until_gate = max(self._until_gate + 1.0 / self.config.gate_rate, 0.0)
             self._since_gate = 0.0
-        motion = Motion(self.applied, self.gait.phases, bool(self.gait.stepping))
+        motion = Motion(self._trimmed, self.gait.phases, bool(self.gait.stepping))
         return self._blend.step(self._paced.step(state, base, motion, dt), dt)
 
     def _forget(self) -> None:
-        self.commanded = self.applied = ZERO
+        self.commanded = self.applied = self._trimmed = ZERO
+        self._trim.reset()
         self.clamped = False
         self.reason = ""
         self._age = math.inf
@@ -172,6 +177,12 @@ class Locomotion:
         capture, misplaced = balance_errors(R, com, velocity, soles @ R.T, self._stance)
         self.gait.config = self.controller.gait
         self.gait.step(np.asarray(self.applied != ZERO), capture, misplaced, dt)
+        if self.applied == ZERO:
+            self._trim.reset()
+            self._trimmed = ZERO
+        else:
+            wanted = np.array(_values(self.applied))
+            self._trimmed = Twist(*self._trim.step(wanted, R, base.velocity, rate, dt).tolist())
 
     def _soles(self, q: Array) -> Array:
         """Return the (2, 3) centres of the soles in base_link at the joints `q` (27,) [m]."""
