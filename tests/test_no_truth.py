@@ -185,7 +185,7 @@ class Inspected:
         assert self.run.result is None
         coroutine = self.run._coroutine
         self.roots += [
-            ("context", self.running._context),
+            ("context", self.running._stack.context),
             ("pick", skill),
             ("coroutine", coroutine),
             ("bus", self.running.bus),

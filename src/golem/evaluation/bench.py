@@ -26,8 +26,8 @@ from golem.hardware.safety.gate import check
 from golem.hardware.servo.servo import Servo
 from golem.robots.mujoco.config import MujocoConfig, World
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime import nodes
 from golem.runtime.assembly import build, start_posture
+from golem.runtime.cameras import CameraNode, LocalizerNode
 from golem.runtime.executor import TICK
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import load_stack
@@ -192,7 +192,7 @@ def _perception(config: BenchConfig) -> list[Figure]:
 
 def _robot(config: BenchConfig) -> list[Figure]:
     """Robot seconds per CPU second of a whole tethered pick, with and without what cameras and detector took."""
-    with stopwatch(nodes.CameraNode) as cameras, stopwatch(nodes.LocalizerNode) as localizer:
+    with stopwatch(CameraNode) as cameras, stopwatch(LocalizerNode) as localizer:
         running, robot = build(load_stack("tether", profile="field"), config.seed)
         try:
             start = time.process_time()

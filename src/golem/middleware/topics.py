@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from golem.types import Array, LocalizedObject, Side, Twist
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.types import Array, CameraInfo, LocalizedObject, Side, Twist
 
 LOW_STATE = "lowstate"
 """`LowState` at 500 Hz, from the robot."""
@@ -54,6 +57,11 @@ def hand_status(side: Side) -> str:
     return f"{side}/gripper/status"
 
 
+def exposures(camera: str) -> str:
+    """Return the topic of `Exposure` of one camera."""
+    return f"exposures/{camera}"
+
+
 def frames(camera: str) -> str:
     """Return the topic of `Frame` of one camera."""
     return f"realsense/{camera}"
@@ -67,6 +75,20 @@ def look(camera: str) -> str:
 def sightings(camera: str) -> str:
     """Return the topic of `Sightings` from one camera."""
     return f"objects/{camera}"
+
+
+@dataclass(frozen=True, slots=True)
+class Exposure:
+    """What a camera saw, before anybody says from where: a `Frame` without its pose.
+
+    Attributes:
+        t, info, rgb, depth: as in `Frame`.
+    """
+
+    t: float
+    info: CameraInfo
+    rgb: NDArray[np.uint8]
+    depth: NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)

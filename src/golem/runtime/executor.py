@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from enum import IntEnum
 from typing import Protocol
 
 from golem.errors import ConfigError
@@ -29,6 +30,36 @@ class Node(Protocol):
     def step(self, t: float) -> None:
         """Read the bus, run the module once at time `t` [s], publish what it returns."""
         ...
+
+
+class Phase(IntEnum):
+    """When in a tick a node has its turn; the same in one process and in many."""
+
+    RECEIVE = 0
+    """What other processes sent comes in."""
+    MEASURE = 1
+    ESTIMATE = 2
+    EXPOSE = 3
+    PERCEIVE = 4
+    DECIDE = 5
+    SERVE = 6
+    """The robot's own computer answers."""
+    CONTROL = 7
+    PROTECT = 8
+    OPERATE = 9
+    """What an operator does who watches the gate."""
+    ACT = 10
+    SEND = 11
+    """What other processes want goes out."""
+
+
+Placed = tuple[Phase, Node]
+"""A node and its turn."""
+
+
+def in_order(placed: Iterable[Placed]) -> list[Node]:
+    """Return the nodes in the order of their phases; within a phase as given."""
+    return [node for _, node in sorted(placed, key=lambda pair: pair[0])]
 
 
 class _Entry:

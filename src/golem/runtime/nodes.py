@@ -6,7 +6,6 @@ import numpy as np
 
 from golem.capabilities.arms.base import ArmCommand, UpperBody
 from golem.capabilities.legs.base import LegCommand
-from golem.capabilities.localization.base import Localizer
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.base import EmergencyStop, EstopFrame
 from golem.hardware.hands.base import HandController, HandStatus
@@ -15,9 +14,8 @@ from golem.hardware.safety.gate import Gate
 from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
 from golem.middleware.bus import Bus
-from golem.middleware.topics import HandGoal, LegStatus, LookRequest, Sightings
+from golem.middleware.topics import HandGoal, LegStatus
 from golem.robots.base import Robot
-from golem.robots.model.kinematics import Kinematics
 from golem.runtime.executor import TICK
 from golem.runtime.guard import Guard
 from golem.skills.context import Context
@@ -28,10 +26,8 @@ from golem.types import (
     SIDES,
     UPPER,
     BaseEstimate,
-    Frame,
     HandCommand,
     HandState,
-    LocalizedObject,
     LowCommand,
     LowState,
     PalmTargets,
@@ -109,65 +105,6 @@ class EstimatorNode:
             raise self._guard.fault("T_odom_base is not a rigid transform")
         self._guard.array("velocity", estimate.velocity, 3)
         self._bus.publish(topics.BASE, estimate, t)
-
-
-class CameraNode:
-    """Exposes one camera at its frame rate while somebody asks for it."""
-
-    def __init__(
-        self, bus: Bus, robot: Robot, name: str, optical_frame: str, latency: float, guard: Guard
-    ) -> None:
-        """Expose camera `name`, whose nominal frame in the model is `optical_frame`; frames take `latency` [s]."""
-        self._bus, self._robot, self._info, self._guard = bus, robot, robot.cameras[name], guard
-        self._optical, self._latency = optical_frame, latency
-        self._kinematics = Kinematics()
-        self.period = 1.0 / self._info.rate
-
-    def step(self, t: float) -> None:
-        """Publish one frame, with the pose the robot believes the camera had."""
-        request = self._bus.latest(topics.look(self._info.name), LookRequest)
-        state = self._bus.latest(topics.LOW_STATE, LowState)
-        base = self._bus.latest(topics.BASE, BaseEstimate)
-        if request is None or not request.labels or state is None or base is None:
-            return
-        rgb, depth = self._guard.call(self._robot.capture, self._info.name)
-        self._kinematics.update(state.q)
-        T_base_optical = self._kinematics.pose(self._optical) @ self._robot.calibration[self._info.name]
-        pose = base.T_odom_base @ T_base_optical
-        self._bus.publish(
-            topics.frames(self._info.name), Frame(t, self._info, rgb, depth, pose), t, self._latency
-        )
-
-
-class LocalizerNode:
-    """Runs the localizer on every new frame of one camera."""
-
-    period = TICK
-
-    def __init__(self, bus: Bus, localizer: Localizer, camera: str, guard: Guard) -> None:
-        """Run `localizer` on the frames of `camera`."""
-        self._bus, self._localizer, self._camera, self._guard = bus, localizer, camera, guard
-        self._latency = guard.number("latency", localizer.latency, least=0.0)
-        self._seen = 0
-
-    def step(self, t: float) -> None:
-        """Publish what is in the newest frame, if it is new."""
-        count = self._bus.count(topics.frames(self._camera))
-        if count == self._seen:
-            return
-        self._seen = count
-        frame = self._bus.latest(topics.frames(self._camera), Frame)
-        request = self._bus.latest(topics.look(self._camera), LookRequest)
-        if frame is None or request is None or not request.labels:
-            return
-        labels = request.labels
-        objects = self._guard.call(lambda: tuple(self._localizer.locate(frame, labels)))
-        for o in objects:
-            self._guard.kind("a located object", o, LocalizedObject)
-            self._guard.array("position", o.position, 3)
-            self._guard.array("points", o.points, None, 3)
-        message = Sightings(frame.t, self._camera, objects)
-        self._bus.publish(topics.sightings(self._camera), message, t, self._latency)
 
 
 class UpperBodyNode:

@@ -1,0 +1,121 @@
+"""The nodes of sight: a camera is exposed, its frame gets the pose the robot believes, objects are located in it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+
+from golem.capabilities.localization.base import Localizer
+from golem.middleware import topics
+from golem.middleware.bus import Bus, News
+from golem.middleware.topics import Exposure, LookRequest, Sightings
+from golem.robots.base import Robot
+from golem.robots.model.kinematics import Kinematics
+from golem.runtime.executor import TICK
+from golem.runtime.guard import Guard
+from golem.types import SIDES, Array, BaseEstimate, Frame, LocalizedObject, LowState
+
+LATENCY = 0.033
+"""Time from exposure to the frame being available [s]: one frame period of a D400 at 30 Hz."""
+OPTICAL_FRAMES = {"head": "head_camera_optical"} | {f"{s}_hand": f"{s}_hand_camera_optical" for s in SIDES}
+"""Frame of the nominal model per camera."""
+MEMORY = 1.0
+"""How old an exposure may be when its frame arrives [s]."""
+
+SLACK = 5e-4
+"""Tolerance of a stamp [s]: half of the robot's own resolution."""
+
+
+class CameraNode:
+    """Exposes one camera at its frame rate while somebody wants its frames."""
+
+    def __init__(self, bus: Bus, robot: Robot, name: str, wanted: Callable[[], bool], guard: Guard) -> None:
+        """Expose camera `name` whenever `wanted()` is true at its time."""
+        self._bus, self._robot, self._info, self._guard = bus, robot, robot.cameras[name], guard
+        self._wanted = wanted
+        self.period = 1.0 / self._info.rate
+
+    def step(self, t: float) -> None:
+        """Publish one exposure."""
+        if self._wanted():
+            rgb, depth = self._guard.call(self._robot.capture, self._info.name)
+            self._bus.publish(topics.exposures(self._info.name), Exposure(t, self._info, rgb, depth), t)
+
+
+class FrameNode:
+    """Gives each exposure the pose the robot believes the camera had when it was made."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, calibration: Mapping[str, Array], latency: float) -> None:
+        """Serve the cameras of `calibration` (see `Robot.calibration`); frames take another `latency` [s]."""
+        self._bus, self._calibration, self._latency = bus, calibration, latency
+        self._exposures = {name: News(bus, topics.exposures(name), Exposure) for name in calibration}
+        self._kinematics = Kinematics()
+        self._moments: deque[tuple[LowState, BaseEstimate]] = deque()
+
+    def step(self, t: float) -> None:
+        """Remember where the robot is, and publish a frame for each exposure that came."""
+        state = self._bus.latest(topics.LOW_STATE, LowState)
+        base = self._bus.latest(topics.BASE, BaseEstimate)
+        if state is None or base is None:
+            return
+        moments = self._moments
+        moments.append((state, base))
+        while len(moments) > 1 and moments[0][0].t < t - MEMORY:
+            moments.popleft()
+        for name, news in self._exposures.items():
+            exposure = news.read()
+            if exposure is not None and moments[0][0].t <= exposure.t + SLACK:
+                pose = self._pose(name, exposure.t)
+                frame = Frame(exposure.t, exposure.info, exposure.rgb, exposure.depth, pose)
+                self._bus.publish(topics.frames(name), frame, t, self._latency)
+
+    def _pose(self, name: str, t: float) -> Array:
+        """Return the (4, 4) pose in odom of a camera's optical frame at time `t` [s]."""
+        # Newest first: it is the newest unless the exposure came from afar.
+        state, base = next(m for m in reversed(self._moments) if m[0].t <= t + SLACK)
+        self._kinematics.update(state.q)
+        T_base_optical = self._kinematics.pose(OPTICAL_FRAMES[name]) @ self._calibration[name]
+        return base.T_odom_base @ T_base_optical
+
+
+class LocalizerNode:
+    """Runs the localizer on every new frame of one camera."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, localizer: Localizer, camera: str, guard: Guard) -> None:
+        """Run `localizer` on the frames of `camera`."""
+        self._bus, self._localizer, self._camera, self._guard = bus, localizer, camera, guard
+        self._latency = guard.number("latency", localizer.latency, least=0.0)
+        self._seen = 0
+
+    def step(self, t: float) -> None:
+        """Publish what is in the newest frame, if it is new."""
+        count = self._bus.count(topics.frames(self._camera))
+        if count == self._seen:
+            return
+        self._seen = count
+        frame = self._bus.latest(topics.frames(self._camera), Frame)
+        request = self._bus.latest(topics.look(self._camera), LookRequest)
+        if frame is None or request is None or not request.labels:
+            return
+        labels = request.labels
+        objects = self._guard.call(lambda: tuple(self._localizer.locate(frame, labels)))
+        for o in objects:
+            self._guard.kind("a located object", o, LocalizedObject)
+            self._guard.array("position", o.position, 3)
+            self._guard.array("points", o.points, None, 3)
+        message = Sightings(frame.t, self._camera, objects)
+        self._bus.publish(topics.sightings(self._camera), message, t, self._latency)
+
+
+def looked_for(bus: Bus, camera: str) -> Callable[[], bool]:
+    """Return whether a skill wants the frames of a camera of its own process."""
+
+    def wanted() -> bool:
+        request = bus.latest(topics.look(camera), LookRequest)
+        return request is not None and bool(request.labels)
+
+    return wanted
