@@ -1,0 +1,177 @@
+"""The goals of one action server: their states, which of them a request to cancel means, how long results are kept.
+
+States and transitions are those of ros2/rcl, rcl_action/src/rcl_action/goal_state_machine.c; the selection of goals to
+cancel is that of `rcl_action_process_cancel_request` in action_server.c; codes and their meaning are those of
+ros2/rcl_interfaces, action_msgs/srv/CancelGoal.srv. A result is kept for a while after its goal has ended, as the
+design (design.ros2.org, "Actions", result caching) and rcl since PR 1121 have it. No transport and no clock in here.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from enum import Enum, IntEnum
+
+from golem.middleware.ros.future import RosError
+
+
+class GoalStatus(IntEnum):
+    """State of a goal; the numbers of action_msgs/msg/GoalStatus."""
+
+    UNKNOWN = 0
+    ACCEPTED = 1
+    EXECUTING = 2
+    CANCELING = 3
+    SUCCEEDED = 4
+    CANCELED = 5
+    ABORTED = 6
+
+    @property
+    def active(self) -> bool:
+        """Whether the goal is still pursued."""
+        return self in (GoalStatus.ACCEPTED, GoalStatus.EXECUTING, GoalStatus.CANCELING)
+
+    @property
+    def terminal(self) -> bool:
+        """Whether the goal has ended."""
+        return self >= GoalStatus.SUCCEEDED
+
+
+class GoalEvent(Enum):
+    """What may happen to a goal."""
+
+    EXECUTE = "execute"
+    CANCEL_GOAL = "cancel_goal"
+    SUCCEED = "succeed"
+    ABORT = "abort"
+    CANCELED = "canceled"
+
+
+class CancelCode(IntEnum):
+    """Answer to a request to cancel; the numbers of action_msgs/srv/CancelGoal."""
+
+    NONE = 0
+    """Accepted: the listed goals are canceling (there may have been none to cancel)."""
+    REJECTED = 1
+    """No goal changed its state: the server declined."""
+    UNKNOWN_GOAL_ID = 2
+    """No goal with that id."""
+    GOAL_TERMINATED = 3
+    """The goal with that id cannot be canceled: it has ended, or is canceling already."""
+
+
+TRANSITIONS = {
+    (GoalStatus.ACCEPTED, GoalEvent.EXECUTE): GoalStatus.EXECUTING,
+    (GoalStatus.ACCEPTED, GoalEvent.CANCEL_GOAL): GoalStatus.CANCELING,
+    (GoalStatus.EXECUTING, GoalEvent.CANCEL_GOAL): GoalStatus.CANCELING,
+    (GoalStatus.EXECUTING, GoalEvent.SUCCEED): GoalStatus.SUCCEEDED,
+    (GoalStatus.EXECUTING, GoalEvent.ABORT): GoalStatus.ABORTED,
+    (GoalStatus.CANCELING, GoalEvent.SUCCEED): GoalStatus.SUCCEEDED,
+    (GoalStatus.CANCELING, GoalEvent.ABORT): GoalStatus.ABORTED,
+    (GoalStatus.CANCELING, GoalEvent.CANCELED): GoalStatus.CANCELED,
+}
+NO_ID = bytes(16)
+"""The id that stands for no particular goal."""
+MAX_ENDED = 1000
+"""Ended goals that are remembered at most; beyond it the oldest is forgotten before its time."""
+
+
+class GoalState:
+    """One goal's state.
+
+    Attributes:
+        id: 16 bytes, chosen by the client.
+        stamp: when it was accepted [ns].
+        status: where it stands.
+    """
+
+    def __init__(self, id: bytes, stamp: int) -> None:
+        """Accept the goal with this `id` at time `stamp` [ns]."""
+        self.id, self.stamp = id, stamp
+        self.status = GoalStatus.ACCEPTED
+
+    @property
+    def cancelable(self) -> bool:
+        """Whether it may be asked to cancel."""
+        return (self.status, GoalEvent.CANCEL_GOAL) in TRANSITIONS
+
+    def update(self, event: GoalEvent) -> None:
+        """Let `event` happen.
+
+        Raises:
+            RosError: it cannot happen in the present state.
+        """
+        status = TRANSITIONS.get((self.status, event))
+        if status is None:
+            valid = ", ".join(e.value for s, e in TRANSITIONS if s is self.status) or "nothing"
+            raise RosError(
+                f"Goal {self.id.hex()} is {self.status.name.lower()}: '{event.value}' cannot happen to it; "
+                f"what can: {valid}."
+            )
+        self.status = status
+
+
+class GoalTable:
+    """Every goal of a server that is active or whose result is still kept, oldest first."""
+
+    def __init__(self, result_timeout: float) -> None:
+        """Keep results for `result_timeout` [s] after the end of their goal."""
+        self._keep = result_timeout * 1e9
+        self._goals: dict[bytes, GoalState] = {}
+        self._ended: deque[tuple[int, GoalState]] = deque()
+
+    def __len__(self) -> int:
+        return len(self._goals)
+
+    def __contains__(self, id: bytes) -> bool:
+        return id in self._goals
+
+    def all(self) -> list[GoalState]:
+        """Return the goals, oldest first."""
+        return list(self._goals.values())
+
+    def accept(self, id: bytes, now: int) -> GoalState:
+        """Take a new goal in at time `now` [ns]; its id must not be in use."""
+        goal = self._goals[id] = GoalState(id, now)
+        return goal
+
+    def to_cancel(self, id: bytes, stamp: int) -> tuple[CancelCode, list[GoalState]]:
+        """Return which goals a request to cancel means.
+
+        Args:
+            id: of a goal, or `NO_ID`.
+            stamp: [ns]; 0 for none.
+
+        Returns:
+            With an id alone, that goal; with a stamp, every cancelable goal accepted at or before it, and the one with
+            that id; with neither, every cancelable goal. The code is the answer should the server agree.
+        """
+        if id != NO_ID and stamp == 0:
+            goal = self._goals.get(id)
+            if goal is None:
+                return CancelCode.UNKNOWN_GOAL_ID, []
+            return (CancelCode.NONE, [goal]) if goal.cancelable else (CancelCode.GOAL_TERMINATED, [])
+        everything = id == NO_ID and stamp == 0
+        meant = [g for g in self._goals.values() if everything or g.stamp <= stamp or g.id == id]
+        return CancelCode.NONE, [g for g in meant if g.cancelable]
+
+    def update(self, goal: GoalState, event: GoalEvent, now: int) -> None:
+        """Let `event` happen to `goal` at time `now` [ns].
+
+        Raises:
+            RosError: it cannot happen in the goal's present state.
+        """
+        goal.update(event)
+        if goal.status.terminal:
+            self._ended.append((now, goal))
+
+    def expire(self, now: int) -> list[GoalState]:
+        """Forget the goals whose results were kept long enough at time `now` [ns], and return them."""
+        if self._ended and self._ended[-1][0] > now:
+            # The clock jumped back (a restarted simulation): nothing is kept for longer than it would have been.
+            self._ended = deque((min(ended, now), goal) for ended, goal in self._ended)
+        expired: list[GoalState] = []
+        while self._ended and (len(self._ended) > MAX_ENDED or now - self._ended[0][0] >= self._keep):
+            goal = self._ended.popleft()[1]
+            del self._goals[goal.id]
+            expired.append(goal)
+        return expired
