@@ -28,7 +28,9 @@ class Robot:
         walker = Part(RECORDER, {"target": 1.0} | (walk or {}))
         stander = Part(RECORDER, {"target": 0.0} | (stand or {}))
         self.legs = Handover(HandoverConfig(walker, stander))
-        self.layer = Locomotion(self.legs, LocomotionConfig(trim=TrimConfig(gain=0.0)))  # the plant stands still
+        self.layer = Locomotion(
+            self.legs, LocomotionConfig(trim=TrimConfig(gain=0.0))
+        )  # the plant stands still
         self.state, self.base = crouching(), still()
         self.layer.reset(self.state)
         self.targets: list[float] = []

@@ -30,15 +30,17 @@ class GaitConfig:
         period: time of one step of each foot [s].
         stance: share of the period for which a foot stays on the ground, more than a half.
         start: when the clock runs: `never`, at a `command` other than zero, also for `recovery`, or `always`.
-        capture_start, capture_stop: distance between capture point and middle of the feet beyond which a standing
-            robot steps, and below which it may stop [m].
-        feet_start, feet_stop: the same for how far the feet are from where they belong relative to each other [m].
+        capture_start: half axes, ahead and sideways, of the ellipse about the middle of the feet out of which the
+            capture point of a robot that stands must come for it to step [m]: well inside the soles, because a push
+            grows by a fifth until the foot is off the ground.
+        capture_stop: distance of the capture point from the middle of the feet below which it may stop [m].
+        feet_start, feet_stop: how far the feet are from where they belong relative to each other, likewise [m].
     """
 
     period: float = 0.7
     stance: float = 0.55
     start: Literal["never", "command", "recovery", "always"] = "recovery"
-    capture_start: float = 0.13
+    capture_start: tuple[float, float] = (0.10, 0.15)
     capture_stop: float = 0.07
     feet_start: float = 0.12
     feet_stop: float = 0.05
@@ -81,16 +83,21 @@ class Gait:
         """
         config = self.config
         error = np.hypot(capture[..., 0], capture[..., 1])
-        lost = (error > config.capture_start) | (misplaced > config.feet_start)
+        ahead, sideways = config.capture_start
+        lost = np.hypot(capture[..., 0] / ahead, capture[..., 1] / sideways) > 1.0
+        lost = lost | (misplaced > config.feet_start)
         if config.start == "always":
             wanted = np.ones_like(self.stepping)
         elif config.start == "never":
             wanted = np.zeros_like(self.stepping)
         else:
             wanted = commanded | lost if config.start == "recovery" else commanded
-        # The unloaded foot swings first: the right one, from phase 0, while the body leans to the left.
+        # The unloaded foot swings first: the right one, from phase 0, while the body leans to the left. Who falls has
+        # no time for the double support before it.
         begins = wanted & ~self.stepping
-        self.phase = np.where(begins, np.where(capture[..., 1] >= 0.0, 0.0, 0.5), self.phase)
+        skipped = np.where(lost & ~commanded, config.stance - 0.5, 0.0) if config.start == "recovery" else 0.0
+        first = np.where(capture[..., 1] >= 0.0, 0.0, 0.5) + skipped
+        self.phase = np.where(begins, first, self.phase)
         settled = (error < config.capture_stop) & (misplaced < config.feet_stop)
         may_stop = ~wanted & (settled if config.start == "recovery" else True)
         after = self.phase + dt / config.period

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,10 +55,20 @@ class Reason(StrEnum):
     BRAKING = "joint_braking_distance"
     TILT = "tilt"
     BASE_STALE = "base_estimate_stale"
+    WRITERS = "two_writers"
+    STATE_CRC = "state_checksum"
+    COMMAND_CRC = "command_checksum"
     COMMAND_MISSING = "command_never_seen"
     COMMAND_STALE = "command_stale"
     COMMAND_TIME = "command_time_invalid"
     COMMAND_INVALID = "command_not_finite"
+
+
+class Fault(NamedTuple):
+    """A reason, and one line that names the joint, the sender or the figures."""
+
+    reason: Reason
+    detail: str = ""
 
 
 class Request(StrEnum):
@@ -94,7 +105,8 @@ class SafetyLimits:
             damping breaks no torque limit at any legal speed [own].
         kp_max, kd_max: bounds of the gains [authors].
         kp_rate, kd_rate: how fast gains may rise, per second; they may fall at once [own: full arm stiffness in 0.2 s].
-        tilt: angle between the torso's and the world's up that stops the robot [rad] [own].
+        tilt: angle between the torso's and the world's up that stops the robot [rad] [own: legs that
+            recover from the largest pushes lean up to 38 degrees; from here no step helps].
         estop_age: age of the e-stop frame that counts as pressed [s]: five frames [board].
         state_age: age of the state that stops the robot [s]: 25 samples at 500 Hz [own].
         base_age: time without a base estimate that is not stale, after which a robot that had one is stopped [s]
@@ -127,7 +139,7 @@ class SafetyLimits:
     kd_max: float = 30.0
     kp_rate: float = 1000.0
     kd_rate: float = 100.0
-    tilt: float = 0.6
+    tilt: float = 0.8
     estop_age: float = 0.050
     state_age: float = 0.050
     base_age: float = 0.300
@@ -189,6 +201,8 @@ class GateInputs:
         estop: newest frame of the emergency stop that arrived, or None.
         request: what the operator asks for.
         base: newest estimate of the base that arrived, or None.
+        transport: what is wrong with the way the frames came: a checksum, or a second writer of the motors' command;
+            None when nothing is, or when there is no transport.
     """
 
     t: float
@@ -197,6 +211,7 @@ class GateInputs:
     estop: EstopFrame | None = None
     request: Request = Request.NONE
     base: BaseEstimate | None = None
+    transport: Fault | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,3 +288,23 @@ class GateResult:
     reason: Reason | None
     detail: str
     memory: GateMemory
+
+
+@dataclass(frozen=True, slots=True)
+class GateStatus:
+    """What the gate lets everybody know.
+
+    Attributes:
+        t: when it ran [s].
+        state, reason, detail: see `GateResult`.
+    """
+
+    t: float
+    state: GateState
+    reason: Reason | None = None
+    detail: str = ""
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the robot was stopped, and stays so until it is reset."""
+        return self.state in (GateState.STOP1, GateState.STOP0)

@@ -19,6 +19,7 @@ import numpy as np
 from golem.hardware.estop.base import EstopFrame
 from golem.hardware.safety.base import (
     Counters,
+    Fault,
     GateInputs,
     GateMemory,
     GateResult,
@@ -29,7 +30,7 @@ from golem.hardware.safety.base import (
     SafetyLimits,
 )
 from golem.hardware.safety.limiter import limit_command
-from golem.hardware.safety.monitor import Fault, examine, whole, whole_command
+from golem.hardware.safety.monitor import examine, whole, whole_command
 from golem.types import NUM_JOINTS, Array, BaseEstimate, LowCommand, LowState
 
 
@@ -51,7 +52,7 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     state, counters, state_fault = _state(inputs.state, memory, t, limits)
     command, command_fault = _command(inputs.command, memory.command, t, limits)
     grounded, base_fault = _base(inputs.base, memory, t, limits)
-    fault = (None if running else Fault(Reason.CLOCK)) or estop_fault or state_fault
+    fault = (None if running else Fault(Reason.CLOCK)) or inputs.transport or estop_fault or state_fault
     edge = inputs.request if inputs.request is not memory.request else Request.NONE
 
     mode, reason, detail, since = memory.mode, memory.reason, memory.detail, memory.since

@@ -4,24 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
-from golem.hardware.safety.base import Counters, Reason, SafetyLimits
+from golem.hardware.safety.base import Counters, Fault, Reason, SafetyLimits
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand, LowState
 
 _ABSURD = 1e6
 """No joint position, speed, torque or gain has a number this large; below it nothing here can overflow."""
 _SOUND = Counters()
-
-
-class Fault(NamedTuple):
-    """A reason, and one line that names the joint and the figures."""
-
-    reason: Reason
-    detail: str = ""
 
 
 def finite(*arrays: Array) -> bool:

@@ -41,8 +41,9 @@ class TrainConfig:
             `learned` (motions, and a policy that moves half of the robots once `learned_from` steps are done).
         learned_from: steps after which the learned adversary begins.
         rate: change of the upper body's difficulties per update.
-        push_ramp: steps after which pushes have their full range. It grows whether or not the robot survives: tied to
-            survival it went up and down below half, and the legs learned to take no more than that.
+        push_ramp: steps before which pushes are light, and after which they have their full range. They
+            grow whether or not the robot survives: tied to survival they went up and down below half, and the legs
+            learned to take no more than that.
     """
 
     out: Path = Path("runs/legs/seed0")
@@ -54,7 +55,7 @@ class TrainConfig:
     learned_from: float = 4e6
     start: Path | None = None
     rate: float = 0.006
-    push_ramp: float = 8e6
+    push_ramp: tuple[float, float] = (1e6, 10e6)
     env: EnvConfig = field(default_factory=EnvConfig)
     ppo: PpoConfig = field(default_factory=PpoConfig)
 
@@ -142,7 +143,7 @@ class _Run:
             share = min(1.0, meter.finished / 64.0)
             self._survival += share * 0.5 * (meter.lasted / meter.finished - self._survival)
         env.difficulty.update(self._survival, config.rate)
-        env.difficulty.push = float(np.clip(self.steps / config.push_ramp, 0.05, 1.0))
+        env.difficulty.push = float(np.interp(self.steps, config.push_ramp, (0.05, 1.0)))
         if config.adversary == "none":
             env.difficulty.amplitude = env.difficulty.speed = 0.0
         self._cpu += time.process_time() - began
