@@ -82,7 +82,7 @@ def violations(limits: SafetyLimits) -> dict[Reason, dict[str, np.ndarray]]:
         Reason.TORQUE: {"tau": at(-limits.torque[JOINT] * 1.01)},
         # 0.3 rad before the limit at 5 rad/s: 5^2 / (2 20) = 0.6 rad are needed.
         Reason.BRAKING: {"q": at(limits.state_upper[JOINT] - 0.3), "dq": at(5.0)},
-        Reason.TILT: {"quat": np.array([np.cos(0.35), np.sin(0.35), 0.0, 0.0])},
+        Reason.TILT: {"quat": np.array([np.cos(0.45), np.sin(0.45), 0.0, 0.0])},
     }
 
 
