@@ -103,3 +103,15 @@ def test_news_gives_each_value_once_and_begins_now() -> None:
     bus.publish("a", 2, 0.1)
     bus.publish("a", 3, 0.1)
     assert (news.read(), news.read()) == (3, None)
+
+
+def test_a_cleared_bus_holds_nothing_but_still_tells_new_from_old() -> None:
+    bus = Bus()
+    bus.publish("a", 1, 0.0)
+    bus.publish("a", 2, 0.0, latency=1.0)
+    news = News(bus, "a", int)
+    bus.clear()
+    bus.deliver(5.0)
+    assert bus.latest("a", int) is None and bus.topics() == {} and news.read() is None
+    bus.publish("a", 3, 0.0)
+    assert bus.count("a") == 2 and news.read() == 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from golem.hardware.estop.base import EstopFrame
-from golem.hardware.safety.base import GateResult, GateState, Reason, Request, SafetyLimits
+from golem.hardware.safety.base import GateState, GateStatus, Reason, Request, SafetyLimits
 from golem.middleware import topics
 from golem.middleware.bus import Bus
 from golem.runtime.nodes import SafetyNode
@@ -29,7 +29,7 @@ def test_an_estimate_that_stays_stale_stops_the_motors() -> None:
         bus.publish(topics.BASE, BaseEstimate(t, np.eye(4), stale=i >= 100), t)
         bus.deliver(t)
         node.step(t)
-        result = bus.latest(topics.SAFETY, GateResult)
+        result = bus.latest(topics.SAFETY, GateStatus)
         assert result is not None
         results.append(result)
     assert all(r.state is GateState.ACTIVE for r in results[5:200])

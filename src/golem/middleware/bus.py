@@ -47,6 +47,11 @@ class Bus:
                 self._now[topic] = queue.popleft()[1]
                 self._count[topic] = self._count.get(topic, 0) + 1
 
+    def clear(self) -> None:
+        """Forget every value, delivered or not; counts go on, so that no reader takes what comes next for old."""
+        self._now.clear()
+        self._pending.clear()
+
     def latest(self, topic: str, kind: type[T]) -> T | None:
         """Return the newest delivered value of `topic`, or None before the first.
 

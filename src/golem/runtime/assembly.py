@@ -16,7 +16,7 @@ from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.navigation.base import Navigator
 from golem.errors import ConfigError, ModuleFault
 from golem.hardware.estop.virtual import VirtualEstop
-from golem.hardware.safety.base import GateResult, Request, SafetyLimits
+from golem.hardware.safety.base import GateStatus, Request, SafetyLimits
 from golem.middleware.bus import Bus
 from golem.robots.base import Banded, Robot
 from golem.robots.sensors.profiles import load_profile
@@ -71,7 +71,7 @@ class Running:
         return self._stack.navigator
 
     @property
-    def safety(self) -> GateResult | None:
+    def safety(self) -> GateStatus | None:
         """The newest verdict of the safety gate."""
         return self._stack.safety
 
@@ -131,7 +131,7 @@ class Running:
             return run.result
         run.cancel()
         safety = self.safety
-        if self._stack.stopped and safety is not None:
+        if safety is not None and safety.stopped:
             return SkillResult(False, "safety", "safety", f"Safety stop: {safety.reason}. {safety.detail}")
         return SkillResult(False, "timeout", None, f"Not done after {timeout:g} s of robot time.")
 

@@ -82,6 +82,12 @@ class _Entry:
         self.k += 1
         self.due = math.ceil(self.k * self.period - 1e-6)
 
+    def skip(self, tick: int) -> None:
+        """Leave out every step that was due before `tick`."""
+        if self.due < tick:
+            self.k = math.ceil(tick / self.period - 1e-6)
+            self.due = math.ceil(self.k * self.period - 1e-6)
+
 
 class Executor:
     """Drives nodes in the given order on one clock."""
@@ -110,6 +116,16 @@ class Executor:
                 entry.step(t)
                 entry.advance()
         self._tick += 1
+
+    def advance(self, t: float, most: int) -> None:
+        """Follow a clock from outside up to time `t` [s]; ticks further back than the last `most` are left out."""
+        target = round(t / TICK)
+        if target - self._tick >= most:
+            self._tick = target - most + 1
+            for entry in self._schedule:
+                entry.skip(self._tick)
+        while self._tick <= target:
+            self.step()
 
     def run(self, until: float, stop: Callable[[], bool] = lambda: False, realtime: bool = False) -> None:
         """Step until time `until` [s] or until `stop()` is true.

@@ -9,11 +9,11 @@ from golem.capabilities.legs.base import LegCommand
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.base import EmergencyStop, EstopFrame
 from golem.hardware.hands.base import HandController, HandStatus
-from golem.hardware.safety.base import GateInputs, GateResult, GateState, Request, SafetyLimits
+from golem.hardware.safety.base import Fault, GateInputs, GateState, GateStatus, Request, SafetyLimits
 from golem.hardware.safety.gate import Gate
 from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
-from golem.middleware.bus import Bus
+from golem.middleware.bus import Bus, News
 from golem.middleware.topics import HandGoal, LegStatus
 from golem.robots.base import Robot
 from golem.runtime.executor import TICK
@@ -38,6 +38,8 @@ MIN_RATE = 1.0
 """Slowest controller that is taken for one [Hz]."""
 
 
+WATCHDOG = 0.1
+"""Age of a command at which the drives go limp [s]; the authors' twin."""
 IDENTITY = np.eye(3)
 
 
@@ -69,8 +71,10 @@ class ActNode:
         self._bus, self._robot, self._guard = bus, robot, guard
 
     def step(self, t: float) -> None:
-        """Advance the robot by one tick; motors without a command are limp."""
-        command = self._bus.latest(topics.LOW_CMD, LowCommand) or _limp(t)
+        """Advance the robot by one tick; motors without a command of late are limp."""
+        command = self._bus.latest(topics.LOW_CMD, LowCommand)
+        if command is None or t - command.t > WATCHDOG:
+            command = _limp(t)
         hands: dict[Side, HandCommand] = {}
         for side in SIDES:
             hand = self._bus.latest(topics.hand_command(side), HandCommand)
@@ -249,6 +253,7 @@ class SafetyNode:
     def __init__(self, bus: Bus, limits: SafetyLimits) -> None:
         """Enforce `limits`."""
         self._bus, self._gate = bus, Gate(limits)
+        self._faults = News(bus, topics.TRANSPORT_FAULT, Fault)
         self.request = Request.NONE
 
     def step(self, t: float) -> None:
@@ -266,10 +271,11 @@ class SafetyNode:
             estop,
             Request.NONE if waiting else self.request,
             self._bus.latest(topics.BASE, BaseEstimate),
+            self._faults.read(),
         )
         result = self._gate.step(inputs)
         self._bus.publish(topics.LOW_CMD, result.command, t)
-        self._bus.publish(topics.SAFETY, result, t)
+        self._bus.publish(topics.SAFETY, GateStatus(t, result.state, result.reason, result.detail), t)
 
 
 class SkillNode:
@@ -303,8 +309,8 @@ def moving(bus: Bus) -> bool:
     While it does not, every controller starts over from the measured state at each step, so that a release finds all
     of them where the robot is.
     """
-    result = bus.latest(topics.SAFETY, GateResult)
-    return result is not None and result.state is GateState.ACTIVE
+    status = bus.latest(topics.SAFETY, GateStatus)
+    return status is not None and status.state is GateState.ACTIVE
 
 
 def _limp(t: float) -> LowCommand:

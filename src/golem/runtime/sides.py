@@ -18,7 +18,7 @@ from golem.errors import GolemError
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.hands.base import HandController
-from golem.hardware.safety.base import GateResult, GateState, Request, SafetyLimits
+from golem.hardware.safety.base import GateStatus, Request, SafetyLimits
 from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
 from golem.middleware.bus import Bus
@@ -184,15 +184,15 @@ class StackSide:
         return GuardedNavigator(*self._workshop.make("navigator"))
 
     @property
-    def safety(self) -> GateResult | None:
+    def safety(self) -> GateStatus | None:
         """The newest verdict of the safety gate."""
-        return self.bus.latest(topics.SAFETY, GateResult)
+        return self.bus.latest(topics.SAFETY, GateStatus)
 
     @property
     def stopped(self) -> bool:
         """Whether the safety gate has stopped the robot."""
         safety = self.safety
-        return safety is not None and safety.state in (GateState.STOP1, GateState.STOP0)
+        return safety is not None and safety.stopped
 
     @property
     def envelope(self) -> Envelope:
