@@ -1,0 +1,229 @@
+"""Every public stream, service and action of a running robot, simulated or real: the one table of them.
+
+What offers a row creates its endpoints from the row, `docs/interfaces.md` is written from the rows, and tests compare
+both with what running processes really offer. Names are those of ROS 2; on the wire `/x` is `rt/x`, so that
+`/lowstate` and the vendor's `rt/lowstate` are the same topic.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from golem.middleware.dds.base import DEFAULT, LATCHED, SENSOR, Qos
+from golem.types import SIDES
+
+Role = Literal["robot", "safety", "stack", "user"]
+"""Who offers something: the robot (`golem twin`, or the H1-2 with its drivers), `golem safety`, `golem up`, anybody."""
+
+CAMERAS = ("head", "left_hand", "right_hand")
+BASE_FRAME = "base_link"
+"""Root of the robot in /tf; the link `pelvis` coincides with it."""
+NEWEST = Qos(depth=1)
+CLOUD = Qos(depth=20)
+LOW = Qos(reliable=False, depth=1)
+"""What the vendor's clients ask for: a command or a state is worth nothing once there is a newer one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A stream of messages.
+
+    Attributes:
+        name: in ROS 2.
+        type: of its messages.
+        by: who publishes it.
+        to: who of GOLEM's own processes reads it.
+        qos: what the publisher offers.
+        rate: messages per second of robot time [Hz]; None where something has to happen first.
+        frame: `frame_id` of its messages; empty where they have none.
+        text: what it carries.
+    """
+
+    name: str
+    type: str
+    by: Role
+    to: tuple[Role, ...]
+    qos: Qos
+    rate: float | None
+    frame: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """A call with an answer.
+
+    Attributes:
+        name, type: in ROS 2.
+        by: who answers.
+        text: what it does.
+    """
+
+    name: str
+    type: str
+    by: Role
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """A goal with feedback, a result, and a way to cancel it.
+
+    Attributes:
+        name, type: in ROS 2.
+        by: who pursues it.
+        text: what it does.
+    """
+
+    name: str
+    type: str
+    by: Role
+    text: str
+
+
+def optical_frame(camera: str) -> str:
+    """Return the frame of the images of a camera: z forward, x right, y down, where the calibration claims it is."""
+    return "camera_color_optical_frame" if camera == "head" else f"{camera}_camera_color_optical_frame"
+
+
+def image(camera: str, what: str) -> str:
+    """Return the topic of one kind of image of a camera, e.g. `color/image_raw`."""
+    return f"/realsense/{camera}/{what}"
+
+
+def gripper(side: str, what: str) -> str:
+    """Return the name of a topic or service of one hand, e.g. `state`."""
+    return f"/{side}/gripper/{what}"
+
+
+COLOR, COLOR_JPEG = "color/image_raw", "color/image_raw/compressed"
+DEPTH, DEPTH_PNG = "aligned_depth_to_color/image_raw", "aligned_depth_to_color/image_raw/compressedDepth"
+CAMERA_INFO = "color/camera_info"
+
+
+def _camera(camera: str) -> tuple[Topic, ...]:
+    rows: tuple[tuple[str, str, tuple[Role, ...], str], ...] = (
+        (COLOR, "Image", ("stack",), "Colour, rgb8."),
+        (COLOR_JPEG, "CompressedImage", (), "The same as JPEG."),
+        (DEPTH, "Image", ("stack",), "Depth aligned to colour, 16UC1 [mm], 0 where there is none."),
+        (DEPTH_PNG, "CompressedImage", (), "The same as PNG, behind the 12 bytes of compressed_depth."),
+        (CAMERA_INFO, "CameraInfo", ("stack",), "Pinhole intrinsics, no distortion."),
+    )
+    frame = optical_frame(camera)
+    return tuple(
+        Topic(image(camera, what), f"sensor_msgs/msg/{kind}", "robot", to, SENSOR, 15, frame, text)
+        for what, kind, to, text in rows
+    )
+
+
+# fmt: off
+def _hand(side: str) -> tuple[Topic, ...]:
+    own, frame = "golem_interfaces/msg/", f"{side}_gripper"
+    return (
+        Topic(gripper(side, "state"), own + "HandState", "robot", ("stack",), SENSOR, 100, frame,
+              "Opening, fingers and forces as the servos report them."),
+        Topic(gripper(side, "command"), own + "HandCommand", "stack", ("robot",), SENSOR, 100, frame,
+              "Opening and force the servos are told."),
+        Topic(gripper(side, "status"), own + "HandStatus", "stack", (), DEFAULT, 10, frame,
+              "What the hand's controller found: open, closing, holding, slipped, ..."),
+    )
+
+
+TOPICS: tuple[Topic, ...] = (
+    Topic("/lowstate", "unitree_hg/msg/LowState", "robot", ("safety", "stack"), LOW, 500, "",
+          "Motors and torso IMU, with checksum; tick is robot time in ms and the clock of everything above the "
+          "robot."),
+    Topic("/lowcmd", "unitree_hg/msg/LowCmd", "safety", ("robot", "safety"), LOW, 500, "",
+          "What the motors are told, with checksum; from the safety gate and nobody else. The drives go limp "
+          "0.1 s after the last one."),
+    Topic("/clock", "rosgraph_msgs/msg/Clock", "robot", (), NEWEST, 500, "",
+          "Robot time; simulated robots only."),
+    Topic("/joint_states", "sensor_msgs/msg/JointState", "robot", (), SENSOR, 100, "",
+          "The 27 joints in motor order, then the joints of the fingers."),
+    Topic("/tf", "tf2_msgs/msg/TFMessage", "robot", (), DEFAULT, 50, "",
+          "Every moving link in its parent."),
+    Topic("/tf", "tf2_msgs/msg/TFMessage", "stack", (), DEFAULT, 50, "odom",
+          "base_link in odom, by the base estimate."),
+    Topic("/tf_static", "tf2_msgs/msg/TFMessage", "robot", ("stack",), LATCHED, None, "",
+          "Sensor frames; those of the cameras are where their calibration claims them."),
+    Topic("/robot_description", "std_msgs/msg/String", "robot", (), LATCHED, None, "",
+          "The robot as URDF."),
+    *(row for camera in CAMERAS for row in _camera(camera)),
+    Topic("/livox/lidar", "livox_ros_driver2/msg/CustomMsg", "robot", (), CLOUD, 10, "lidar_link",
+          "Points of the LiDAR in the driver's own type. The twin has none yet: the publisher is silent."),
+    Topic("/livox/pointcloud", "sensor_msgs/msg/PointCloud2", "robot", (), CLOUD, 10, "lidar_link",
+          "The same points. Silent like /livox/lidar."),
+    Topic("/livox/imu", "sensor_msgs/msg/Imu", "robot", (), SENSOR, 200, "lidar_link",
+          "IMU inside the LiDAR. Silent like /livox/lidar: it is part of that device, not of the torso's IMU."),
+    *(row for side in SIDES for row in _hand(side)),
+    Topic("/api/motion_switcher/request", "unitree_api/msg/Request", "user", ("robot",), NEWEST, None, "",
+          "Calls 1001 check, 1002 select, 1003 release: which on-board controller runs."),
+    Topic("/api/motion_switcher/response", "unitree_api/msg/Response", "robot", (), NEWEST, None, "",
+          "The answers."),
+    Topic("/api/loco/request", "unitree_api/msg/Request", "stack", ("robot",), NEWEST, None, "",
+          "Calls of the on-board leg controller: state, velocity."),
+    Topic("/api/loco/response", "unitree_api/msg/Response", "robot", ("stack",), NEWEST, None, "",
+          "The answers."),
+    Topic("/safety/lowcmd_in", "unitree_hg/msg/LowCmd", "stack", ("safety",), LOW, 500, "",
+          "What the stack wants of the motors, for the gate to judge. reserve[0] repeats the tick of the state"
+          " it answers, 0 where unknown; the gate takes a command to be as old as that state."),
+    Topic("/safety/status", "golem_interfaces/msg/SafetyStatus", "safety", ("stack",), LATCHED, 20, "",
+          "State of the gate, and why; at every change, and regularly."),
+    Topic("/estop", "golem_interfaces/msg/EstopFrame", "safety", (), SENSOR, 100, "",
+          "Frames of the emergency stop as the gate sees them."),
+    Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "safety", (), DEFAULT, 1, "",
+          "State of the gate, ages of what it watches, rate of its loop."),
+    Topic("/base_estimate", "golem_interfaces/msg/BaseEstimate", "stack", ("safety",), LOW, 500, "odom",
+          "Pose, velocity, height and contacts of the base as the stack estimates them; the gate watches "
+          "`stale`."),
+    Topic("/odom", "nav_msgs/msg/Odometry", "stack", (), DEFAULT, 50, "odom",
+          "Pose of base_link in odom and its velocity in base_link."),
+    Topic("/cmd_vel", "geometry_msgs/msg/Twist", "user", ("stack",), DEFAULT, None, BASE_FRAME,
+          "Velocity for the legs [m/s], [rad/s]; to be repeated at least every 0.5 s, or the robot stands."),
+    Topic("/legs/status", "golem_interfaces/msg/LegStatus", "stack", (), DEFAULT, 50, BASE_FRAME,
+          "What the lower body was told, what it does, and why not more."),
+    *(Topic(f"/objects/{camera}", "golem_interfaces/msg/Sightings", "stack", (), DEFAULT, None, "odom",
+            "Objects located in the frames that a skill asked for.") for camera in CAMERAS),
+)
+
+TRIGGER = "std_srvs/srv/Trigger"
+SERVICES: tuple[Service, ...] = (
+    Service("/safety/activate", TRIGGER, "safety", "Let commands through, if the gate is armed."),
+    Service("/safety/stop", TRIGGER, "safety", "Stop the robot: its motors damp, then go limp."),
+    Service("/safety/reset", TRIGGER, "safety", "Arm the gate again after a stop, if all is sound."),
+    Service("/estop/press", "std_srvs/srv/SetBool", "safety",
+            "Press or release the virtual emergency stop; simulation only."),
+    Service("/elastic_band/release", TRIGGER, "robot", "Let the band of a standing robot go; simulation only."),
+    *(service for side in SIDES for service in (
+        Service(gripper(side, "open"), TRIGGER, "stack", "Open the hand as far as it goes."),
+        Service(gripper(side, "close"), TRIGGER, "stack", "Close the hand until its fingers press."),
+        Service(gripper(side, "set_position"), "golem_interfaces/srv/SetGap", "stack",
+                "Open or close the hand to a gap."),
+        Service(gripper(side, "set_force"), "golem_interfaces/srv/SetForce", "stack",
+                "Close the hand with a force."),
+    )),
+)
+
+ACTIONS: tuple[Action, ...] = (
+    Action("/skill/pick", "golem_interfaces/action/Pick", "stack",
+           "Find an object, grasp it, pull it straight out and drop it in a container."),
+    Action("/skill/walk", "golem_interfaces/action/Walk", "stack", "Walk to a pose and stand there."),
+    Action("/skill/stand", "golem_interfaces/action/Stand", "stack", "Stand for a while."),
+)
+
+ABSENT: dict[str, str] = {
+    "/sportmodestate":
+        "The vendor's simulator publishes the true position and velocity of the robot on it. No module of GOLEM reads "
+        "ground truth, and the robot has none to publish; the estimate is on /odom.",
+    "/secondary_imu": "Published for the G1 only; the H1-2's torso IMU is in /lowstate.",
+    "/lf/bmsstate": "The twin has no battery; invented figures would be worse than none.",
+    "/wirelesscontroller": "The twin has no remote control.",
+}
+"""Topics of the vendor's own simulators that are left out on purpose, and why."""
+# fmt: on
+
+
+def topic(name: str, by: Role | None = None) -> Topic:
+    """Return the row of the topic called `name`, of the publisher `by` where there are several."""
+    return next(row for row in TOPICS if row.name == name and by in (None, row.by))
