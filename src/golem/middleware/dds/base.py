@@ -25,6 +25,20 @@ class DdsError(GolemError):
     """The transport cannot do what it was asked: the message says what to change."""
 
 
+def as_sample(topic: str, payload: Payload) -> bytes:
+    """Return `payload` as bytes, for a writer of `topic`.
+
+    Raises:
+        DdsError: it is no little-endian XCDR1, or has nothing after its header (ROS 2 gives an empty message an octet).
+    """
+    data = payload if isinstance(payload, bytes) else bytes(payload)
+    if len(data) <= len(ENCAPSULATION) or not data.startswith(ENCAPSULATION[:2]):
+        raise DdsError(
+            f"A sample of '{topic}' is a CDR header (00 01 00 00) and at least a byte, not {data[:5].hex(' ') or '-'}."
+        )
+    return data
+
+
 @dataclass(frozen=True, slots=True)
 class Qos:
     """Quality of service of one endpoint.
@@ -61,13 +75,14 @@ class Sample:
     """One sample as taken from a reader.
 
     Attributes:
-        payload: CDR with its encapsulation header; empty if not `alive`. Valid as long as it is held.
+        payload: CDR with its encapsulation header and up to 3 bytes of padding; empty if not `alive`.
         source_time: when the writer wrote it, by the writer's clock [s since 1970].
         writer: instance handle (uint64) of the writer as the reader's participant knows it.
-        alive: False for the notice, without payload, that the last matched writer of the topic has gone.
+        alive: False for the notice, without payload, that the last matched writer of the topic has gone (or that
+            one disposed of it, as writers of other makes may when they close).
     """
 
-    payload: bytes | memoryview
+    payload: bytes
     source_time: float
     writer: int
     alive: bool = True
@@ -79,16 +94,21 @@ class Writer(Protocol):
     Attributes:
         guid: 16 bytes, unique on the domain.
         handle: instance handle (uint64) by which its own participant knows it.
+        dropped: samples that were not sent because a reliable reader was too far behind.
     """
 
     guid: bytes
     handle: int
+    dropped: int
 
     def write(self, payload: Payload) -> None:
         """Send one sample; `payload` may be changed once this returns.
 
+        Where a reliable reader is so far behind that much waits for it already, this waits up to 0.1 s, then drops
+        the sample and counts it in `dropped`: a stalled peer must not stop the robot's process.
+
         Raises:
-            DdsError: it is no CDR, a reliable peer took nothing for a second, or the writer is closed.
+            DdsError: it is no CDR, or the writer is closed.
         """
         ...
 

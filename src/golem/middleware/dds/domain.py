@@ -1,0 +1,124 @@
+"""Which domain, on which network interface, and Cyclone's configuration that follows from it.
+
+The configuration is handed to Cyclone when the domain is opened: the environment variable CYCLONEDDS_URI has no say, as
+with the vendor's SDK.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from xml.sax.saxutils import quoteattr
+
+from golem.errors import ConfigError
+from golem.middleware.dds.base import DdsError
+from golem.middleware.dds.interfaces import Interface, find_interface
+from golem.middleware.dds.library import PRECONDITION_NOT_MET, Cyclone
+
+ROBOT_DOMAIN = 0
+"""The domain of the real robot."""
+LAST_DOMAIN = 232
+"""The last domain whose UDP ports exist: 7400 + 250 * 232 < 65536 (DDSI-RTPS 2.5, 9.6.2.3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class DdsConfig:
+    """How to join a DDS domain."""
+
+    domain: int = 1
+    """Domain id, 0 to 232. 0 is the real robot's."""
+    interface: str = "lo"
+    """Network interface, by name; lo stays on this machine."""
+    peers: tuple[str, ...] = ()
+    """Addresses of machines to look for besides those that multicast finds; for networks without multicast."""
+    robot: bool = False
+    """Take part in the real robot's domain."""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.domain <= LAST_DOMAIN:
+            raise ConfigError(f"DDS domain {self.domain} does not exist; choose one of 0 to {LAST_DOMAIN}.")
+        if self.domain == ROBOT_DOMAIN and not self.robot:
+            raise ConfigError(
+                f"DDS domain {ROBOT_DOMAIN} is the real robot's; choose one of 1 to {LAST_DOMAIN}, "
+                "or say that the robot is meant (--robot)."
+            )
+
+    def __str__(self) -> str:
+        return f"domain {self.domain}, interface {self.interface}"
+
+
+def configuration(interface: Interface, peers: tuple[str, ...]) -> str:
+    """Return Cyclone's configuration, XML.
+
+    On the loopback interface datagrams are as large as UDP allows: nothing has to fit a frame there, and an image
+    then takes 15 of them instead of 63. Elsewhere only discovery uses multicast, because Wi-Fi and many switches
+    carry multicast data badly, and 16 MB of receive buffer are asked for: an image arrives as one burst.
+    """
+    name = quoteattr(interface.name)
+    general = "<AllowMulticast>spdp</AllowMulticast>"
+    if interface.loopback:
+        general = "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>64000B</FragmentSize>"
+    listed = "".join(f"<Peer address={quoteattr(peer)}/>" for peer in peers)
+    return (
+        "<CycloneDDS><Domain>"
+        f"<General><Interfaces><NetworkInterface name={name}/></Interfaces>{general}</General>"
+        f"<Discovery>{f'<Peers>{listed}</Peers>' if listed else ''}</Discovery>"
+        '<Internal><SocketReceiveBufferSize max="16MB"/></Internal>'
+        "</Domain></CycloneDDS>"
+    )
+
+
+class _Open:
+    """A domain that is open in this process, and how many participants use it."""
+
+    def __init__(self, xml: str, entity: int) -> None:
+        self.xml, self.entity, self.users = xml, entity, 0
+
+
+_open: dict[int, _Open] = {}
+_lock = threading.Lock()
+
+
+def open_domain(library: Cyclone, config: DdsConfig) -> None:
+    """Open a domain in this process, or use it once more if it is open. `close_domain` undoes it.
+
+    Raises:
+        DdsError: the interface is not there or cannot reach anybody, or the domain is open in this process with
+            another configuration.
+    """
+    interface = find_interface(config.interface)
+    if not (interface.loopback or interface.multicast or config.peers):
+        raise DdsError(
+            f"Network interface '{interface.name}' has no multicast, so nobody can be found through it; "
+            "name the addresses of the other machines (peers), or choose another interface."
+        )
+    xml = configuration(interface, config.peers)
+    with _lock:
+        known = _open.get(config.domain)
+        if known is None:
+            entity = library.blocking.dds_create_domain(config.domain, xml.encode())
+            if entity == PRECONDITION_NOT_MET:
+                raise DdsError(
+                    f"DDS domain {config.domain} is already open in this process through another library; "
+                    "open it with golem.middleware.dds first."
+                )
+            what = (
+                f"DDS domain {config.domain} cannot be opened on '{interface.name}'; has it an IPv4 address?"
+            )
+            known = _open[config.domain] = _Open(xml, library.check(entity, what))
+        elif known.xml != xml:
+            raise DdsError(
+                f"DDS domain {config.domain} is already open in this process on another interface or with other "
+                "peers; close its participants first, or use the same."
+            )
+        known.users += 1
+
+
+def close_domain(library: Cyclone, domain: int) -> None:
+    """Close a domain in this process once nobody uses it any more."""
+    with _lock:
+        known = _open[domain]
+        known.users -= 1
+        if known.users == 0:
+            del _open[domain]
+            library.blocking.dds_delete(known.entity)

@@ -1,0 +1,54 @@
+"""The network interfaces of this machine."""
+
+from __future__ import annotations
+
+import socket
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from golem.errors import unknown_name
+
+_UP, _LOOPBACK, _MULTICAST = 0x1, 0x8, 0x1000
+"""Bits of an interface's flags: IFF_UP, IFF_LOOPBACK, IFF_MULTICAST of linux/if.h."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """A network interface.
+
+    Attributes:
+        name: as the operating system calls it.
+        loopback: whether it stays on this machine.
+        multicast: whether it can send to groups.
+    """
+
+    name: str
+    loopback: bool
+    multicast: bool
+
+
+def interfaces() -> list[Interface]:
+    """Return the interfaces that are up, in the operating system's order."""
+    found = (_describe(name) for _, name in socket.if_nameindex())
+    return [interface for interface in found if interface is not None]
+
+
+def find_interface(name: str) -> Interface:
+    """Return an interface that is up; `lo` is the loopback interface, whatever it is called here.
+
+    Raises:
+        ConfigError: there is none of that name; the message lists those there are.
+    """
+    known = interfaces()
+    for interface in known:
+        if interface.name == name or (name == "lo" and interface.loopback):
+            return interface
+    raise unknown_name("network interface", name, [interface.name for interface in known])
+
+
+def _describe(name: str) -> Interface | None:
+    if not sys.platform.startswith("linux"):
+        return Interface(name, loopback=name.startswith("lo"), multicast=True)
+    flags = int(Path("/sys/class/net", name, "flags").read_text(encoding="ascii"), 16)
+    return Interface(name, bool(flags & _LOOPBACK), bool(flags & _MULTICAST)) if flags & _UP else None
