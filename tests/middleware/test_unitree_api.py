@@ -77,3 +77,14 @@ def test_any_text_is_decoded_or_a_value_error(text: str) -> None:
             read(text)
         except ValueError:
             pass
+
+
+@pytest.mark.parametrize("payload", ["[" * 100_000, '{"data":' * 100_000])
+def test_a_payload_of_any_depth_is_a_value_error(payload: str) -> None:
+    with pytest.raises(ValueError):
+        decode_int(payload)
+
+
+def test_a_number_no_float_holds_is_refused() -> None:
+    with pytest.raises(ValueError):
+        decode_velocity('{"velocity": [1%s, 0, 0], "duration": 1}' % ("0" * 400))

@@ -12,12 +12,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 OK = 0
+SEND_FAILED = 3102
 TIMEOUT = 3104
 NOT_IMPLEMENTED = 3203
 BAD_PARAMETER = 3204
 GET_VERSION = 1
 """The api_id with which every service answers its version."""
 MEANING = {
+    SEND_FAILED: "nobody on the domain offers the service",
     TIMEOUT: "no answer in time",
     NOT_IMPLEMENTED: "the service has no such function",
     BAD_PARAMETER: "the parameter is wrong",
@@ -33,11 +35,19 @@ class Request:
         id: tells the calls of one client apart.
         api_id: the function that is called.
         parameter: its argument, JSON; empty where it takes none.
+        lease: number of the lease it is made under; 0 without.
+        priority: a higher one goes first where the service has a queue for it.
+        noreply: whether no answer is wanted.
+        binary: an argument that is no JSON.
     """
 
     id: int
     api_id: int
     parameter: str = ""
+    lease: int = 0
+    priority: int = 0
+    noreply: bool = False
+    binary: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +58,14 @@ class Response:
         id, api_id: those of the request.
         code: status, 0 for success.
         data: the result, JSON; empty where there is none.
+        binary: a result that is no JSON.
     """
 
     id: int
     api_id: int
     code: int = OK
     data: str = ""
+    binary: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +148,10 @@ def decode(payload: str) -> dict[str, object]:
     Raises:
         ValueError: it is no JSON object.
     """
-    values = json.loads(payload or "{}", parse_constant=_refuse)
+    try:
+        values = json.loads(payload or "{}", parse_constant=_refuse)
+    except RecursionError as error:
+        raise ValueError("a payload is a JSON object, not this deep") from error
     if not isinstance(values, dict):
         raise ValueError(f"a payload is a JSON object, not {payload!r}")
     return values
@@ -170,7 +185,10 @@ def decode_velocity(payload: str) -> tuple[tuple[float, float, float], float]:
 
 
 def _is_finite(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # an integer that no float holds
+        return False
 
 
 def _refuse(constant: str) -> object:

@@ -1,0 +1,129 @@
+"""unitree_api: remote calls and their answers as CDR.
+
+Members and types: unitree_sdk2_python, unitree_sdk2py/idl/unitree_api/msg/dds_. Both end in a string and a sequence of
+bytes, so that their size varies. A length that a payload claims is compared with what is there before anything is done
+with it.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Final
+
+from golem.middleware.dds.base import ENCAPSULATION, Payload
+from golem.middleware.unitree_api import Request, Response
+from golem.middleware.wire.layout import WireError, check_encapsulation
+
+REQUEST: Final = "unitree_api::msg::dds_::Request_"
+RESPONSE: Final = "unitree_api::msg::dds_::Response_"
+MOST = 1 << 20
+"""Bytes of the largest payload that is accepted [own: the vendor's calls have some hundred]."""
+
+_REQUEST_HEADER = struct.Struct("<qqqiB")  # id, api_id, lease, priority, noreply
+_RESPONSE_HEADER = struct.Struct("<qqi")  # id, api_id, code
+_LENGTH = struct.Struct("<I")
+_PADDING = 3
+"""Bytes that may follow a message: payloads are multiples of four."""
+
+
+def encode_request(request: Request) -> bytes:
+    """Return `request` as a `Request_`.
+
+    Raises:
+        WireError: a number is out of range, the parameter cannot be sent, or it is all too long.
+    """
+    r = request
+    header = _pack(_REQUEST_HEADER, REQUEST, r.id, r.api_id, r.lease, r.priority, r.noreply)
+    return _encode(header, r.parameter, r.binary, REQUEST)
+
+
+def decode_request(payload: Payload) -> Request:
+    """Return the call in a `Request_`.
+
+    Raises:
+        WireError: it is not well-formed.
+    """
+    numbers, text, binary = _decode(payload, _REQUEST_HEADER, REQUEST)
+    number, api_id, lease, priority, noreply = numbers
+    if noreply not in (0, 1):
+        raise WireError(f"The noreply of a {REQUEST} is {noreply}; a boolean is 0 or 1.")
+    return Request(number, api_id, text, lease, priority, bool(noreply), binary)
+
+
+def encode_response(response: Response) -> bytes:
+    """Return `response` as a `Response_`.
+
+    Raises:
+        WireError: a number is out of range, the data cannot be sent, or it is all too long.
+    """
+    header = _pack(_RESPONSE_HEADER, RESPONSE, response.id, response.api_id, response.code)
+    return _encode(header, response.data, response.binary, RESPONSE)
+
+
+def decode_response(payload: Payload) -> Response:
+    """Return the answer in a `Response_`.
+
+    Raises:
+        WireError: it is not well-formed.
+    """
+    (number, api_id, code), text, binary = _decode(payload, _RESPONSE_HEADER, RESPONSE)
+    return Response(number, api_id, code, text, binary)
+
+
+def _pack(layout: struct.Struct, type_name: str, *numbers: int) -> bytes:
+    try:
+        return layout.pack(*numbers)
+    except struct.error as error:
+        raise WireError(f"A {type_name} cannot say {numbers}: {error}.") from error
+
+
+def _align(offset: int) -> int:
+    return -(-offset // 4) * 4
+
+
+def _encode(header: bytes, text: str, binary: bytes, type_name: str) -> bytes:
+    """Return a payload: header, string, sequence of bytes."""
+    try:
+        string = text.encode()
+    except UnicodeEncodeError as error:
+        raise WireError(f"The text of a {type_name} is no Unicode: {error}.") from error
+    if b"\0" in string:
+        raise WireError(f"The text of a {type_name} has a NUL character, which ends a string.")
+    body = bytearray(ENCAPSULATION + header)
+    for count, data in ((len(string) + 1, string + b"\0"), (len(binary), binary)):
+        body += bytes(_align(len(body)) - len(body)) + _LENGTH.pack(count) + data
+    if len(body) > MOST:
+        raise WireError(f"A {type_name} of {len(body)} bytes is too long; the most is {MOST}.")
+    return bytes(body)
+
+
+def _decode(payload: Payload, header: struct.Struct, type_name: str) -> tuple[tuple[int, ...], str, bytes]:
+    """Return the numbers of the header, the string and the sequence of bytes."""
+    check_encapsulation(payload, type_name)
+    if len(payload) > MOST:
+        raise WireError(f"A {type_name} of {len(payload)} bytes is too long; the most is {MOST}.")
+    start = len(ENCAPSULATION)
+    if len(payload) < start + header.size:
+        raise WireError(f"A {type_name} of {len(payload)} bytes is too short.")
+    numbers = header.unpack_from(payload, start)
+    string, end = _counted(payload, start + header.size, type_name)
+    binary, end = _counted(payload, end, type_name)
+    if len(payload) - end > _PADDING:
+        raise WireError(f"A {type_name} has {len(payload) - end} bytes behind its end.")
+    if not string or string.find(b"\0") != len(string) - 1:
+        raise WireError(f"The string of a {type_name} does not end with its only NUL character.")
+    try:
+        return numbers, string[:-1].decode(), binary
+    except UnicodeDecodeError as error:
+        raise WireError(f"The string of a {type_name} is not UTF-8: {error}.") from error
+
+
+def _counted(payload: Payload, offset: int, type_name: str) -> tuple[bytes, int]:
+    """Return the bytes behind the length that stands at the next multiple of four from `offset`, and where they end."""
+    start = _align(offset) + _LENGTH.size
+    if start > len(payload):
+        raise WireError(f"A {type_name} of {len(payload)} bytes is too short.")
+    (count,) = _LENGTH.unpack_from(payload, start - _LENGTH.size)
+    if count > len(payload) - start:
+        raise WireError(f"A {type_name} claims {count} bytes where {len(payload) - start} are left.")
+    return bytes(payload[start : start + count]), start + count

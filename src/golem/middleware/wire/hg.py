@@ -1,0 +1,89 @@
+"""unitree_hg: state and command of the humanoids' motors, and the IMU.
+
+Members and types: unitree_sdk2_python, unitree_sdk2py/idl/unitree_hg/msg/dds_. Both motor messages have 35 slots. A
+motor's `mode` byte stands 4 bytes before its `q`, behind padding, except the first motor's: the two bytes before it end
+on an address where a byte may follow at once, so that it stands 2 bytes before its `q`. `first_mode` is that byte;
+`motor["mode"][0]` is not a mode but a byte of the member before.
+"""
+
+from __future__ import annotations
+
+from golem.middleware.wire.crc import Checksum
+from golem.middleware.wire.layout import Fields, Layout, struct
+
+MOTORS = 35
+"""Motor slots of a message; the H1-2 uses the first 27."""
+ENABLE = 1
+"""`mode` of a motor that follows its command; 0 is a motor that is off."""
+PR = 0
+"""`mode_pr` of ankles commanded as pitch and roll; 1 is as the two motors (A, B) that move them together."""
+
+IMU: Fields = {
+    "quaternion": (0, ("<f4", 4)),  # wxyz
+    "gyroscope": (16, ("<f4", 3)),
+    "accelerometer": (28, ("<f4", 3)),
+    "rpy": (40, ("<f4", 3)),
+    "temperature": (52, "<i2"),
+}
+_MOTOR_STATE = struct(
+    56,
+    {
+        "mode": (0, "u1"),
+        "q": (4, "<f4"),
+        "dq": (8, "<f4"),
+        "ddq": (12, "<f4"),
+        "tau_est": (16, "<f4"),
+        "temperature": (20, ("<i2", 2)),
+        "vol": (24, "<f4"),
+        "sensor": (28, ("<u4", 2)),
+        "motorstate": (36, "<u4"),
+        "reserve": (40, ("<u4", 4)),
+        "measured": (4, ("<f4", 4)),  # q, dq, ddq, tau_est at once
+    },
+)
+_MOTOR_CMD = struct(
+    28,
+    {
+        "mode": (0, "u1"),
+        "q": (4, "<f4"),
+        "dq": (8, "<f4"),
+        "tau": (12, "<f4"),
+        "kp": (16, "<f4"),
+        "kd": (20, "<f4"),
+        "reserve": (24, "<u4"),
+        "target": (4, ("<f4", 5)),  # q, dq, tau, kp, kd at once
+    },
+)
+
+IMU_STATE = Layout("unitree_hg::msg::dds_::IMUState_", 54, IMU)
+LOW_STATE = Layout(
+    "unitree_hg::msg::dds_::LowState_",
+    2088,
+    {
+        "version": (0, ("<u4", 2)),
+        "mode_pr": (8, "u1"),
+        "mode_machine": (9, "u1"),
+        "tick": (12, "<u4"),
+        "imu": (16, struct(54, IMU)),
+        "first_mode": (70, "u1"),
+        "motor": (68, (_MOTOR_STATE, MOTORS)),
+        "wireless_remote": (2028, ("u1", 40)),
+        "reserve": (2068, ("<u4", 4)),
+        "crc": (2084, "<u4"),
+    },
+)
+LOW_CMD = Layout(
+    "unitree_hg::msg::dds_::LowCmd_",
+    1000,
+    {
+        "mode_pr": (0, "u1"),
+        "mode_machine": (1, "u1"),
+        "first_mode": (2, "u1"),
+        "motor": (0, (_MOTOR_CMD, MOTORS)),
+        "reserve": (980, ("<u4", 4)),
+        "crc": (996, "<u4"),
+    },
+)
+
+STATE_CHECKSUM = Checksum(LOW_STATE.size, first_mode=70, stride=56, motors=MOTORS, halves=(8,))
+COMMAND_CHECKSUM = Checksum(LOW_CMD.size, first_mode=2, stride=28, motors=MOTORS)
