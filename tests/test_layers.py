@@ -84,6 +84,8 @@ def test_an_upward_import_is_found(statement: str, owner: str) -> None:
 
 def test_files_stay_readable() -> None:
     lengths = {
-        str(path.relative_to(SOURCE)): len(path.read_text(encoding="utf-8").splitlines()) for path in FILES
+        str(path.relative_to(SOURCE)): len(path.read_text(encoding="utf-8").splitlines())
+        for path in FILES
+        if path.parent.name != "msgs"  # generated
     }
     assert {name: n for name, n in lengths.items() if n > 400} == {}

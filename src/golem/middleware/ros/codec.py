@@ -1,0 +1,340 @@
+"""Messages to bytes and back: classical CDR (XCDR1) with its 4-byte encapsulation header, as ROS 2 writes it.
+
+rosbags compiles the serialisers. Around them stands what it leaves to its caller: arrays are checked before their
+bits are copied, and whatever arrives from a network ends in a message or in a `CodecError`, with memory in proportion
+to the payload.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeVar, cast
+
+import numpy as np
+
+from golem.errors import unknown_name
+from golem.middleware.ros import definitions
+from golem.middleware.ros.definitions import ARRAY, BASE, NAME, SEQUENCE, Definition
+from golem.middleware.ros.generate import class_source, numpy_name, python_name, short
+from golem.middleware.ros.message import CodecError, Message
+
+DEFAULT = "jazzy"
+"""Distribution of the functions of this module; where the distribution matters, use `codec`."""
+Payload = bytes | bytearray | memoryview
+M = TypeVar("M", bound=Message)
+
+
+class Service(NamedTuple):
+    """The messages of a service, and its type name."""
+
+    name: str
+    Request: type[Any]
+    Response: type[Any]
+
+
+class Action(NamedTuple):
+    """The messages of an action, and its type name.
+
+    Attributes:
+        Goal, Result, Feedback: what its file defines.
+        SendGoal, GetResult: the services by which a client sends a goal and gets the result.
+        FeedbackMessage: what travels on its feedback topic.
+    """
+
+    name: str
+    Goal: type[Any]
+    Result: type[Any]
+    Feedback: type[Any]
+    SendGoal: Service
+    GetResult: Service
+    FeedbackMessage: type[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class _Compiled:
+    """rosbags' functions of one type, and the check that must precede them."""
+
+    size: Callable[..., int]
+    write: Callable[..., int]
+    check: Callable[[Any], None] | None
+
+
+class _Scratch(threading.local):
+    """Where a thread writes its large messages: fresh pages for each image would cost ten times its copy."""
+
+    small = 1 << 16
+
+    def __init__(self) -> None:
+        self._bytes = np.zeros(0, np.uint8)
+
+    def zeros(self, size: int) -> memoryview:
+        """Return `size` zero bytes, to be used before the next call."""
+        if size <= self.small:
+            return memoryview(bytearray(size))
+        if self._bytes.size < size:
+            self._bytes = np.empty(size, np.uint8)
+        view = self._bytes[:size]
+        view.fill(0)
+        return view.data
+
+
+class Codec:
+    """Knows every type of one ROS 2 distribution, and GOLEM's."""
+
+    def __init__(self, distro: str = DEFAULT) -> None:
+        """Know the standard types of `distro`.
+
+        Raises:
+            MissingExtra: rosbags is not installed.
+            ConfigError: there is no such distribution.
+        """
+        self._store = definitions.load(distro)
+        self._types = cast(dict[str, Definition], self._store.fielddefs)
+        self._classes: dict[str, type[Message]] = {}
+        self._compiled: dict[str, _Compiled] = {}
+        self._hashes: dict[str, str] = {}
+        self._scratch = _Scratch()
+        self._making = threading.RLock()
+
+    def names(self) -> list[str]:
+        """Return the names of all types, among them those of services and actions."""
+        return sorted(self._types)
+
+    def message(self, name: str) -> type[Any]:
+        """Return the class of a message, e.g. `"sensor_msgs/msg/Image"` or `"std_srvs/srv/SetBool_Request"`.
+
+        It is that of `golem.middleware.ros.msgs` where there is one.
+
+        Raises:
+            ConfigError: there is no such type.
+        """
+        if name not in self._classes:
+            self._known(name)
+            with self._making:
+                for used in definitions.nested(self._types[name][1]):
+                    self.message(used)
+                if name not in self._classes:
+                    made = self._saved(name) or self._made(name)
+                    self._store.types[name] = cast(Any, made)
+                    self._classes[name] = made
+        return self._classes[name]
+
+    def service(self, name: str) -> Service:
+        """Return the messages of a service, e.g. `"std_srvs/srv/SetBool"`.
+
+        Raises:
+            ConfigError: there is no such service.
+        """
+        self._known(f"{name}_Request", name)
+        return Service(name, self.message(f"{name}_Request"), self.message(f"{name}_Response"))
+
+    def action(self, name: str) -> Action:
+        """Return the messages of an action, e.g. `"golem_interfaces/action/Pick"`.
+
+        Raises:
+            ConfigError: there is no such action.
+        """
+        self._known(f"{name}_Goal", name)
+        goal, result, feedback = (self.message(f"{name}_{part}") for part in ("Goal", "Result", "Feedback"))
+        services = self.service(f"{name}_SendGoal"), self.service(f"{name}_GetResult")
+        return Action(name, goal, result, feedback, *services, self.message(f"{name}_FeedbackMessage"))
+
+    def serialize(self, message: Message) -> bytes:
+        """Return the CDR of a message, little endian, padded to a multiple of four bytes.
+
+        Raises:
+            CodecError: a field does not hold what its definition says.
+        """
+        name = message.__msgtype__
+        compiled = self._compiled.get(name) or self._compile(name)
+        try:
+            if compiled.check is not None:
+                compiled.check(message)
+            size = 4 + compiled.size(0, message, self._store)
+            buffer = self._scratch.zeros(size + -size % 4)
+            buffer[1] = 1
+            compiled.write(buffer[4:], 0, message, self._store)
+        except CodecError:
+            raise
+        except Exception as error:  # a field may hold anything
+            raise CodecError(f"A {name} cannot be serialised: {_told(error)}.") from error
+        return bytes(buffer)
+
+    def deserialize(self, payload: Payload, kind: type[M]) -> M:
+        """Return the message of type `kind` that `payload` holds; its arrays are read-only views of `payload`.
+
+        Raises:
+            CodecError: the payload is no such message.
+        """
+        name = kind.__msgtype__
+        if name not in self._compiled:
+            self._compile(name)
+        try:
+            return cast(M, self._store.deserialize_cdr(memoryview(payload).cast("B"), name))
+        except Exception as error:  # the bytes are a stranger's
+            raise CodecError(f"{len(payload)} bytes are no {name}: {_told(error)}.") from error
+
+    def type_hash(self, name: str) -> str:
+        """Return the RIHS01 hash of a message, service or action (REP-2011).
+
+        Raises:
+            ConfigError: there is no such type.
+        """
+        self._known(name)
+        if name not in self._hashes:
+            self._hashes[name] = self._store.hash_rihs01(name)
+        return self._hashes[name]
+
+    def definition(self, name: str) -> str:
+        """Return the definition of a type, followed by those it uses, as bags carry it (`ros2msg`).
+
+        Raises:
+            ConfigError: there is no such type.
+        """
+        self._known(name)
+        return definitions.text(name, self._types)
+
+    def _known(self, name: str, asked: str | None = None) -> None:
+        if name in self._types:
+            return
+        wrong = asked or name
+        package = wrong.split("/")[0]
+        siblings = [each for each in self._types if each.startswith(f"{package}/") and "_" not in short(each)]
+        if siblings:
+            raise unknown_name("ROS interface", wrong, siblings)
+        raise unknown_name("ROS package", package, {each.split("/")[0] for each in self._types})
+
+    def _saved(self, name: str) -> type[Message] | None:
+        try:
+            module = importlib.import_module(f"golem.middleware.ros.msgs.{name.split('/')[0]}")
+        except ModuleNotFoundError:
+            return None
+        found = getattr(module, short(name), None)
+        return found if found is not None and found.__msgtype__ == name else None
+
+    def _made(self, name: str) -> type[Message]:
+        """Return the class of a type that `msgs` does not hold."""
+        nested = {_identifier(used): self._classes[used] for used in definitions.nested(self._types[name][1])}
+        source = (
+            "from dataclasses import dataclass, field\n"
+            "from typing import ClassVar\n"
+            "import numpy as np\n"
+            "from numpy.typing import NDArray\n"
+            "from golem.middleware.ros.message import Message\n"
+        ) + class_source(name, self._types[name], _identifier)
+        scope: dict[str, Any] = {**nested, "__name__": __name__}
+        exec(compile(source, f"<{name}>", "exec", dont_inherit=True), scope)
+        return scope[_identifier(name)]
+
+    def _compile(self, name: str) -> _Compiled:
+        self.message(name)
+        functions = self._store.get_msgdef(name)
+        compiled = _Compiled(functions.getsize_cdr, functions.serialize_cdr_le, self._check(name))
+        self._compiled[name] = compiled
+        return compiled
+
+    @functools.cache  # noqa: B019  a codec lives as long as its process
+    def _check(self, name: str) -> Callable[[Any], None] | None:
+        """Return what refuses a message of type `name` whose arrays are not of their types; None if it has none."""
+        arrays: list[tuple[str, np.dtype[Any]]] = []
+        deeper: list[tuple[str, bool, Callable[[Any], None]]] = []
+        for field, (what, of) in self._types[name][1]:
+            element = of[0] if what in (ARRAY, SEQUENCE) else (what, of)
+            if element[0] == NAME:
+                inner = self._check(element[1])
+                if inner is not None:
+                    deeper.append((python_name(field), what != NAME, inner))
+            elif what != BASE and element[1][0] != "string":
+                arrays.append((python_name(field), np.dtype(getattr(np, numpy_name(element[1][0])))))
+        if not arrays and not deeper:
+            return None
+
+        def check(message: Any) -> None:
+            for field, dtype in arrays:
+                value = getattr(message, field)
+                if (
+                    type(value) is not np.ndarray
+                    or value.dtype != dtype
+                    or value.ndim != 1
+                    or not value.flags.c_contiguous
+                ):
+                    raise CodecError(
+                        f"'{field}' of a {name} must be a contiguous one-dimensional numpy array of {dtype}, "
+                        f"not {_described(value)}."
+                    )
+            for field, many, inner in deeper:
+                value = getattr(message, field)
+                for each in value if many else (value,):
+                    inner(each)
+
+        return check
+
+
+def _identifier(name: str) -> str:
+    return name.replace("/", "__")
+
+
+def _described(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        return f"one of {value.dtype} with the shape {value.shape}"
+    return f"{type(value).__name__}"
+
+
+def _told(error: Exception) -> str:
+    return f"{type(error).__name__}, {error}".rstrip(".")
+
+
+@functools.cache
+def codec(distro: str = DEFAULT) -> Codec:
+    """Return the codec of a distribution; each is made once.
+
+    Raises:
+        MissingExtra: rosbags is not installed.
+        ConfigError: there is no such distribution.
+    """
+    return Codec(distro)
+
+
+def message(name: str) -> type[Any]:
+    """See `Codec.message`."""
+    return codec().message(name)
+
+
+def service(name: str) -> Service:
+    """See `Codec.service`."""
+    return codec().service(name)
+
+
+def action(name: str) -> Action:
+    """See `Codec.action`."""
+    return codec().action(name)
+
+
+def serialize(message: Message) -> bytes:
+    """See `Codec.serialize`."""
+    return codec().serialize(message)
+
+
+def deserialize(payload: Payload, kind: type[M]) -> M:
+    """See `Codec.deserialize`."""
+    return codec().deserialize(payload, kind)
+
+
+def type_hash(name: str) -> str:
+    """See `Codec.type_hash`."""
+    return codec().type_hash(name)
+
+
+def definition(name: str) -> str:
+    """See `Codec.definition`."""
+    return codec().definition(name)
+
+
+def dds_name(kind: str | type[Message]) -> str:
+    """Return what DDS calls a message type: `sensor_msgs::msg::dds_::Image_` for `"sensor_msgs/msg/Image"`."""
+    package, sort, name = (kind if isinstance(kind, str) else kind.__msgtype__).split("/")
+    return f"{package}::{sort}::dds_::{name}_"

@@ -1,0 +1,209 @@
+"""Interface definitions: which types there are, and what each consists of.
+
+The standard types of a ROS 2 distribution come from rosbags' type store; what GOLEM and its vendors add, and services
+and actions, which the store lacks, from the files in `share` (`ros` in the repository): `<package>/msg/*.msg`,
+`srv/*.srv` and `action/*.action`. A service stands for two messages and an event, an action for three messages, two
+services and a feedback message, as rosidl derives them (design.ros2.org/articles/actions.html; rosidl_parser,
+definition.py).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
+
+from golem.errors import MissingExtra, unknown_name
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
+
+Distro = Literal["humble", "jazzy"]
+"""A ROS 2 distribution whose standard types are known; of those GOLEM uses, only `rmw_dds_common/msg/Gid` differs."""
+SHARE = Path(__file__).parent / "share"
+"""Folder of the interface packages."""
+SEPARATOR = "---"
+"""Line between the parts of a .srv or .action file."""
+EMPTY_MEMBER = "structure_needs_at_least_one_member"
+"""The member that stands in for the fields of a type without any, as in rosidl; one byte on the wire."""
+
+BASE, NAME, ARRAY, SEQUENCE = 1, 2, 3, 4
+"""Kinds of a field: (BASE, (primitive, string bound)), (NAME, type), and (ARRAY or SEQUENCE, (element, length))."""
+
+Field = tuple[str, tuple[int, Any]]
+"""Name and kind of a field."""
+Definition = tuple[list[tuple[str, str, Any]], list[Field]]
+"""Constants (name, type, value) and fields of a type."""
+
+PARTS = {"msg": ("",), "srv": ("_Request", "_Response"), "action": ("_Goal", "_Result", "_Feedback")}
+"""What is appended to the name of a file for each of its parts, by the kind of file."""
+
+
+@cache
+def sections() -> dict[str, str]:
+    """Return the text of every message in the files of `share`, by type name.
+
+    A part of a service or an action is named as in ROS: `std_srvs/srv/SetBool_Request`, `.../action/Pick_Goal`.
+    """
+    found: dict[str, str] = {}
+    for kind, suffixes in PARTS.items():
+        for path in sorted(SHARE.glob(f"*/{kind}/*.{kind}")):
+            name = f"{path.parent.parent.name}/{kind}/{path.stem}"
+            for suffix, text in zip(suffixes, split(path.read_text(encoding="utf-8")), strict=True):
+                found[name + suffix] = text
+    return found
+
+
+def files(kind: str) -> list[str]:
+    """Return the names of the interfaces of one kind (`msg`, `srv`, `action`) in `share`."""
+    return [f"{path.parent.parent.name}/{kind}/{path.stem}" for path in sorted(SHARE.glob(f"*/{kind}/*"))]
+
+
+def split(text: str) -> list[str]:
+    """Return the parts of an interface file."""
+    parts: list[list[str]] = [[]]
+    for line in text.splitlines(keepends=True):
+        if line.strip() == SEPARATOR:
+            parts.append([])
+        else:
+            parts[-1].append(line)
+    return ["".join(lines) for lines in parts]
+
+
+def load(distro: str) -> Typestore:
+    """Return a type store with everything: the standard types of `distro`, and those of `share`.
+
+    Raises:
+        MissingExtra: rosbags is not installed.
+        ConfigError: there is no such distribution.
+    """
+    try:
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    except ImportError as error:
+        raise MissingExtra("rosbags", "dds") from error
+    if distro not in get_args(Distro):
+        raise unknown_name("ROS 2 distribution", distro, get_args(Distro))
+    store = get_typestore(Stores[f"ROS2_{distro.upper()}"])
+    types: dict[str, Definition] = {}
+    for name, text in sections().items():
+        # Read as a .msg, wherever it comes from: a type named without its package is a message of that package.
+        package, _, stem = name.split("/")
+        (types[name],) = cast(Any, get_types_from_msg(text, f"{package}/msg/{stem}")).values()
+    for name in files("srv"):
+        types |= service(name)
+    for name in files("action"):
+        types |= action(name)
+    store.register(cast(Any, types))
+    everything = cast(dict[str, Definition], store.fielddefs)
+    for name, (constants, fields) in everything.items():
+        # rosidl_adapter turns `char` into `uint8`; rosbags does not, and would hash ServiceEventInfo wrongly.
+        everything[name] = (constants, [(field, _without_char(kind)) for field, kind in fields])
+    return store
+
+
+def service(name: str) -> dict[str, Definition]:
+    """Return what rosidl derives from a service: its event, and the service as the type that its hash is of."""
+    request, response, event = (f"{name}_{part}" for part in ("Request", "Response", "Event"))
+    return {
+        event: (
+            [],
+            [
+                ("info", (NAME, "service_msgs/msg/ServiceEventInfo")),
+                ("request", (SEQUENCE, ((NAME, request), 1))),
+                ("response", (SEQUENCE, ((NAME, response), 1))),
+            ],
+        ),
+        name: (
+            [],
+            [
+                ("request_message", (NAME, request)),
+                ("response_message", (NAME, response)),
+                ("event_message", (NAME, event)),
+            ],
+        ),
+    }
+
+
+def action(name: str) -> dict[str, Definition]:
+    """Return what rosidl derives from an action: two services, the feedback message, and the action as a type."""
+    goal_id: Field = ("goal_id", (NAME, "unique_identifier_msgs/msg/UUID"))
+    send_goal, get_result, feedback = f"{name}_SendGoal", f"{name}_GetResult", f"{name}_FeedbackMessage"
+    return {
+        f"{send_goal}_Request": ([], [goal_id, ("goal", (NAME, f"{name}_Goal"))]),
+        f"{send_goal}_Response": (
+            [],
+            [("accepted", (BASE, ("bool", 0))), ("stamp", (NAME, "builtin_interfaces/msg/Time"))],
+        ),
+        f"{get_result}_Request": ([], [goal_id]),
+        f"{get_result}_Response": (
+            [],
+            [("status", (BASE, ("int8", 0))), ("result", (NAME, f"{name}_Result"))],
+        ),
+        feedback: ([], [goal_id, ("feedback", (NAME, f"{name}_Feedback"))]),
+        **service(send_goal),
+        **service(get_result),
+        name: (
+            [],
+            [
+                ("goal", (NAME, f"{name}_Goal")),
+                ("result", (NAME, f"{name}_Result")),
+                ("feedback", (NAME, f"{name}_Feedback")),
+                ("send_goal_service", (NAME, send_goal)),
+                ("get_result_service", (NAME, get_result)),
+                ("feedback_message", (NAME, feedback)),
+            ],
+        ),
+    }
+
+
+def nested(fields: list[Field]) -> list[str]:
+    """Return the names of the types that `fields` are made of, in order, each once."""
+    kinds = (kind[1][0] if kind[0] in (ARRAY, SEQUENCE) else kind for _, kind in fields)
+    return list(dict.fromkeys(kind[1] for kind in kinds if kind[0] == NAME))
+
+
+def text(name: str, types: dict[str, Definition]) -> str:
+    """Return the definition of type `name` in the language of .msg files, followed by those it uses.
+
+    This is what bags carry (MCAP's schema encoding `ros2msg`).
+    """
+    order = [name]
+    for each in order:
+        order += [used for used in nested(types[each][1]) if used not in order]
+    blocks = ["\n".join(_lines(types[each])) for each in order]
+    heads = [f"\n{'=' * 80}\nMSG: {_short(each)}\n" for each in order[1:]]
+    return "".join(part for pair in zip(["", *heads], blocks, strict=True) for part in pair) + "\n"
+
+
+def _lines(definition: Definition) -> list[str]:
+    constants, fields = definition
+    written = [f"{kind} {name}={_literal(value)}" for name, kind, value in constants]
+    return written + [f"{_spelled(kind)} {name}" for name, kind in fields if name != EMPTY_MEMBER]
+
+
+def _spelled(kind: tuple[int, Any]) -> str:
+    what, of = kind
+    if what == BASE:
+        primitive, bound = of
+        return f"{primitive}<={bound}" if bound else primitive
+    if what == NAME:
+        return _short(of)
+    element, length = of
+    size = str(length) if what == ARRAY else f"<={length}" if length else ""
+    return f"{_spelled(element)}[{size}]"
+
+
+def _short(name: str) -> str:
+    """Return a type's name as .msg files write it: `std_msgs/Header`."""
+    return name.replace("/msg/", "/")
+
+
+def _literal(value: object) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(value)
+
+
+def _without_char(kind: tuple[int, Any]) -> tuple[int, Any]:
+    what, of = kind
+    if what == BASE:
+        return what, ("uint8", of[1]) if of[0] == "char" else of
+    return (what, (_without_char(of[0]), of[1])) if what in (ARRAY, SEQUENCE) else kind

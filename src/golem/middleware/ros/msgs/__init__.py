@@ -1,0 +1,1 @@
+"""Message classes by ROS package, e.g. `from golem.middleware.ros.msgs.sensor_msgs import Image`; generated."""
