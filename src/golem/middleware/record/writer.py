@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import IO, Literal
 
 from golem.errors import ConfigError, OutputError
-from golem.middleware.record.base import Message, Topic, missing
+from golem.middleware.record.base import NANO, Message, Topic, missing
 from golem.middleware.record.metadata import Contents, dump, information, offered_qos
 
 try:
@@ -24,6 +24,9 @@ except ModuleNotFoundError as error:
 METADATA = "metadata.yaml"
 CUSTOM = "golem"
 """Name of the MCAP metadata record with what else the writer says about a bag."""
+JUMP = NANO
+"""Step back in time that begins a new file [ns] [own]: a simulation was restarted. In a file messages are read in the
+order of their log times, files one after the other."""
 Compression = Literal["none", "lz4", "zstd"]
 
 
@@ -70,6 +73,7 @@ class BagWriter:
         self._custom = dict(custom or {})
         self._files: dict[str, Contents] = {}
         self._file: McapFile | None = None
+        self._newest = 0
         self._closed = False
         try:
             folder.mkdir(parents=True)
@@ -88,8 +92,10 @@ class BagWriter:
         if self._closed:
             raise OutputError(f"The bag {self.folder} is closed.")
         try:
-            if self._file is None:
+            if self._file is None or message.log_time < self._newest - JUMP:
+                self._end()
                 self._begin()
+            self._newest = max(message.log_time, self._newest)
             assert self._file is not None
             self._file.write(message)
             if self._file.size > self._config.split:
@@ -120,12 +126,14 @@ class BagWriter:
     def _begin(self) -> None:
         name = f"{self.folder.name}_{len(self._files)}.mcap"
         self._files[name] = Contents()
+        self._newest = 0
         self._file = McapFile(self.folder / name, self._config, self._files[name], self._custom)
 
     def _end(self) -> None:
-        if self._file is not None:
-            self._file.finish(list(self._files)[-1])
-            self._file = None
+        if self._file is None:
+            return
+        self._file.finish(list(self._files)[-1])
+        self._file = None
         write_metadata(self.folder, self._files, self._custom)
 
     def _unwritable(self, error: OSError) -> OutputError:

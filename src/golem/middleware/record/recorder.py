@@ -1,0 +1,144 @@
+"""Takes messages off a domain as they are and hands them to a sink: nothing is decoded but the time on /clock."""
+
+from __future__ import annotations
+
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from golem.middleware.dds.base import Participant, Payload, Qos, Reader, Sample
+from golem.middleware.record.base import NANO, Message, Sink, Topic
+from golem.middleware.ros import names
+from golem.middleware.ros.codec import dds_name
+
+CLOCK = "/clock"
+PERIOD = 0.05
+"""Time between two looks at what has come [s] [own]."""
+FLUSH = 1.0
+"""Time after which what was recorded survives the death of the process [s] [own]."""
+BULKY = frozenset(
+    f"{package}/msg/{name}"
+    for package, name in (
+        ("sensor_msgs", "Image"),
+        ("sensor_msgs", "CompressedImage"),
+        ("sensor_msgs", "PointCloud2"),
+        ("livox_ros_driver2", "CustomMsg"),
+    )
+)
+"""Types whose messages are large."""
+FEW, MANY = 60, 2000
+"""Messages that wait to be taken, of large and of other types [own]: 4 s at 15 Hz and at 500 Hz. They bound memory:
+60 VGA images are 55 MB."""
+SKEW = 1.0
+"""Difference between two machines' clocks beyond which the writer's time of a message is not relied on [s] [own]."""
+
+
+@dataclass(slots=True)
+class _Subscription:
+    topic: Topic
+    reader: Reader
+    depth: int
+
+
+class Recorder:
+    """Passes the messages of topics to a sink.
+
+    A message's log time is the domain's time when it was written: that of /clock where there is one, else the wall
+    clock's. Its publish time is the writer's wall clock.
+
+    Attributes:
+        received: messages so far, by topic.
+        overruns: how often more came between two looks than was kept, by topic: some of it was lost.
+    """
+
+    def __init__(self, participant: Participant, sink: Sink, wall: Callable[[], float] = time.time) -> None:
+        """Record from the domain of `participant` to `sink`; `wall` tells the time [s since 1970]."""
+        self._participant, self._sink, self._wall = participant, sink, wall
+        self._subscriptions: dict[str, _Subscription] = {}
+        self._clock: int | None = None
+        self.received: dict[str, int] = {}
+        self.overruns: dict[str, int] = {}
+
+    def add(self, topics: Iterable[Topic]) -> None:
+        """Record `topics` from now on; one that is recorded already stays as it is.
+
+        Raises:
+            DdsError: a topic cannot be read.
+        """
+        for topic in topics:
+            if topic.name in self._subscriptions:
+                continue
+            depth = FEW if topic.kind in BULKY else MANY
+            qos = Qos(topic.qos.reliable, topic.qos.transient_local, depth)
+            reader = self._participant.reader(names.topic(topic.name), dds_name(topic.kind), qos)
+            self._subscriptions[topic.name] = _Subscription(topic, reader, depth)
+
+    def remove(self, topic: str) -> None:
+        """Record the topic called `topic` no longer."""
+        subscription = self._subscriptions.pop(topic, None)
+        if subscription is not None:
+            subscription.reader.close()
+
+    def poll(self) -> int:
+        """Pass on what has come, in the order in which it was written; return how many messages.
+
+        Raises:
+            OutputError: the sink cannot be written.
+        """
+        now = self._wall()
+        batch: list[tuple[float, Topic, Payload]] = []
+        for subscription in self._subscriptions.values():
+            topic = subscription.topic
+            samples = _take_all(subscription)
+            if len(samples) >= subscription.depth:
+                self.overruns[topic.name] = self.overruns.get(topic.name, 0) + 1
+            if samples:
+                self.received[topic.name] = self.received.get(topic.name, 0) + len(samples)
+            for sample in samples:
+                written = sample.source_time if abs(sample.source_time - now) < SKEW else now
+                batch.append((written, topic, sample.payload))
+        batch.sort(key=lambda entry: entry[0])
+        for written, topic, payload in batch:
+            if topic.name == CLOCK:
+                self._clock = clock_time(payload)
+            at = round(written * NANO)
+            self._sink.write(Message(topic, at if self._clock is None else self._clock, at, payload))
+        return len(batch)
+
+    def run(self, stop: threading.Event, flush: Callable[[], None], limit: float = float("inf")) -> None:
+        """Record until `stop` is set or `limit` [s] is over, and call `flush` every second; errors as for `poll`."""
+        end = time.monotonic() + limit
+        flushed = time.monotonic()
+        while not stop.wait(PERIOD) and time.monotonic() < end:
+            self.poll()
+            if time.monotonic() - flushed >= FLUSH:
+                flushed = time.monotonic()
+                flush()
+        self.poll()
+
+    def close(self) -> None:
+        """Stop reading; the sink stays open."""
+        for name in list(self._subscriptions):
+            self.remove(name)
+
+
+def clock_time(payload: Payload) -> int | None:
+    """Return the time in a `rosgraph_msgs/msg/Clock` [ns]; None if it is no such message."""
+    order = {0: ">", 1: "<"}.get(payload[1] if len(payload) == 12 else -1)
+    if order is None:
+        return None
+    seconds, nanoseconds = struct.unpack_from(f"{order}iI", payload, 4)
+    return max(0, seconds * NANO + nanoseconds)
+
+
+def _take_all(subscription: _Subscription) -> list[Sample]:
+    """Return what has come to a reader, at most as much as it keeps: a writer faster than us must not hold us up."""
+    out: list[Sample] = []
+    while len(out) < subscription.depth:
+        samples = subscription.reader.take(min(64, subscription.depth - len(out)))
+        if not samples:
+            break
+        out += samples
+    return [sample for sample in out if sample.alive]
