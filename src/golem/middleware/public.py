@@ -21,8 +21,10 @@ BASE_FRAME = "base_link"
 """Root of the robot in /tf; the link `pelvis` coincides with it."""
 NEWEST = Qos(depth=1)
 CLOUD = Qos(depth=20)
-LOW = Qos(reliable=False, depth=1)
-"""What the vendor's clients ask for: a command or a state is worth nothing once there is a newer one."""
+LOW = Qos(depth=8)
+"""Reliable, so that ROS subscriptions of either kind match; short, so that nobody who is slow holds the writer up."""
+VENDOR = ("unitree_hg", "unitree_api")
+"""Packages of the messages that are written as images, past the ROS codec."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +50,11 @@ class Topic:
     rate: float | None
     frame: str
     text: str
+
+    @property
+    def vendor(self) -> bool:
+        """Whether it is the vendor's own."""
+        return self.type.split("/")[0] in VENDOR
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,6 +190,9 @@ TOPICS: tuple[Topic, ...] = (
           "Velocity for the legs [m/s], [rad/s]; to be repeated at least every 0.5 s, or the robot stands."),
     Topic("/legs/status", "golem_interfaces/msg/LegStatus", "stack", (), DEFAULT, 50, BASE_FRAME,
           "What the lower body was told, what it does, and why not more."),
+    Topic("/onboard/lowcmd", "unitree_hg/msg/LowCmd", "robot", ("stack",), LOW, 500, "",
+          "What the on-board leg controller wants of the 12 leg motors while it is on, the others off. Simulation only: "
+          "there it takes the way of every other command, through the gate."),
     *(Topic(f"/objects/{camera}", "golem_interfaces/msg/Sightings", "stack", (), DEFAULT, None, "odom",
             "Objects located in the frames that a skill asked for.") for camera in CAMERAS),
 )

@@ -66,16 +66,27 @@ def test_used_motors_are_on_and_the_others_off() -> None:
         assert not image["motor"]["q"][27:].any()
 
 
-def test_the_imu_and_the_base_survive_the_wire() -> None:
-    imu, base = samples.imu(rng()), samples.base(rng())
+def test_the_imu_survives_the_wire() -> None:
+    imu = samples.imu(rng())
     again = convert.decode_imu(convert.encode_imu(imu))
     for name in ("quat", "gyro", "acc"):
         np.testing.assert_array_equal(getattr(again, name), getattr(imu, name))
-    estimate = convert.decode_base(convert.encode_base(base, imu))
-    assert (estimate.t, estimate.height) == (base.t, base.height)
-    np.testing.assert_array_equal(estimate.velocity, base.velocity)
-    np.testing.assert_allclose(estimate.T_odom_base, base.T_odom_base, atol=1e-6)
-    np.testing.assert_array_equal(estimate.T_odom_base[:3, 3], base.T_odom_base[:3, 3])
+
+
+def test_a_command_says_which_state_it_answers() -> None:
+    command = samples.command(rng())
+    assert convert.answered(convert.encode_low_command(command, 0)) == 0.0
+    assert convert.answered(convert.encode_low_command(command, 0, 12.346)) == 12.346
+
+
+def test_the_robots_own_estimate_is_read_by_name() -> None:
+    payload = go.SPORT_MODE_STATE.blank()
+    image = go.SPORT_MODE_STATE.read(payload)
+    image["position"], image["velocity"], image["sec"] = (1, 2, 3), (4, 5, 6), -7
+    again = go.SPORT_MODE_STATE.read(bytes(payload))
+    assert (list(again["position"]), list(again["velocity"]), again["sec"]) == ([1, 2, 3], [4, 5, 6], -7)
+    with pytest.raises(WireError, match="516 bytes"):
+        go.SPORT_MODE_STATE.read(bytes(payload[:-4]))
 
 
 def test_a_padded_payload_is_accepted() -> None:
@@ -130,11 +141,6 @@ DECODERS: dict[str, tuple[Layout, Callable[[], bytes], Callable[[bytes], object]
         lambda payload: convert.decode_low_command(payload, 0.0),
     ),
     "imu": (hg.IMU_STATE, lambda: convert.encode_imu(samples.imu(rng())), convert.decode_imu),
-    "base": (
-        go.SPORT_MODE_STATE,
-        lambda: convert.encode_base(samples.base(rng()), samples.imu(rng())),
-        convert.decode_base,
-    ),
 }
 
 
@@ -181,9 +187,6 @@ def inertial(field: str, value: Any) -> Callable[[Any], None]:
         ("command", whole("mode_machine", 5), "copy it from the LowState"),
         ("imu", inertial("gyroscope", np.nan), "not finite"),
         ("imu", inertial("accelerometer", np.inf), "not finite"),
-        ("base", whole("position", np.nan), "not finite"),
-        ("base", whole("body_height", np.inf), "not finite"),
-        ("base", inertial("quaternion", 1.0), "no unit quaternion"),
     ],
 )
 def test_what_makes_no_sense_is_refused(name: str, edit: Callable[[Any], None], words: str) -> None:
@@ -193,7 +196,7 @@ def test_what_makes_no_sense_is_refused(name: str, edit: Callable[[Any], None], 
 
 
 def test_what_would_be_refused_is_not_sent() -> None:
-    state, command, base = samples.state(rng()), samples.command(rng()), samples.base(rng())
+    state, command = samples.state(rng()), samples.command(rng())
     huge = np.full(27, 1e300)
     for broken in (replace(state, q=huge), replace(state, t=-1.0), replace(state, t=float("nan"))):
         with pytest.raises(WireError):
@@ -203,13 +206,6 @@ def test_what_would_be_refused_is_not_sent() -> None:
             convert.encode_low_command(replace(command, **{name: huge}), 0)
     with pytest.raises(WireError):
         convert.encode_imu(replace(state.imu, quat=np.zeros(4)))
-    for broken in (
-        replace(base, t=1e12),
-        replace(base, height=float("nan")),
-        replace(base, T_odom_base=np.full((4, 4), np.nan)),
-    ):
-        with pytest.raises(WireError):
-            convert.encode_base(broken, state.imu)
 
 
 @pytest.mark.parametrize("name", ["state", "command"])
@@ -222,3 +218,12 @@ def test_one_wrong_bit_is_noticed(name: str) -> None:
         with pytest.raises(WireError, match="checksum"):
             decode(bytes(damaged))
     assert layout.size == len(payload)
+
+
+def test_a_command_says_which_state_it_answers() -> None:
+    zeros = np.zeros(27)
+    command = LowCommand(0.0, zeros, zeros, zeros, zeros, zeros)
+    assert convert.answered(convert.encode_low_command(command, 0)) == 0
+    payload = convert.encode_low_command(command, 0, answers=2**32 + 7)
+    assert convert.answered(payload) == 7
+    convert.decode_low_command(payload, 0.0)

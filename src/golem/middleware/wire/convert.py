@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from golem.middleware.dds.base import Payload
-from golem.middleware.wire import go, hg
+from golem.middleware.wire import hg
 from golem.middleware.wire.crc import Checksum
 from golem.middleware.wire.layout import Image, Layout, WireError
-from golem.types import NUM_JOINTS, Array, BaseEstimate, Imu, LowCommand, LowState
+from golem.types import NUM_JOINTS, Array, Imu, LowCommand, LowState
 
 MODE_MACHINE = 0
 """Machine type a twin reports [own: nobody publishes the H1-2's]; a client copies what the robot reports."""
@@ -85,12 +84,13 @@ def mode_machine(payload: Payload) -> int:
     return int(hg.LOW_STATE.read(payload)["mode_machine"])
 
 
-def encode_low_command(command: LowCommand, mode_machine: int) -> bytes:
+def encode_low_command(command: LowCommand, mode_machine: int, answers: int = 0) -> bytes:
     """Return `command` as a `LowCmd_` with the ankles in pitch and roll and all 27 motors on.
 
     Args:
         command: what the motors are told; its time is not sent.
         mode_machine: what the robot reports; it ignores other commands.
+        answers: tick of the state it was computed from, which GOLEM's own safety gate reads from `reserve`.
 
     Raises:
         WireError: a value is not finite in single precision.
@@ -98,6 +98,7 @@ def encode_low_command(command: LowCommand, mode_machine: int) -> bytes:
     payload = bytearray(_COMMAND)
     image = hg.LOW_CMD.read(payload)
     image["mode_machine"] = mode_machine
+    image["reserve"][0] = _tick(answers)
     target = image["motor"]["target"][:NUM_JOINTS]
     with np.errstate(over="ignore"):
         target[:, 0] = command.q
@@ -142,6 +143,24 @@ def decode_low_command(payload: Payload, t: float, mode_machine: int = MODE_MACH
     return LowCommand(t, *np.ascontiguousarray(target.T))
 
 
+def answered(payload: Payload) -> int:
+    """Return the tick of the state that a `LowCmd_` answers; 0 where its sender does not say.
+
+    Raises:
+        WireError: encapsulation or length is wrong.
+    """
+    return int(hg.LOW_CMD.read(payload)["reserve"][0])
+
+
+def answered(payload: Payload) -> float:
+    """Return the time of the state that a `LowCmd_` answers [s], 0 for none.
+
+    Raises:
+        WireError: encapsulation or length is wrong.
+    """
+    return int(hg.LOW_CMD.read(payload)["reserve"][0]) / _TICKS
+
+
 def encode_imu(imu: Imu) -> bytes:
     """Return `imu` as an `IMUState_`.
 
@@ -160,52 +179,6 @@ def decode_imu(payload: Payload) -> Imu:
         WireError: encapsulation or length is wrong, a value is not finite, or the quaternion is none.
     """
     return _read_imu(hg.IMU_STATE.read(payload), hg.IMU_STATE)
-
-
-def encode_base(base: BaseEstimate, imu: Imu) -> bytes:
-    """Return a base estimate as a `SportModeState_`.
-
-    Args:
-        base: stamp, position, height and velocity of the message; its orientation is that of the message's IMU.
-        imu: rate and specific force of the message's IMU, as the torso measures them.
-
-    Raises:
-        WireError: a value is not finite in single precision, or the time is negative.
-    """
-    layout = go.SPORT_MODE_STATE
-    payload = layout.blank()
-    image = layout.read(payload)
-    nanoseconds = round(base.t * 1e9) if math.isfinite(base.t) else -1
-    if not 0 <= nanoseconds < 2**31 * 10**9:
-        raise WireError(f"A {layout.type_name} cannot say the time {base.t} s.")
-    if not np.isfinite(base.T_odom_base).all():
-        raise WireError(f"The pose for a {layout.type_name} is not finite.")
-    image["sec"], image["nanosec"] = divmod(nanoseconds, 10**9)
-    with np.errstate(over="ignore"):
-        image["position"] = base.T_odom_base[:3, 3]
-        image["velocity"] = base.velocity
-        image["body_height"] = base.height
-    image["yaw_speed"] = imu.gyro[2]
-    _check_base(image)
-    quat = Rotation.from_matrix(base.T_odom_base[:3, :3]).as_quat(scalar_first=True)
-    _fill_imu(image["imu"], Imu(quat, imu.gyro, imu.acc), layout)
-    return bytes(payload)
-
-
-def decode_base(payload: Payload) -> BaseEstimate:
-    """Return the base estimate in a `SportModeState_`; it does not say which foot carries the robot.
-
-    Raises:
-        WireError: encapsulation or length is wrong, a value is not finite, or the quaternion is none.
-    """
-    image = go.SPORT_MODE_STATE.read(payload)
-    _check_base(image)
-    pose = np.eye(4)
-    quat = _read_imu(image["imu"], go.SPORT_MODE_STATE).quat
-    pose[:3, :3] = Rotation.from_quat(quat, scalar_first=True).as_matrix()
-    pose[:3, 3] = image["position"]
-    t = int(image["sec"]) + 1e-9 * int(image["nanosec"])
-    return BaseEstimate(t, pose, image["velocity"].astype(np.float64), float(image["body_height"]))
 
 
 def rpy(quat: Array) -> tuple[float, float, float]:
@@ -229,7 +202,7 @@ def _checked(payload: Payload, layout: Layout, checksum: Checksum) -> Image:
 
 def _tick(t: float) -> int:
     if not (math.isfinite(t) and t >= 0.0):
-        raise WireError(f"A {hg.LOW_STATE.type_name} cannot say the time {t} s.")
+        raise WireError(f"A tick cannot say the time {t} s.")
     return round(t * _TICKS) % 2**32
 
 
@@ -241,11 +214,6 @@ def _check_motors(values: np.ndarray, names: tuple[str, ...], layout: Layout) ->
         raise WireError(
             f"{names[column]} of motor {motor} in a {layout.type_name} is {values[motor, column]}, not finite."
         )
-
-
-def _check_base(image: Image) -> None:
-    if not all(np.isfinite(image[name]).all() for name in ("position", "velocity", "body_height")):
-        raise WireError(f"Position, velocity or height of a {go.SPORT_MODE_STATE.type_name} is not finite.")
 
 
 def _fill_imu(image: Image, imu: Imu, layout: Layout) -> None:
