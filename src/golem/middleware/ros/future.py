@@ -8,6 +8,7 @@ from typing import Generic, TypeVar
 from golem.errors import GolemError
 
 T = TypeVar("T")
+U = TypeVar("U")
 
 
 class RosError(GolemError):
@@ -50,11 +51,24 @@ class Future(Generic[T]):
         else:
             self._callbacks.append(callback)
 
+    def map(self, convert: Callable[[T], U]) -> Future[U]:
+        """Return a future of `convert(value)`; giving that up gives this up."""
+        mapped: Future[U] = Future(self.cancel)
+
+        def settle(future: Future[T]) -> None:
+            if future._error is not None:
+                mapped.fail(future._error)
+            elif not mapped.done:
+                mapped.complete(convert(future.result()))
+
+        self.then(settle)
+        return mapped
+
     def cancel(self, reason: str = "The answer was given up.") -> None:
         """Want the value no more; what was asked for happens all the same. Does nothing once it is done."""
         if not self.done:
-            self._forget()
             self.fail(RosError(reason))
+            self._forget()
 
     def complete(self, value: T) -> None:
         """Deliver the value. For whoever made the promise; does nothing once it is done."""

@@ -1,0 +1,173 @@
+"""An action client over the transport contract; what it asks and keeps follows ros2/rclpy, rclpy/action/client.py."""
+
+from __future__ import annotations
+
+import uuid
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+from golem.middleware.dds.base import DEFAULT, LATCHED, Sample
+from golem.middleware.ros import codec, names
+from golem.middleware.ros.base import Canceling, ClientGoal, Outcome
+from golem.middleware.ros.endpoints import Endpoints
+from golem.middleware.ros.future import Future, RosError
+from golem.middleware.ros.goal_info import CANCEL_GOAL, SECOND, STATUS_ARRAY, from_uuid, goal_info, to_uuid
+from golem.middleware.ros.goals import NO_ID, CancelCode, GoalStatus
+from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, CancelGoal_Response, GoalStatusArray
+from golem.middleware.ros.service import DdsClient
+
+
+class DdsClientGoal:
+    """A goal as its client sees it; see `base.ClientGoal`.
+
+    Attributes:
+        on_feedback: called with each feedback message.
+    """
+
+    def __init__(self, client: DdsActionClient, id: bytes, on_feedback: Callable[[Any], None] | None) -> None:
+        """Belong to `client`, which is about to send it."""
+        self._client, self._id = client, id
+        self._accepted, self._status = False, GoalStatus.UNKNOWN
+        self.on_feedback = on_feedback
+
+    @property
+    def id(self) -> bytes:
+        """16 bytes."""
+        return self._id
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the server took the goal on."""
+        return self._accepted
+
+    @property
+    def status(self) -> GoalStatus:
+        """The newest the server said."""
+        return self._status
+
+    def result(self) -> Future[Outcome]:
+        """Ask for the outcome."""
+        return self._client.get_result(self)
+
+    def cancel(self) -> Future[Canceling]:
+        """Ask the server to cancel the goal."""
+        return self._client.cancel(self._id)
+
+    def answered(self, response: Any) -> ClientGoal:
+        """Take in the server's decision and return itself."""
+        self._accepted = bool(response.accepted)
+        return self
+
+    def learn(self, status: GoalStatus) -> None:
+        """Take in the status; what the status topic says late does not bring an ended goal back."""
+        if not self._status.terminal:
+            self._status = status
+
+
+class DdsActionClient:
+    """Gives goals to one action; see `base.ActionClient`.
+
+    Attributes:
+        malformed: feedback and status messages that could not be read.
+    """
+
+    def __init__(self, endpoints: Endpoints, name: str, type: str) -> None:
+        """Use the action with absolute `name`."""
+        self.name, self.malformed = name, 0
+        self._type, self._endpoints = codec.action(type), endpoints
+        self._goals: weakref.WeakValueDictionary[bytes, DdsClientGoal] = weakref.WeakValueDictionary()
+        parts = names.action(name)
+        self._goal = DdsClient(endpoints, parts.send_goal, f"{type}_SendGoal")
+        self._cancel = DdsClient(endpoints, parts.cancel_goal, CANCEL_GOAL)
+        self._result = DdsClient(endpoints, parts.get_result, f"{type}_GetResult")
+        self._feedback = endpoints.inbox(
+            names.topic(parts.feedback), f"{type}_FeedbackMessage", DEFAULT, self._on_feedback
+        )
+        self._status = endpoints.inbox(names.topic(parts.status), STATUS_ARRAY, LATCHED, self._on_status)
+
+    def ready(self) -> bool:
+        """Return whether a server with all its services and topics is there."""
+        services = all(client.ready() for client in (self._goal, self._cancel, self._result))
+        return services and self._feedback.matched() > 0 and self._status.matched() > 0
+
+    def send_goal(
+        self, goal: Any, feedback: Callable[[Any], None] | None = None, id: bytes | None = None
+    ) -> Future[ClientGoal]:
+        """Propose a goal; see `base.ActionClient.send_goal`.
+
+        Raises:
+            CodecError: it is not of the action's type.
+            RosError: the id is not 16 bytes, or that of a goal in use.
+        """
+        if not isinstance(goal, self._type.Goal):
+            raise CodecError(
+                f"Action '{self.name}' wants a {self._type.Goal.__msgtype__}, not {type(goal).__name__}."
+            )
+        id = uuid.uuid4().bytes if id is None else id
+        if len(id) != 16 or id == NO_ID or id in self._goals:
+            raise RosError(
+                f"A goal needs an id of its own, 16 bytes and not all zero; {id.hex()} cannot be it."
+            )
+        proposed = DdsClientGoal(self, id, feedback)
+        answer = self._goal.call(self._type.SendGoal.Request(to_uuid(id), goal))
+        self._goals[id] = proposed
+        return answer.map(proposed.answered)
+
+    def cancel(self, id: bytes = NO_ID, before: float = 0.0) -> Future[Canceling]:
+        """Ask to cancel goals; see `base.ActionClient.cancel`."""
+        request = CancelGoal_Request(goal_info(id, int(before * SECOND)))
+        return self._cancel.call(request).map(_canceling)
+
+    def get_result(self, goal: DdsClientGoal) -> Future[Outcome]:
+        """Ask for the outcome of `goal`."""
+
+        def outcome(response: Any) -> Outcome:
+            status = _status(response.status)
+            goal.learn(status)
+            return Outcome(status, response.result)
+
+        return self._result.call(self._type.GetResult.Request(to_uuid(goal.id))).map(outcome)
+
+    def close(self) -> None:
+        """Stop; what is unanswered fails."""
+        for client in (self._goal, self._cancel, self._result):
+            client.close()
+        self._endpoints.close(self._feedback, self._status)
+
+    def _on_feedback(self, sample: Sample) -> None:
+        try:
+            message = codec.deserialize(sample.payload, self._type.FeedbackMessage)
+        except CodecError:
+            self.malformed += 1
+            return
+        goal = self._goals.get(from_uuid(message.goal_id))
+        if goal is not None and goal.on_feedback is not None:
+            goal.on_feedback(message.feedback)
+
+    def _on_status(self, sample: Sample) -> None:
+        try:
+            message = codec.deserialize(sample.payload, GoalStatusArray)
+        except CodecError:
+            self.malformed += 1
+            return
+        for entry in message.status_list:
+            goal = self._goals.get(from_uuid(entry.goal_info.goal_id))
+            if goal is not None:
+                goal.learn(_status(entry.status))
+
+
+def _canceling(response: CancelGoal_Response) -> Canceling:
+    try:
+        code = CancelCode(response.return_code)
+    except ValueError:  # a code of the future is no consent
+        code = CancelCode.REJECTED
+    return Canceling(code, tuple(from_uuid(info.goal_id) for info in response.goals_canceling))
+
+
+def _status(number: int) -> GoalStatus:
+    try:
+        return GoalStatus(number)
+    except ValueError:
+        return GoalStatus.UNKNOWN

@@ -1,0 +1,219 @@
+"""An action server over the transport contract: three services and two topics around a table of goals.
+
+What a server answers follows ros2/rclpy, rclpy/action/server.py, with two additions of ros2/rclcpp,
+rclcpp_action/src/server.cpp: the status is published when a goal is accepted, too, and a request to cancel of which
+nothing was granted is answered by ERROR_REJECTED. The status is published once a poll, however often it changed.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from golem.middleware.dds.base import DEFAULT, LATCHED
+from golem.middleware.ros import codec, names
+from golem.middleware.ros.base import RESULT_TIMEOUT, ActionHandler, ServerGoal
+from golem.middleware.ros.endpoints import Endpoints
+from golem.middleware.ros.future import RosError
+from golem.middleware.ros.goal_info import (
+    CANCEL_GOAL,
+    SECOND,
+    STATUS_ARRAY,
+    from_time,
+    from_uuid,
+    goal_info,
+    to_time,
+    to_uuid,
+)
+from golem.middleware.ros.goals import NO_ID, CancelCode, GoalEvent, GoalState, GoalStatus, GoalTable
+from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, CancelGoal_Response, GoalStatusArray
+from golem.middleware.ros.msgs.action_msgs import GoalStatus as StatusMessage
+from golem.middleware.ros.service import Header, Responder
+
+MAX_WAITING = 100
+"""Requests for the result of one goal that are remembered; beyond it the oldest stays unanswered."""
+
+
+class DdsServerGoal:
+    """A goal as its server pursues it; see `base.ServerGoal`."""
+
+    def __init__(self, server: DdsActionServer, state: GoalState, request: Any) -> None:
+        """Belong to `server`, which has accepted it."""
+        self._server, self._state, self._request = server, state, request
+
+    @property
+    def id(self) -> bytes:
+        """16 bytes."""
+        return self._state.id
+
+    @property
+    def request(self) -> Any:
+        """The action's goal message."""
+        return self._request
+
+    @property
+    def status(self) -> GoalStatus:
+        """Where it stands."""
+        return self._state.status
+
+    def execute(self) -> None:
+        """Say that work on it begins."""
+        self._server.update(self._state, GoalEvent.EXECUTE)
+
+    def feedback(self, feedback: Any) -> None:
+        """Send a feedback message."""
+        self._server.send_feedback(self._state, feedback)
+
+    def succeed(self, result: Any) -> None:
+        """End it: reached."""
+        self._server.end(self._state, GoalEvent.SUCCEED, result)
+
+    def abort(self, result: Any) -> None:
+        """End it: failed."""
+        self._server.end(self._state, GoalEvent.ABORT, result)
+
+    def canceled(self, result: Any) -> None:
+        """End it: given up as was asked."""
+        self._server.end(self._state, GoalEvent.CANCELED, result)
+
+
+class DdsActionServer:
+    """Offers one action; see `base.ActionServer`."""
+
+    def __init__(
+        self,
+        endpoints: Endpoints,
+        name: str,
+        type: str,
+        handler: ActionHandler,
+        now: Callable[[], float],
+        result_timeout: float = RESULT_TIMEOUT,
+    ) -> None:
+        """Offer the action with absolute `name`; `now` is the node's clock [s]."""
+        self.name = name
+        self._handler, self._now, self._endpoints = handler, now, endpoints
+        self._type = codec.action(type)
+        self._table = GoalTable(result_timeout)
+        self._active: dict[bytes, DdsServerGoal] = {}
+        self._results: dict[bytes, bytes] = {}
+        self._waiting: dict[bytes, deque[Header]] = {}
+        self._news = False
+        parts = names.action(name)
+        self._feedback = endpoints.writer(names.topic(parts.feedback), f"{type}_FeedbackMessage", DEFAULT)
+        self._status = endpoints.writer(names.topic(parts.status), STATUS_ARRAY, LATCHED)
+        self._cancel = Responder(endpoints, parts.cancel_goal, CANCEL_GOAL, self._on_cancel)
+        self._result = Responder(endpoints, parts.get_result, f"{type}_GetResult", self._on_result)
+        self._goal = Responder(endpoints, parts.send_goal, f"{type}_SendGoal", self._on_goal)
+        endpoints.attend(self)
+
+    def goals(self) -> list[ServerGoal]:
+        """Return the goals that have not ended, oldest first."""
+        return list(self._active.values())
+
+    def keep(self) -> None:
+        """Forget what expired, publish the status if it changed; called at every poll."""
+        for goal in self._table.expire(self._stamp()):
+            del self._results[goal.id]
+            self._news = True
+        if self._news:
+            self._publish_status()
+
+    def close(self) -> None:
+        """Stop."""
+        self._endpoints.dismiss(self)
+        for service in (self._goal, self._cancel, self._result):
+            service.close()
+        self._endpoints.close(self._feedback, self._status)
+
+    def update(self, goal: GoalState, event: GoalEvent) -> None:
+        """Let `event` happen to `goal`.
+
+        Raises:
+            RosError: it cannot happen in the goal's present state.
+        """
+        self._table.update(goal, event, self._stamp())
+        self._news = True
+
+    def end(self, goal: GoalState, event: GoalEvent, result: Any) -> None:
+        """End `goal` by `event` and send its result to those who asked for it.
+
+        Raises:
+            RosError: it cannot end so in its present state.
+            CodecError: the result is not of the action's type.
+        """
+        self._check(result, self._type.Result)
+        # First, so that a result that cannot be sent does not end the goal.
+        codec.serialize(result)
+        self.update(goal, event)
+        response = codec.serialize(self._type.GetResult.Response(int(goal.status), result))
+        self._results[goal.id] = response
+        del self._active[goal.id]
+        for header in self._waiting.pop(goal.id, ()):
+            self._result.reply(header, response)
+
+    def send_feedback(self, goal: GoalState, feedback: Any) -> None:
+        """Publish feedback on `goal`.
+
+        Raises:
+            RosError: the goal has ended.
+            CodecError: the feedback is not of the action's type.
+        """
+        self._check(feedback, self._type.Feedback)
+        if not goal.status.active:
+            raise RosError(
+                f"Goal {goal.id.hex()} is {goal.status.name.lower()}: there is no feedback on it any more."
+            )
+        self._feedback.write(codec.serialize(self._type.FeedbackMessage(to_uuid(goal.id), feedback)))
+
+    def _check(self, message: Any, kind: type[Any]) -> None:
+        if not isinstance(message, kind):
+            raise CodecError(
+                f"Action '{self.name}' wants a {kind.__msgtype__} here, not {type(message).__name__}."
+            )
+
+    def _stamp(self) -> int:
+        return int(self._now() * SECOND)
+
+    def _on_goal(self, header: Header, request: Any) -> None:
+        id, stamp = from_uuid(request.goal_id), self._stamp()
+        # The id of no goal could not be canceled: it means all of them.
+        known = id == NO_ID or id in self._table
+        accepted = not known and bool(self._handler.decide(request.goal))
+        goal = DdsServerGoal(self, self._table.accept(id, stamp), request.goal) if accepted else None
+        response = self._type.SendGoal.Response(accepted, to_time(stamp if accepted else 0))
+        self._goal.reply(header, codec.serialize(response))
+        if goal is not None:
+            self._active[id] = goal
+            self._news = True
+            self._handler.accepted(goal)
+
+    def _on_cancel(self, header: Header, request: CancelGoal_Request) -> None:
+        info = request.goal_info
+        code, meant = self._table.to_cancel(from_uuid(info.goal_id), from_time(info.stamp))
+        canceling: list[GoalState] = []
+        for goal in meant:
+            # Asked about this one or the one before, the handler may have ended it.
+            if goal.cancelable and self._handler.cancel(self._active[goal.id]) and goal.cancelable:
+                self.update(goal, GoalEvent.CANCEL_GOAL)
+                canceling.append(goal)
+        if meant and not canceling:
+            code = CancelCode.REJECTED
+        response = CancelGoal_Response(int(code), [goal_info(g.id, g.stamp) for g in canceling])
+        self._cancel.reply(header, codec.serialize(response))
+
+    def _on_result(self, header: Header, request: Any) -> None:
+        id = from_uuid(request.goal_id)
+        if id in self._active:
+            self._waiting.setdefault(id, deque(maxlen=MAX_WAITING)).append(header)
+        elif id in self._results:
+            self._result.reply(header, self._results[id])
+        else:
+            response = self._type.GetResult.Response(int(GoalStatus.UNKNOWN), self._type.Result())
+            self._result.reply(header, codec.serialize(response))
+
+    def _publish_status(self) -> None:
+        self._news = False
+        goals = [StatusMessage(goal_info(g.id, g.stamp), int(g.status)) for g in self._table.all()]
+        self._status.write(codec.serialize(GoalStatusArray(goals)))

@@ -1,0 +1,127 @@
+"""The writers and readers of one node: made with what ROS peers expect of them, and announced to the graph."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import Protocol
+
+from golem.middleware.dds.base import Participant, Qos, Sample, Writer
+from golem.middleware.ros import codec
+from golem.middleware.ros.future import RosError
+from golem.middleware.ros.graph import DiscoveryInfo
+from golem.middleware.ros.waitset import Inbox, WaitSet
+
+
+class Attended(Protocol):
+    """Something to be looked after whenever its node is polled."""
+
+    def keep(self) -> None:
+        """Do what is due."""
+        ...
+
+    def close(self) -> None:
+        """Stop."""
+        ...
+
+
+class Endpoints:
+    """Makes and closes the endpoints of a node.
+
+    Attributes:
+        waitset: what their samples go through.
+    """
+
+    def __init__(self, participant: Participant, info: DiscoveryInfo) -> None:
+        """Make endpoints of `participant` and announce them by `info`."""
+        self.waitset = WaitSet()
+        self._participant, self._info = participant, info
+        self._open: list[Inbox | Writer] = []
+        self._attended: list[Attended] = []
+        self._number = itertools.count(1)
+        self._closed = False
+
+    def identity(self) -> str:
+        """Return an id for a new client or server: hex bytes joined by dots, unique on the domain.
+
+        It is made as rmw_cyclonedds makes its own (`get_unique_csid`); peers only compare it.
+        """
+        number = next(self._number)
+        return ".".join(f"{byte:x}" for byte in self._participant.guid[:12] + number.to_bytes(4, "big"))
+
+    def writer(self, topic: str, type: str, qos: Qos, owner: str = "") -> Writer:
+        """Create a writer.
+
+        Args:
+            topic: name on the wire.
+            type: ROS name of its type.
+            qos: what it offers.
+            owner: `clientid=...;` or `serviceid=...;` of the client or server it belongs to.
+
+        Raises:
+            RosError: the node is closed.
+        """
+        self._check()
+        writer = self._participant.writer(topic, codec.dds_name(type), qos, owner + _hash(type))
+        self._add(writer)
+        return writer
+
+    def inbox(
+        self, topic: str, type: str, qos: Qos, handle: Callable[[Sample], None], owner: str = ""
+    ) -> Inbox:
+        """Create a reader whose samples go to `handle` when the node is spun; see `writer` for the rest."""
+        self._check()
+        inbox = Inbox(self.waitset, handle, qos)
+        inbox.open(self._participant, topic, codec.dds_name(type), qos, owner + _hash(type))
+        self._add(inbox)
+        return inbox
+
+    def close(self, *endpoints: Inbox | Writer) -> None:
+        """Close some endpoints; those that are closed already stay so."""
+        for endpoint in endpoints:
+            if endpoint in self._open:
+                self._open.remove(endpoint)
+                endpoint.close()
+        if not self._closed:
+            self._announce()
+
+    def attend(self, what: Attended) -> None:
+        """Look after `what` at every poll, and close it with the node."""
+        self._attended.append(what)
+
+    def dismiss(self, what: Attended) -> None:
+        """Look after `what` no more."""
+        if what in self._attended:
+            self._attended.remove(what)
+
+    def poll(self) -> int:
+        """Handle the samples that have arrived, return how many, and look after what needs it."""
+        handled = self.waitset.poll()
+        for what in list(self._attended):
+            what.keep()
+        return handled
+
+    def close_all(self) -> None:
+        """Close every endpoint, withdraw the node, and make no more."""
+        if not self._closed:
+            self._closed = True
+            self._info.close()
+            for what in list(self._attended):
+                what.close()
+            self.close(*self._open)
+
+    def _check(self) -> None:
+        if self._closed:
+            raise RosError("The node is closed; create another one.")
+
+    def _add(self, endpoint: Inbox | Writer) -> None:
+        self._open.append(endpoint)
+        self._announce()
+
+    def _announce(self) -> None:
+        readers = [e.guid for e in self._open if isinstance(e, Inbox)]
+        self._info.announce(readers, [e.guid for e in self._open if not isinstance(e, Inbox)])
+
+
+def _hash(type: str) -> str:
+    return f"typehash={codec.type_hash(type)};"

@@ -1,0 +1,39 @@
+"""Goal ids and times as the messages of actions carry them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from golem.middleware.ros.msgs.action_msgs import GoalInfo
+from golem.middleware.ros.msgs.builtin_interfaces import Time
+from golem.middleware.ros.msgs.unique_identifier_msgs import UUID
+
+CANCEL_GOAL = "action_msgs/srv/CancelGoal"
+STATUS_ARRAY = "action_msgs/msg/GoalStatusArray"
+SECOND = 1_000_000_000
+"""[ns]."""
+
+
+def to_uuid(id: bytes) -> UUID:
+    """Return the message of a goal id (16 bytes)."""
+    return UUID(np.frombuffer(id, np.uint8))
+
+
+def from_uuid(message: UUID) -> bytes:
+    """Return the goal id (16 bytes) of a message."""
+    return message.uuid.tobytes()
+
+
+def to_time(stamp: int) -> Time:
+    """Return the message of a time [ns]."""
+    return Time(*divmod(stamp, SECOND))
+
+
+def from_time(message: Time) -> int:
+    """Return the time of a message [ns]."""
+    return message.sec * SECOND + message.nanosec
+
+
+def goal_info(id: bytes, stamp: int) -> GoalInfo:
+    """Return the message of a goal's id and time [ns]."""
+    return GoalInfo(to_uuid(id), to_time(stamp))

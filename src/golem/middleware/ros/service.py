@@ -1,0 +1,211 @@
+"""Services over the transport contract: a request topic, a reply topic, and a header that pairs what travels on them.
+
+A payload is CDR of the header followed by the body: the 64-bit handle of the client's request writer and a 64-bit
+sequence number, echoed by the reply (`cdds_request_header`, ros2/rmw_cyclonedds, serdata.hpp). A client takes the
+replies that carry its handle. `clientid` and `serviceid` in USER_DATA, equal for the two endpoints of a client or a
+server, let a peer know which reader belongs to which writer (`rmw_init_cs`, rmw_node.cpp).
+"""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from golem.middleware.dds.base import Payload, Qos, Sample
+from golem.middleware.ros import codec, names
+from golem.middleware.ros.endpoints import Endpoints
+from golem.middleware.ros.future import Future, RosError
+from golem.middleware.ros.message import CodecError
+
+SERVICES = Qos(depth=1000)
+"""ROS's service profile keeps 10; the depth is nobody else's business, and a burst of goals is larger than that."""
+MAX_PENDING = 1000
+"""Unanswered requests of one client; beyond it the oldest is given up."""
+HOLD = 0.1
+"""How long a reply waits for the client's reader to be discovered [s]; that of `rmw_send_response`."""
+
+
+class Header(NamedTuple):
+    """Pairs a reply with its request.
+
+    Attributes:
+        client: handle of the client's request writer (uint64).
+        sequence: number of the request, by its client (int64).
+    """
+
+    client: int
+    sequence: int
+
+
+def pack(header: Header, body: Payload) -> bytes:
+    """Return the payload that carries `body` (CDR with encapsulation header, little endian) behind `header`.
+
+    The header is 16 bytes long, so that the body keeps its alignment.
+    """
+    return b"".join((body[:4], struct.pack("<Qq", *header), body[4:]))
+
+
+def unpack(payload: Payload) -> tuple[Header, bytes]:
+    """Return header and body of a payload; the inverse of `pack`.
+
+    Raises:
+        CodecError: it is too short.
+    """
+    if len(payload) < 20:
+        raise CodecError(f"A service payload has at least 20 bytes, not {len(payload)}.")
+    order = "<" if payload[1] & 1 else ">"
+    return Header(*struct.unpack_from(f"{order}Qq", payload, 4)), b"".join((payload[:4], payload[20:]))
+
+
+class DdsClient:
+    """Calls one service; see `base.Client`.
+
+    Attributes:
+        malformed: replies that could not be read.
+    """
+
+    def __init__(self, endpoints: Endpoints, name: str, type: str) -> None:
+        """Call the service with absolute `name`."""
+        self.name, self.malformed = name, 0
+        self._endpoints = endpoints
+        self._type = codec.service(type)
+        self._pending: dict[int, Future[Any]] = {}
+        self._sequence = 0
+        owner = f"clientid={endpoints.identity()};"
+        # The reply reader first: a server then knows it when the first request arrives.
+        self._inbox = endpoints.inbox(names.reply(name), f"{type}_Response", SERVICES, self._take, owner)
+        self._writer = endpoints.writer(names.request(name), f"{type}_Request", SERVICES, owner)
+        endpoints.attend(self)
+
+    def ready(self) -> bool:
+        """Return whether a server is there."""
+        return self._writer.matched() > 0 and self._inbox.matched() > 0
+
+    def call(self, request: Any) -> Future[Any]:
+        """Send a request; see `base.Client.call`.
+
+        Raises:
+            CodecError: it is not of the service's type.
+        """
+        if not isinstance(request, self._type.Request):
+            raise CodecError(
+                f"'{self.name}' is asked by {self._type.Request.__msgtype__}, not {type(request).__name__}."
+            )
+        body = codec.serialize(request)
+        self._sequence += 1
+        number = self._sequence
+        future: Future[Any] = Future(lambda: self._forget(number))
+        if not self.ready():
+            future.fail(RosError(f"No server of '{self.name}' is there."))
+            return future
+        if len(self._pending) >= MAX_PENDING:
+            next(iter(self._pending.values())).cancel(
+                f"'{self.name}' left {MAX_PENDING} newer requests unanswered."
+            )
+        self._pending[number] = future
+        self._writer.write(pack(Header(self._writer.handle, number), body))
+        return future
+
+    def keep(self) -> None:
+        """Give up on what will not be answered any more; called at every poll."""
+        if self._pending and not self.ready():
+            self._give_up(f"The server of '{self.name}' has gone.")
+
+    def close(self) -> None:
+        """Stop; what is unanswered fails."""
+        self._endpoints.dismiss(self)
+        self._endpoints.close(self._writer, self._inbox)
+        self._give_up(f"The client of '{self.name}' was closed.")
+
+    def _forget(self, number: int) -> None:
+        self._pending.pop(number, None)
+
+    def _give_up(self, reason: str) -> None:
+        for future in list(self._pending.values()):
+            future.cancel(reason)
+
+    def _take(self, sample: Sample) -> None:
+        try:
+            header, body = unpack(sample.payload)
+            if header.client != self._writer.handle or header.sequence not in self._pending:
+                return
+            response = codec.deserialize(body, self._type.Response)
+        except CodecError:
+            self.malformed += 1
+            return
+        self._pending.pop(header.sequence).complete(response)
+
+
+class Responder:
+    """The server's end of a service whose requests may be answered later.
+
+    Attributes:
+        malformed: requests that could not be read.
+    """
+
+    def __init__(
+        self, endpoints: Endpoints, name: str, type: str, handle: Callable[[Header, Any], None]
+    ) -> None:
+        """Give requests for the service with absolute `name` to `handle`, which shall `reply` some time."""
+        self.name, self.malformed = name, 0
+        self._endpoints, self._handle = endpoints, handle
+        self._request = codec.service(type).Request
+        self._held: deque[tuple[float, bytes]] = deque(maxlen=SERVICES.depth)
+        owner = f"serviceid={endpoints.identity()};"
+        self._writer = endpoints.writer(names.reply(name), f"{type}_Response", SERVICES, owner)
+        self._inbox = endpoints.inbox(names.request(name), f"{type}_Request", SERVICES, self._take, owner)
+        endpoints.attend(self)
+
+    def reply(self, header: Header, response: Payload) -> None:
+        """Answer the request that came with `header` by `response` (CDR)."""
+        payload = pack(header, response)
+        if self._writer.matched() > 0:
+            self._writer.write(payload)
+        else:
+            self._held.append((time.monotonic() + HOLD, payload))
+
+    def keep(self) -> None:
+        """Send the replies that waited for their reader, drop those that waited in vain; called at every poll."""
+        while self._held and (self._writer.matched() > 0 or time.monotonic() > self._held[0][0]):
+            self._writer.write(self._held.popleft()[1])
+
+    def close(self) -> None:
+        """Stop."""
+        self._endpoints.dismiss(self)
+        self._endpoints.close(self._inbox, self._writer)
+        self._held.clear()
+
+    def _take(self, sample: Sample) -> None:
+        try:
+            header, body = unpack(sample.payload)
+            request = codec.deserialize(body, self._request)
+        except CodecError:
+            self.malformed += 1
+            return
+        self._handle(header, request)
+
+
+class DdsService:
+    """Answers the requests of one service at once; see `base.Service`."""
+
+    def __init__(self, endpoints: Endpoints, name: str, type: str, callback: Callable[[Any], Any]) -> None:
+        """Answer requests for the service with absolute `name` by what `callback` returns."""
+        self._response = codec.service(type).Response
+        self._callback = callback
+        self.responder = Responder(endpoints, name, type, self._answer)
+
+    def close(self) -> None:
+        """Stop."""
+        self.responder.close()
+
+    def _answer(self, header: Header, request: Any) -> None:
+        response = self._callback(request)
+        if not isinstance(response, self._response):
+            raise CodecError(
+                f"The service '{self.responder.name}' answers by {self._response.__msgtype__}, "
+                f"not {type(response).__name__}."
+            )
+        self.responder.reply(header, codec.serialize(response))
