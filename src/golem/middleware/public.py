@@ -173,8 +173,8 @@ TOPICS: tuple[Topic, ...] = (
     Topic("/api/loco/response", "unitree_api/msg/Response", "robot", ("stack",), NEWEST, None, "",
           "The answers."),
     Topic("/safety/lowcmd_in", "unitree_hg/msg/LowCmd", "stack", ("safety",), LOW, 500, "",
-          "What the stack wants of the motors, for the gate to judge. reserve[0] repeats the tick of the state"
-          " it answers, 0 where unknown; the gate takes a command to be as old as that state."),
+          "What the stack wants of the motors, for the gate to judge. reserve[0] repeats the tick of the state "
+          "it answers, 0 where unknown; the gate takes a command to be as old as that state."),
     Topic("/safety/status", "golem_interfaces/msg/SafetyStatus", "safety", ("stack",), LATCHED, 20, "",
           "State of the gate, and why; at every change, and regularly."),
     Topic("/estop", "golem_interfaces/msg/EstopFrame", "safety", (), SENSOR, 100, "",
@@ -191,8 +191,8 @@ TOPICS: tuple[Topic, ...] = (
     Topic("/legs/status", "golem_interfaces/msg/LegStatus", "stack", (), DEFAULT, 50, BASE_FRAME,
           "What the lower body was told, what it does, and why not more."),
     Topic("/onboard/lowcmd", "unitree_hg/msg/LowCmd", "robot", ("stack",), LOW, 500, "",
-          "What the on-board leg controller wants of the 12 leg motors while it is on, the others off. Simulation only: "
-          "there it takes the way of every other command, through the gate."),
+          "What the on-board leg controller wants of the 12 leg motors while it is on, the others off. Simulation "
+          "only: there it takes the way of every other command, through the gate."),
     *(Topic(f"/objects/{camera}", "golem_interfaces/msg/Sightings", "stack", (), DEFAULT, None, "odom",
             "Objects located in the frames that a skill asked for.") for camera in CAMERAS),
 )
