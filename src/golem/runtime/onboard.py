@@ -1,7 +1,8 @@
-"""The twin's on-board computer: the vendor's loco service on the bus, and the legs it controls itself."""
+"""The twin's on-board computer: the vendor's services on the bus, and the legs it controls itself."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -50,11 +51,35 @@ class BusOnboard:
         return self._bus.latest(ONBOARD_LEGS, LegCommand)
 
 
+class ServiceNode:
+    """Answers the calls to one service, one per tick."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, service: str, answer: Callable[[Request, float], Response]) -> None:
+        """Serve `service` on `bus`; `answer` acts on a call at a time [s]."""
+        self._bus, self._answer = bus, answer
+        self._topic = response_topic(service)
+        self._requests = News(bus, request_topic(service), Request)
+
+    def step(self, t: float) -> None:
+        """Answer the call that came, if one did."""
+        request = self._requests.read()
+        if request is None:
+            return
+        response = self._answer(request, t)
+        if not request.noreply:
+            self._bus.publish(self._topic, response, t, ANSWER)
+
+
 class LocoServiceNode:
     """Answers calls, and controls the legs on board in the state that was called for.
 
     In the start state the robot is controlled by any lower body, under a base layer of its own. A controller that fails
     is not replaced: the robot damps, and the service refuses to go on.
+
+    Attributes:
+        service: what answers.
     """
 
     period = TICK
@@ -62,18 +87,15 @@ class LocoServiceNode:
     def __init__(self, bus: Bus, api: LocoApi, legs: Legs) -> None:
         """Serve `api` on `bus`, with `legs` for the start state."""
         self._bus, self._legs = bus, legs
-        self._service = LocoService(api)
-        self._state = self._service.state
+        self.service = LocoService(api)
+        self._state = self.service.state
         self._hold = Hold(HoldConfig(stance=STANCE, speed=1.0))
         self._locomotion = Locomotion(legs.controller)
-        self._requests = News(bus, request_topic(api.service), Request)
+        self._calls = ServiceNode(bus, api.service, self.service.answer)
 
     def step(self, t: float) -> None:
         """Answer a call, and publish what the legs are told."""
-        service = self._service
-        request = self._requests.read()
-        if request is not None:
-            self._bus.publish(response_topic(service.api.service), service.answer(request, t), t, ANSWER)
+        self._calls.step(t)
         state = self._bus.latest(topics.LOW_STATE, LowState)
         base = self._bus.latest(topics.BASE, BaseEstimate)
         if state is None or base is None:
@@ -81,13 +103,13 @@ class LocoServiceNode:
         try:
             command, latency = self._control(state, base, t), self._legs.check_latency()
         except ModuleFault as fault:
-            service.fail(str(fault))
+            self.service.fail(str(fault))
             command, latency = damp(state), 0.0
         self._bus.publish(ONBOARD_LEGS, command, t, latency)
 
     def _control(self, state: LowState, base: BaseEstimate, t: float) -> LegCommand:
         """Return what the legs are told in the present state of the service."""
-        service, guard = self._service, self._legs.guard
+        service, guard = self.service, self._legs.guard
         entered, self._state = service.state != self._state, service.state
         if service.state == service.api.start:
             if entered:

@@ -25,12 +25,14 @@ from golem.middleware.bus import Bus
 from golem.middleware.unitree_api import LOCO_APIS
 from golem.robots.base import Banded, Robot
 from golem.robots.model.kinematics import Kinematics
+from golem.robots.onboard import motion_switcher
+from golem.robots.onboard.motion_switcher import MotionSwitcher
 from golem.runtime import cameras, nodes
 from golem.runtime.executor import Phase, Placed
 from golem.runtime.guard import Guard
 from golem.runtime.guarded import GuardedMethod, GuardedNavigator
 from golem.runtime.legs import Legs, LowerBodyNode
-from golem.runtime.onboard import BusOnboard, LocoServiceNode
+from golem.runtime.onboard import BusOnboard, LocoServiceNode, ServiceNode
 from golem.runtime.release import ReleaseNode
 from golem.skills.base import Skill
 from golem.skills.context import Context
@@ -94,9 +96,13 @@ class RobotSide:
         for name in robot.cameras:
             camera = cameras.CameraNode(bus, robot, name, wanted(name), guard)
             self.nodes.append((Phase.EXPOSE, camera))
+        loco: LocoServiceNode | None = None
         if stack.legs_on_board is not None:
             legs = Legs(*Workshop(stack).make("lower_body", stack.legs_on_board))
-            self.nodes.append((Phase.SERVE, LocoServiceNode(bus, LOCO_APIS["h1"], legs)))
+            loco = LocoServiceNode(bus, LOCO_APIS["h1"], legs)
+            self.nodes.append((Phase.SERVE, loco))
+        switcher = MotionSwitcher(None if loco is None else loco.service)
+        self.nodes.append((Phase.SERVE, ServiceNode(bus, motion_switcher.SERVICE, switcher.answer)))
         self.nodes.append((Phase.ACT, self.act))
 
 

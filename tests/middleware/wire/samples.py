@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from golem.types import NUM_JOINTS, Array, BaseEstimate, Imu, LowCommand, LowState
+from golem.types import NUM_JOINTS, Array, Imu, LowCommand, LowState
 
 QUARTER = 0.25
 """Values are multiples of a power of two, which single precision holds exactly."""
@@ -31,10 +31,3 @@ def state(rng: np.random.Generator) -> LowState:
 
 def command(rng: np.random.Generator) -> LowCommand:
     return LowCommand(1.5, joints(rng), joints(rng), joints(rng), abs(joints(rng)), abs(joints(rng)))
-
-
-def base(rng: np.random.Generator) -> BaseEstimate:
-    pose = np.eye(4)
-    pose[:3, :3] = Rotation.random(rng=rng).as_matrix()
-    pose[:3, 3] = exact(rng, 3)
-    return BaseEstimate(2.125, pose, exact(rng, 3), 1.0)

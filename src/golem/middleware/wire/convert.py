@@ -84,13 +84,13 @@ def mode_machine(payload: Payload) -> int:
     return int(hg.LOW_STATE.read(payload)["mode_machine"])
 
 
-def encode_low_command(command: LowCommand, mode_machine: int, answers: int = 0) -> bytes:
+def encode_low_command(command: LowCommand, mode_machine: int, answers: float = 0.0) -> bytes:
     """Return `command` as a `LowCmd_` with the ankles in pitch and roll and all 27 motors on.
 
     Args:
         command: what the motors are told; its time is not sent.
         mode_machine: what the robot reports; it ignores other commands.
-        answers: tick of the state it was computed from, which GOLEM's own safety gate reads from `reserve`.
+        answers: time of the state it was computed from [s], which GOLEM's safety gate reads from `reserve`; 0 for none.
 
     Raises:
         WireError: a value is not finite in single precision.
@@ -143,17 +143,8 @@ def decode_low_command(payload: Payload, t: float, mode_machine: int = MODE_MACH
     return LowCommand(t, *np.ascontiguousarray(target.T))
 
 
-def answered(payload: Payload) -> int:
-    """Return the tick of the state that a `LowCmd_` answers; 0 where its sender does not say.
-
-    Raises:
-        WireError: encapsulation or length is wrong.
-    """
-    return int(hg.LOW_CMD.read(payload)["reserve"][0])
-
-
 def answered(payload: Payload) -> float:
-    """Return the time of the state that a `LowCmd_` answers [s], 0 for none.
+    """Return the time of the state that a `LowCmd_` answers [s]; 0 where its sender does not say.
 
     Raises:
         WireError: encapsulation or length is wrong.

@@ -32,6 +32,7 @@ class LocoService:
         state: id of the present state.
         standing: whether the legs have reached the standing posture; set by whoever moves them.
         failure: why the legs cannot be controlled; empty while they can. Set by whoever moves them.
+        released: whether the motion switcher has taken the legs away; every call but for the version is refused then.
     """
 
     def __init__(self, api: LocoApi) -> None:
@@ -40,6 +41,7 @@ class LocoService:
         self.state = api.zero_torque
         self.standing = False
         self.failure = ""
+        self.released = False
         self._twist = Twist()
         self._until = -math.inf
 
@@ -60,10 +62,21 @@ class LocoService:
         self.failure = reason
         self._enter(self.api.damp)
 
+    def release(self) -> None:
+        """Go limp, and refuse calls until `resume`."""
+        self.released = True
+        self._enter(self.api.zero_torque)
+
+    def resume(self) -> None:
+        """Begin anew, limp, as after power-on; a failure remains."""
+        self.released = False
+
     def _act(self, request: Request, t: float) -> tuple[int, str]:
         api = self.api
         if request.api_id == GET_VERSION:
             return OK, api.version
+        if self.released:
+            return api.not_available, "the motion mode is released"
         if request.api_id == api.get_fsm_id:
             return OK, encode({"data": self.state})
         if request.api_id == api.set_fsm_id:
