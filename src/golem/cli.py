@@ -129,6 +129,28 @@ TRAINERS = {"detector": "golem.training.detector.__main__", "legs": "golem.train
 """What can be trained, and the module that does it."""
 
 
+def _record(words: list[str]) -> int:
+    """Record a domain into a bag that ROS 2 tools and Foxglove read."""
+    from golem.middleware.record.commands import RecordConfig, run_record
+
+    return 0 if run_record(_parse(RecordConfig, "record", words)) else FAILED
+
+
+def _replay(words: list[str]) -> int:
+    """Play a bag onto a domain."""
+    from golem.middleware.record.commands import ReplayConfig, run_replay
+
+    return 0 if run_replay(_parse(ReplayConfig, "replay", words)) else FAILED
+
+
+def _view(words: list[str]) -> int:
+    """Show a domain live in Foxglove."""
+    from golem.middleware.record.view import ViewConfig, run_view
+
+    run_view(_parse(ViewConfig, "view", words))
+    return 0
+
+
 def _doctor(words: list[str]) -> int:
     """Say what this machine lacks to run GOLEM, and the line that brings it."""
     _parse(_NoOptions, "doctor", words)
@@ -150,6 +172,9 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "model": _model,
     "bench": _bench,
     "train": _train,
+    "record": _record,
+    "replay": _replay,
+    "view": _view,
     "doctor": _doctor,
 }
 

@@ -35,6 +35,11 @@ class Topic:
     qos: Qos = DEFAULT
     type_hash: str = ""
 
+    @property
+    def user_data(self) -> str:
+        """What an endpoint of this topic says about its type during discovery, as ROS 2 does from Iron on."""
+        return f"typehash={self.type_hash};" if self.type_hash else ""
+
 
 @dataclass(frozen=True, slots=True)
 class Message:

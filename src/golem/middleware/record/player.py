@@ -147,7 +147,8 @@ class Player:
             yield elapsed, message
 
     def _writer(self, topic: Topic) -> Writer:
-        return self._participant.writer(names.topic(topic.name), codec.dds_name(topic.kind), topic.qos)
+        wire, kind = names.topic(topic.name), codec.dds_name(topic.kind)
+        return self._participant.writer(wire, kind, topic.qos, topic.user_data)
 
 
 def _clock(time: int) -> bytes:

@@ -72,7 +72,8 @@ class Recorder:
                 continue
             depth = FEW if topic.kind in BULKY else MANY
             qos = Qos(topic.qos.reliable, topic.qos.transient_local, depth)
-            reader = self._participant.reader(names.topic(topic.name), dds_name(topic.kind), qos)
+            wire, kind = names.topic(topic.name), dds_name(topic.kind)
+            reader = self._participant.reader(wire, kind, qos, topic.user_data)
             self._subscriptions[topic.name] = _Subscription(topic, reader, depth)
 
     def remove(self, topic: str) -> None:

@@ -1,0 +1,137 @@
+"""`golem record` and `golem replay`: a domain into a bag, a bag onto a domain."""
+
+from __future__ import annotations
+
+import math
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tyro.conf import OmitArgPrefixes, Positional
+
+from golem.errors import ConfigError
+from golem.middleware.dds.connect import connect
+from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.record.catalog import public_topics
+from golem.middleware.record.player import PlayConfig, Player
+from golem.middleware.record.reader import Bag, repair
+from golem.middleware.record.recorder import Recorder
+from golem.middleware.record.writer import BagConfig, BagWriter, Compression
+from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
+
+
+@dataclass(frozen=True)
+class RecordConfig:
+    """Record a domain into a bag, until Ctrl-C."""
+
+    bag: Positional[Path | None] = None
+    """Folder to create; default: runs/bags/ and the time."""
+    topics: tuple[str, ...] = ()
+    """Topics to record, by their ROS names; default: all public ones."""
+    compression: Compression = "none"
+    """Of the messages: none, lz4 or zstd. zstd makes an image smaller for about 1 ms of CPU."""
+    split: int = 2048
+    """Size at which the next file of the bag is begun [MiB]."""
+    seconds: float = math.inf
+    """Time to record."""
+    repair: bool = False
+    """Record nothing: finish a bag whose recorder was killed."""
+    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
+
+
+@dataclass(frozen=True)
+class ReplayConfig:
+    """Play a bag onto a domain, with /clock."""
+
+    bag: Positional[Path]
+    """Folder of a bag, or an MCAP file."""
+    rate: float = 1.0
+    """How much faster than it was recorded."""
+    loop: bool = False
+    """Begin again at its end, until Ctrl-C."""
+    start: float = 0.0
+    """Where to begin [s from the beginning of the bag]."""
+    stop: float = math.inf
+    """Where to end [s from the beginning of the bag]."""
+    topics: tuple[str, ...] = ()
+    """Topics to play; default: all in the bag."""
+    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
+
+
+def run_record(config: RecordConfig) -> int:
+    """Record, and say what; return how many messages.
+
+    Raises:
+        ConfigError: a topic or an option is wrong.
+        OutputError: the bag cannot be written.
+        DdsError: the domain cannot be joined.
+    """
+    if config.repair:
+        return _repair(config)
+    topics = public_topics(config.topics)
+    folder = config.bag or Path("runs/bags") / time.strftime("%Y_%m_%d-%H_%M_%S")
+    with closing(connect(config.dds, PARTICIPANT_USER_DATA)) as participant, interrupted() as stop:
+        bag = BagWriter(folder, BagConfig(config.compression, split=config.split * 2**20))
+        with closing(bag), closing(Recorder(participant, bag)) as recorder:
+            recorder.add(topics)
+            print(f"Recording {config.dds} to {folder}. Ctrl-C ends it.", flush=True)
+            recorder.run(stop, bag.flush, config.seconds)
+    for name, count in sorted(recorder.received.items()):
+        lost = "  more than could be kept; some were lost" if name in recorder.overruns else ""
+        print(f"{count:9d}  {name}{lost}")
+    size = sum(file.stat().st_size for file in folder.iterdir())
+    nothing = f" Nobody published anything on {config.dds}." if bag.messages == 0 else ""
+    print(f"{bag.messages} messages, {size / 1e6:.1f} MB, in {folder}.{nothing}", flush=True)
+    return bag.messages
+
+
+def run_replay(config: ReplayConfig) -> int:
+    """Play, and say what; return how many messages were written.
+
+    Raises:
+        BagError: there is no bag, or it is damaged.
+        ConfigError: an option is wrong, or the bag would be played to the real robot.
+        DdsError: the domain cannot be joined.
+    """
+    if config.dds.robot:
+        raise ConfigError("A bag is not played to the real robot: it would move to commands of another time.")
+    play = PlayConfig(config.rate, config.loop, config.start, config.stop, config.topics)
+    bag = Bag(config.bag)
+    if not bag.finished:
+        print(
+            "The recorder of this bag was killed; it is played up to the last chunk that is whole.",
+            flush=True,
+        )
+    with closing(connect(config.dds, PARTICIPANT_USER_DATA)) as participant, interrupted() as stop:
+        with closing(Player(bag, participant, play)) as player:
+            print(f"Playing {config.bag} on {config.dds}. Ctrl-C ends it.", flush=True)
+            written = player.run(stop)
+    print(f"{written} messages.", flush=True)
+    return written
+
+
+@contextmanager
+def interrupted() -> Iterator[threading.Event]:
+    """Yield an event that Ctrl-C (or SIGTERM) sets, so that what is being written is completed first."""
+    stop = threading.Event()
+    before = {s: signal.signal(s, lambda *_: stop.set()) for s in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _repair(config: RecordConfig) -> int:
+    if config.bag is None:
+        raise ConfigError("Say which bag to repair: golem record BAG --repair.")
+    for file in repair(config.bag):
+        print(f"Finished {file}.")
+    bag = Bag(config.bag)
+    count = sum(1 for _ in bag.messages())
+    print(f"{count} messages of {len(bag.topics)} topics in {config.bag}.", flush=True)
+    return count

@@ -1,0 +1,78 @@
+"""`golem view`: a domain before the eyes of viewers."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+
+from tyro.conf import OmitArgPrefixes
+
+from golem.errors import ConfigError
+from golem.middleware.dds.base import Participant
+from golem.middleware.dds.connect import connect
+from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.record.base import Topic
+from golem.middleware.record.catalog import public_topics
+from golem.middleware.record.commands import interrupted
+from golem.middleware.record.foxglove_server import FoxgloveServer, ServerConfig
+from golem.middleware.record.recorder import CLOCK, Recorder
+from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
+
+PERIOD = 0.02
+"""Time between two looks at what has come [s] [own]: half a frame of a camera at 25 Hz."""
+
+
+@dataclass(frozen=True)
+class ViewConfig:
+    """Show a domain live."""
+
+    foxglove: bool = False
+    """Serve Foxglove's protocol; open the address that is printed in Foxglove."""
+    topics: tuple[str, ...] = ()
+    """Topics to offer, by their ROS names; default: all public ones."""
+    host: str = "127.0.0.1"
+    """Address to listen on; 0.0.0.0 lets other machines in."""
+    port: int = 8765
+    """Port to listen on."""
+    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
+
+
+def run_view(config: ViewConfig) -> None:
+    """Serve until Ctrl-C.
+
+    Raises:
+        ConfigError: an option is wrong, or the port is taken.
+        DdsError: the domain cannot be joined.
+    """
+    if not config.foxglove:
+        raise ConfigError(
+            "golem view serves a domain to Foxglove: add --foxglove. The view of a stack in one process is: "
+            "golem run STACK --view."
+        )
+    topics = public_topics(config.topics)
+    with closing(connect(config.dds, PARTICIPANT_USER_DATA)) as participant, interrupted() as stop:
+        with closing(FoxgloveServer(ServerConfig(config.host, config.port))) as server:
+            print(
+                f"Serving {config.dds} at {server.url} (in Foxglove: Open connection). Ctrl-C ends it.",
+                flush=True,
+            )
+            serve(participant, topics, server, stop)
+
+
+def serve(
+    participant: Participant, topics: Sequence[Topic], server: FoxgloveServer, stop: threading.Event
+) -> None:
+    """Send viewers what they subscribe to until `stop` is set; nothing else is taken off the domain but the time."""
+    for topic in topics:
+        server.advertise(topic)
+    with closing(Recorder(participant, server)) as recorder:
+        while not stop.wait(PERIOD):
+            for topic in topics:
+                if topic.name == CLOCK or server.wanted(topic):
+                    recorder.add([topic])
+                else:
+                    recorder.remove(topic.name)
+            recorder.poll()
+            server.refresh()
