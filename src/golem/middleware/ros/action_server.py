@@ -30,7 +30,7 @@ from golem.middleware.ros.goals import NO_ID, CancelCode, GoalEvent, GoalState, 
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, CancelGoal_Response, GoalStatusArray
 from golem.middleware.ros.msgs.action_msgs import GoalStatus as StatusMessage
-from golem.middleware.ros.service import Header, Responder
+from golem.middleware.ros.service import Origin, Responder
 
 MAX_WAITING = 100
 """Requests for the result of one goal that are remembered; beyond it the oldest stays unanswered."""
@@ -98,7 +98,7 @@ class DdsActionServer:
         self._table = GoalTable(result_timeout)
         self._active: dict[bytes, DdsServerGoal] = {}
         self._results: dict[bytes, bytes] = {}
-        self._waiting: dict[bytes, deque[Header]] = {}
+        self._waiting: dict[bytes, deque[Origin]] = {}
         self._news = False
         parts = names.action(name)
         self._feedback = endpoints.writer(names.topic(parts.feedback), f"{type}_FeedbackMessage", DEFAULT)
@@ -150,8 +150,8 @@ class DdsActionServer:
         response = codec.serialize(self._type.GetResult.Response(int(goal.status), result))
         self._results[goal.id] = response
         del self._active[goal.id]
-        for header in self._waiting.pop(goal.id, ()):
-            self._result.reply(header, response)
+        for origin in self._waiting.pop(goal.id, ()):
+            self._result.reply(origin, response)
 
     def send_feedback(self, goal: GoalState, feedback: Any) -> None:
         """Publish feedback on `goal`.
@@ -176,20 +176,20 @@ class DdsActionServer:
     def _stamp(self) -> int:
         return int(self._now() * SECOND)
 
-    def _on_goal(self, header: Header, request: Any) -> None:
+    def _on_goal(self, origin: Origin, request: Any) -> None:
         id, stamp = from_uuid(request.goal_id), self._stamp()
         # The id of no goal could not be canceled: it means all of them.
         known = id == NO_ID or id in self._table
         accepted = not known and bool(self._handler.decide(request.goal))
         goal = DdsServerGoal(self, self._table.accept(id, stamp), request.goal) if accepted else None
         response = self._type.SendGoal.Response(accepted, to_time(stamp if accepted else 0))
-        self._goal.reply(header, codec.serialize(response))
+        self._goal.reply(origin, codec.serialize(response))
         if goal is not None:
             self._active[id] = goal
             self._news = True
             self._handler.accepted(goal)
 
-    def _on_cancel(self, header: Header, request: CancelGoal_Request) -> None:
+    def _on_cancel(self, origin: Origin, request: CancelGoal_Request) -> None:
         info = request.goal_info
         code, meant = self._table.to_cancel(from_uuid(info.goal_id), from_time(info.stamp))
         canceling: list[GoalState] = []
@@ -201,17 +201,17 @@ class DdsActionServer:
         if meant and not canceling:
             code = CancelCode.REJECTED
         response = CancelGoal_Response(int(code), [goal_info(g.id, g.stamp) for g in canceling])
-        self._cancel.reply(header, codec.serialize(response))
+        self._cancel.reply(origin, codec.serialize(response))
 
-    def _on_result(self, header: Header, request: Any) -> None:
+    def _on_result(self, origin: Origin, request: Any) -> None:
         id = from_uuid(request.goal_id)
         if id in self._active:
-            self._waiting.setdefault(id, deque(maxlen=MAX_WAITING)).append(header)
+            self._waiting.setdefault(id, deque(maxlen=MAX_WAITING)).append(origin)
         elif id in self._results:
-            self._result.reply(header, self._results[id])
+            self._result.reply(origin, self._results[id])
         else:
             response = self._type.GetResult.Response(int(GoalStatus.UNKNOWN), self._type.Result())
-            self._result.reply(header, codec.serialize(response))
+            self._result.reply(origin, codec.serialize(response))
 
     def _publish_status(self) -> None:
         self._news = False

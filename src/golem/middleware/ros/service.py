@@ -24,6 +24,8 @@ SERVICES = Qos(depth=1000)
 """ROS's service profile keeps 10; the depth is nobody else's business, and a burst of goals is larger than that."""
 MAX_PENDING = 1000
 """Unanswered requests of one client; beyond it the oldest is given up."""
+MAX_REACHED = 1000
+"""Clients of one server that are remembered to be within reach."""
 HOLD = 0.1
 """How long a reply waits for the client's reader to be discovered [s]; that of `rmw_send_response`."""
 
@@ -32,12 +34,24 @@ class Header(NamedTuple):
     """Pairs a reply with its request.
 
     Attributes:
-        client: handle of the client's request writer (uint64).
+        client: handle of the client's request writer (uint64), as the client knows it.
         sequence: number of the request, by its client (int64).
     """
 
     client: int
     sequence: int
+
+
+class Origin(NamedTuple):
+    """Where a request came from.
+
+    Attributes:
+        header: what its reply shall repeat.
+        writer: handle of the client's request writer (uint64), as the server's participant knows it.
+    """
+
+    header: Header
+    writer: int
 
 
 def pack(header: Header, body: Payload) -> bytes:
@@ -147,36 +161,53 @@ class Responder:
     """
 
     def __init__(
-        self, endpoints: Endpoints, name: str, type: str, handle: Callable[[Header, Any], None]
+        self, endpoints: Endpoints, name: str, type: str, handle: Callable[[Origin, Any], None]
     ) -> None:
         """Give requests for the service with absolute `name` to `handle`, which shall `reply` some time."""
         self.name, self.malformed = name, 0
         self._endpoints, self._handle = endpoints, handle
         self._request = codec.service(type).Request
-        self._held: deque[tuple[float, bytes]] = deque(maxlen=SERVICES.depth)
+        self._held: deque[tuple[float, int, bytes]] = deque(maxlen=SERVICES.depth)
+        self._reached: set[int] = set()
         owner = f"serviceid={endpoints.identity()};"
         self._writer = endpoints.writer(names.reply(name), f"{type}_Response", SERVICES, owner)
         self._inbox = endpoints.inbox(names.request(name), f"{type}_Request", SERVICES, self._take, owner)
         endpoints.attend(self)
 
-    def reply(self, header: Header, response: Payload) -> None:
-        """Answer the request that came with `header` by `response` (CDR)."""
-        payload = pack(header, response)
-        if self._writer.matched() > 0:
+    def reply(self, origin: Origin, response: Payload) -> None:
+        """Answer the request that came from `origin` by `response` (CDR)."""
+        payload = pack(origin.header, response)
+        if self._reaches(origin.writer):
             self._writer.write(payload)
         else:
-            self._held.append((time.monotonic() + HOLD, payload))
+            self._held.append((time.monotonic() + HOLD, origin.writer, payload))
 
     def keep(self) -> None:
-        """Send the replies that waited for their reader, drop those that waited in vain; called at every poll."""
-        while self._held and (self._writer.matched() > 0 or time.monotonic() > self._held[0][0]):
-            self._writer.write(self._held.popleft()[1])
+        """Send the replies that waited for their reader long enough; called at every poll."""
+        reached = {writer: self._reaches(writer) for writer in {writer for _, writer, _ in self._held}}
+        for _ in range(len(self._held)):
+            end, writer, payload = held = self._held.popleft()
+            if reached[writer] or time.monotonic() > end:
+                self._writer.write(payload)
+            else:
+                self._held.append(held)
 
     def close(self) -> None:
         """Stop."""
         self._endpoints.dismiss(self)
         self._endpoints.close(self._inbox, self._writer)
         self._held.clear()
+
+    def _reaches(self, writer: int) -> bool:
+        """Return whether a reply reader is known of the participant with this request writer, or will never be."""
+        if writer not in self._reached:
+            guid = self._inbox.writers().get(writer)
+            if guid is not None and all(r[:12] != guid[:12] for r in self._writer.readers().values()):
+                return False
+            if len(self._reached) >= MAX_REACHED:
+                self._reached.clear()
+            self._reached.add(writer)
+        return True
 
     def _take(self, sample: Sample) -> None:
         try:
@@ -185,7 +216,7 @@ class Responder:
         except CodecError:
             self.malformed += 1
             return
-        self._handle(header, request)
+        self._handle(Origin(header, sample.writer), request)
 
 
 class DdsService:
@@ -201,11 +232,11 @@ class DdsService:
         """Stop."""
         self.responder.close()
 
-    def _answer(self, header: Header, request: Any) -> None:
+    def _answer(self, origin: Origin, request: Any) -> None:
         response = self._callback(request)
         if not isinstance(response, self._response):
             raise CodecError(
                 f"The service '{self.responder.name}' answers by {self._response.__msgtype__}, "
                 f"not {type(response).__name__}."
             )
-        self.responder.reply(header, codec.serialize(response))
+        self.responder.reply(origin, codec.serialize(response))
