@@ -36,6 +36,7 @@ def test_a_sample_arrives_once_with_its_writer_and_time(pair: Pair) -> None:
     )
     assert reader.take() == []
     assert reader.writers() == {writer.handle: writer.guid}
+    assert writer.readers() == {reader.handle: reader.guid}
 
 
 @pytest.mark.parametrize(

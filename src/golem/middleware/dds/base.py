@@ -116,6 +116,13 @@ class Writer(Protocol):
         """Return how many readers match now."""
         ...
 
+    def readers(self) -> dict[int, bytes]:
+        """Return the guid (16 bytes) of every reader that matches now, by its instance handle.
+
+        The first 12 bytes of a guid are those of its participant.
+        """
+        ...
+
     def close(self) -> None:
         """Leave the domain; calling it again does nothing."""
         ...

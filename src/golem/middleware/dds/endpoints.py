@@ -6,7 +6,7 @@ import ctypes
 import struct
 import threading
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 from golem.middleware.dds.base import DdsError, Payload, Sample, as_sample
 from golem.middleware.dds.library import (
@@ -70,6 +70,18 @@ class _Endpoint:
             self._owner.forget(self.entity)
             self._owner.library.blocking.dds_delete(self.entity)
 
+    def _peers(self, handles_of: Callable[..., int], data_of: Callable[..., Any]) -> dict[int, bytes]:
+        """Return the guids of the endpoints that match, by handle, given Cyclone's functions that list them."""
+        handles = (ctypes.c_uint64 * 1024)()
+        n = handles_of(self.entity, handles, len(handles))
+        found: dict[int, bytes] = {}
+        for handle in handles[: max(0, min(n, len(handles)))]:
+            data = data_of(self.entity, handle)
+            if data:
+                found[handle] = bytes(data.contents.guid)
+                self._calls.dds_builtintopic_free_endpoint(data)
+        return found
+
     def _check(self, code: int, what: str) -> int:
         if code >= 0:
             return code
@@ -129,6 +141,11 @@ class CycloneWriter(_Endpoint):
         """Return how many readers match now."""
         return max(0, self._calls.dds_get_matched_subscriptions(self.entity, None, 0))
 
+    def readers(self) -> dict[int, bytes]:
+        """Return the guid of every reader that matches now, by its instance handle."""
+        calls = self._calls
+        return self._peers(calls.dds_get_matched_subscriptions, calls.dds_get_matched_subscription_data)
+
 
 class CycloneReader(_Endpoint):
     """A reader of a `CycloneParticipant`; see `base.Reader`.
@@ -171,15 +188,8 @@ class CycloneReader(_Endpoint):
 
     def writers(self) -> dict[int, bytes]:
         """Return the guid of every writer that matches now, by its instance handle."""
-        handles = (ctypes.c_uint64 * 1024)()
-        n = self._calls.dds_get_matched_publications(self.entity, handles, len(handles))
-        found: dict[int, bytes] = {}
-        for handle in handles[: max(0, min(n, len(handles)))]:
-            data = self._calls.dds_get_matched_publication_data(self.entity, handle)
-            if data:
-                found[handle] = bytes(data.contents.guid)
-                self._calls.dds_builtintopic_free_endpoint(data)
-        return found
+        calls = self._calls
+        return self._peers(calls.dds_get_matched_publications, calls.dds_get_matched_publication_data)
 
     def _sample(self, i: int) -> Sample:
         """Return the i-th taken sample and release Cyclone's."""

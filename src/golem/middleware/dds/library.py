@@ -120,6 +120,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "dds_get_matched_subscriptions": (c_int32, [_entity, POINTER(c_uint64), c_size_t]),
     "dds_get_matched_publications": (c_int32, [_entity, POINTER(c_uint64), c_size_t]),
     "dds_get_matched_publication_data": (POINTER(EndpointData), [_entity, c_uint64]),
+    "dds_get_matched_subscription_data": (POINTER(EndpointData), [_entity, c_uint64]),
     "dds_builtintopic_free_endpoint": (None, [POINTER(EndpointData)]),
     "dds_create_qos": (ptr, []),
     "dds_delete_qos": (None, [ptr]),

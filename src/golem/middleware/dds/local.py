@@ -207,7 +207,11 @@ class LocalWriter:
 
     def matched(self) -> int:
         """Return how many readers match now."""
-        return len(self._domain.readers(self)) if self._open else 0
+        return len(self.readers())
+
+    def readers(self) -> dict[int, bytes]:
+        """Return the guid of every reader that matches now, by its instance handle."""
+        return {r.handle: r.guid for r in self._domain.readers(self)} if self._open else {}
 
     def close(self) -> None:
         """Leave the domain."""
