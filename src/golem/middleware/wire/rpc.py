@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 
-from golem.middleware.dds.base import DEFAULT, Participant, Sample
+from golem.middleware.dds.base import Participant, Qos, Reader, Sample, Writer
 from golem.middleware.unitree_api import (
     SEND_FAILED,
     TIMEOUT,
@@ -19,6 +19,8 @@ from golem.middleware.unitree_api import (
 from golem.middleware.wire import api
 from golem.middleware.wire.layout import WireError
 
+CALLS = Qos(depth=256)
+"""Reliable; as deep as answers to everybody may pile up while one client is busy elsewhere [own]."""
 _POLL = 0.001
 """How often a call that waits looks for its answer [s]."""
 
@@ -26,6 +28,21 @@ _POLL = 0.001
 def on_the_wire(topic: str) -> str:
     """Return the DDS name of a topic of the vendor's."""
     return f"rt/{topic}"
+
+
+def serve(participant: Participant, service: str) -> RpcServer:
+    """Join a domain as the server of `service`."""
+    # The writer first: a client that sees the reader calls at once.
+    responses = participant.writer(on_the_wire(response_topic(service)), api.RESPONSE, CALLS)
+    requests = participant.reader(on_the_wire(request_topic(service)), api.REQUEST, CALLS)
+    return RpcServer(requests, responses)
+
+
+def reach(participant: Participant, service: str) -> RpcClient:
+    """Join a domain as a client of `service`; finding the server takes a moment."""
+    responses = participant.reader(on_the_wire(response_topic(service)), api.RESPONSE, CALLS)
+    requests = participant.writer(on_the_wire(request_topic(service)), api.REQUEST, CALLS)
+    return RpcClient(requests, responses)
 
 
 class RpcServer:
@@ -36,12 +53,10 @@ class RpcServer:
         refusal: what was wrong with the last of them.
     """
 
-    def __init__(self, participant: Participant, service: str) -> None:
-        """Join as the server of `service`."""
+    def __init__(self, requests: Reader, responses: Writer) -> None:
+        """Take calls from `requests` and answer on `responses`."""
         self.refused, self.refusal = 0, ""
-        # The writer first: a client that sees the reader calls at once.
-        self._writer = participant.writer(on_the_wire(response_topic(service)), api.RESPONSE, DEFAULT)
-        self._reader = participant.reader(on_the_wire(request_topic(service)), api.REQUEST, DEFAULT)
+        self._reader, self._writer = requests, responses
 
     def take(self) -> list[Request]:
         """Return the calls that came since the last time, oldest first."""
@@ -72,10 +87,9 @@ class RpcServer:
 class RpcClient:
     """Calls one service."""
 
-    def __init__(self, participant: Participant, service: str) -> None:
-        """Join as a client of `service`; finding the server takes a moment."""
-        self._reader = participant.reader(on_the_wire(response_topic(service)), api.RESPONSE, DEFAULT)
-        self._writer = participant.writer(on_the_wire(request_topic(service)), api.REQUEST, DEFAULT)
+    def __init__(self, requests: Writer, responses: Reader) -> None:
+        """Call on `requests` and take answers from `responses`."""
+        self._writer, self._reader = requests, responses
 
     @property
     def connected(self) -> bool:
