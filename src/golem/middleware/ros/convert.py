@@ -1,0 +1,290 @@
+"""GOLEM's words as ROS messages and back: time, poses, joints, IMU, base, hands, objects. Images: `images`.
+
+Inside quaternions are wxyz and poses are 4x4 matrices; here, at the edge, they become xyzw. Frames are REP-103's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.msgs import diagnostic_msgs, geometry_msgs, golem_interfaces, sensor_msgs
+from golem.middleware.ros.msgs.builtin_interfaces import Duration, Time
+from golem.middleware.ros.msgs.nav_msgs import Odometry
+from golem.middleware.ros.msgs.std_msgs import Header
+from golem.middleware.ros.msgs.tf2_msgs import TFMessage
+from golem.middleware.topics import LegStatus, LookRequest, Sightings
+from golem.types import Array, BaseEstimate, Detection, HandCommand, HandState, Imu, LocalizedObject, Twist
+
+NANO = 1_000_000_000
+"""Nanoseconds in a second."""
+
+
+def time(t: float) -> Time:
+    """Return `t` [s] as a ROS time.
+
+    Raises:
+        CodecError: it is not finite or does not fit into 32 bits.
+    """
+    return Time(*_sec_nanosec(t))
+
+
+def duration(t: float) -> Duration:
+    """Return a time span [s] as a ROS duration; the same limits as for `time`."""
+    return Duration(*_sec_nanosec(t))
+
+
+def seconds(time: Time | Duration) -> float:
+    """Return a ROS time or duration in seconds."""
+    return time.sec + time.nanosec / NANO
+
+
+def header(t: float, frame: str = "") -> Header:
+    """Return the header of what was measured at `t` [s] in `frame`."""
+    return Header(time(t), frame)
+
+
+def quaternion(wxyz: Array) -> geometry_msgs.Quaternion:
+    """Return a quaternion (4,), wxyz, as ROS has it, xyzw."""
+    w, x, y, z = np.asarray(wxyz, float).tolist()
+    return geometry_msgs.Quaternion(x, y, z, w)
+
+
+def vector(v: Array) -> geometry_msgs.Vector3:
+    """Return a vector (3,)."""
+    return geometry_msgs.Vector3(*np.asarray(v, float).tolist())
+
+
+def pose(T: Array) -> geometry_msgs.Pose:
+    """Return the pose `T` (4, 4)."""
+    (xyzw,) = _xyzw(T[None])
+    return geometry_msgs.Pose(
+        geometry_msgs.Point(*np.asarray(T[:3, 3], float).tolist()), geometry_msgs.Quaternion(*xyzw)
+    )
+
+
+def matrix(pose: geometry_msgs.Pose) -> Array:
+    """Return a pose as (4, 4); the quaternion need not have length one.
+
+    Raises:
+        CodecError: a number is not finite, or the quaternion is zero or absurdly large.
+    """
+    p, q = pose.position, pose.orientation
+    numbers = np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w])
+    if not np.isfinite(numbers).all() or not 1e-6 < np.abs(numbers[3:]).max() < 1e6:
+        raise CodecError(f"{numbers.tolist()} is no position (x, y, z) and quaternion (x, y, z, w).")
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_quat(numbers[3:]).as_matrix()
+    T[:3, 3] = numbers[:3]
+    return T
+
+
+def transforms(t: float, links: Sequence[tuple[str, str]], T_parent_child: Array) -> TFMessage:
+    """Return poses of frames for /tf.
+
+    Args:
+        t: time [s].
+        links: parent and child of each of n poses.
+        T_parent_child: (n, 4, 4) pose of each child in its parent.
+    """
+    positions, rotations = T_parent_child[:, :3, 3].tolist(), _xyzw(T_parent_child)
+    stamp = time(t)
+    return TFMessage(
+        [
+            geometry_msgs.TransformStamped(
+                Header(stamp, parent),
+                child,
+                geometry_msgs.Transform(geometry_msgs.Vector3(*xyz), geometry_msgs.Quaternion(*xyzw)),
+            )
+            for (parent, child), xyz, xyzw in zip(links, positions, rotations, strict=True)
+        ]
+    )
+
+
+def joint_state(t: float, names: Sequence[str], q: Array, dq: Array, tau: Array) -> sensor_msgs.JointState:
+    """Return positions [rad], velocities [rad/s] and torques [N m] of joints, each (n,); empty where not known."""
+    values = (np.ascontiguousarray(v, np.float64) for v in (q, dq, tau))
+    return sensor_msgs.JointState(header(t), list(names), *values)
+
+
+def imu(t: float, sample: Imu, frame: str) -> sensor_msgs.Imu:
+    """Return a sample of the IMU in `frame`; its covariances are unknown, which ROS writes as zeros."""
+    return sensor_msgs.Imu(
+        header=header(t, frame),
+        orientation=quaternion(sample.quat),
+        angular_velocity=vector(sample.gyro),
+        linear_acceleration=vector(sample.acc),
+    )
+
+
+def twist(command: Twist) -> geometry_msgs.Twist:
+    """Return a velocity command in base_link."""
+    return geometry_msgs.Twist(
+        geometry_msgs.Vector3(command.vx, command.vy, 0.0), geometry_msgs.Vector3(0.0, 0.0, command.wz)
+    )
+
+
+def to_twist(message: geometry_msgs.Twist) -> Twist:
+    """Return what a velocity command says of the plane: vx, vy, wz; they may be not finite."""
+    return Twist(message.linear.x, message.linear.y, message.angular.z)
+
+
+def odometry(estimate: BaseEstimate, gyro: Array | None = None) -> Odometry:
+    """Return the base's pose in odom and its velocity in base_link.
+
+    Args:
+        estimate: of the base.
+        gyro: (3,) angular velocity of base_link in base_link [rad/s]; zeros where not given.
+    """
+    message = Odometry(header(estimate.t, "odom"), "base_link")
+    message.pose.pose = pose(estimate.T_odom_base)
+    message.twist.twist.linear = vector(estimate.T_odom_base[:3, :3].T @ estimate.velocity)
+    if gyro is not None:
+        message.twist.twist.angular = vector(gyro)
+    return message
+
+
+def diagnostics(
+    t: float, statuses: Sequence[diagnostic_msgs.DiagnosticStatus]
+) -> diagnostic_msgs.DiagnosticArray:
+    """Return what is known of the health of the robot's parts."""
+    return diagnostic_msgs.DiagnosticArray(header(t), list(statuses))
+
+
+def diagnostic(
+    level: int, name: str, message: str, values: Mapping[str, object], hardware: str = ""
+) -> diagnostic_msgs.DiagnosticStatus:
+    """Return the health of one part.
+
+    Args:
+        level: `DiagnosticStatus.OK`, `WARN`, `ERROR` or `STALE`.
+        name: of the part.
+        message: one line for a person.
+        values: figures behind it.
+        hardware: which device.
+    """
+    pairs = [diagnostic_msgs.KeyValue(key, str(value)) for key, value in values.items()]
+    return diagnostic_msgs.DiagnosticStatus(level, name, message, hardware, pairs)
+
+
+def base_estimate(estimate: BaseEstimate) -> golem_interfaces.BaseEstimate:
+    """Return an estimate of the base."""
+    return golem_interfaces.BaseEstimate(
+        header(estimate.t, "odom"),
+        pose(estimate.T_odom_base),
+        vector(estimate.velocity),
+        float(estimate.height),
+        np.array(estimate.contact, np.float64),
+        bool(estimate.stale),
+    )
+
+
+def to_base_estimate(message: golem_interfaces.BaseEstimate) -> BaseEstimate:
+    """Return an estimate of the base.
+
+    Raises:
+        CodecError: its pose is none.
+    """
+    v = message.velocity
+    return BaseEstimate(
+        seconds(message.header.stamp),
+        matrix(message.pose),
+        np.array([v.x, v.y, v.z]),
+        message.height,
+        np.array(message.contact),
+        message.stale,
+    )
+
+
+def hand_state(state: HandState, side: str) -> golem_interfaces.HandState:
+    """Return what one hand reports."""
+    return golem_interfaces.HandState(
+        header(state.t, f"{side}_gripper"),
+        float(state.gap),
+        np.array(state.fingers, np.float64),
+        np.array(state.force, np.float64),
+    )
+
+
+def to_hand_state(message: golem_interfaces.HandState) -> HandState:
+    """Return what one hand reports."""
+    stamp = seconds(message.header.stamp)
+    return HandState(stamp, message.gap, np.array(message.fingers), np.array(message.force))
+
+
+def hand_command(command: HandCommand, side: str) -> golem_interfaces.HandCommand:
+    """Return what one hand is told."""
+    head = header(command.t, f"{side}_gripper")
+    return golem_interfaces.HandCommand(head, float(command.gap), float(command.force))
+
+
+def to_hand_command(message: golem_interfaces.HandCommand) -> HandCommand:
+    """Return what one hand is told."""
+    return HandCommand(seconds(message.header.stamp), message.gap, message.force)
+
+
+def leg_status(status: LegStatus) -> golem_interfaces.LegStatus:
+    """Return what the lower body does."""
+    return golem_interfaces.LegStatus(
+        header(status.t, "base_link"),
+        twist(status.commanded),
+        twist(status.applied),
+        bool(status.clamped),
+        status.reason,
+        bool(status.stepping),
+        np.array(status.phase, np.float64),
+        status.controller,
+        status.fault or "",
+    )
+
+
+def look_request(request: LookRequest) -> golem_interfaces.LookRequest:
+    """Return what a camera shall look for."""
+    return golem_interfaces.LookRequest(list(request.labels))
+
+
+def sightings(seen: Sightings) -> golem_interfaces.Sightings:
+    """Return what a localizer found in one frame."""
+    objects = [
+        golem_interfaces.LocalizedObject(
+            o.label,
+            float(o.detection.score),
+            np.array(o.detection.box, np.float64),
+            np.array(o.detection.center, np.float64),
+            geometry_msgs.Point(*np.asarray(o.position, float).tolist()),
+            np.asarray(o.points, np.float32).reshape(-1),
+        )
+        for o in seen.objects
+    ]
+    return golem_interfaces.Sightings(header(seen.t, "odom"), seen.camera, objects)
+
+
+def to_sightings(message: golem_interfaces.Sightings) -> Sightings:
+    """Return what a localizer found in one frame.
+
+    Raises:
+        CodecError: the coordinates of a point cloud do not come in threes.
+    """
+    t = seconds(message.header.stamp)
+    objects: list[LocalizedObject] = []
+    for o in message.objects:
+        if o.points.size % 3:
+            raise CodecError(f"{o.points.size} coordinates are no points with x, y and z.")
+        detection = Detection(o.label, o.score, np.array(o.box), np.array(o.center))
+        position = np.array([o.position.x, o.position.y, o.position.z])
+        objects.append(LocalizedObject(detection, t, position, o.points.reshape(-1, 3).astype(np.float64)))
+    return Sightings(t, message.camera, tuple(objects))
+
+
+def _sec_nanosec(t: float) -> tuple[int, int]:
+    if not abs(t) < 2.0**31:
+        raise CodecError(f"{t} s is no time that ROS can write.")
+    return divmod(round(t * NANO), NANO)
+
+
+def _xyzw(T: Array) -> list[list[float]]:
+    """Return the (n, 4) quaternions, xyzw with w >= 0, of (n, 4, 4) poses."""
+    return Rotation.from_matrix(T[:, :3, :3]).as_quat(canonical=True).tolist() if len(T) else []
