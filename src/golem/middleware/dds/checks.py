@@ -5,7 +5,9 @@ from __future__ import annotations
 import functools
 import time
 
-from golem.middleware.dds.base import ENCAPSULATION, DdsError, Qos, Reader, Writer
+from golem.middleware.dds import discovery
+from golem.middleware.dds.base import ENCAPSULATION, DdsError, Qos
+from golem.middleware.dds.endpoints import CycloneReader, CycloneWriter
 from golem.middleware.dds.library import cyclone
 from golem.middleware.dds.participant import CycloneParticipant
 
@@ -27,7 +29,7 @@ def self_test() -> None:
     library = cyclone()
     domain = library.blocking.dds_create_domain(_DOMAIN, _NO_NETWORK)
     library.check(domain, "The self-test of the transport cannot start")
-    participant = CycloneParticipant(library, _DOMAIN, "", lambda: None)
+    participant = CycloneParticipant(library, _DOMAIN, "the self-test", "", lambda: None)
     try:
         qos = Qos(transient_local=True, depth=2)
         writer = participant.writer("self_test", "golem::SelfTest", qos)
@@ -49,20 +51,49 @@ def self_test() -> None:
         library.blocking.dds_delete(domain)
 
 
-def wait_for_peer(endpoint: Writer | Reader, what: str, remedy: str, timeout: float) -> None:
-    """Wait until somebody matches `endpoint`.
+def wait_for_peer(
+    participant: CycloneParticipant, endpoint: CycloneWriter | CycloneReader, remedy: str, timeout: float
+) -> None:
+    """Wait until somebody matches `endpoint`, a writer or reader of `participant`.
 
     Args:
-        endpoint: the writer or reader.
-        what: what is missed, e.g. `"rt/lowstate on domain 1, interface lo"`.
-        remedy: what the user can do, e.g. `"start it with: golem twin"`.
+        participant: its participant.
+        endpoint: what somebody else should match.
+        remedy: what the user can do, e.g. `"start the robot with: golem twin"`.
         timeout: how long to wait [s].
 
     Raises:
-        DdsError: nobody did in time.
+        DdsError: nobody did in time; the message says what discovery knows of the reason.
     """
     end = time.monotonic() + timeout
     while not endpoint.matched():
         if time.monotonic() > end:
-            raise DdsError(f"Nobody answers on {what} after {timeout:g} s; {remedy}.")
+            raise DdsError(
+                f"{_reason(participant, endpoint)} ({participant.where}, {timeout:g} s); {remedy}."
+            )
         time.sleep(0.01)
+
+
+def _reason(participant: CycloneParticipant, endpoint: CycloneWriter | CycloneReader) -> str:
+    writing = isinstance(endpoint, CycloneWriter)
+    does = "reads" if writing else "writes"
+    topic = endpoint.topic
+    others = [m for m in discovery.members(participant) if m.guid != participant.guid]
+    if not others:
+        return "Nobody else is on the DDS domain"
+    there = discovery.readers(participant) if writing else discovery.writers(participant)
+    there = [other for other in there if other.topic == topic]
+    if not there:
+        return f"Of {len(others)} others on the DDS domain nobody {does} '{topic}'"
+    for other in there:
+        if other.type_name == endpoint.type_name:
+            offered, requested = (endpoint.qos, other.qos) if writing else (other.qos, endpoint.qos)
+            return (
+                f"The writer of '{topic}' offers {_words(offered)}, its reader requests {_words(requested)}"
+            )
+    return f"Somebody {does} '{topic}' as '{there[0].type_name}', not as '{endpoint.type_name}'"
+
+
+def _words(qos: Qos) -> str:
+    reliability = "reliable" if qos.reliable else "best effort"
+    return f"{reliability}, {'transient local' if qos.transient_local else 'volatile'}"

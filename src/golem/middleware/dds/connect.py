@@ -28,7 +28,7 @@ def connect(config: DdsConfig | None = None, user_data: str = "") -> CyclonePart
     open_domain(library, config)
     leave = partial(close_domain, library, config.domain)
     try:
-        return CycloneParticipant(library, config.domain, user_data, leave)
+        return CycloneParticipant(library, config.domain, str(config), user_data, leave)
     except BaseException:
         leave()
         raise

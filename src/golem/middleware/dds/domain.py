@@ -47,25 +47,36 @@ class DdsConfig:
         return f"domain {self.domain}, interface {self.interface}"
 
 
-def configuration(interface: Interface, peers: tuple[str, ...]) -> str:
-    """Return Cyclone's configuration, XML.
+_LOOPBACK = """
+<General>
+  <Interfaces><NetworkInterface name={name} multicast="true"/></Interfaces><AllowMulticast>spdp</AllowMulticast>
+  <MaxMessageSize>65500B</MaxMessageSize><FragmentSize>64000B</FragmentSize>
+</General>
+<Discovery>
+  <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>31</MaxAutoParticipantIndex>
+  <Peers><Peer address="127.0.0.1"/>{peers}</Peers>
+</Discovery>
+"""
+"""On the loopback interface Cyclone 0.10 looks for others at the first UDP ports of this machine, Cyclone 11 by
+multicast; this does both. Datagrams are as large as UDP allows: nothing has to fit a frame there, and an image then
+takes 15 of them instead of 63."""
+_NETWORK = """
+<General>
+  <Interfaces><NetworkInterface name={name}/></Interfaces><AllowMulticast>spdp</AllowMulticast>
+</General>
+<Discovery><Peers>{peers}</Peers></Discovery>
+"""
+"""On a network only discovery uses multicast: Wi-Fi and many switches carry multicast data badly."""
+_COMMON = '<Internal><SocketReceiveBufferSize max="16MB"/></Internal>'
+"""An image arrives as one burst; the operating system may grant less."""
 
-    On the loopback interface datagrams are as large as UDP allows: nothing has to fit a frame there, and an image
-    then takes 15 of them instead of 63. Elsewhere only discovery uses multicast, because Wi-Fi and many switches
-    carry multicast data badly, and 16 MB of receive buffer are asked for: an image arrives as one burst.
-    """
-    name = quoteattr(interface.name)
-    general = "<AllowMulticast>spdp</AllowMulticast>"
-    if interface.loopback:
-        general = "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>64000B</FragmentSize>"
+
+def configuration(interface: Interface, peers: tuple[str, ...]) -> str:
+    """Return Cyclone's configuration, XML."""
     listed = "".join(f"<Peer address={quoteattr(peer)}/>" for peer in peers)
-    return (
-        "<CycloneDDS><Domain>"
-        f"<General><Interfaces><NetworkInterface name={name}/></Interfaces>{general}</General>"
-        f"<Discovery>{f'<Peers>{listed}</Peers>' if listed else ''}</Discovery>"
-        '<Internal><SocketReceiveBufferSize max="16MB"/></Internal>'
-        "</Domain></CycloneDDS>"
-    )
+    template = _LOOPBACK if interface.loopback else _NETWORK
+    specific = template.format(name=quoteattr(interface.name), peers=listed)
+    return f"<CycloneDDS><Domain>{specific}{_COMMON}</Domain></CycloneDDS>"
 
 
 class _Open:

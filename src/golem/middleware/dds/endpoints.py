@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from golem.middleware.dds.base import DdsError, Payload, Sample, as_sample
+from golem.middleware.dds.base import DdsError, Payload, Qos, Sample, as_sample
 from golem.middleware.dds.library import (
     ALREADY_DELETED,
     ANY_STATE,
@@ -43,6 +43,8 @@ class _Endpoint:
 
     Attributes:
         topic: name of the topic.
+        type_name: name of its type.
+        qos: what it offers or requests.
         guid: 16 bytes, unique on the domain.
         handle: instance handle (uint64) by which its participant knows it.
         entity: Cyclone's name for it.
@@ -50,9 +52,9 @@ class _Endpoint:
 
     kind: str
 
-    def __init__(self, owner: Owner, topic: str, entity: int) -> None:
+    def __init__(self, owner: Owner, topic: str, type_name: str, qos: Qos, entity: int) -> None:
         """Take over `entity`, which exists."""
-        self.topic, self.entity = topic, entity
+        self.topic, self.type_name, self.qos, self.entity = topic, type_name, qos, entity
         self._owner = owner
         self._open = True
         self._lock = threading.Lock()
@@ -99,9 +101,9 @@ class CycloneWriter(_Endpoint):
 
     kind = "writer"
 
-    def __init__(self, owner: Owner, topic: str, entity: int) -> None:
+    def __init__(self, owner: Owner, topic: str, type_name: str, qos: Qos, entity: int) -> None:
         """Take over `entity`, a writer."""
-        super().__init__(owner, topic, entity)
+        super().__init__(owner, topic, type_name, qos, entity)
         self.dropped = 0
         sertype = ctypes.c_void_p()
         owner.library.check(self._calls.dds_get_entity_sertype(entity, ctypes.byref(sertype)), "No type")
@@ -156,9 +158,17 @@ class CycloneReader(_Endpoint):
 
     kind = "reader"
 
-    def __init__(self, owner: Owner, topic: str, entity: int, on_data: Callable[[], None] | None) -> None:
+    def __init__(
+        self,
+        owner: Owner,
+        topic: str,
+        type_name: str,
+        qos: Qos,
+        entity: int,
+        on_data: Callable[[], None] | None,
+    ) -> None:
         """Take over `entity`, a reader."""
-        super().__init__(owner, topic, entity)
+        super().__init__(owner, topic, type_name, qos, entity)
         self.on_data = on_data
         self._serdata = (ctypes.c_void_p * _BATCH)()
         self._infos = (SampleInfo * _BATCH)()

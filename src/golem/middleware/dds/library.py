@@ -100,6 +100,12 @@ class EndpointData(ctypes.Structure):
     )
 
 
+class ParticipantData(ctypes.Structure):
+    """What discovery told of a participant: dds_builtintopic_participant_t."""
+
+    _fields_ = (("guid", ctypes.c_ubyte * 16), ("qos", ptr))
+
+
 _entity = c_int32
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "dds_strretcode": (c_char_p, [c_int32]),

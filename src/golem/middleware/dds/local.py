@@ -92,18 +92,20 @@ class LocalDomain:
                 return
             self._calling = True
         try:
-            while (on_data := self._next_call()) is not None:
-                on_data()
+            while (reader := self._next_call()) is not None:
+                waiting = len(reader.queue)
+                if reader.on_data is not None:
+                    reader.on_data()
+                if 0 < len(reader.queue) < waiting:
+                    self._calls.append(reader)
         except BaseException:
             self._calling = False
             raise
 
-    def _next_call(self) -> Callable[[], None] | None:
+    def _next_call(self) -> LocalReader | None:
         with self.lock:
-            while self._calls:
-                on_data = self._calls.popleft().on_data
-                if on_data is not None:
-                    return on_data
+            if self._calls:
+                return self._calls.popleft()
             self._calling = False
             return None
 

@@ -21,11 +21,15 @@ class CycloneParticipant:
         library: Cyclone.
         entity: Cyclone's name for it.
         guid: 16 bytes, unique on the domain.
+        where: the domain and how it is reached, in words.
     """
 
-    def __init__(self, library: Cyclone, domain: int, user_data: str, on_close: Callable[[], None]) -> None:
+    def __init__(
+        self, library: Cyclone, domain: int, where: str, user_data: str, on_close: Callable[[], None]
+    ) -> None:
         """Join `domain`, which is open; `on_close` is called once it has been left."""
         self.library = library
+        self.where = where
         self._on_close = on_close
         with cyclone_qos(library, None, user_data) as handle:
             entity = library.blocking.dds_create_participant(domain, handle, None)
@@ -45,7 +49,7 @@ class CycloneParticipant:
             with cyclone_qos(self.library, qos, user_data) as handle:
                 entity = self.library.blocking.dds_create_writer(self.entity, known, handle, None)
             self.library.check(entity, f"'{topic}' cannot be written")
-            writer = self._endpoints[entity] = CycloneWriter(self, topic, entity)
+            writer = self._endpoints[entity] = CycloneWriter(self, topic, type_name, qos, entity)
             return writer
 
     def reader(
@@ -62,7 +66,7 @@ class CycloneParticipant:
             with cyclone_qos(self.library, qos, user_data) as handle:
                 entity = self.library.blocking.dds_create_reader(self.entity, known, handle, None)
             self.library.check(entity, f"'{topic}' cannot be read")
-            reader = self._endpoints[entity] = CycloneReader(self, topic, entity, on_data)
+            reader = self._endpoints[entity] = CycloneReader(self, topic, type_name, qos, entity, on_data)
             if on_data is not None:
                 if self._waitset is None:
                     self._waitset = Waitset(self.library, self.entity)

@@ -45,3 +45,28 @@ def _fill(library: Cyclone, handle: int, qos: Qos) -> None:
         calls.dds_qset_durability_service(handle, 0, kind, depth, *limits)
     calls.dds_qset_writer_data_lifecycle(handle, False)
     calls.dds_qset_data_representation(handle, 1, (ctypes.c_int16 * 1)(_XCDR1))
+
+
+def read_qos(library: Cyclone, handle: int) -> Qos:
+    """Return what a dds_qos_t of an endpoint says."""
+    calls = library.quick
+    reliability, durability, history = (ctypes.c_int() for _ in range(3))
+    depth, blocking = ctypes.c_int32(1), ctypes.c_int64()
+    calls.dds_qget_reliability(handle, ctypes.byref(reliability), ctypes.byref(blocking))
+    calls.dds_qget_durability(handle, ctypes.byref(durability))
+    calls.dds_qget_history(handle, ctypes.byref(history), ctypes.byref(depth))
+    return Qos(
+        reliable=reliability.value == _RELIABLE,
+        transient_local=durability.value >= _TRANSIENT_LOCAL,
+        depth=None if history.value == _KEEP_ALL else max(1, depth.value),
+    )
+
+
+def read_user_data(library: Cyclone, handle: int) -> str:
+    """Return the USER_DATA of a dds_qos_t; what is no text in it is replaced."""
+    data, size = ctypes.c_void_p(), ctypes.c_size_t()
+    if not library.quick.dds_qget_userdata(handle, ctypes.byref(data), ctypes.byref(size)) or not data.value:
+        return ""
+    text = ctypes.string_at(data.value, size.value).decode(errors="replace")
+    library.quick.dds_free(data)
+    return text

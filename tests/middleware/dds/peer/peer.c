@@ -1,0 +1,46 @@
+/* A peer on Cyclone DDS 0.10 with generated types: peer DOMAIN TYPE COUNT
+   Sends every sample it receives on rt/there back on rt/back, COUNT of them, then exits with 0. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "dds/dds.h"
+#include "messages.h"
+
+static const dds_topic_descriptor_t *const TYPES[] = {
+  &std_msgs_msg_dds__String__desc, &geometry_msgs_msg_dds__Twist__desc, &sensor_msgs_msg_dds__JointState__desc,
+  &sensor_msgs_msg_dds__Image__desc, &sensor_msgs_msg_dds__PointCloud2__desc,
+  &unitree_hg_msg_dds__LowState__desc, &unitree_hg_msg_dds__LowCmd__desc,
+};
+
+int main (int argc, char **argv)
+{
+  const dds_topic_descriptor_t *type = NULL;
+  if (argc != 4) return 64;
+  for (size_t i = 0; i < sizeof (TYPES) / sizeof (TYPES[0]); i++)
+    if (strcmp (TYPES[i]->m_typename, argv[2]) == 0) type = TYPES[i];
+  if (type == NULL) return 65;
+  dds_qos_t *qos = dds_create_qos ();
+  dds_qset_reliability (qos, DDS_RELIABILITY_RELIABLE, DDS_SECS (5));
+  dds_qset_history (qos, DDS_HISTORY_KEEP_ALL, 0);
+  dds_entity_t participant = dds_create_participant ((dds_domainid_t) atoi (argv[1]), NULL, NULL);
+  dds_entity_t there = dds_create_topic (participant, type, "rt/there", NULL, NULL);
+  dds_entity_t back = dds_create_topic (participant, type, "rt/back", NULL, NULL);
+  dds_entity_t writer = dds_create_writer (participant, back, qos, NULL);
+  dds_entity_t reader = dds_create_reader (participant, there, qos, NULL);
+  if (participant < 0 || there < 0 || back < 0 || reader < 0 || writer < 0) return 66;
+  int left = atoi (argv[3]);
+  for (int waited = 0; left > 0 && waited < 10000; )
+  {
+    void *sample = NULL;
+    dds_sample_info_t info;
+    int n = dds_take (reader, &sample, &info, 1, 1);
+    if (n < 0) return 67;
+    if (n == 0) { dds_sleepfor (DDS_MSECS (1)); waited++; continue; }
+    if (info.valid_data) { if (dds_write (writer, sample) < 0) return 68; left--; }
+    if (dds_return_loan (reader, &sample, n) < 0) return 69;
+  }
+  if (left == 0 && dds_wait_for_acks (writer, DDS_SECS (5)) < 0) return 70;
+  dds_delete (participant);
+  dds_delete_qos (qos);
+  return left == 0 ? 0 : 71;
+}

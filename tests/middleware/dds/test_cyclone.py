@@ -1,0 +1,216 @@
+"""What only the Cyclone transport does: domains, interfaces, discovery, a thread, other processes."""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib import metadata
+
+import pytest
+
+pytest.importorskip("cyclonedds")
+
+from tests.middleware.dds.test_contract import TYPE, eventually, texts
+
+from golem.errors import ConfigError, MissingExtra
+from golem.middleware.dds import checks, discovery, domain, endpoints, library
+from golem.middleware.dds.base import ENCAPSULATION, DdsError, Qos
+from golem.middleware.dds.connect import connect
+from golem.middleware.dds.domain import DdsConfig, configuration
+from golem.middleware.dds.interfaces import Interface, find_interface, interfaces
+from golem.middleware.dds.participant import CycloneParticipant
+
+SAMPLE = ENCAPSULATION + b"text"
+
+
+@pytest.fixture
+def participant(domain: int) -> Iterator[CycloneParticipant]:
+    member = connect(DdsConfig(domain), "enclave=/;")
+    yield member
+    member.close()
+
+
+@pytest.mark.parametrize("number", [-1, 233])
+def test_a_domain_that_does_not_exist_is_refused(number: int) -> None:
+    with pytest.raises(ConfigError, match="choose one of 0 to 232"):
+        DdsConfig(number)
+
+
+def test_the_robots_domain_must_be_meant() -> None:
+    with pytest.raises(ConfigError, match=r"0 is the real robot's.*--robot"):
+        DdsConfig(0)
+    assert DdsConfig(0, robot=True).domain == 0
+
+
+def test_a_wrong_interface_is_named_with_those_there_are(domain: int) -> None:
+    loopback = find_interface("lo")
+    assert loopback.loopback and loopback in interfaces()
+    with pytest.raises(ConfigError, match=rf"'lol'; valid: .*{loopback.name}"):
+        connect(DdsConfig(domain, interface="lol"))
+
+
+def test_an_interface_without_multicast_needs_peers(monkeypatch: pytest.MonkeyPatch) -> None:
+    tunnel = Interface("tun0", loopback=False, multicast=False)
+    monkeypatch.setattr(domain, "find_interface", lambda name: tunnel)
+    with pytest.raises(DdsError, match=r"'tun0' has no multicast.*peers"):
+        connect(DdsConfig(9, interface="tun0"))
+    assert '<Peer address="10.0.0.7"/>' in configuration(tunnel, ("10.0.0.7",))
+
+
+def test_participants_of_a_process_share_a_domain_on_the_same_terms(
+    participant: CycloneParticipant, domain: int
+) -> None:
+    with pytest.raises(DdsError, match="already open"):
+        connect(DdsConfig(domain, peers=("127.0.0.1",)))
+    second = connect(DdsConfig(domain))
+    second.close()
+    assert len(discovery.members(participant)) == 1
+    participant.close()
+    connect(DdsConfig(domain, peers=("127.0.0.1",))).close()
+
+
+def test_a_participant_can_be_closed_from_its_callback(participant: CycloneParticipant) -> None:
+    reader = participant.reader("rt/a", TYPE, Qos(), on_data=participant.close)
+    participant.writer("rt/a", TYPE, Qos()).write(SAMPLE)
+    eventually(lambda: _is_closed(participant))
+    with pytest.raises(DdsError, match="closed"):
+        reader.take()
+
+
+def _is_closed(participant: CycloneParticipant) -> bool:
+    try:
+        participant.writer("rt/b", TYPE, Qos())
+    except DdsError:
+        return True
+    return False
+
+
+def test_a_callback_that_raises_is_logged_and_called_again(
+    participant: CycloneParticipant, caplog: pytest.LogCaptureFixture
+) -> None:
+    calls: list[int] = []
+    second: list[str] = []
+
+    def on_data() -> None:
+        calls.append(1)
+        if len(calls) == 1:
+            raise RuntimeError("first")
+        second.extend(texts(reader.take()))
+
+    reader = participant.reader("rt/a", TYPE, Qos(), on_data=on_data)
+    writer = participant.writer("rt/a", TYPE, Qos())
+    with caplog.at_level(logging.ERROR):
+        writer.write(SAMPLE)
+        eventually(lambda: "callback of 'rt/a' failed" in caplog.text)
+    writer.write(ENCAPSULATION + b"more")
+    eventually(lambda: second)
+    assert second == ["more"] and len(calls) == 2
+
+
+def test_discovery_tells_who_is_there(participant: CycloneParticipant, domain: int) -> None:
+    other = connect(DdsConfig(domain))
+    qos = Qos(reliable=False, transient_local=True, depth=3)
+    writer = participant.writer("rt/a", TYPE, qos, "typehash=x;")
+    reader = other.reader("rt/b", TYPE, Qos(depth=None))
+    try:
+        (wrote,), (read,) = discovery.writers(other), discovery.readers(other)
+        assert {m.guid: m.user_data for m in discovery.members(other)} == {
+            participant.guid: "enclave=/;",
+            other.guid: "",
+        }
+        assert (wrote.topic, wrote.type_name, wrote.qos, wrote.user_data) == (
+            "rt/a",
+            TYPE,
+            qos,
+            "typehash=x;",
+        )
+        assert (wrote.guid, wrote.participant) == (writer.guid, participant.guid)
+        assert (read.topic, read.qos, read.guid) == ("rt/b", Qos(depth=None), reader.guid)
+    finally:
+        other.close()
+
+
+def test_nobody_there_is_said_with_the_reason(participant: CycloneParticipant, domain: int) -> None:
+    reader = participant.reader("rt/a", TYPE, Qos())
+
+    def wait() -> None:
+        checks.wait_for_peer(participant, reader, "start it", 0.02)
+
+    where = rf"\(domain {domain}, interface lo, 0.02 s\); start it\."
+    with pytest.raises(DdsError, match="Nobody else is on the DDS domain " + where):
+        wait()
+    other = connect(DdsConfig(domain))
+    with pytest.raises(DdsError, match="Of 1 others on the DDS domain nobody writes 'rt/a' " + where):
+        wait()
+    other.writer("rt/a", "wrong", Qos())
+    with pytest.raises(DdsError, match=rf"Somebody writes 'rt/a' as 'wrong', not as '{TYPE}'"):
+        wait()
+    other.close()
+    other = connect(DdsConfig(domain))
+    other.writer("rt/a", TYPE, Qos(reliable=False))
+    with pytest.raises(
+        DdsError, match="offers best effort, volatile, its reader requests reliable, volatile"
+    ):
+        wait()
+    other.writer("rt/a", TYPE, Qos()).write(SAMPLE)
+    wait()
+    other.close()
+
+
+def test_the_self_test_sees_structs_of_another_layout(monkeypatch: pytest.MonkeyPatch) -> None:
+    checks.self_test.cache_clear()
+
+    shifted = struct.Struct("@III?xxxxxxxxqQQ5I4x")
+    monkeypatch.setattr(endpoints, "_INFO", shifted)
+    monkeypatch.setattr(endpoints, "SampleInfo", ctypes.c_ubyte * shifted.size)
+    with pytest.raises(DdsError, match="does not give back what it was sent"):
+        checks.self_test()
+    monkeypatch.undo()
+    checks.self_test()
+
+
+def test_another_series_of_cyclone_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    library.cyclone.cache_clear()
+    monkeypatch.setattr(metadata, "version", lambda name: "11.1.0")
+    with pytest.raises(DdsError, match=r"11\.1\.0 is installed.*pip install 'cyclonedds>="):
+        library.cyclone()
+    monkeypatch.undo()
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(MissingExtra, match=r"golem-humanoid\[dds\]"):
+        library.cyclone()
+
+
+OTHER = """
+import sys
+from golem.middleware.dds.base import Qos
+from golem.middleware.dds.checks import wait_for_peer
+from golem.middleware.dds.connect import connect
+from golem.middleware.dds.domain import DdsConfig
+participant = connect(DdsConfig(int(sys.argv[1])))
+writer = participant.writer("rt/a", sys.argv[2], Qos(depth=None))
+wait_for_peer(participant, writer, "be there", 10.0)
+for i in range(500):
+    writer.write(b"\\0\\1\\0\\0" + str(i).encode())
+sys.stdin.read()
+"""
+
+
+def test_another_process_sends_all_and_leaves_at_its_end(
+    participant: CycloneParticipant, domain: int
+) -> None:
+    reader = participant.reader("rt/a", TYPE, Qos(depth=None))
+    arguments = [sys.executable, "-c", OTHER, str(domain), TYPE]
+    other = subprocess.Popen(arguments, stdin=subprocess.PIPE)
+    try:
+        got: list[str] = []
+        eventually(lambda: got.extend(texts(reader.take())) or len(got) >= 500)
+        assert got == [str(i) for i in range(500)]
+        other.communicate(timeout=10.0)  # It ends without closing anything: its exit handler does.
+        assert other.returncode == 0
+        eventually(lambda: not reader.matched())
+    finally:
+        other.kill()

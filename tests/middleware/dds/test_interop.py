@@ -1,0 +1,94 @@
+"""Cyclone DDS 0.10, as the vendor's SDK and ROS 2 Humble to Kilted use it, on topics of ours, in both directions.
+
+A peer with generated types reads what we write, writes it again, and must exit with 0: a topic with type information
+would make it crash. What comes back must be what was sent, to the byte.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("cyclonedds")
+
+from tests.middleware.dds.cdr import MESSAGES, message
+
+from golem.middleware.dds.base import Qos
+from golem.middleware.dds.connect import connect
+from golem.middleware.dds.domain import DdsConfig
+
+PEER = Path(__file__).parent / "peer"
+COUNT = 20
+OLD_PYTHON = "GOLEM_OLD_CYCLONE_PYTHON"
+URI = '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces></General></Domain></CycloneDDS>'
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def c_peer(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    if not shutil.which("idlc") or not shutil.which("gcc"):
+        pytest.skip("needs Cyclone DDS 0.10 in C: apt-get install gcc cyclonedds-dev cyclonedds-tools")
+    version = subprocess.run(["idlc", "-v"], capture_output=True, text=True, check=False)
+    if "0.10" not in version.stdout + version.stderr:
+        pytest.skip("needs Cyclone DDS 0.10 in C; the idlc found first is another: " + version.stdout)
+    work = tmp_path_factory.mktemp("c_peer")
+    for command in (
+        ["idlc", str(PEER / "messages.idl")],
+        ["gcc", "-I.", str(PEER / "peer.c"), "messages.c", "-lddsc", "-o", "peer"],
+    ):
+        subprocess.run(command, cwd=work, check=True, capture_output=True)
+    return [str(work / "peer")]
+
+
+@pytest.fixture(scope="module")
+def python_peer(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    python = os.environ.get(OLD_PYTHON, "")
+    if not python:
+        pytest.skip(f"needs {OLD_PYTHON}=PATH of a Python 3.10 that has the wheel cyclonedds==0.10.2")
+    work = tmp_path_factory.mktemp("python_peer")
+    tools = Path(python).parent
+    path = f"{tools}{os.pathsep}{os.environ['PATH']}"
+    subprocess.run(
+        [str(tools / "idlc"), "-l", "py", str(PEER / "messages.idl")],
+        cwd=work,
+        env={**os.environ, "PATH": path},
+        check=True,
+        capture_output=True,
+    )
+    shutil.copy(PEER / "peer.py", work)
+    return [python, str(work / "peer.py")]
+
+
+@pytest.mark.parametrize("language", ["c", "python"])
+@pytest.mark.parametrize("type_name", MESSAGES)
+def test_an_old_peer_reads_and_writes_our_topics(
+    type_name: str, language: str, domain: int, request: pytest.FixtureRequest
+) -> None:
+    command: list[str] = request.getfixturevalue(f"{language}_peer")
+    sent = [message(type_name, seed) for seed in range(COUNT)]
+    participant = connect(DdsConfig(domain))
+    reader = participant.reader("rt/back", type_name, Qos(depth=None))
+    writer = participant.writer("rt/there", type_name, Qos(depth=None))
+    arguments = [*command, str(domain), type_name, str(COUNT)]
+    peer = subprocess.Popen(arguments, env={**os.environ, "CYCLONEDDS_URI": URI})
+    back: list[bytes] = []
+    try:
+        end = time.monotonic() + 20.0
+        while not (writer.matched() and reader.matched()) and peer.poll() is None and time.monotonic() < end:
+            time.sleep(0.01)
+        for payload in sent:
+            writer.write(payload)
+        while len(back) < COUNT and time.monotonic() < end:
+            back += [sample.payload for sample in reader.take() if sample.alive]
+            time.sleep(0.005)
+        assert peer.wait(timeout=15.0) == 0
+    finally:
+        peer.kill()
+        participant.close()
+    assert [got[4 : len(payload)] for got, payload in zip(back, sent, strict=True)] == [p[4:] for p in sent]
+    assert all(len(got) - len(payload) < 4 for got, payload in zip(back, sent, strict=True))
