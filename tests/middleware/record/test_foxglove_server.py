@@ -13,6 +13,7 @@ pytest.importorskip("rosbags")
 
 from rosbags.typesys import Stores, get_typestore
 from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
 
 from golem.errors import ConfigError
 from golem.middleware.dds.base import DEFAULT, LATCHED, Qos
@@ -73,7 +74,7 @@ def server() -> Iterator[FoxgloveServer]:
 
 @pytest.fixture
 def viewer(server: FoxgloveServer) -> Iterator[Viewer]:
-    with connect(server.url, subprotocols=["foxglove.sdk.v1"]) as socket:  # pyright: ignore[reportArgumentType]
+    with connect(server.url, subprotocols=[Subprotocol("foxglove.sdk.v1")]) as socket:
         assert isinstance(socket, ClientConnection)
         yield Viewer(socket)
 
