@@ -25,7 +25,8 @@ from golem.middleware.dds.domain import DdsConfig
 PEER = Path(__file__).parent / "peer"
 COUNT = 20
 OLD_PYTHON = "GOLEM_OLD_CYCLONE_PYTHON"
-URI = '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces></General></Domain></CycloneDDS>'
+LOOPBACK = '<General><Interfaces><NetworkInterface name="lo"/></Interfaces></General>'
+URI = f"<CycloneDDS><Domain>{LOOPBACK}</Domain></CycloneDDS>"
 pytestmark = pytest.mark.slow
 
 

@@ -46,16 +46,15 @@ def test_a_callback_that_takes_one_by_one_is_called_until_nothing_is_left(
     participant: LocalParticipant,
 ) -> None:
     taken: list[int] = []
-    ready = False
-
-    def on_data() -> None:
-        if ready:
-            taken.append(len(reader.take(1)))
-
-    reader = participant.reader("rt/a", TYPE, Qos(), on_data=on_data)
+    ready: list[bool] = []
+    reader = participant.reader(
+        "rt/a", TYPE, Qos(), on_data=lambda: taken.append(len(reader.take(1))) if ready else None
+    )
     writer = participant.writer("rt/a", TYPE, Qos())
-    for ready in (False, False, False, True):
+    for _ in range(3):
         writer.write(SAMPLE)
+    ready.append(True)
+    writer.write(SAMPLE)
     assert taken == [1, 1, 1, 1]
 
 
