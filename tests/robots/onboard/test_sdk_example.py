@@ -31,7 +31,7 @@ DEADLINE = 40.0
 DURATION, DT = 3.0, 0.002
 """Time over which the example moves to zero, and its period [s]; both as its source says."""
 
-Q: Array = np.where(np.arange(NUM_JOINTS) % 2, -1.0, 1.0) * (1.0 + np.arange(NUM_JOINTS)) / 32.0
+Q: Array = np.cos(np.pi * np.arange(NUM_JOINTS)) * np.linspace(0.1, 0.9, NUM_JOINTS)
 """A posture that tells every joint and its sign apart [rad]."""
 
 
