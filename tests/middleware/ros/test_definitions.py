@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rosbags")
+
+from golem.middleware.ros import definitions, generate
+
+ROOT = Path(__file__).resolve().parents[3]
+PACKAGE = definitions.SHARE / "golem_interfaces"
+SECTIONS = definitions.sections()
+TYPES: dict[str, definitions.Definition] = definitions.load("jazzy").fielddefs  # type: ignore[assignment]
+OF_GOLEM = [name for name in SECTIONS if name.startswith("golem_interfaces/")]
+
+
+def test_the_folder_for_colcon_is_the_one_in_the_package() -> None:
+    assert (ROOT / "ros").resolve() == definitions.SHARE
+
+
+def test_a_file_is_split_at_its_separators() -> None:
+    assert definitions.split("int32 a\n---\nint32 b\n --- \n") == ["int32 a\n", "int32 b\n", ""]
+
+
+def test_cmake_builds_every_file_and_no_other() -> None:
+    listed = set(re.findall(r'"((?:msg|srv|action)/\w+\.\w+)"', (PACKAGE / "CMakeLists.txt").read_text()))
+    there = {str(path.relative_to(PACKAGE)) for path in PACKAGE.glob("*/*")}
+    assert listed == there
+
+
+def test_the_package_depends_on_what_its_types_are_made_of() -> None:
+    package = ElementTree.parse(PACKAGE / "package.xml").getroot()
+    declared = {element.text for element in package.findall("depend")}
+    used = {other.split("/")[0] for name in OF_GOLEM for other in definitions.nested(TYPES[name][1])}
+    assert used - {"golem_interfaces"} <= declared
+    cmake = (PACKAGE / "CMakeLists.txt").read_text()
+    assert all(f"find_package({name} REQUIRED)" in cmake for name in declared)
+    assert set(re.findall(r"DEPENDENCIES (.*)\n", cmake)[0].split()) == declared
+
+
+def test_the_package_has_the_version_of_the_software() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    version = ElementTree.parse(PACKAGE / "package.xml").getroot().findtext("version")
+    assert version == project["version"]
+
+
+@pytest.mark.parametrize("name", OF_GOLEM)
+def test_every_field_of_ours_says_what_it_is(name: str) -> None:
+    for line in SECTIONS[name].splitlines():
+        if line.strip() and not line.startswith("#") and not name.endswith(("_Result", "_Feedback")):
+            assert "#" in line or "LocalizedObject[]" in line, line
+        assert len(line) <= 120
+
+
+@pytest.mark.parametrize("name", OF_GOLEM)
+def test_names_are_those_that_rosidl_allows(name: str) -> None:
+    # rosidl_adapter, parser.py: VALID_MESSAGE_NAME_PATTERN, VALID_FIELD_NAME_PATTERN, VALID_CONSTANT_NAME_PATTERN
+    constants, fields = TYPES[name]
+    stem = name.rsplit("/", 1)[1].split("_")[0]
+    assert re.fullmatch("[A-Z][A-Za-z0-9]*", stem)
+    for field, _ in fields:
+        assert re.fullmatch("(?!.*__)(?!.*_$)[a-z][a-z0-9_]*", field)
+    for constant, *_ in constants:
+        assert re.fullmatch("(?!.*__)(?!.*_$)[A-Z]([A-Z0-9_]?[A-Z0-9]+)*", constant)
+
+
+def test_the_generated_classes_are_current() -> None:
+    # If this fails: python -m golem.middleware.ros.generate
+    kept = {path.name: path.read_text() for path in generate.MSGS.glob("*.py") if path.name != "__init__.py"}
+    assert kept == generate.modules()
+
+
+def test_the_generated_classes_need_no_rosbags() -> None:
+    code = (
+        "import sys; sys.modules['rosbags'] = None\n"
+        "from golem.middleware.ros.msgs import golem_interfaces\n"
+        "assert golem_interfaces.SafetyStatus(state='active').state == golem_interfaces.SafetyStatus.ACTIVE"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_a_definition_reads_back_as_the_same_type() -> None:
+    from rosbags.typesys import get_types_from_msg
+
+    for name in ("sensor_msgs/msg/CameraInfo", "golem_interfaces/msg/Sightings", "unitree_hg/msg/LowState"):
+        read = get_types_from_msg(definitions.text(name, TYPES), name)
+        assert all(list(fields) == TYPES[each][1] for each, (_, fields) in read.items())
+        assert name in read and len(read) > 1
