@@ -98,14 +98,18 @@ def test_a_violation_must_persist(
     assert reasons == [None] * (needed - 1) + [reason]
 
 
-@pytest.mark.parametrize("reason", [Reason.VELOCITY, Reason.BRAKING])
-def test_legs_may_be_fast_for_longer_because_feet_touch_down(
+@pytest.mark.parametrize("reason", [Reason.POSITION, Reason.VELOCITY, Reason.BRAKING])
+def test_legs_may_be_fast_or_at_their_stop_for_longer_because_feet_touch_down(
     reason: Reason, limits: SafetyLimits, state_at: Callable[..., LowState]
 ) -> None:
     knee = 3
     q, dq = np.zeros(27), np.zeros(27)
-    dq[knee] = 1.05 * limits.velocity[knee] if reason is Reason.VELOCITY else 0.9 * limits.velocity[knee]
-    q[knee] = 0.0 if reason is Reason.VELOCITY else limits.state_upper[knee] - 0.1
+    if reason is Reason.POSITION:
+        q[knee] = limits.state_upper[knee] + 0.02
+    elif reason is Reason.VELOCITY:
+        dq[knee] = 1.05 * limits.velocity[knee]
+    else:
+        q[knee], dq[knee] = limits.state_upper[knee] - 0.1, 0.9 * limits.velocity[knee]
     reasons = persistent(state_at(0.0, q=q, dq=dq), limits, limits.leg_samples)
     assert reasons == [None] * (limits.leg_samples - 1) + [reason]
 

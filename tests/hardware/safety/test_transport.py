@@ -8,7 +8,7 @@ from tests.hardware.conftest import Bench
 from golem.hardware.safety.base import Fault, GateState, Reason, Request
 
 
-@pytest.mark.parametrize("reason", [Reason.WRITERS, Reason.STATE_CRC, Reason.COMMAND_CRC])
+@pytest.mark.parametrize("reason", [Reason.WRITERS, Reason.STATE_DAMAGED, Reason.COMMAND_DAMAGED])
 def test_one_fault_of_the_transport_stops_and_is_latched(bench: Bench, reason: Reason) -> None:
     bench.activate()
     result = bench.tick(transport=Fault(reason, "by whom"))

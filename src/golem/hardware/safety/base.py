@@ -56,8 +56,8 @@ class Reason(StrEnum):
     TILT = "tilt"
     BASE_STALE = "base_estimate_stale"
     WRITERS = "two_writers"
-    STATE_CRC = "state_checksum"
-    COMMAND_CRC = "command_checksum"
+    STATE_DAMAGED = "state_damaged"
+    COMMAND_DAMAGED = "command_damaged"
     COMMAND_MISSING = "command_never_seen"
     COMMAND_STALE = "command_stale"
     COMMAND_TIME = "command_time_invalid"
@@ -115,10 +115,10 @@ class SafetyLimits:
         command_age: age of the command that stops the robot [s] [own].
         future: how far ahead of the clock a stamp may be [s] [own].
         samples: consecutive bad samples of position, speed, braking distance or tilt that stop the robot [own].
-        leg_samples: the same for speed and braking distance of the legs, which peak at every touch-down, and whose
-            stop is a fall [own].
-        torque_samples: the same for torque [own: the gate predicts it from a state as old as the command is late, and
-            a push is over before 50 ms at the motor's own limit harm it].
+        leg_samples: the same for position, speed and braking distance of the legs, whose stop is a fall [own: a foot
+            that slaps down after a push turns an ankle half a radian in 50 ms, and may come to its stop].
+        torque_samples: the same for torque [own: it is bounded below the motors' peak anyway, by a prediction from a
+            state as old as the command is late; the legs stand a push at that bound for a tenth of a second].
         gross: multiple of the velocity limit, and violation of the position range [rad], that no sensor noise
             explains and that one sample of suffices [own].
         damping_time: how long STOP1 damps before STOP0 [s] [own: arms have sunk after 2 s].
@@ -146,8 +146,8 @@ class SafetyLimits:
     command_age: float = 0.100
     future: float = 0.005
     samples: int = 3
-    leg_samples: int = 10
-    torque_samples: int = 25
+    leg_samples: int = 25
+    torque_samples: int = 50
     gross: float = 3.0
     damping_time: float = 3.0
     longest_tick: float = 0.010
@@ -219,6 +219,7 @@ class Counters:
     """Consecutive bad samples of each check."""
 
     position: int = 0
+    leg_position: int = 0
     velocity: int = 0
     leg_velocity: int = 0
     torque: int = 0

@@ -71,13 +71,15 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
     beyond_range = (rest > limits.state_upper) | (rest < limits.state_lower)
     fast, over = count(quick), count(beyond_range)
     strong = count(load > limits.torque)
-    out = count(q > limits.state_upper) + count(q < limits.state_lower)
+    outside = np.maximum(q - limits.state_upper, limits.state_lower - q)
+    out = count(outside > 0.0)
     tilted = angle > limits.tilt
     if not (fast or strong or over or out or tilted):
         return _SOUND, None
 
     new = Counters(
-        position=counters.position + 1 if out else 0,
+        position=counters.position + 1 if out and outside[UPPER].max() > 0.0 else 0,
+        leg_position=counters.leg_position + 1 if out and outside[LEGS].max() > 0.0 else 0,
         velocity=counters.velocity + 1 if quick[UPPER].any() else 0,
         leg_velocity=counters.leg_velocity + 1 if quick[LEGS].any() else 0,
         torque=counters.torque + 1 if strong else 0,
@@ -85,11 +87,10 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
         leg_braking=counters.leg_braking + 1 if beyond_range[LEGS].any() else 0,
         tilt=counters.tilt + 1 if tilted else 0,
     )
-    outside = np.maximum(q - limits.state_upper, limits.state_lower - q)
     beyond = np.maximum(rest - limits.state_upper, limits.state_lower - rest)
     ratio = speed / limits.velocity
     n, legs = limits.samples, limits.leg_samples
-    if out and (new.position >= n or outside.max() > limits.gross):
+    if new.position >= n or new.leg_position >= legs or outside.max() > limits.gross:
         return new, Fault(Reason.POSITION, _worst(outside, lambda i: f"at {q[i]:.3f} rad"))
     if fast and (new.velocity >= n or new.leg_velocity >= legs or ratio.max() > limits.gross):
         return new, Fault(Reason.VELOCITY, _worst(ratio, lambda i: f"at {dq[i]:.2f} rad/s"))
