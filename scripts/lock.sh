@@ -17,7 +17,10 @@ compile pyproject.toml --all-extras --no-header --output-file "$together" "$@"
 
 compile pyproject.toml --constraints "$together" --output-file requirements/core.txt "$@"
 compile pyproject.toml --constraints "$together" --extra pink --output-file requirements/pink.txt "$@"
+compile pyproject.toml --constraints "$together" --extra dds --output-file requirements/dds.txt "$@"
+compile pyproject.toml --constraints "$together" --extra record --extra foxglove --output-file requirements/record.txt "$@"
 compile pyproject.toml --constraints "$together" --extra train --output-file requirements/train.txt "$@"
 compile pyproject.toml --constraints "$together" --extra docs --output-file requirements/docs.txt "$@"
-compile pyproject.toml --constraints "$together" --extra dev --extra pink --output-file requirements/dev.txt "$@"
+compile pyproject.toml --constraints "$together" --extra dev --extra pink --extra dds --extra record --extra foxglove \
+    --output-file requirements/dev.txt "$@"
 echo "uv>=0.13,<0.14" | compile - --output-file requirements/uv.txt "$@"
