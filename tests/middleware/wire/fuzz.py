@@ -155,7 +155,8 @@ def attack(target: Target, count: int, seed: int = 0) -> tuple[int, int]:
     taken = refused = 0
     for payload in payloads(target, count, seed):
         try:
-            target.decode(payload)
+            with np.errstate(all="raise"):
+                target.decode(payload)
             taken += 1
         except WireError:
             refused += 1

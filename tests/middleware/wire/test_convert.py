@@ -175,7 +175,7 @@ def inertial(field: str, value: Any) -> Callable[[Any], None]:
         ("state", motor("q", np.nan), "q of motor 26"),
         ("state", motor("tau_est", -np.inf), "tau_est of motor 26"),
         ("state", inertial("quaternion", 0.0), "no unit quaternion"),
-        ("state", inertial("quaternion", np.nan), "no unit quaternion"),
+        ("state", inertial("quaternion", np.nan), "not finite"),
         ("command", motor("kp", np.inf), "kp of motor 26"),
         ("command", whole("mode_pr", 1), "mode_pr 1"),
         ("command", whole("mode_machine", 5), "copy it from the LowState"),

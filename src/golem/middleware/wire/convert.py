@@ -69,9 +69,9 @@ def decode_low_state(payload: Payload) -> LowState:
         WireError: encapsulation, length or checksum is wrong, a value is not finite, or the quaternion is none.
     """
     image = _checked(payload, hg.LOW_STATE, hg.STATE_CHECKSUM)
-    measured = image["motor"]["measured"][:NUM_JOINTS].astype(np.float64)
+    measured = image["motor"]["measured"][:NUM_JOINTS]
     _check_motors(measured, ("q", "dq", "ddq", "tau_est"), hg.LOW_STATE)
-    q, dq, _, tau = np.ascontiguousarray(measured.T)
+    q, dq, _, tau = measured.T.astype(np.float64, order="C")
     return LowState(int(image["tick"]) / _TICKS, q, dq, tau, _read_imu(image["imu"], hg.LOW_STATE))
 
 
@@ -135,12 +135,12 @@ def decode_low_command(payload: Payload, t: float, mode_machine: int = MODE_MACH
             "copy it from the LowState."
         )
     motor = image["motor"][:NUM_JOINTS]
-    target = motor["target"].astype(np.float64)
+    target = motor["target"].copy()
     off = motor["mode"] != hg.ENABLE
     off[0] = image["first_mode"] != hg.ENABLE
     target[off] = 0.0
     _check_motors(target, ("q", "dq", "tau", "kp", "kd"), hg.LOW_CMD)
-    return LowCommand(t, *np.ascontiguousarray(target.T))
+    return LowCommand(t, *target.T.astype(np.float64, order="C"))
 
 
 def answered(payload: Payload) -> float:
@@ -217,11 +217,10 @@ def _fill_imu(image: Image, imu: Imu, layout: Layout) -> None:
 
 
 def _read_imu(image: Image, layout: Layout) -> Imu:
-    quat = image["quaternion"].astype(np.float64)
-    gyro = image["gyroscope"].astype(np.float64)
-    acc = image["accelerometer"].astype(np.float64)
-    if not (np.isfinite(gyro).all() and np.isfinite(acc).all()):
-        raise WireError(f"The IMU in a {layout.type_name} is not finite: gyro {gyro}, acc {acc}.")
-    if not abs(float(quat @ quat) - 1.0) < 2.0 * _UNIT:  # so that NaN is refused too
+    values = [image[name] for name in ("quaternion", "gyroscope", "accelerometer")]
+    if not all(np.isfinite(value).all() for value in values):  # a cast of a signalling NaN would warn
+        raise WireError(f"The IMU in a {layout.type_name} is not finite: {values}.")
+    quat, gyro, acc = (value.astype(np.float64) for value in values)
+    if abs(float(quat @ quat) - 1.0) > 2.0 * _UNIT:
         raise WireError(f"The quaternion of the IMU in a {layout.type_name} is no unit quaternion: {quat}.")
     return Imu(quat, gyro, acc)
