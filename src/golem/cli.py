@@ -88,7 +88,7 @@ def _model(words: list[str]) -> int:
 
 
 def _bench(words: list[str]) -> int:
-    """Print every performance figure beside its reference; `bench push|legs|estimation` test robots on their feet."""
+    """Print every performance figure beside its reference; `bench push|legs|estimation|dds` test one thing each."""
     _prepare_graphics()
     if words[:1] == ["push"]:
         from golem.evaluation.push_bench import PushBenchConfig, run_push_bench
@@ -102,6 +102,10 @@ def _bench(words: list[str]) -> int:
         from golem.evaluation.estimation import EstimationConfig, run_estimation
 
         run_estimation(_parse(EstimationConfig, "bench estimation", words[1:]))
+    elif words[:1] == ["dds"]:
+        from golem.evaluation.dds_bench import DdsBenchConfig, run_dds_bench
+
+        run_dds_bench(_parse(DdsBenchConfig, "bench dds", words[1:]))
     else:
         from golem.evaluation.bench import BenchConfig, run_bench
 
