@@ -130,7 +130,7 @@ def test_messages_of_other_types_are_refused(pair: Pair) -> None:
     _, work = pair.send()
     work.execute()
     for call in (work.succeed, work.feedback, pair.client.send_goal):
-        with pytest.raises(CodecError, match="wants a golem_interfaces/action/Pick"):
+        with pytest.raises(CodecError, match="takes a golem_interfaces/action/Pick"):
             call(SkillResult())
     assert work.status is GoalStatus.EXECUTING
 

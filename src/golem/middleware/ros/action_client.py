@@ -12,11 +12,21 @@ from golem.middleware.ros import codec, names
 from golem.middleware.ros.base import Canceling, ClientGoal, Outcome
 from golem.middleware.ros.endpoints import Endpoints
 from golem.middleware.ros.future import Future, RosError
-from golem.middleware.ros.goal_info import CANCEL_GOAL, SECOND, STATUS_ARRAY, from_uuid, goal_info, to_uuid
-from golem.middleware.ros.goals import NO_ID, CancelCode, GoalStatus
+from golem.middleware.ros.goal_info import (
+    CANCEL_GOAL,
+    SECOND,
+    STATUS_ARRAY,
+    canceling,
+    from_uuid,
+    goal_info,
+    goal_status,
+    to_uuid,
+)
+from golem.middleware.ros.goals import NO_ID, GoalStatus
 from golem.middleware.ros.message import CodecError
-from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, CancelGoal_Response, GoalStatusArray
+from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, GoalStatusArray
 from golem.middleware.ros.service import DdsClient
+from golem.middleware.ros.typed import check
 
 
 class DdsClientGoal:
@@ -101,10 +111,7 @@ class DdsActionClient:
             CodecError: it is not of the action's type.
             RosError: the id is not 16 bytes, or that of a goal in use.
         """
-        if not isinstance(goal, self._type.Goal):
-            raise CodecError(
-                f"Action '{self.name}' wants a {self._type.Goal.__msgtype__}, not {type(goal).__name__}."
-            )
+        check(f"Action '{self.name}'", goal, self._type.Goal)
         id = uuid.uuid4().bytes if id is None else id
         if len(id) != 16 or id == NO_ID or id in self._goals:
             raise RosError(
@@ -118,13 +125,13 @@ class DdsActionClient:
     def cancel(self, id: bytes = NO_ID, before: float = 0.0) -> Future[Canceling]:
         """Ask to cancel goals; see `base.ActionClient.cancel`."""
         request = CancelGoal_Request(goal_info(id, int(before * SECOND)))
-        return self._cancel.call(request).map(_canceling)
+        return self._cancel.call(request).map(canceling)
 
     def get_result(self, goal: DdsClientGoal) -> Future[Outcome]:
         """Ask for the outcome of `goal`."""
 
         def outcome(response: Any) -> Outcome:
-            status = _status(response.status)
+            status = goal_status(response.status)
             goal.learn(status)
             return Outcome(status, response.result)
 
@@ -155,19 +162,4 @@ class DdsActionClient:
         for entry in message.status_list:
             goal = self._goals.get(from_uuid(entry.goal_info.goal_id))
             if goal is not None:
-                goal.learn(_status(entry.status))
-
-
-def _canceling(response: CancelGoal_Response) -> Canceling:
-    try:
-        code = CancelCode(response.return_code)
-    except ValueError:  # a code of the future is no consent
-        code = CancelCode.REJECTED
-    return Canceling(code, tuple(from_uuid(info.goal_id) for info in response.goals_canceling))
-
-
-def _status(number: int) -> GoalStatus:
-    try:
-        return GoalStatus(number)
-    except ValueError:
-        return GoalStatus.UNKNOWN
+                goal.learn(goal_status(entry.status))

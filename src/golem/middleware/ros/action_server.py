@@ -27,10 +27,10 @@ from golem.middleware.ros.goal_info import (
     to_uuid,
 )
 from golem.middleware.ros.goals import NO_ID, CancelCode, GoalEvent, GoalState, GoalStatus, GoalTable
-from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, CancelGoal_Response, GoalStatusArray
 from golem.middleware.ros.msgs.action_msgs import GoalStatus as StatusMessage
 from golem.middleware.ros.service import Origin, Responder
+from golem.middleware.ros.typed import check, serialize
 
 MAX_WAITING = 100
 """Requests for the result of one goal that are remembered; beyond it the oldest stays unanswered."""
@@ -143,9 +143,8 @@ class DdsActionServer:
             RosError: it cannot end so in its present state.
             CodecError: the result is not of the action's type.
         """
-        self._check(result, self._type.Result)
         # First, so that a result that cannot be sent does not end the goal.
-        codec.serialize(result)
+        serialize(f"Action '{self.name}'", result, self._type.Result)
         self.update(goal, event)
         response = codec.serialize(self._type.GetResult.Response(int(goal.status), result))
         self._results[goal.id] = response
@@ -160,18 +159,12 @@ class DdsActionServer:
             RosError: the goal has ended.
             CodecError: the feedback is not of the action's type.
         """
-        self._check(feedback, self._type.Feedback)
+        check(f"Action '{self.name}'", feedback, self._type.Feedback)
         if not goal.status.active:
             raise RosError(
                 f"Goal {goal.id.hex()} is {goal.status.name.lower()}: there is no feedback on it any more."
             )
         self._feedback.write(codec.serialize(self._type.FeedbackMessage(to_uuid(goal.id), feedback)))
-
-    def _check(self, message: Any, kind: type[Any]) -> None:
-        if not isinstance(message, kind):
-            raise CodecError(
-                f"Action '{self.name}' wants a {kind.__msgtype__} here, not {type(message).__name__}."
-            )
 
     def _stamp(self) -> int:
         return int(self._now() * SECOND)

@@ -41,7 +41,7 @@ class Subscription(Protocol):
     """Receives the messages of one topic."""
 
     def latest(self) -> Any | None:
-        """Return the newest message, or None before the first; needs no spinning."""
+        """Return the newest message, or None before the first; over DDS this needs no spinning."""
         ...
 
     def count(self) -> int:

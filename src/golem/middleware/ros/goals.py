@@ -75,6 +75,20 @@ MAX_ENDED = 1000
 """Ended goals that are remembered at most; beyond it the oldest is forgotten before its time."""
 
 
+def after(id: bytes, status: GoalStatus, event: GoalEvent) -> GoalStatus:
+    """Return what becomes of the goal with this `id` and `status` by `event`.
+
+    Raises:
+        RosError: it cannot happen in this state.
+    """
+    if (status, event) not in TRANSITIONS:
+        valid = ", ".join(e.value for s, e in TRANSITIONS if s is status) or "nothing"
+        raise RosError(
+            f"Goal {id.hex()} is {status.name.lower()}: '{event.value}' cannot happen to it; what can: {valid}."
+        )
+    return TRANSITIONS[status, event]
+
+
 class GoalState:
     """One goal's state.
 
@@ -100,14 +114,7 @@ class GoalState:
         Raises:
             RosError: it cannot happen in the present state.
         """
-        status = TRANSITIONS.get((self.status, event))
-        if status is None:
-            valid = ", ".join(e.value for s, e in TRANSITIONS if s is self.status) or "nothing"
-            raise RosError(
-                f"Goal {self.id.hex()} is {self.status.name.lower()}: '{event.value}' cannot happen to it; "
-                f"what can: {valid}."
-            )
-        self.status = status
+        self.status = after(self.id, self.status, event)
 
 
 class GoalTable:

@@ -13,7 +13,7 @@ from golem.middleware.ros.action_server import DdsActionServer
 from golem.middleware.ros.base import RESULT_TIMEOUT, ActionHandler
 from golem.middleware.ros.codec import DEFAULT as DEFAULT_DISTRO
 from golem.middleware.ros.endpoints import Endpoints
-from golem.middleware.ros.future import Future
+from golem.middleware.ros.future import Future, spin_until
 from golem.middleware.ros.graph import DiscoveryInfo
 from golem.middleware.ros.service import DdsClient, DdsService
 from golem.middleware.ros.topics import DdsPublisher, DdsSubscription
@@ -101,14 +101,7 @@ class DdsNode:
 
     def wait(self, future: Future[T], timeout: float) -> T:
         """Spin until `future` is done; see `base.Node.wait`."""
-        end = time.monotonic() + timeout
-        while not future.done:
-            left = end - time.monotonic()
-            if left <= 0.0:
-                future.cancel(f"No answer within {timeout:g} s.")
-            else:
-                self.spin_once(min(left, KEEP_PERIOD))
-        return future.result()
+        return spin_until(self, future, timeout)
 
     def close(self) -> None:
         """Close everything the node has made and leave the graph."""

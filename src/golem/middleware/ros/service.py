@@ -19,6 +19,7 @@ from golem.middleware.ros import codec, names
 from golem.middleware.ros.endpoints import Endpoints
 from golem.middleware.ros.future import Future, RosError
 from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.typed import serialize
 
 SERVICES = Qos(depth=1000)
 """ROS's service profile keeps 10; the depth is nobody else's business, and a burst of goals is larger than that."""
@@ -104,11 +105,7 @@ class DdsClient:
         Raises:
             CodecError: it is not of the service's type.
         """
-        if not isinstance(request, self._type.Request):
-            raise CodecError(
-                f"'{self.name}' is asked by {self._type.Request.__msgtype__}, not {type(request).__name__}."
-            )
-        body = codec.serialize(request)
+        body = serialize(f"Service '{self.name}'", request, self._type.Request)
         self._sequence += 1
         number = self._sequence
         future: Future[Any] = Future(lambda: self._forget(number))
@@ -234,9 +231,4 @@ class DdsService:
 
     def _answer(self, origin: Origin, request: Any) -> None:
         response = self._callback(request)
-        if not isinstance(response, self._response):
-            raise CodecError(
-                f"The service '{self.responder.name}' answers by {self._response.__msgtype__}, "
-                f"not {type(response).__name__}."
-            )
-        self.responder.reply(origin, codec.serialize(response))
+        self.responder.reply(origin, serialize(f"Service '{self.responder.name}'", response, self._response))

@@ -9,6 +9,7 @@ from golem.middleware.dds.base import Qos, Sample
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.endpoints import Endpoints
 from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.typed import serialize
 
 
 class DdsPublisher:
@@ -26,11 +27,7 @@ class DdsPublisher:
         Raises:
             CodecError: it is not of the topic's type.
         """
-        if not isinstance(message, self._kind):
-            raise CodecError(
-                f"'{self.name}' carries {self._kind.__msgtype__}; a {type(message).__name__} cannot be published on it."
-            )
-        self.writer.write(codec.serialize(message))
+        self.writer.write(serialize(f"Topic '{self.name}'", message, self._kind))
 
     def matched(self) -> int:
         """Return how many subscriptions are known to listen now."""
