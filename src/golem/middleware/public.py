@@ -107,6 +107,8 @@ def gripper(side: str, what: str) -> str:
 COLOR, COLOR_JPEG = "color/image_raw", "color/image_raw/compressed"
 DEPTH, DEPTH_PNG = "aligned_depth_to_color/image_raw", "aligned_depth_to_color/image_raw/compressedDepth"
 CAMERA_INFO = "color/camera_info"
+IMAGES = (COLOR, COLOR_JPEG, DEPTH, DEPTH_PNG, CAMERA_INFO)
+"""What there is of each camera."""
 
 
 def _camera(camera: str) -> tuple[Topic, ...]:
@@ -164,13 +166,13 @@ TOPICS: tuple[Topic, ...] = (
     Topic("/livox/imu", "sensor_msgs/msg/Imu", "robot", (), SENSOR, 200, "lidar_link",
           "IMU inside the LiDAR. Silent like /livox/lidar: it is part of that device, not of the torso's IMU."),
     *(row for side in SIDES for row in _hand(side)),
-    Topic("/api/motion_switcher/request", "unitree_api/msg/Request", "user", ("robot",), NEWEST, None, "",
+    Topic("/api/motion_switcher/request", "unitree_api/msg/Request", "user", ("robot",), DEFAULT, None, "",
           "Calls 1001 check, 1002 select, 1003 release: which on-board controller runs."),
-    Topic("/api/motion_switcher/response", "unitree_api/msg/Response", "robot", (), NEWEST, None, "",
+    Topic("/api/motion_switcher/response", "unitree_api/msg/Response", "robot", (), DEFAULT, None, "",
           "The answers."),
-    Topic("/api/loco/request", "unitree_api/msg/Request", "stack", ("robot",), NEWEST, None, "",
+    Topic("/api/loco/request", "unitree_api/msg/Request", "stack", ("robot",), DEFAULT, None, "",
           "Calls of the on-board leg controller: state, velocity."),
-    Topic("/api/loco/response", "unitree_api/msg/Response", "robot", ("stack",), NEWEST, None, "",
+    Topic("/api/loco/response", "unitree_api/msg/Response", "robot", ("stack",), DEFAULT, None, "",
           "The answers."),
     Topic("/safety/lowcmd_in", "unitree_hg/msg/LowCmd", "stack", ("safety",), LOW, 500, "",
           "What the stack wants of the motors, for the gate to judge. reserve[0] repeats the tick of the state "

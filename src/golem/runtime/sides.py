@@ -114,14 +114,12 @@ class SafetySide:
         gate: the one of them that runs the gate.
     """
 
-    def __init__(self, bus: Bus, limits: SafetyLimits, estop: EmergencyStop) -> None:
-        """Enforce `limits`, under `estop`."""
-        self._bus = bus
+    def __init__(self, bus: Bus, limits: SafetyLimits, estop: EmergencyStop | None) -> None:
+        """Enforce `limits`, under `estop`; without one the gate stays shut."""
         self.gate = nodes.SafetyNode(bus, limits)
-        self.nodes: list[Placed] = [
-            (Phase.PROTECT, nodes.EstopNode(bus, estop)),
-            (Phase.PROTECT, self.gate),
-        ]
+        self.nodes: list[Placed] = [(Phase.PROTECT, self.gate)]
+        if estop is not None:
+            self.nodes.insert(0, (Phase.PROTECT, nodes.EstopNode(bus, estop)))
 
     def request(self, request: Request) -> None:
         """Ask something of the safety gate as an operator does: activate, stop, reset; it decides."""

@@ -1,0 +1,1 @@
+"""The processes of a live robot: the twin, the safety gate, the stack, and what starts and watches them."""

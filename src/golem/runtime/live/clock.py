@@ -1,0 +1,32 @@
+"""The robot's time as others see it: it stands still, jumps back when the robot restarts, and never runs backwards."""
+
+from __future__ import annotations
+
+import math
+
+BACK = 0.1
+"""How far back a stamp must be to mean a restart, rather than a sample that was overtaken [s]."""
+
+
+class RobotClock:
+    """Judges the stamps of the robot's states.
+
+    Attributes:
+        t: newest time [s]; -inf before the first.
+    """
+
+    def __init__(self) -> None:
+        """Start before the first state."""
+        self.t = -math.inf
+        self._writer: int | None = None
+
+    def restarted(self, t: float, writer: int) -> bool:
+        """Return whether a state with stamp `t` [s] from `writer` is of a robot that was started anew."""
+        return self._writer is not None and (writer != self._writer or t < self.t - BACK)
+
+    def advances(self, t: float, writer: int) -> bool:
+        """Return whether a state is new, and remember it if so; one that repeats or was overtaken is not."""
+        if not self.restarted(t, writer) and t <= self.t:
+            return False
+        self.t, self._writer = t, writer
+        return True

@@ -1,0 +1,272 @@
+"""The safety process: the emergency stop and the gate, on a monotonic clock of their own.
+
+Whatever arrives is stamped by this clock when it arrives, so that nobody else's clock can make something old look new.
+The robot's time serves only to tell a new state from a repeated one, and which state a command answers.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import replace
+
+from golem.hardware.estop.base import EstopFrame
+from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.safety.base import Fault, GateState, GateStatus, Reason, Request, SafetyLimits
+from golem.middleware import topics
+from golem.middleware.bus import Bus, News
+from golem.middleware.dds.base import Participant, Sample
+from golem.middleware.ros.base import Node
+from golem.middleware.ros.convert import diagnostic, diagnostics, header, to_base_estimate
+from golem.middleware.ros.msgs import golem_interfaces
+from golem.middleware.ros.msgs.diagnostic_msgs import DiagnosticStatus
+from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response, Trigger_Response
+from golem.middleware.ros.waitset import WaitSet
+from golem.middleware.wire import convert
+from golem.middleware.wire.layout import WireError
+from golem.runtime.executor import in_order
+from golem.runtime.live.clock import RobotClock
+from golem.runtime.live.surface import Surface
+from golem.runtime.sides import SafetySide
+from golem.types import BaseEstimate, LowCommand, LowState
+
+REMEMBERED = 256
+"""States whose time of arrival is remembered: half a second."""
+LOOK = 0.05
+"""Time between two looks for other writers of the motors' command [s]."""
+REPORT = 0.05
+"""Time between two reports while nothing changes [s]."""
+DIAGNOSE = 1.0
+"""Time between two diagnostics [s]."""
+
+
+class Arrivals:
+    """Brings states and commands to the bus of the gate, stamped with the time they arrived.
+
+    Attributes:
+        commands: what the process waits on.
+        mode_machine: machine type that the robot reports; None before its first state.
+    """
+
+    def __init__(self, bus: Bus, surface: Surface, clock: Callable[[], float]) -> None:
+        """Stamp by `clock` [s]."""
+        self._bus, self._clock = bus, clock
+        self._robot = RobotClock()
+        self._arrived: OrderedDict[float, float] = OrderedDict()
+        self.commands, self._states = WaitSet(), WaitSet()
+        self.mode_machine: int | None = None
+        surface.receive("/lowstate", self._states, self._state)
+        surface.receive("/safety/lowcmd_in", self.commands, self._command)
+
+    def poll(self) -> None:
+        """Take what has come; states first, since commands answer them."""
+        self._states.poll()
+        self.commands.poll()
+
+    def _state(self, sample: Sample) -> None:
+        now = self._clock()
+        try:
+            state = convert.decode_low_state(sample.payload)
+            self.mode_machine = convert.mode_machine(sample.payload)
+        except WireError as error:
+            self._refuse(Reason.STATE_DAMAGED, error, now)
+            return
+        if self._robot.restarted(state.t, sample.writer):
+            self._arrived.clear()
+        if self._robot.advances(state.t, sample.writer):
+            self._arrived[state.t] = now
+            if len(self._arrived) > REMEMBERED:
+                self._arrived.popitem(last=False)
+            self._bus.publish(topics.LOW_STATE, replace(state, t=now), now)
+
+    def _command(self, sample: Sample) -> None:
+        now = self._clock()
+        try:
+            command = convert.decode_low_command(sample.payload, now, self.mode_machine or 0)
+            answered = convert.answered(sample.payload)
+        except WireError as error:
+            self._refuse(Reason.COMMAND_DAMAGED, error, now)
+            return
+        if answered:
+            # As old as the state it answers; one that answers a state nobody remembers is too old for anything.
+            command = replace(command, t=self._arrived.get(answered, -math.inf))
+        self._bus.publish(topics.LOW_CMD_REQUEST, command, now)
+
+    def _refuse(self, reason: Reason, error: WireError, now: float) -> None:
+        self._bus.publish(topics.TRANSPORT_FAULT, Fault(reason, str(error)), now)
+
+
+class LiveGate:
+    """The safety process without its loop.
+
+    Attributes:
+        commands: what to wait on between two steps.
+        bus: its streams.
+        status: its newest verdict.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        node: Node,
+        limits: SafetyLimits,
+        estop: VirtualEstop | None,
+        clock: Callable[[], float] = time.monotonic,
+        who: Callable[[bytes], str] = bytes.hex,
+    ) -> None:
+        """Guard the robot on the domain.
+
+        Args:
+            participant: member of the domain.
+            node: its ROS node.
+            limits: what to enforce.
+            estop: the virtual emergency stop of a simulation. None where a real one belongs: until there is one,
+                the gate stays shut.
+            clock: monotonic [s].
+            who: names the owner of an endpoint by its guid.
+        """
+        self.bus = Bus()
+        self._node, self._clock, self._who = node, clock, who
+        self._surface = surface = Surface("safety", participant, node)
+        self._arrivals = Arrivals(self.bus, surface, clock)
+        self.commands = self._arrivals.commands
+        self._out = surface.writer("/lowcmd")
+        self._all_commands = surface.reader("/lowcmd")
+        self._estop = estop
+        self._side = SafetySide(self.bus, limits, estop)
+        self._nodes = in_order(self._side.nodes)
+        self._estops = News(self.bus, topics.ESTOP, EstopFrame)
+        self._base_stamp = -math.inf
+        self._others: list[str] = []
+        self._looks, self._reports, self._diagnoses = Every(LOOK), Every(REPORT), Every(DIAGNOSE)
+        self._steps = 0
+        self.status = GateStatus(clock(), GateState.INIT)
+        surface.subscribe("/base_estimate", self._base)
+        surface.serve(
+            {
+                "/safety/activate": lambda _: self._ask(Request.ACTIVATE, GateState.ACTIVE),
+                "/safety/stop": lambda _: self._ask(Request.STOP, GateState.STOP1, GateState.STOP0),
+                "/safety/reset": lambda _: self._ask(Request.RESET, GateState.ARMED),
+                "/estop/press": self._press,
+            }
+        )
+
+    def step(self) -> None:
+        """Take what has come, judge it, and tell the motors."""
+        self._arrivals.poll()
+        self._node.poll()
+        now = self._clock()
+        if self._looks.due(now):
+            own = self._out.guid
+            self._others = [self._who(g) for g in self._all_commands.writers().values() if g != own]
+        self._judge()
+        if self._diagnoses.due(now):
+            self._diagnose(now)
+
+    def stop(self) -> bool:
+        """Ask for a stop, and return whether the gate has done damping, if it had anything to damp."""
+        self._side.request(Request.STOP)
+        self.step()
+        return self.status.state is not GateState.STOP1
+
+    def _judge(self) -> None:
+        """Run the gate once, and publish what follows."""
+        now, before = self._clock(), self.status
+        if self._others:
+            names = ", ".join(self._others)
+            self.bus.publish(
+                topics.TRANSPORT_FAULT, Fault(Reason.WRITERS, f"/lowcmd is also written by {names}"), now
+            )
+        for node in self._nodes:
+            node.step(now)
+        self._steps += 1
+        status = self.bus.latest(topics.SAFETY, GateStatus)
+        command = self.bus.latest(topics.LOW_CMD, LowCommand)
+        assert status is not None and command is not None
+        self.status = status
+        if self._arrivals.mode_machine is not None:
+            self._out.write(convert.encode_low_command(command, self._arrivals.mode_machine))
+        frame = self._estops.read()
+        if frame is not None and self._surface.heard("/estop"):
+            message = golem_interfaces.EstopFrame(header(now), frame.sequence, frame.pressed)
+            self._surface.publish("/estop", message)
+        if (status.state, status.reason) != (before.state, before.reason) or self._reports.due(now):
+            self._surface.publish("/safety/status", status_message(status))
+
+    def _ask(self, request: Request, *wanted: GateState) -> Trigger_Response:
+        """Pass on what an operator asks for; the answer says what came of it."""
+        self._side.request(request)
+        self._judge()
+        self._side.request(Request.NONE)
+        return Trigger_Response(self.status.state in wanted, told(self.status))
+
+    def _press(self, request: SetBool_Request) -> SetBool_Response:
+        if self._estop is None:
+            return SetBool_Response(False, "This emergency stop is not virtual: press the button.")
+        (self._estop.press if request.data else self._estop.release)()
+        return SetBool_Response(True, "pressed" if request.data else "released")
+
+    def _base(self, message: golem_interfaces.BaseEstimate) -> None:
+        estimate = to_base_estimate(message)
+        if estimate.t != self._base_stamp:
+            self._base_stamp, now = estimate.t, self._clock()
+            self.bus.publish(topics.BASE, replace(estimate, t=now), now)
+
+    def _diagnose(self, now: float) -> None:
+        """Say once a second how old everything is."""
+        values: dict[str, object] = {"state": self.status.state, "steps per second": self._steps}
+        self._steps = 0
+        stamped = (
+            ("state", topics.LOW_STATE, LowState),
+            ("command", topics.LOW_CMD_REQUEST, LowCommand),
+            ("base estimate", topics.BASE, BaseEstimate),
+            ("e-stop", topics.ESTOP, EstopFrame),
+        )
+        for name, topic, kind in stamped:
+            newest = self.bus.latest(topic, kind)
+            values[f"age of {name} [ms]"] = (
+                "never seen" if newest is None else f"{(now - newest.t) * 1e3:.0f}"
+            )
+        level = DiagnosticStatus.ERROR if self.status.stopped else DiagnosticStatus.OK
+        if self.status.state in (GateState.INIT, GateState.ARMED):
+            level = DiagnosticStatus.WARN
+        entry = diagnostic(level, "safety gate", told(self.status), values)
+        self._surface.publish("/diagnostics", diagnostics(now, [entry]))
+
+
+class Every:
+    """Tells when something is due again."""
+
+    def __init__(self, period: float) -> None:
+        """Be due every `period` [s], the first time at once."""
+        self._period, self._last = period, -math.inf
+
+    def due(self, now: float) -> bool:
+        """Return whether it is due at `now` [s]."""
+        if now - self._last < self._period:
+            return False
+        self._last = now
+        return True
+
+
+def told(status: GateStatus) -> str:
+    """Return the state of the gate and why, for a person."""
+    why = ": ".join(part for part in (status.reason or "", status.detail) if part)
+    return f"{status.state} ({why})" if why else str(status.state)
+
+
+def status_message(status: GateStatus) -> golem_interfaces.SafetyStatus:
+    """Return what the gate lets everybody know."""
+    return golem_interfaces.SafetyStatus(header(status.t), status.state, status.reason or "", status.detail)
+
+
+def to_status(message: golem_interfaces.SafetyStatus, t: float) -> GateStatus:
+    """Return what the gate said, as of time `t` [s]; a state or a reason nobody knows is a shut gate."""
+    try:
+        return GateStatus(
+            t, GateState(message.state), Reason(message.reason) if message.reason else None, message.detail
+        )
+    except ValueError:
+        return GateStatus(t, GateState.INIT, None, f"the gate says '{message.state}', '{message.reason}'")

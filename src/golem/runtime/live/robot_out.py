@@ -1,0 +1,180 @@
+"""What the robot shows of itself: time, joints, frames, description, images, hands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from golem.middleware import public, topics
+from golem.middleware.bus import Bus, News
+from golem.middleware.ros import convert, images
+from golem.middleware.ros.msgs import geometry_msgs
+from golem.middleware.ros.msgs.golem_interfaces import HandCommand as HandCommandMessage
+from golem.middleware.ros.msgs.rosgraph_msgs import Clock
+from golem.middleware.ros.msgs.std_msgs import Header, String
+from golem.middleware.ros.msgs.tf2_msgs import TFMessage
+from golem.middleware.topics import Exposure
+from golem.robots.model import tree
+from golem.robots.model.export import export_urdf
+from golem.runtime.cameras import OPTICAL_FRAMES
+from golem.runtime.executor import TICK
+from golem.runtime.live.surface import Surface
+from golem.types import SIDES, Array, HandState, LowState, Side
+
+JOINTS = tuple(hinge.joint for hinge in tree.HINGES)
+PARENT = {edge.child: edge.parent for edge in tree.FIXED}
+
+
+def describe(surface: Surface, calibration: Mapping[str, Array]) -> None:
+    """Publish what holds for good: the description, and every frame that does not move in its parent.
+
+    Args:
+        surface: of the robot.
+        calibration: of each camera; see `Robot.calibration`. Its optical frame in /tf_static is the claimed one.
+    """
+    surface.publish("/robot_description", String(export_urdf(hands=True)))
+    links = [(edge.parent, edge.child) for edge in tree.FIXED]
+    poses = [edge.T_parent_child for edge in tree.FIXED]
+    for camera, T in calibration.items():
+        links.append((OPTICAL_FRAMES[camera], public.optical_frame(camera)))
+        poses.append(T)
+    surface.publish("/tf_static", convert.transforms(0.0, links, np.array(poses)))
+
+
+class ClockOut:
+    """Sends the robot's time, where anybody wants it."""
+
+    period = TICK
+
+    def __init__(self, surface: Surface) -> None:
+        """Publish on `surface`."""
+        self._surface = surface
+
+    def step(self, t: float) -> None:
+        """Send the time."""
+        if self._surface.heard("/clock"):
+            self._surface.publish("/clock", Clock(convert.time(t)))
+
+
+class JointsOut:
+    """Sends the angles of all hinges, where anybody wants them."""
+
+    period = 0.01
+
+    def __init__(self, bus: Bus, surface: Surface) -> None:
+        """Publish on `surface` what is on `bus`."""
+        self._bus, self._surface = bus, surface
+
+    def step(self, t: float) -> None:
+        """Send the present angles; the fingers' speeds and torques are not measured."""
+        state = self._bus.latest(topics.LOW_STATE, LowState)
+        if state is not None and self._surface.heard("/joint_states"):
+            angle, none = _angles(self._bus, state), np.zeros(len(JOINTS) - len(state.q))
+            dq, tau = (np.concatenate([v, none]) for v in (state.dq, state.tau))
+            self._surface.publish("/joint_states", convert.joint_state(state.t, JOINTS, angle, dq, tau))
+
+
+class FramesOut:
+    """Sends every moving link in its parent, where anybody wants it."""
+
+    period = 0.02
+
+    def __init__(self, bus: Bus, surface: Surface) -> None:
+        """Publish on `surface` what is on `bus`."""
+        self._bus, self._surface = bus, surface
+
+    def step(self, t: float) -> None:
+        """Send the present poses."""
+        state = self._bus.latest(topics.LOW_STATE, LowState)
+        if state is None or not self._surface.heard("/tf"):
+            return
+        positions, quats = tree.poses(_angles(self._bus, state))
+        stamp = convert.time(state.t)
+        self._surface.publish(
+            "/tf",
+            TFMessage(
+                [
+                    geometry_msgs.TransformStamped(
+                        Header(stamp, hinge.parent),
+                        hinge.child,
+                        geometry_msgs.Transform(
+                            geometry_msgs.Vector3(*position), geometry_msgs.Quaternion(x, y, z, w)
+                        ),
+                    )
+                    for hinge, position, (w, x, y, z) in zip(
+                        tree.HINGES, positions.tolist(), quats.tolist(), strict=True
+                    )
+                ]
+            ),
+        )
+
+
+class CameraOut:
+    """Sends the exposures of one camera, in the forms that anybody wants."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, surface: Surface, camera: str) -> None:
+        """Publish on `surface` what `camera` puts on `bus`."""
+        self._surface = surface
+        self._exposures = News(bus, topics.exposures(camera), Exposure)
+        self._frame = public.optical_frame(camera)
+        self._topics = {what: public.image(camera, what) for what in public.IMAGES}
+
+    def wanted(self) -> bool:
+        """Return whether anybody wants images."""
+        return self._surface.heard(*self._topics.values())
+
+    def step(self, t: float) -> None:
+        """Send a new exposure."""
+        e = self._exposures.read()
+        if e is None:
+            return
+        frame = self._frame
+        forms = {
+            public.COLOR: lambda: images.color_image(e.t, e.rgb, frame),
+            public.COLOR_JPEG: lambda: images.color_jpeg(e.t, e.rgb, frame),
+            public.DEPTH: lambda: images.depth_image(e.t, e.depth, frame),
+            public.DEPTH_PNG: lambda: images.depth_png(e.t, e.depth, frame),
+            public.CAMERA_INFO: lambda: images.camera_info(e.t, e.info, frame),
+        }
+        for what, topic in self._topics.items():
+            if self._surface.heard(topic):
+                self._surface.publish(topic, forms[what]())
+
+
+class HandOut:
+    """Sends what one hand reports."""
+
+    period = 0.01
+
+    def __init__(self, bus: Bus, surface: Surface, side: Side) -> None:
+        """Publish on `surface` what the hand on `side` puts on `bus`."""
+        self._bus, self._surface = bus, surface
+        self._side: Side = side
+        self._topic = public.gripper(side, "state")
+
+    def step(self, t: float) -> None:
+        """Send the present report."""
+        state = self._bus.latest(topics.hand_state(self._side), HandState)
+        if state is not None and self._surface.heard(self._topic):
+            self._surface.publish(self._topic, convert.hand_state(state, self._side))
+
+
+def take_hand_commands(bus: Bus, surface: Surface, side: Side) -> None:
+    """Bring what the hand on `side` is told to `bus`, whenever the node is polled."""
+    topic = topics.hand_command(side)
+
+    def take(message: HandCommandMessage) -> None:
+        command = convert.to_hand_command(message)
+        bus.publish(topic, command, command.t)
+
+    surface.subscribe(public.gripper(side, "command"), take)
+
+
+def _angles(bus: Bus, state: LowState) -> Array:
+    """Return the angle of every hinge [rad]; a hand that has not reported counts as closed."""
+    hands = [bus.latest(topics.hand_state(side), HandState) for side in SIDES]
+    left, right = (np.zeros(2) if hand is None else hand.fingers for hand in hands)
+    return tree.angles(state.q, (left, right))

@@ -1,0 +1,147 @@
+"""The stack as a process: everything that decides what the robot does, on the robot's own clock.
+
+Each state that arrives makes the clock tick. A slow robot thus slows the stack and not the physics; a robot that was
+started anew finds a stack that was built anew.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from golem.middleware import public, topics
+from golem.middleware.bus import Bus
+from golem.middleware.dds.base import Participant, Sample
+from golem.middleware.ros.base import Node
+from golem.middleware.ros.waitset import WaitSet
+from golem.middleware.unitree_api import LOCO_APIS, request_topic, response_topic
+from golem.middleware.wire import convert
+from golem.middleware.wire.layout import WireError
+from golem.middleware.wire.rpc import RpcClient
+from golem.runtime.executor import Executor, Phase, Placed, in_order
+from golem.runtime.live import stack_out as out
+from golem.runtime.live.clock import RobotClock
+from golem.runtime.live.motors import RequestOut
+from golem.runtime.live.onboard import AnswersIn, CallsOut, Identities, LegsIn
+from golem.runtime.live.skills import Skills
+from golem.runtime.live.stack_in import CameraIn, GateIn, RemoteBand, listen
+from golem.runtime.live.surface import Surface
+from golem.runtime.live.twin import Poll
+from golem.runtime.sides import StackSide
+from golem.stack import Stack
+from golem.types import SIDES, Array
+
+CATCH_UP = 5
+"""Ticks that are made up for when states were late or lost; more are left out."""
+
+
+class LiveStack:
+    """A stack on the domain, without its loop.
+
+    Attributes:
+        states: what to wait on between two steps.
+        side: the stack, once a robot has reported.
+        restarts: how often the robot was started anew since.
+        ignored: how many states were damaged.
+        why: the reason of the last one.
+    """
+
+    def __init__(
+        self,
+        stack: Stack,
+        participant: Participant,
+        node: Node,
+        *,
+        banded: bool,
+        realtime: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Join the domain; the modules are built when the robot reports.
+
+        Args:
+            stack: which modules.
+            participant: member of the domain.
+            node: its ROS node.
+            banded: whether the robot is a twin that stands in a band.
+            realtime: whether leg controllers are held to their period by the wall clock.
+            clock: this process's own [s].
+        """
+        self._stack, self._node, self._realtime = stack, node, realtime
+        self._bus = Bus()
+        self._robot = RobotClock()
+        self._calibration: dict[str, Array] = {name: np.eye(4) for name in public.CAMERAS}
+        self._surface = surface = Surface("stack", participant, node)
+        self.side: StackSide | None = None
+        self.restarts, self.ignored, self.why = 0, 0, ""
+        self._executor: Executor | None = None
+        self._mode_machine = 0
+        self._band = RemoteBand(node) if banded else None
+        self._gate = GateIn(self._bus, surface, clock)
+        self._cameras = [CameraIn(self._bus, surface, name) for name in public.CAMERAS]
+        service = LOCO_APIS["h1"].service
+        requests, responses = request_topic(service), response_topic(service)
+        self._calls = RpcClient(surface.writer(f"/{requests}"), surface.reader(f"/{responses}"))
+        self._onboard = surface.reader("/onboard/lowcmd")
+        self._skills = Skills(surface)
+        surface.serve({k: v for s in SIDES for k, v in out.hand_services(self._bus, s, self._now).items()})
+        listen(self._bus, surface, self._calibration, self._now)
+        self.states = WaitSet()
+        surface.receive("/lowstate", self.states, self._state)
+
+    def step(self) -> None:
+        """Take the states that have come, and tick for each of them."""
+        if not self.states.poll():
+            self._node.poll()
+
+    def _now(self) -> float:
+        return max(self._robot.t, 0.0)
+
+    def _state(self, sample: Sample) -> None:
+        try:
+            state = convert.decode_low_state(sample.payload)
+            self._mode_machine = convert.mode_machine(sample.payload)
+        except WireError as error:
+            self.ignored, self.why = self.ignored + 1, str(error)
+            return
+        anew = self._robot.restarted(state.t, sample.writer)
+        if not self._robot.advances(state.t, sample.writer):
+            return
+        if anew or self._executor is None:
+            self.restarts += anew
+            self._executor = self._build()
+        self._bus.publish(topics.LOW_STATE, state, state.t)
+        self._executor.advance(state.t, CATCH_UP)
+
+    def _build(self) -> Executor:
+        """Build every module anew, for a robot whose time begins anew."""
+        bus, surface = self._bus, self._surface
+        bus.clear()
+        for camera in self._cameras:
+            camera.close()
+        if self._band is not None:
+            self._band.renew()
+        side = self.side = StackSide(bus, self._stack, self._calibration, self._band, 0.0)
+        side.legs.realtime = self._realtime
+        self._skills.attach(side)
+        service, identities = LOCO_APIS["h1"].service, Identities()
+        placed: list[Placed] = [
+            (Phase.RECEIVE, Poll(self._node)),
+            (Phase.RECEIVE, self._gate),
+            (Phase.RECEIVE, AnswersIn(bus, service, self._calls, identities)),
+            (Phase.RECEIVE, LegsIn(bus, self._onboard)),
+            *side.nodes,
+            # Before anything else is sent: it is what the robot waits for.
+            (Phase.PROTECT, RequestOut(bus, surface, lambda: self._mode_machine)),
+            (Phase.SEND, out.BaseOut(bus, surface)),
+            (Phase.SEND, out.OdometryOut(bus, surface)),
+            (Phase.SEND, out.LegsOut(bus, surface)),
+            (Phase.SEND, CallsOut(bus, service, self._calls, identities)),
+            (Phase.SEND, self._skills),
+            *((Phase.SEND, camera) for camera in self._cameras),
+            *((Phase.SEND, out.SightingsOut(bus, surface, name)) for name in public.CAMERAS),
+            *((Phase.SEND, out.HandCommandOut(bus, surface, hand)) for hand in SIDES),
+            *((Phase.SEND, out.HandStatusOut(bus, surface, hand)) for hand in SIDES),
+        ]
+        return Executor(bus, in_order(placed))

@@ -1,0 +1,180 @@
+"""What the stack reads from the domain beside the robot's state: images, hands, the gate, velocities, calibration."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from golem.hardware.safety.base import GateState, GateStatus
+from golem.middleware import public, topics
+from golem.middleware.bus import Bus
+from golem.middleware.ros import convert, images
+from golem.middleware.ros.base import Client, Node, Subscription
+from golem.middleware.ros.future import Future
+from golem.middleware.ros.msgs import golem_interfaces, sensor_msgs
+from golem.middleware.ros.msgs.geometry_msgs import Twist
+from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
+from golem.middleware.ros.msgs.tf2_msgs import TFMessage
+from golem.middleware.topics import Exposure
+from golem.robots.sensors.cameras import CAMERAS
+from golem.runtime.cameras import looked_for
+from golem.runtime.executor import TICK
+from golem.runtime.live.gate import to_status
+from golem.runtime.live.surface import Surface
+from golem.types import SIDES, Array, CameraInfo, Side
+
+SILENT = 0.25
+"""Silence after which the safety process counts as gone [s]: five of its reports."""
+
+
+class CameraIn:
+    """Subscribes to the images of one camera while a skill looks through it, and brings them to the bus in pairs."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, surface: Surface, camera: str) -> None:
+        """Bring the exposures of `camera` to `bus`."""
+        self._bus, self._surface, self._camera = bus, surface, camera
+        self._wanted = looked_for(bus, camera)
+        self._open: list[Subscription] = []
+        self._info: CameraInfo | None = None
+        self._color: sensor_msgs.Image | None = None
+        self._depth: sensor_msgs.Image | None = None
+
+    def step(self, t: float) -> None:
+        """Come or go, as skills want."""
+        if bool(self._open) == self._wanted():
+            return
+        if self._open:
+            self.close()
+            return
+        callbacks = (
+            (public.CAMERA_INFO, self._take_info),
+            (public.COLOR, self._take_color),
+            (public.DEPTH, self._take_depth),
+        )
+        for what, callback in callbacks:
+            self._open.append(self._surface.subscribe(public.image(self._camera, what), callback))
+
+    def close(self) -> None:
+        """Read no more."""
+        for subscription in self._open:
+            subscription.close()
+        self._open.clear()
+        self._color = self._depth = None
+
+    def _take_info(self, message: sensor_msgs.CameraInfo) -> None:
+        known = CAMERAS[self._camera]
+        self._info = images.to_camera(message, self._camera, known.near, known.far, known.rate)
+
+    def _take_color(self, message: sensor_msgs.Image) -> None:
+        self._color = message
+        self._pair()
+
+    def _take_depth(self, message: sensor_msgs.Image) -> None:
+        self._depth = message
+        self._pair()
+
+    def _pair(self) -> None:
+        """Publish colour and depth of one exposure once both are there."""
+        color, depth, info = self._color, self._depth, self._info
+        if color is None or depth is None or info is None or color.header.stamp != depth.header.stamp:
+            return
+        self._color = self._depth = None
+        rgb, metres = images.to_rgb(color), images.to_depth(depth)
+        if rgb.shape[:2] == metres.shape == (info.height, info.width):
+            t = convert.seconds(color.header.stamp)
+            self._bus.publish(topics.exposures(self._camera), Exposure(t, info, rgb, metres), t)
+
+
+class GateIn:
+    """Brings the verdicts of the safety gate to the bus; a gate that is silent counts as shut."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, surface: Surface, clock: Callable[[], float] = time.monotonic) -> None:
+        """Bring them to `bus`; `clock` is this process's own [s]."""
+        self._bus, self._clock = bus, clock
+        self._heard_at, self._t = -SILENT, 0.0
+        self._status: GateStatus | None = None
+        surface.subscribe("/safety/status", self._take)
+
+    def step(self, t: float) -> None:
+        """Publish the newest verdict."""
+        self._t = t
+        silent = self._clock() - self._heard_at > SILENT
+        if silent or self._status is None:
+            self._bus.publish(
+                topics.SAFETY, GateStatus(t, GateState.INIT, None, "the safety process is silent"), t
+            )
+        else:
+            self._bus.publish(topics.SAFETY, self._status, t)
+
+    def _take(self, message: golem_interfaces.SafetyStatus) -> None:
+        self._heard_at, self._status = self._clock(), to_status(message, self._t)
+
+
+class RemoteBand:
+    """The band of a twin that stands, let go by a call; see `Banded`.
+
+    Attributes:
+        banded: whether it is still to be let go, as far as is known.
+    """
+
+    def __init__(self, node: Node) -> None:
+        """Call through `node`."""
+        self._client: Client = node.client("/elastic_band/release", public.TRIGGER)
+        self._answer: Future[Trigger_Response] | None = None
+        self.banded = True
+
+    def release(self) -> None:
+        """Ask for it; the answer comes later, and a call that fails is made again."""
+        if self._answer is None and self._client.ready():
+            self._answer = self._client.call(Trigger_Request())
+            self._answer.then(self._answered)
+
+    def renew(self) -> None:
+        """Begin anew: the robot was started again."""
+        self._answer, self.banded = None, True
+
+    def _answered(self, answer: Future[Trigger_Response]) -> None:
+        if answer is not self._answer:
+            return
+        self._answer = None
+        try:
+            answer.result()
+        except Exception:  # whatever became of the call: it is made again
+            return
+        # Let go, or there was none.
+        self.banded = False
+
+
+def listen(bus: Bus, surface: Surface, calibration: dict[str, Array], now: Callable[[], float]) -> None:
+    """Bring hands and velocities to the bus, and keep the calibration of the cameras up to date.
+
+    Args:
+        bus: where they go.
+        surface: where they come from.
+        calibration: by camera; see `Robot.calibration`.
+        now: robot time [s].
+    """
+    cameras = {public.optical_frame(camera): camera for camera in public.CAMERAS}
+
+    def take_frames(message: TFMessage) -> None:
+        for link in message.transforms:
+            if link.child_frame_id in cameras:
+                v, q = link.transform.translation, link.transform.rotation
+                at = convert.geometry_msgs.Point(v.x, v.y, v.z)
+                calibration[cameras[link.child_frame_id]] = convert.matrix(convert.geometry_msgs.Pose(at, q))
+
+    def take_twist(message: Twist) -> None:
+        bus.publish(topics.TWIST, convert.to_twist(message), now())
+
+    def take_hand(side: Side) -> Callable[[golem_interfaces.HandState], None]:
+        topic = topics.hand_state(side)
+        return lambda message: bus.publish(topic, convert.to_hand_state(message), now())
+
+    surface.subscribe("/tf_static", take_frames)
+    surface.subscribe("/cmd_vel", take_twist)
+    for side in SIDES:
+        surface.subscribe(public.gripper(side, "state"), take_hand(side))

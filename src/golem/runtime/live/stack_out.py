@@ -1,0 +1,172 @@
+"""What the stack shows of itself, and what others may ask of it beside its skills."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from golem.hardware.hands.base import HandStatus
+from golem.middleware import public, topics
+from golem.middleware.bus import Bus, News
+from golem.middleware.ros import convert
+from golem.middleware.ros.msgs import golem_interfaces
+from golem.middleware.ros.msgs.std_srvs import Trigger_Response
+from golem.middleware.topics import HandGoal, LegStatus, Sightings
+from golem.robots.model import magpie
+from golem.runtime.executor import TICK
+from golem.runtime.live.surface import Surface
+from golem.runtime.nodes import moving
+from golem.types import BaseEstimate, HandCommand, Side
+
+SHUT = "The safety gate is shut, see /safety/status."
+
+
+class BaseOut:
+    """Sends every estimate of the base to the safety gate."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, surface: Surface) -> None:
+        """Publish on `surface` what is on `bus`."""
+        self._surface, self._news = surface, News(bus, topics.BASE, BaseEstimate)
+
+    def step(self, t: float) -> None:
+        """Send a new estimate."""
+        estimate = self._news.read()
+        if estimate is not None:
+            self._surface.publish("/base_estimate", convert.base_estimate(estimate))
+
+
+class OdometryOut:
+    """Sends where base_link is in odom, where anybody wants it."""
+
+    period = 0.02
+
+    def __init__(self, bus: Bus, surface: Surface) -> None:
+        """Publish on `surface` what is on `bus`."""
+        self._bus, self._surface = bus, surface
+
+    def step(self, t: float) -> None:
+        """Send the present estimate."""
+        estimate = self._bus.latest(topics.BASE, BaseEstimate)
+        if estimate is None:
+            return
+        if self._surface.heard("/odom"):
+            self._surface.publish("/odom", convert.odometry(estimate))
+        if self._surface.heard("/tf"):
+            pose = estimate.T_odom_base[np.newaxis]
+            self._surface.publish("/tf", convert.transforms(estimate.t, [("odom", public.BASE_FRAME)], pose))
+
+
+class LegsOut:
+    """Sends what the lower body does, where anybody wants it."""
+
+    period = 0.02
+
+    def __init__(self, bus: Bus, surface: Surface) -> None:
+        """Publish on `surface` what is on `bus`."""
+        self._bus, self._surface = bus, surface
+
+    def step(self, t: float) -> None:
+        """Send the present status."""
+        status = self._bus.latest(topics.LEG_STATUS, LegStatus)
+        if status is not None and self._surface.heard("/legs/status"):
+            self._surface.publish("/legs/status", convert.leg_status(status))
+
+
+class SightingsOut:
+    """Sends what a localizer found."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, surface: Surface, camera: str) -> None:
+        """Publish on `surface` what was found in the frames of `camera`."""
+        self._surface, self._topic = surface, f"/objects/{camera}"
+        self._news = News(bus, topics.sightings(camera), Sightings)
+
+    def step(self, t: float) -> None:
+        """Send new sightings."""
+        sightings = self._news.read()
+        if sightings is not None:
+            self._surface.publish(self._topic, convert.sightings(sightings))
+
+
+class HandCommandOut:
+    """Sends what one hand is told to its servos."""
+
+    period = 0.01
+
+    def __init__(self, bus: Bus, surface: Surface, side: Side) -> None:
+        """Publish on `surface` what is on `bus`."""
+        self._bus, self._surface = bus, surface
+        self._side: Side = side
+
+    def step(self, t: float) -> None:
+        """Send the present command."""
+        command = self._bus.latest(topics.hand_command(self._side), HandCommand)
+        if command is not None:
+            message = convert.hand_command(command, self._side)
+            self._surface.publish(public.gripper(self._side, "command"), message)
+
+
+class HandStatusOut:
+    """Sends what a hand's controller found, where anybody wants it."""
+
+    period = 0.1
+
+    def __init__(self, bus: Bus, surface: Surface, side: Side) -> None:
+        """Publish on `surface` what is on `bus`."""
+        self._bus, self._surface = bus, surface
+        self._side: Side = side
+
+    def step(self, t: float) -> None:
+        """Send the present status."""
+        topic = public.gripper(self._side, "status")
+        status = self._bus.latest(topics.hand_status(self._side), HandStatus)
+        if status is None or not self._surface.heard(topic):
+            return
+        head = convert.header(max(status.t, 0.0), f"{self._side}_gripper")
+        force = np.array(status.force, np.float64)
+        self._surface.publish(
+            topic, golem_interfaces.HandStatus(head, status.state, status.gap, status.offset, force)
+        )
+
+
+def hand_services(bus: Bus, side: Side, now: Callable[[], float]) -> dict[str, Callable[[Any], Any]]:
+    """Return what answers the services of one hand.
+
+    Args:
+        bus: where its controller takes goals from.
+        side: which hand.
+        now: robot time [s].
+    """
+
+    def give(goal: HandGoal) -> tuple[bool, str]:
+        if not moving(bus):
+            return False, SHUT
+        bus.publish(topics.hand_goal(side), goal, now())
+        return True, ""
+
+    def set_gap(request: Any) -> Any:
+        if not 0.0 <= request.gap <= magpie.MAX_GAP:
+            return golem_interfaces.SetGap_Response(
+                False, f"The gap is {request.gap} m; it must lie between 0 and {magpie.MAX_GAP:.3f} m."
+            )
+        return golem_interfaces.SetGap_Response(*give(HandGoal(request.gap)))
+
+    def set_force(request: Any) -> Any:
+        if not magpie.MIN_FORCE <= request.force <= magpie.MAX_FORCE:
+            return golem_interfaces.SetForce_Response(
+                False,
+                f"The force is {request.force} N; it must lie between {magpie.MIN_FORCE} and {magpie.MAX_FORCE} N.",
+            )
+        return golem_interfaces.SetForce_Response(*give(HandGoal(None, request.force)))
+
+    return {
+        public.gripper(side, "open"): lambda _: Trigger_Response(*give(HandGoal(magpie.MAX_GAP))),
+        public.gripper(side, "close"): lambda _: Trigger_Response(*give(HandGoal(None, magpie.MAX_FORCE))),
+        public.gripper(side, "set_position"): set_gap,
+        public.gripper(side, "set_force"): set_force,
+    }

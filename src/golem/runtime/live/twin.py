@@ -1,0 +1,108 @@
+"""The twin as a process: the simulated robot, its sensors and its on-board computer, paced by the wall clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from golem.middleware.bus import Bus
+from golem.middleware.dds.base import Participant
+from golem.middleware.ros.base import Node
+from golem.middleware.ros.msgs.std_srvs import Trigger_Response
+from golem.middleware.unitree_api import LOCO_APIS, request_topic, response_topic
+from golem.middleware.wire.rpc import RpcServer
+from golem.robots.base import Banded, Robot
+from golem.robots.onboard import motion_switcher
+from golem.runtime import nodes
+from golem.runtime.executor import TICK, Executor, Phase, Placed, in_order
+from golem.runtime.live.motors import CommandIn, StateOut
+from golem.runtime.live.onboard import AnswersOut, CallsIn, LegsOut
+from golem.runtime.live.robot_out import (
+    CameraOut,
+    ClockOut,
+    FramesOut,
+    HandOut,
+    JointsOut,
+    describe,
+    take_hand_commands,
+)
+from golem.runtime.live.surface import Surface
+from golem.runtime.sides import RobotSide, Workshop
+from golem.stack import Stack
+from golem.types import SIDES
+
+FOREVER = 1e9
+"""A time nobody sees [s]."""
+
+
+class Poll:
+    """Lets a ROS node handle what has arrived, once per tick."""
+
+    period = TICK
+
+    def __init__(self, node: Node) -> None:
+        """Poll `node`."""
+        self._node = node
+
+    def step(self, t: float) -> None:
+        """Handle what has arrived."""
+        self._node.poll()
+
+
+class Twin:
+    """A robot on the domain.
+
+    Attributes:
+        executor: its clock.
+        commands: what takes the motors' command.
+    """
+
+    def __init__(self, stack: Stack, robot: Robot, participant: Participant, node: Node) -> None:
+        """Put `robot`, which was built for `stack`, on the domain.
+
+        Raises:
+            ConfigError, ModuleFault: about the on-board legs.
+        """
+        bus = Bus()
+        surface = Surface("robot", participant, node)
+        self._robot = robot
+        cameras = {name: CameraOut(bus, surface, name) for name in robot.cameras}
+        self.commands = CommandIn(bus, surface)
+        side = RobotSide(bus, stack, robot, lambda camera: cameras[camera].wanted)
+        placed: list[Placed] = [
+            (Phase.RECEIVE, Poll(node)),
+            (Phase.RECEIVE, self.commands),
+            *side.nodes,
+            # As soon as it is measured: whoever answers has the whole tick for it.
+            (Phase.ESTIMATE, StateOut(bus, surface)),
+            (Phase.ESTIMATE, ClockOut(surface)),
+            (Phase.SEND, JointsOut(bus, surface)),
+            (Phase.SEND, FramesOut(bus, surface)),
+            (Phase.SEND, LegsOut(bus, surface.writer("/onboard/lowcmd"))),
+            *((Phase.SEND, camera) for camera in cameras.values()),
+            *((Phase.SEND, HandOut(bus, surface, hand)) for hand in SIDES),
+        ]
+        for service in (motion_switcher.SERVICE, LOCO_APIS["h1"].service):
+            requests, responses = request_topic(service), response_topic(service)
+            server = RpcServer(surface.reader(f"/{requests}"), surface.writer(f"/{responses}"))
+            placed.append((Phase.RECEIVE, CallsIn(bus, service, server)))
+            placed.append((Phase.SEND, AnswersOut(bus, service, server)))
+        if stack.legs_on_board is not None:
+            estimator = nodes.EstimatorNode(bus, *Workshop(stack).make("estimator"))
+            placed.append((Phase.ESTIMATE, estimator))
+        for hand in SIDES:
+            take_hand_commands(bus, surface, hand)
+        surface.serve({"/elastic_band/release": self._release})
+        describe(surface, robot.calibration)
+        self.executor = Executor(bus, in_order(placed))
+
+    def run(self, stop: Callable[[], bool]) -> None:
+        """Let the robot's time pass with the wall clock until `stop()`; a machine too slow for it falls behind."""
+        self.executor.run(FOREVER, stop, realtime=True)
+
+    def _release(self, request: Any) -> Trigger_Response:
+        robot = self._robot
+        if not isinstance(robot, Banded) or not robot.banded:
+            return Trigger_Response(False, "There is no band to let go: this robot hangs, or stands already.")
+        robot.release()
+        return Trigger_Response(True, "The band is let go.")

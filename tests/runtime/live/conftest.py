@@ -1,0 +1,165 @@
+"""Twin, safety gate and stack as three members of a domain inside one process, in simulated time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+
+from golem import registry
+from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.safety.base import GateState, SafetyLimits
+from golem.middleware.dds.local import LocalDomain, LocalParticipant
+from golem.middleware.ros.msgs.std_srvs import SetBool_Request, Trigger_Request
+from golem.middleware.ros.node import DdsNode
+from golem.runtime.assembly import start_posture
+from golem.runtime.executor import TICK
+from golem.runtime.live.gate import LiveGate
+from golem.runtime.live.stack import LiveStack
+from golem.runtime.live.twin import Twin
+from golem.stack import Choice, Stack
+
+BLIND = """
+class Blind:
+    latency = 0.0
+    def locate(self, frame, labels):
+        return []
+"""
+
+
+@dataclass
+class Live:
+    """The three processes without their loops; any of them may be None."""
+
+    stack: Stack
+    domain: LocalDomain = field(default_factory=LocalDomain)
+    clock: float = 1000.0
+    twin: Twin | None = None
+    gate: LiveGate | None = None
+    up: LiveStack | None = None
+    robot: Any = None
+    members: list[tuple[LocalParticipant, DdsNode]] = field(default_factory=list)
+
+    def member(self, name: str) -> tuple[LocalParticipant, DdsNode]:
+        """Return a new participant and its node."""
+        participant = self.domain.participant()
+        node = DdsNode(participant, name)
+        self.members.append((participant, node))
+        return participant, node
+
+    def start_twin(self, seed: int = 0) -> None:
+        """Put a new robot on the domain."""
+        choice = self.stack.robot
+        self.robot = registry.create(
+            "robot",
+            choice.use,
+            choice.options,
+            profile=self.stack.profile,
+            seed=seed,
+            posture=start_posture(self.stack.on_ground),
+        )
+        self.twin = Twin(self.stack, self.robot, *self.member("twin"))
+
+    def start_gate(self) -> None:
+        """Put a new gate on the domain."""
+        limits = SafetyLimits.from_profile(self.stack.limits)
+        self.gate = LiveGate(*self.member("safety"), limits, VirtualEstop(), clock=lambda: self.clock)
+
+    def start_up(self) -> None:
+        """Put a new stack on the domain."""
+        banded = self.stack.on_ground
+        self.up = LiveStack(self.stack, *self.member("up"), banded=banded, clock=lambda: self.clock)
+
+    def leave(self, node: str) -> None:
+        """Take a process off the domain, as if it had been killed."""
+        for member in self.members:
+            if member[1].name == node:
+                member[0].close()
+                self.members.remove(member)
+                break
+        if node == "twin":
+            self.twin = None
+            self.robot.close()
+        elif node == "safety":
+            self.gate = None
+        else:
+            self.up = None
+
+    def run(self, seconds: float, stop: Callable[[], bool] = lambda: False) -> None:
+        """Let time pass, until `stop()`."""
+        end = self.clock + seconds
+        while self.clock < end - 1e-9 and not stop():
+            if self.twin is not None:
+                self.twin.executor.step()
+            if self.up is not None:
+                self.up.step()
+            if self.gate is not None:
+                self.gate.step()
+            self.clock += TICK
+
+    def ask(self, what: str) -> tuple[bool, str]:
+        """Call one of the gate's services as an operator; return success and message."""
+        _, node = self.member("operator")
+        press = what in ("press", "release")
+        name, kind = ("/estop/press", "SetBool") if press else (f"/safety/{what}", "Trigger")
+        request = SetBool_Request(what == "press") if press else Trigger_Request()
+        answer = node.client(name, f"std_srvs/srv/{kind}").call(request)
+        for _ in range(50):
+            self.run(TICK)
+            node.poll()
+            if answer.done:
+                break
+        self.leave_quietly(node)
+        response = answer.result()
+        return response.success, response.message
+
+    def leave_quietly(self, node: DdsNode) -> None:
+        """Take a member off the domain that is none of the three processes."""
+        for member in self.members:
+            if member[1] is node:
+                node.close()
+                member[0].close()
+                self.members.remove(member)
+                return
+
+    def activate(self) -> None:
+        """Wait for a stack that speaks, and let its commands through."""
+        self.run(0.1)
+        success, message = self.ask("activate")
+        assert success, message
+        assert self.state is GateState.ACTIVE
+
+    @property
+    def state(self) -> GateState:
+        """Where the gate is."""
+        assert self.gate is not None
+        return self.gate.status.state
+
+    @property
+    def reason(self) -> str:
+        """Why."""
+        assert self.gate is not None
+        return self.gate.status.reason or ""
+
+    def close(self) -> None:
+        """Take everybody off the domain."""
+        for participant, _ in self.members:
+            participant.close()
+        if self.robot is not None:
+            self.robot.close()
+
+
+@pytest.fixture
+def live(tmp_path: Any) -> Iterator[Live]:
+    """A hanging robot that sees nothing: twin, gate and stack."""
+    (tmp_path / "blind.py").write_text(BLIND)
+    robot = Choice("mujoco", {"world": "open"})
+    stack = Stack(robot, localizer=Choice(f"{tmp_path / 'blind.py'}:Blind"), profile="ideal")
+    live = Live(stack)
+    live.start_twin()
+    live.start_gate()
+    live.start_up()
+    yield live
+    live.close()

@@ -1,0 +1,155 @@
+"""A robot, a gate and a stack that share nothing but a domain: they find each other, move, stop, and come back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.runtime.live.conftest import Live
+
+from golem.hardware.safety.base import GateState
+from golem.middleware import topics
+from golem.middleware.dds.base import Qos
+from golem.middleware.wire import hg
+from golem.middleware.wire.convert import encode_low_command
+from golem.runtime.executor import TICK
+from golem.runtime.nodes import WATCHDOG
+from golem.types import NUM_JOINTS, LowCommand
+
+VENDOR = Qos(depth=1)
+"""What the vendor's clients offer."""
+
+
+def stiff(live: Live) -> bool:
+    """Return whether the motors of the robot hold a position."""
+    assert live.gate is not None
+    command = live.gate.bus.latest(topics.LOW_CMD, LowCommand)
+    return command is not None and bool(command.kp.any())
+
+
+def torque(live: Live) -> float:
+    """Return the largest torque of a motor [N m]."""
+    return float(np.abs(live.robot.joints()[2]).max())
+
+
+def test_commands_pass_once_the_gate_is_activated(live: Live) -> None:
+    live.run(0.1)
+    assert live.state is GateState.ARMED and not stiff(live)
+    live.activate()
+    live.run(0.5)
+    assert live.state is GateState.ACTIVE and stiff(live) and torque(live) > 1.0
+    assert live.twin is not None and live.up is not None
+    assert live.twin.commands.ignored == 0 and live.up.ignored == 0
+
+
+def test_a_stack_that_dies_is_noticed_and_the_robot_damped_then_it_comes_back(live: Live) -> None:
+    live.activate()
+    live.leave("up")
+    live.run(0.2)
+    assert (live.state, live.reason) == (GateState.STOP1, "command_stale") and not stiff(live)
+    assert live.gate is not None
+    command = live.gate.bus.latest(topics.LOW_CMD, LowCommand)
+    assert command is not None and (command.kd > 0.0).all()
+    live.start_up()
+    live.run(0.1)
+    assert live.state is GateState.STOP1  # latched, whatever comes back
+    assert live.ask("reset") == (True, "armed")
+    assert live.ask("activate") == (True, "active")
+
+
+def test_drives_go_limp_when_the_safety_process_dies(live: Live) -> None:
+    live.activate()
+    live.run(0.5)
+    live.leave("safety")
+    live.run(WATCHDOG - 0.01)
+    assert torque(live) > 1.0
+    live.run(0.03)
+    assert torque(live) == 0.0
+    live.run(0.4)
+    live.start_gate()
+    live.run(0.1)
+    assert live.state is GateState.ARMED
+    assert live.ask("activate")[0]
+    live.run(0.3)
+    assert live.state is GateState.ACTIVE and torque(live) > 1.0
+
+
+def test_a_twin_that_is_started_anew_freezes_nobody(live: Live) -> None:
+    live.activate()
+    live.run(0.5)
+    live.leave("twin")
+    live.run(0.2)
+    assert live.state is GateState.STOP1 and live.reason in ("state_stale", "command_stale")
+    live.start_twin(seed=1)  # its time begins at zero again
+    live.run(0.1)
+    assert live.up is not None and live.up.restarts == 1
+    assert live.ask("reset") == (True, "armed")
+    assert live.ask("activate") == (True, "active")
+    live.run(0.5)
+    assert live.state is GateState.ACTIVE and stiff(live)
+
+
+def test_another_writer_of_the_motors_command_is_named_and_stops_the_robot(live: Live) -> None:
+    live.activate()
+    intruder, _ = live.member("intruder")
+    writer = intruder.writer("rt/lowcmd", hg.LOW_CMD.type_name, VENDOR)
+    live.run(0.1)
+    assert (live.state, live.reason) == (GateState.STOP1, "two_writers")
+    assert live.gate is not None and writer.guid.hex() in live.gate.status.detail
+    assert not live.ask("reset")[0]
+    intruder.close()
+    live.run(0.1)
+    assert live.ask("reset")[0]
+
+
+def test_a_command_with_a_wrong_checksum_stops_the_robot(live: Live) -> None:
+    live.activate()
+    zeros = np.zeros(NUM_JOINTS)
+    payload = bytearray(encode_low_command(LowCommand(0.0, zeros, zeros, zeros, zeros, zeros), 0))
+    payload[100] ^= 1
+    stranger, _ = live.member("stranger")
+    stranger.writer("rt/safety/lowcmd_in", hg.LOW_CMD.type_name, VENDOR).write(payload)
+    live.run(0.01)
+    assert (live.state, live.reason) == (GateState.STOP1, "command_damaged")
+    assert live.gate is not None and "checksum" in live.gate.status.detail
+
+
+@pytest.mark.parametrize("what", ["stop", "press"])
+def test_an_operator_stops_the_robot_and_sets_it_free_again(live: Live, what: str) -> None:
+    live.activate()
+    assert live.ask(what)[0]
+    live.run(0.02)
+    assert live.state is GateState.STOP1
+    assert live.reason == {"stop": "stop_requested", "press": "estop_pressed"}[what]
+    if what == "press":
+        assert live.ask("reset") == (False, "stop1 (estop_pressed)")
+        assert live.ask("release")[0]
+        live.run(0.02)
+    assert live.ask("reset") == (True, "armed")
+
+
+def test_a_command_is_as_old_as_the_state_it_answers(live: Live) -> None:
+    live.activate()
+    assert live.twin is not None
+    answered = live.twin.executor.t - 0.02
+    live.leave("up")
+    commander, _ = live.member("commander")
+    zeros = np.zeros(NUM_JOINTS)
+    writer = commander.writer("rt/safety/lowcmd_in", hg.LOW_CMD.type_name, VENDOR)
+    payload = encode_low_command(LowCommand(0.0, zeros, zeros, zeros, zeros, zeros), 0, answers=answered)
+    for _ in range(60):  # it speaks, but it has gone blind
+        writer.write(payload)
+        live.run(TICK)
+    assert (live.state, live.reason) == (GateState.STOP1, "command_stale")
+
+
+def test_a_client_that_does_not_say_what_it_answers_is_as_old_as_its_message(live: Live) -> None:
+    live.activate()
+    live.leave("up")
+    commander, _ = live.member("commander")
+    zeros = np.zeros(NUM_JOINTS)
+    writer = commander.writer("rt/safety/lowcmd_in", hg.LOW_CMD.type_name, VENDOR)
+    payload = encode_low_command(LowCommand(0.0, zeros, zeros, zeros, zeros, zeros), 0)
+    for _ in range(100):
+        writer.write(payload)
+        live.run(TICK)
+    assert live.state is GateState.ACTIVE
