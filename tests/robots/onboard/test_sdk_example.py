@@ -1,20 +1,12 @@
-"""The vendor's own low-level example for the H1-2, unchanged, against the wire.
-
-GOLEM_UNITREE_SDK names a checkout of unitree_sdk2_python; GOLEM_UNITREE_PYTHON an interpreter that has numpy and the
-cyclonedds of one's choice (the SDK asks for 0.10.2, which exists for Python 3.10), this one if it is not set.
-"""
+"""The vendor's own low-level example for the H1-2, unchanged, against the wire; see `conftest.py` for what it needs."""
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.robots.onboard.conftest import Started
 
 from golem.middleware.dds.base import Qos
 from golem.middleware.wire import convert, hg
@@ -33,28 +25,6 @@ DURATION, DT = 3.0, 0.002
 
 Q: Array = np.cos(np.pi * np.arange(NUM_JOINTS)) * np.linspace(0.1, 0.9, NUM_JOINTS)
 """A posture that tells every joint and its sign apart [rad]."""
-
-
-@pytest.fixture
-def client() -> Iterator[tuple[subprocess.Popen[str], int]]:
-    """The example, running, and its domain."""
-    pytest.importorskip("cyclonedds")
-    if not os.environ.get("GOLEM_UNITREE_SDK"):
-        pytest.skip("GOLEM_UNITREE_SDK does not name a checkout of unitree_sdk2_python")
-    domain = 20 + os.getpid() % 180
-    python = os.environ.get("GOLEM_UNITREE_PYTHON", sys.executable)
-    script = Path(__file__).with_name("sdk_example.py")
-    process = subprocess.Popen(
-        [python, "-u", str(script), str(domain), EXAMPLE],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    try:
-        yield process, domain
-    finally:
-        process.kill()
-        process.wait()
 
 
 class Twin:
@@ -92,9 +62,9 @@ class Twin:
 
 
 @pytest.mark.slow
-def test_the_vendors_example_reads_and_commands_this_robot(client: tuple[subprocess.Popen[str], int]) -> None:
-    process, domain = client
+def test_the_vendors_example_reads_and_commands_this_robot(sdk: Started, domain: int) -> None:
     twin = Twin(domain)
+    process = sdk("sdk_example.py", str(domain), EXAMPLE)
     try:
         start = time.monotonic()
         while len(twin.payloads) < WANTED and time.monotonic() - start < DEADLINE:

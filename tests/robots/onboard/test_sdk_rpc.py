@@ -1,0 +1,85 @@
+"""Remote calls between the vendor's SDK and this package, over DDS; see `conftest.py` for what they need."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import pytest
+from tests.robots.onboard.conftest import Started
+from tests.robots.onboard.sdk_rpc import ECHO, FAIL
+
+from golem.capabilities.legs.hold import Hold
+from golem.middleware.bus import Bus
+from golem.middleware.unitree_api import LOCO_APIS, NOT_IMPLEMENTED, OK, SEND_FAILED
+from golem.middleware.wire.rpc import reach, serve
+from golem.robots.onboard import motion_switcher
+from golem.robots.onboard.motion_switcher import UNKNOWN_MODE, MotionSwitcher
+from golem.runtime.executor import TICK, Executor
+from golem.runtime.guard import Guard
+from golem.runtime.legs import Legs
+from golem.runtime.live.onboard import AnswersOut, CallsIn
+from golem.runtime.onboard import LocoServiceNode, ServiceNode
+
+pytestmark = pytest.mark.slow
+API = LOCO_APIS["h1"]
+DEADLINE = 40.0
+
+
+def test_the_vendors_clients_are_answered(sdk: Started, domain: int) -> None:
+    from golem.middleware.dds.connect import connect
+    from golem.middleware.dds.domain import DdsConfig
+
+    participant, bus = connect(DdsConfig(domain)), Bus()
+    try:
+        loco = LocoServiceNode(bus, API, Legs(Hold(), Guard("lower_body", "hold")))
+        switcher = ServiceNode(bus, motion_switcher.SERVICE, MotionSwitcher(loco.service).answer)
+        servers = {name: serve(participant, name) for name in (API.service, motion_switcher.SERVICE)}
+        calls = [CallsIn(bus, name, server) for name, server in servers.items()]
+        answers = [AnswersOut(bus, name, server) for name, server in servers.items()]
+        executor = Executor(bus, [*calls, loco, switcher, *answers])
+        process = sdk("sdk_rpc.py", "client", str(domain))
+        deadline = time.monotonic() + DEADLINE
+        while process.poll() is None and time.monotonic() < deadline:
+            executor.step()
+            time.sleep(TICK)
+    finally:
+        participant.close()
+    assert process.poll() == 0
+    said = process.communicate()[0]
+    assert json.loads(said.strip().splitlines()[-1]) == [
+        [OK, "1.0.0.1"],
+        [OK, {"form": "0", "name": "ai"}],
+        [UNKNOWN_MODE, None],
+        [OK, API.version],
+        API.invalid_fsm_id,
+        OK,
+        OK,
+        API.not_available,
+        NOT_IMPLEMENTED,
+        [OK, None],
+        [OK, {"form": "0", "name": ""}],
+        API.not_available,
+        [OK, None],
+        [OK, {"form": "0", "name": "ai"}],
+    ]
+
+
+def test_the_vendors_server_is_called(sdk: Started, domain: int) -> None:
+    from golem.middleware.dds.connect import connect
+    from golem.middleware.dds.domain import DdsConfig
+
+    participant = connect(DdsConfig(domain))
+    try:
+        client = reach(participant, "test")
+        assert client.call(ECHO, timeout=0.05).code == SEND_FAILED
+        process = sdk("sdk_rpc.py", "server", str(domain))
+        assert client.call(1, timeout=DEADLINE).data == "1.2.3.4"
+        for number in range(20):
+            answer = client.call(ECHO, json.dumps({"data": number}), timeout=5.0)
+            assert (answer.code, answer.data) == (OK, json.dumps({"data": number}))
+        assert client.call(FAIL, timeout=5.0).code == 42
+        assert client.call(77777, timeout=5.0).code == NOT_IMPLEMENTED
+        assert process.poll() is None
+    finally:
+        participant.close()
