@@ -52,6 +52,15 @@ def test_an_absent_extra_is_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     assert row.fix and not row.failed
 
 
+def test_a_small_receive_buffer_is_named_with_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("cyclonedds")
+    monkeypatch.setattr("golem.middleware.dds.interfaces.receive_buffer", lambda: 212_992)
+    (row,) = doctor.check_dds()
+    assert "0.2 MB" in row.found and "sysctl -w net.core.rmem_max=16777216" in row.fix and not row.failed
+    monkeypatch.setattr("golem.middleware.dds.interfaces.receive_buffer", lambda: None)
+    assert [row.found for row in doctor.check_dds()] == ["works"]
+
+
 def test_a_package_of_the_wrong_version_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     real = importlib.metadata.version
     monkeypatch.setattr(

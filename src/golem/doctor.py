@@ -25,10 +25,20 @@ DEBIAN_PACKAGES = ("libgomp1", *LIBRARIES["egl"][1].split())
 DISK_NEEDED = 2e9
 """Room for the runs of an evaluation with their pictures [bytes]."""
 
+BUFFER_NEEDED = 4 * 2**20
+"""Receive buffer for the images of one moment: three cameras of 640 x 480, colour and depth [bytes]."""
+
 PROBE_TIMEOUT = 120.0
 """How long a loaded machine may take to import everything once [s]."""
 
-EXTRAS = {"pink": ("pink", "qpsolvers"), "train": ("torch", "onnx"), "docs": ("mkdocs",), "dev": ("pytest",)}
+EXTRAS = {
+    "pink": ("pink", "qpsolvers"),
+    "dds": ("cyclonedds", "rosbags"),
+    "record": ("mcap", "rosbags"),
+    "train": ("torch", "onnx"),
+    "docs": ("mkdocs",),
+    "dev": ("pytest",),
+}
 """The importable modules of each optional extra."""
 
 _CHECKOUT = (Path(__file__).parents[2] / "scripts" / "bootstrap.sh").is_file()
@@ -121,6 +131,25 @@ def check_extras() -> list[Check]:
     return rows
 
 
+def check_dds() -> list[Check]:
+    """Send a sample through Cyclone DDS, and look whether the system lets it receive images; nothing without it."""
+    if importlib.util.find_spec("cyclonedds") is None:
+        return []
+    from golem.middleware.dds import checks, interfaces
+
+    try:
+        checks.self_test()
+    except GolemError as error:
+        return [Check("DDS", str(error), "do as that sentence says", needed=False)]
+    buffer = interfaces.receive_buffer()
+    if buffer is not None and buffer < BUFFER_NEEDED:
+        fix = f"sudo sysctl -w net.core.rmem_max={4 * BUFFER_NEEDED}"
+        return [
+            Check("DDS", f"works, but images get lost in {buffer / 1e6:.1f} MB of buffer", fix, needed=False)
+        ]
+    return [Check("DDS", "works", needed=False)]
+
+
 def check_disk(folder: Path | None = None) -> Check:
     """Look at the free space of `folder` (default: the working directory) and whether it can be written."""
     folder = folder or Path.cwd()
@@ -183,7 +212,7 @@ def install_line() -> str:
 def diagnose() -> list[Check]:
     """Run every check."""
     checks = [check_python(), check_packages(), check_libraries(), check_graphics(), check_disk()]
-    return [*checks, *check_extras()]
+    return [*checks, *check_dds(), *check_extras()]
 
 
 def run(console: Console | None = None) -> int:

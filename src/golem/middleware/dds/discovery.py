@@ -11,7 +11,7 @@ from typing import Any
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.library import Cyclone, EndpointData, ParticipantData, SampleInfo
 from golem.middleware.dds.participant import CycloneParticipant
-from golem.middleware.dds.qos import read_qos, read_user_data
+from golem.middleware.dds.qos import read_property, read_qos, read_user_data
 
 _PSEUDO = 0x7FFF0000
 """DDS_MIN_PSEUDO_HANDLE: built-in topics are counted from here."""
@@ -26,10 +26,12 @@ class Member:
     Attributes:
         guid: 16 bytes.
         user_data: USER_DATA it announced, e.g. `"enclave=/;"` of ROS 2.
+        process: name, number and machine of its process, as Cyclone tells them; empty for other libraries.
     """
 
     guid: bytes
     user_data: str
+    process: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +59,12 @@ def members(participant: CycloneParticipant) -> list[Member]:
     """Return every participant of the domain, `participant` among them."""
 
     def read(data: ParticipantData) -> Member:
-        return Member(bytes(data.guid), read_user_data(participant.library, data.qos))
+        library = participant.library
+        name, number, machine = (
+            read_property(library, data.qos, key) for key in ("__ProcessName", "__Pid", "__Hostname")
+        )
+        process = f"{name} (process {number} on {machine})" if number else ""
+        return Member(bytes(data.guid), read_user_data(library, data.qos), process)
 
     return _take(participant, _PARTICIPANTS, ParticipantData, read)
 

@@ -52,3 +52,9 @@ def _describe(name: str) -> Interface | None:
         return Interface(name, loopback=name.startswith("lo"), multicast=True)
     flags = int(Path("/sys/class/net", name, "flags").read_text(encoding="ascii"), 16)
     return Interface(name, bool(flags & _LOOPBACK), bool(flags & _MULTICAST)) if flags & _UP else None
+
+
+def receive_buffer() -> int | None:
+    """Return the largest receive buffer that a program may ask for [bytes]; None where the system does not say."""
+    limit = Path("/proc/sys/net/core/rmem_max")
+    return int(limit.read_text(encoding="ascii")) if limit.is_file() else None

@@ -138,6 +138,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "dds_qset_data_representation": (None, [ptr, c_uint32, POINTER(ctypes.c_int16)]),
     "dds_qset_userdata": (None, [ptr, c_char_p, c_size_t]),
     "dds_qget_userdata": (c_bool, [ptr, POINTER(ptr), POINTER(c_size_t)]),
+    "dds_qget_prop": (c_bool, [ptr, c_char_p, POINTER(ptr)]),
     "dds_qget_reliability": (c_bool, [ptr, POINTER(c_int), POINTER(c_int64)]),
     "dds_qget_durability": (c_bool, [ptr, POINTER(c_int)]),
     "dds_qget_history": (c_bool, [ptr, POINTER(c_int), POINTER(c_int32)]),

@@ -70,3 +70,13 @@ def read_user_data(library: Cyclone, handle: int) -> str:
     text = ctypes.string_at(data.value, size.value).decode(errors="replace")
     library.quick.dds_free(data)
     return text
+
+
+def read_property(library: Cyclone, handle: int, name: str) -> str:
+    """Return a property of a dds_qos_t; empty if it has none of that name."""
+    value = ctypes.c_void_p()
+    if not library.quick.dds_qget_prop(handle, name.encode(), ctypes.byref(value)) or not value.value:
+        return ""
+    text = ctypes.string_at(value.value).decode(errors="replace")
+    library.quick.dds_free(value)
+    return text
