@@ -1,8 +1,9 @@
 from __future__ import annotations
 
+import os
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import pytest
@@ -19,6 +20,28 @@ SERVICE = "loco"
 @pytest.fixture
 def domain() -> LocalDomain:
     return LocalDomain()
+
+
+@pytest.fixture(params=["local", "cyclone"])
+def join(request: pytest.FixtureRequest) -> Iterator[Callable[[], Participant]]:
+    """Joins one domain as often as it is called."""
+    members: list[Participant] = []
+    if request.param == "local":
+        yield LocalDomain().participant
+        return
+    pytest.importorskip("cyclonedds")
+    from golem.middleware.dds.connect import connect
+    from golem.middleware.dds.domain import DdsConfig
+
+    def joined() -> Participant:
+        members.append(connect(DdsConfig(20 + (os.getpid() * 3 + 1) % 180)))
+        return members[-1]
+
+    try:
+        yield joined
+    finally:
+        for member in members:
+            member.close()
 
 
 @contextmanager
@@ -54,17 +77,17 @@ def test_topics_are_the_vendors(domain: LocalDomain) -> None:
     assert writer.matched() == reader.matched() == 1
 
 
-def test_a_call_gets_its_own_answer(domain: LocalDomain) -> None:
-    server, client = serve(domain.participant(), SERVICE), reach(domain.participant(), SERVICE)
+def test_a_call_gets_its_own_answer(join: Callable[[], Participant]) -> None:
+    server, client = serve(join(), SERVICE), reach(join(), SERVICE)
     with answering(server, code=7) as heard:
         answer = client.call(8101, '{"data": 1}', timeout=5.0)
     assert (answer.api_id, answer.code, answer.data) == (8101, 7, '{"data": 1}')
     assert [(request.id, request.api_id) for request in heard] == [(answer.id, 8101)]
 
 
-def test_two_clients_do_not_take_each_others_answers(domain: LocalDomain) -> None:
-    server = serve(domain.participant(), SERVICE)
-    clients = [reach(domain.participant(), SERVICE) for _ in range(4)]
+def test_two_clients_do_not_take_each_others_answers(join: Callable[[], Participant]) -> None:
+    server = serve(join(), SERVICE)
+    clients = [reach(join(), SERVICE) for _ in range(4)]
     answers: dict[int, list[Response]] = {}
 
     def talk(number: int) -> None:

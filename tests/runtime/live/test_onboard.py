@@ -77,6 +77,17 @@ def test_a_leg_controller_reaches_the_loco_service_of_another_process() -> None:
     assert answer is not None and decode_int(answer.data) == API.damp
 
 
+def test_a_call_waits_for_its_service() -> None:
+    domain = LocalDomain()
+    station = Station(domain)
+    station.ask(1, API.get_fsm_id)
+    run(station.executor)
+    twin = robot(domain)
+    run(station.executor, twin)
+    answer = station.onboard.receive(API.service)
+    assert answer is not None and (answer.id, answer.code) == (1, OK)
+
+
 def test_stations_that_count_alike_do_not_get_each_others_answers() -> None:
     domain = LocalDomain()
     twin, stations = robot(domain), [Station(domain), Station(domain)]

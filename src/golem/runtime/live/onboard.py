@@ -82,7 +82,7 @@ class Identities:
 
 
 class CallsOut:
-    """Sends the calls on the bus to a service on the domain."""
+    """Sends the calls on the bus to a service on the domain; while nobody offers it the newest call waits."""
 
     period = TICK
 
@@ -90,12 +90,14 @@ class CallsOut:
         """Send calls to `service` through `client`."""
         self._news, self._client = News(bus, request_topic(service), Request), client
         self._identities = identities
+        self._unsent: Request | None = None
 
     def step(self, t: float) -> None:
         """Send a new call."""
-        request = self._news.read()
-        if request is not None:
-            self._client.send(self._identities.outgoing(request))
+        self._unsent = self._news.read() or self._unsent
+        if self._unsent is not None and self._client.connected:
+            self._client.send(self._identities.outgoing(self._unsent))
+            self._unsent = None
 
 
 class AnswersIn:
