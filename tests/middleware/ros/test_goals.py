@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.goals import (
     MAX_ENDED,
+    MAX_REPORTED,
     NO_ID,
     CancelCode,
     GoalEvent,
@@ -108,3 +109,13 @@ def test_ended_goals_are_bounded_even_if_time_stands_still() -> None:
         ended(table, number, at=number)
     assert [g.id for g in table.expire(MAX_ENDED + 5)] == [ident(n) for n in range(5)]
     assert len(table) == MAX_ENDED
+
+
+def test_the_status_of_the_newest_is_reported() -> None:
+    table = GoalTable(math.inf)
+    active = table.accept(ident(0), 0)
+    for number in range(1, MAX_REPORTED + 5):
+        ended(table, number, at=number)
+    reported = table.reported()
+    assert [g.id for g in reported[:-1]] == [ident(n) for n in range(5, MAX_REPORTED + 5)]
+    assert reported[-1] is active

@@ -208,5 +208,5 @@ class DdsActionServer:
 
     def _publish_status(self) -> None:
         self._news = False
-        goals = [StatusMessage(goal_info(g.id, g.stamp), int(g.status)) for g in self._table.all()]
+        goals = [StatusMessage(goal_info(g.id, g.stamp), int(g.status)) for g in self._table.reported()]
         self._status.write(codec.serialize(GoalStatusArray(goals)))

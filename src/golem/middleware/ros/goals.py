@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from enum import Enum, IntEnum
+from itertools import islice
 
 from golem.middleware.ros.future import RosError
 
@@ -73,6 +74,8 @@ NO_ID = bytes(16)
 """The id that stands for no particular goal."""
 MAX_ENDED = 1000
 """Ended goals that are remembered at most; beyond it the oldest is forgotten before its time."""
+MAX_REPORTED = 100
+"""Ended goals whose status is published, so that the message stays small whatever clients do."""
 
 
 def after(id: bytes, status: GoalStatus, event: GoalEvent) -> GoalStatus:
@@ -132,9 +135,10 @@ class GoalTable:
     def __contains__(self, id: bytes) -> bool:
         return id in self._goals
 
-    def all(self) -> list[GoalState]:
-        """Return the goals, oldest first."""
-        return list(self._goals.values())
+    def reported(self) -> list[GoalState]:
+        """Return the goals whose status is published: the newest `MAX_REPORTED` that ended, then all that have not."""
+        newest = islice(reversed(self._ended), MAX_REPORTED)
+        return [goal for _, goal in newest][::-1] + [g for g in self._goals.values() if g.status.active]
 
     def accept(self, id: bytes, now: int) -> GoalState:
         """Take a new goal in at time `now` [ns]; its id must not be in use."""
