@@ -70,8 +70,8 @@ _NETWORK = """
 _COMMON = """
 <Internal><SocketReceiveBufferSize max="16MB"/><SocketSendBufferSize max="16MB"/></Internal>
 """
-"""An image arrives as one burst. And while a link is cut Linux holds up to 0.2 MB of datagrams back for each neighbour it
-cannot find (net.ipv4.neigh.default.unres_qlen_bytes), as much as a default send buffer: a writer would then wait for
+"""An image arrives as one burst. And while a link is cut Linux holds up to 0.2 MB of datagrams back for each neighbour
+it cannot find (net.ipv4.neigh.default.unres_qlen_bytes), as much as a default send buffer: a writer would then wait for
 seconds inside `write`. The operating system may grant less than is asked for; for this much it does."""
 
 
