@@ -25,7 +25,7 @@ from golem.evaluation.balance import BalanceRecorder
 from golem.evaluation.oracle import Oracle
 from golem.evaluation.pushes import Pusher, shove
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.run import Narrator, no_display, shown
+from golem.run import Narrator, no_display, on_air, shown
 from golem.runtime.assembly import Running, build
 from golem.skills.base import SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
@@ -64,6 +64,8 @@ class DemoConfig:
     """Folder for film, report and figures."""
     port: int = 8080
     """Port of the live view."""
+    record: Path | None = None
+    """Write everything public into a bag, a new folder of this name."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +91,15 @@ class DemoResult:
 class Demo:
     """One demonstration in progress."""
 
-    def __init__(self, config: DemoConfig, running: Running, robot: MujocoRobot) -> None:
-        """Demonstrate what `config` says with a built stack."""
+    def __init__(
+        self,
+        config: DemoConfig,
+        running: Running,
+        robot: MujocoRobot,
+        show: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Demonstrate what `config` says with a built stack; `show` is called after every tick."""
+        self._show = show
         self._config, self._running, self._robot = config, running, robot
         self._oracle = Oracle(robot)
         self._pusher = Pusher(robot)
@@ -166,6 +175,7 @@ class Demo:
 
     def tick(self) -> None:
         """Follow balance and stages, and take the report's picture when the first screw comes out."""
+        self._show()
         self.recorder(self._running.executor.t, self._pusher.force)
         self._pusher.drive(self._running.executor.t)
         self._timeline.update(self._running)
@@ -262,7 +272,7 @@ def run_demo(config: DemoConfig) -> DemoResult:
             f"(profile {config.profile}, seed {config.seed}).",
             flush=True,
         )
-        demo = Demo(config, running, robot)
+        demo = Demo(config, running, robot, stack.enter_context(on_air(running, robot, config.record)))
         if config.headless:
             return _filmed(config, demo, running, robot)
         view = LiveView(running, robot, config.port)

@@ -49,6 +49,10 @@ class ModuleFault(GolemError):
         self.reason = reason
 
 
+class RobotGone(GolemError):
+    """The robot is no longer there, through no fault of its module: the recording that stands in for it is over."""
+
+
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> ConfigError:
     """Return the error for a name that is not one of `valid`, with the nearest valid name first.
 

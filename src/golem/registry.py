@@ -22,7 +22,10 @@ from golem.errors import ConfigError, GolemError, ModuleFault, unknown_name
 from golem.options import convert_all, dataclass_in, fill
 
 _IMPLEMENTATIONS: dict[str, dict[str, str]] = {
-    "robot": {"mujoco": "golem.robots.mujoco.engine:MujocoRobot"},
+    "robot": {
+        "mujoco": "golem.robots.mujoco.engine:MujocoRobot",
+        "replay": "golem.robots.replay.robot:ReplayRobot",
+    },
     "estimator": {
         "tether": "golem.hardware.estimator.tether:TetherEstimator",
         "random_walk_kf": "golem.hardware.estimator.random_walk_kf:RandomWalkKF",

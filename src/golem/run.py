@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import sys
 import webbrowser
-from contextlib import ExitStack
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 from tyro.conf import Positional
@@ -15,12 +17,16 @@ from golem.dashboard.live import LiveView
 from golem.errors import ConfigError
 from golem.middleware import topics
 from golem.middleware.bus import News
+from golem.robots.base import Robot
 from golem.robots.mujoco.config import World
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.assembly import Running, build
 from golem.skills.base import Feedback, SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import Stack, load_stack
+
+FOXGLOVE_PORT = 8765
+"""Where Foxglove looks first."""
 
 
 def no_display() -> bool:
@@ -47,6 +53,10 @@ class RunConfig:
     """Show a pick live in the browser, paced by the wall clock; operating always does."""
     port: int = 8080
     """Port of the live view."""
+    record: Path | None = None
+    """Write everything public of a pick into a bag, a new folder of this name."""
+    foxglove: bool = False
+    """Serve a pick to Foxglove on port 8765, paced by the wall clock."""
 
 
 def run_stack(config: RunConfig) -> SkillResult:
@@ -61,18 +71,29 @@ def run_stack(config: RunConfig) -> SkillResult:
         robot = replace(stack.robot, options={**stack.robot.options, "world": config.world})
         stack = replace(stack, robot=robot)
     if (config.task or ("operate" if stack.on_ground else "pick")) == "operate":
+        if config.record is not None or config.foxglove:
+            raise ConfigError(
+                "--record and --foxglove are for a pick: add --task pick. A robot that is operated lives on a "
+                "domain: golem twin, and beside it golem record or golem view."
+            )
         return _operate(config, stack)
     running, robot = build(stack, config.seed)
     narrator = Narrator(running)
-    try:
+    with ExitStack() as closing:
+        closing.callback(robot.close)
+        show = closing.enter_context(on_air(running, robot, config.record, config.foxglove))
+
+        def watch() -> None:
+            narrator()
+            show()
+
         if config.view:
-            with LiveView(running, shown(running, robot), config.port) as view:
-                print(f"Live view: {view.url}   (Ctrl-C ends it)")
-                result = view.run(Pick(running.method), PickGoal(), watch=narrator)
+            view = closing.enter_context(LiveView(running, shown(running, robot), config.port))
+            print(f"Live view: {view.url}   (Ctrl-C ends it)")
+            result = view.run(Pick(running.method), PickGoal(), watch=watch)
         else:
-            result = running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=narrator)
-    finally:
-        robot.close()
+            goal, paced = PickGoal(), config.foxglove
+            result = running.execute(Pick(running.method), goal, TIMEOUT, realtime=paced, watch=watch)
     print(
         f"{'Done' if result.success else 'Failed'} after {running.executor.t:.1f} s of robot time: {result.reason}"
     )
@@ -100,6 +121,21 @@ def _operate(config: RunConfig, stack: Stack) -> SkillResult:
         except KeyboardInterrupt:
             print()
     return SkillResult(True, "done", None, "Ended by the operator.")
+
+
+def on_air(
+    running: Running, robot: Robot, bag: Path | None, foxglove: bool = False
+) -> AbstractContextManager[Callable[[], None]]:
+    """Record a stack into `bag` and serve it to Foxglove; enters what is to be called after every tick.
+
+    Raises:
+        ConfigError, MissingExtra, OutputError: see `broadcast`.
+    """
+    if bag is None and not foxglove:
+        return nullcontext(lambda: None)
+    from golem.runtime.live.broadcast import broadcast
+
+    return broadcast(running, robot, bag, FOXGLOVE_PORT if foxglove else None)
 
 
 def shown(running: Running, robot: object) -> MujocoRobot:

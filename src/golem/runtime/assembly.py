@@ -14,7 +14,7 @@ from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.navigation.base import Navigator
-from golem.errors import ConfigError, ModuleFault
+from golem.errors import ConfigError, ModuleFault, RobotGone
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import GateStatus, Request, SafetyLimits
 from golem.middleware.bus import Bus
@@ -110,8 +110,9 @@ class Running:
             watch: called after every tick, for judges and viewers.
 
         Returns:
-            The result; a safety stop or a timeout ends the skill with a result that says so. After a fault of the
-            lower body the fallback gets the time to stand before this returns.
+            The result; a safety stop, a timeout or the end of a recording that stands in for the robot ends the skill
+            with a result that says so. After a fault of the lower body the fallback gets the time to stand before
+            this returns.
         """
         run = self.start(skill, goal)
         self._stack.legs.realtime = realtime
@@ -123,6 +124,10 @@ class Running:
 
         try:
             self.executor.run(self.executor.t + timeout, over, realtime)
+        except RobotGone as gone:
+            result = run.result
+            run.cancel()
+            return result or SkillResult(False, "robot", "robot", str(gone))
         except BaseException:
             run.cancel()
             self.halt()
@@ -151,15 +156,12 @@ def start_posture(on_ground: bool = False) -> Array:
     return q
 
 
-def build(stack: Stack, seed: int) -> tuple[Running, Any]:
-    """Build the robot of `stack` for episode `seed`, and the stack around it.
-
-    Returns:
-        The running stack, and the robot: for evaluation and viewers, never for modules.
+def build_robot(stack: Stack, seed: int) -> Any:
+    """Build the robot of `stack` for episode `seed`.
 
     Raises:
         ConfigError: a name, an option, the profile or the seed is wrong.
-        ModuleFault: a constructor raised, or a module lacks a part of its contract.
+        ModuleFault: its constructor raised, or it lacks a part of its contract.
     """
     load_profile(stack.profile)
     if seed < 0:
@@ -169,4 +171,17 @@ def build(stack: Stack, seed: int) -> tuple[Running, Any]:
         "robot", choice.use, choice.options, profile=stack.profile, seed=seed, posture=posture
     )
     Guard("robot", choice.use).satisfies(robot, Robot)
+    return robot
+
+
+def build(stack: Stack, seed: int) -> tuple[Running, Any]:
+    """Build the robot of `stack` for episode `seed`, and the stack around it.
+
+    Returns:
+        The running stack, and the robot: for evaluation and viewers, never for modules.
+
+    Raises:
+        ConfigError, ModuleFault: see `build_robot`; so for every other module.
+    """
+    robot = build_robot(stack, seed)
     return Running(stack, robot), robot

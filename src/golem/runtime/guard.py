@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from golem.errors import MissingExtra, MissingSystemLibrary, ModuleFault
+from golem.errors import MissingExtra, MissingSystemLibrary, ModuleFault, RobotGone
 from golem.types import Array
 
 T = TypeVar("T")
@@ -45,10 +45,11 @@ class Guard:
         Raises:
             ModuleFault: the module raised anything but such a fault.
             MissingExtra, MissingSystemLibrary: it needs what this machine lacks, which is not its fault.
+            RobotGone: it is the robot, and is no longer there.
         """
         try:
             return function(*arguments)
-        except (ModuleFault, MissingExtra, MissingSystemLibrary):
+        except (ModuleFault, MissingExtra, MissingSystemLibrary, RobotGone):
             raise
         except Exception as error:  # a user's module may raise anything
             raise self.fault(f"{type(error).__name__}: {error}") from error

@@ -10,6 +10,8 @@ from golem.middleware.dds.base import DEFAULT, Qos
 from golem.middleware.record.base import Topic
 from golem.middleware.ros import codec
 
+COMPRESSED = "sensor_msgs/msg/CompressedImage"
+
 
 def topic(name: str, kind: str, qos: Qos = DEFAULT) -> Topic:
     """Return the topic called `name` of messages of type `kind`, whose writers offer `qos`.
@@ -22,14 +24,14 @@ def topic(name: str, kind: str, qos: Qos = DEFAULT) -> Topic:
 
 
 def public_topics(chosen: Iterable[str] = ()) -> list[Topic]:
-    """Return the public topics called `chosen`; default: all.
+    """Return the public topics called `chosen`; default: all, but images in one form only: as they are.
 
     Raises:
         ConfigError: there is no such topic.
         MissingExtra: as for `topic`.
     """
     rows = {row.name: row for row in public.TOPICS}
-    names = list(chosen) or list(rows)
+    names = list(chosen) or [name for name, row in rows.items() if row.type != COMPRESSED]
     for name in names:
         if name not in rows:
             raise unknown_name("topic", name, rows)

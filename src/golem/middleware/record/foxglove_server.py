@@ -6,11 +6,13 @@ Schemas and payloads are those of a bag (`ros2msg`, CDR): nothing is converted f
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from golem.errors import ConfigError, MissingExtra
 from golem.middleware.record.base import Message, Topic
+from golem.middleware.record.recorder import CLOCK, Recorder
 
 try:
     import foxglove
@@ -71,12 +73,8 @@ class FoxgloveServer:
             ) from error
         self.url = f"ws://{config.host}:{self._server.port}"
 
-    def advertise(self, topic: Topic) -> None:
-        """Offer `topic` to the viewers, before its first message; again does nothing."""
-        self._channel(topic)
-
     def wanted(self, topic: Topic) -> bool:
-        """Return whether a viewer subscribes to `topic`."""
+        """Offer `topic` to the viewers, and return whether one subscribes to it."""
         return self._channel(topic).has_sinks()
 
     def write(self, message: Message) -> None:
@@ -92,13 +90,22 @@ class FoxgloveServer:
         self._channel(topic).log(bytes(message.payload), log_time=message.log_time)
 
     def refresh(self) -> None:
-        """Repeat to new viewers what holds; called where no message may come for long."""
+        """Repeat to new viewers what holds."""
         with self._lock:
             newcomers, self._newcomers = self._newcomers, set()
         for name in newcomers:
             held = self._latched.get(name)
             if held is not None:
                 self._channel(held.topic).log(bytes(held.payload), log_time=max(self._now, held.log_time))
+
+    def choose(self, recorder: Recorder, topics: Iterable[Topic]) -> None:
+        """Let `recorder`, whose sink this is, take those of `topics` that a viewer wants, and the time."""
+        for topic in topics:
+            if self.wanted(topic) or topic.name == CLOCK:
+                recorder.add([topic])
+            else:
+                recorder.remove(topic.name)
+        self.refresh()
 
     def subscribed(self, name: str) -> None:
         """Note that a viewer subscribed to the topic called `name`; from any thread."""

@@ -100,7 +100,9 @@ class Recorder:
             for sample in samples:
                 written = sample.source_time if abs(sample.source_time - now) < SKEW else now
                 batch.append((written, topic, sample.payload))
-        batch.sort(key=lambda entry: entry[0])
+        batch.sort(
+            key=lambda entry: (entry[0], entry[1].name != CLOCK)
+        )  # what happens at a time, happens after it
         for written, topic, payload in batch:
             if topic.name == CLOCK:
                 self._clock = clock_time(payload)

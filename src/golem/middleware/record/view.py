@@ -17,7 +17,7 @@ from golem.middleware.record.base import Topic
 from golem.middleware.record.catalog import public_topics
 from golem.middleware.record.commands import interrupted
 from golem.middleware.record.foxglove_server import FoxgloveServer, ServerConfig
-from golem.middleware.record.recorder import CLOCK, Recorder
+from golem.middleware.record.recorder import Recorder
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 
 PERIOD = 0.02
@@ -65,14 +65,7 @@ def serve(
     participant: Participant, topics: Sequence[Topic], server: FoxgloveServer, stop: threading.Event
 ) -> None:
     """Send viewers what they subscribe to until `stop` is set; nothing else is taken off the domain but the time."""
-    for topic in topics:
-        server.advertise(topic)
     with closing(Recorder(participant, server)) as recorder:
         while not stop.wait(PERIOD):
-            for topic in topics:
-                if topic.name == CLOCK or server.wanted(topic):
-                    recorder.add([topic])
-                else:
-                    recorder.remove(topic.name)
+            server.choose(recorder, topics)
             recorder.poll()
-            server.refresh()

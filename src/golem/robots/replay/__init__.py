@@ -1,0 +1,1 @@
+"""A recorded robot in place of a real or a simulated one."""

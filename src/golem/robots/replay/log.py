@@ -1,0 +1,192 @@
+"""What a recorded robot measured, in the order of time."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.middleware import public
+from golem.middleware.record.base import NANO, BagError, Message
+from golem.middleware.record.reader import Bag
+from golem.middleware.ros import codec, convert, images
+from golem.middleware.ros.msgs.geometry_msgs import Point, Pose
+from golem.middleware.ros.msgs.golem_interfaces import HandState as HandMessage
+from golem.middleware.ros.msgs.sensor_msgs import CameraInfo as InfoMessage
+from golem.middleware.ros.msgs.sensor_msgs import Image
+from golem.middleware.ros.msgs.std_msgs import Header
+from golem.middleware.ros.msgs.tf2_msgs import TFMessage
+from golem.middleware.wire.convert import decode_low_state
+from golem.robots.sensors.cameras import CAMERAS
+from golem.types import SIDES, Array, CameraInfo, HandState, LowState, Side
+
+T = TypeVar("T")
+STATE, STATIC = "/lowstate", "/tf_static"
+AHEAD = 0.5
+"""How far the log is read ahead [s] [own]: an image is recorded when it arrives, up to so long after its exposure."""
+SLACK = 5e-4
+"""Tolerance of a time [s]: half of the robot's own resolution."""
+RESTART = 1.0
+"""Step back in time that means another robot, or one that was started anew [s] [own]."""
+
+Picture = tuple[NDArray[np.uint8], NDArray[np.float32]]
+"""Colour (height, width, 3) and depth (height, width) [m] of one exposure."""
+
+
+class Track(Generic[T]):
+    """One measured quantity over time."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._samples: deque[tuple[float, T]] = deque()
+
+    def add(self, t: float, value: T) -> None:
+        """Append what was measured at `t` [s]."""
+        self._samples.append((t, value))
+
+    def at(self, t: float) -> T | None:
+        """Return the newest of up to `t` [s], and forget those before it; None where there is none yet."""
+        samples = self._samples
+        while len(samples) > 1 and samples[1][0] <= t + SLACK:
+            samples.popleft()
+        return samples[0][1] if samples and samples[0][0] <= t + SLACK else None
+
+
+class CameraTrack:
+    """The exposures of one camera, put together from their images."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self.pictures: Track[Picture] = Track()
+        self._color: tuple[float, NDArray[np.uint8]] | None = None
+        self._depth: tuple[float, NDArray[np.float32]] | None = None
+
+    def add_color(self, t: float, color: NDArray[np.uint8]) -> None:
+        """Take the colour of the exposure at `t` [s]."""
+        self._color = t, color
+        self._complete()
+
+    def add_depth(self, t: float, depth: NDArray[np.float32]) -> None:
+        """Take the depth of the exposure at `t` [s]."""
+        self._depth = t, depth
+        self._complete()
+
+    def _complete(self) -> None:
+        if self._color is not None and self._depth is not None and self._color[0] == self._depth[0]:
+            self.pictures.add(self._color[0], (self._color[1], self._depth[1]))
+
+
+class Log:
+    """A bag that is read as time passes; times are seconds since its first state.
+
+    States and hands have the time at which they were recorded, images that of their exposure. Both are the domain's.
+
+    Attributes:
+        cameras: those that were recorded.
+        calibration: per camera the (4, 4) pose of its optical frame, as the recorded robot's calibration claims it, in
+            that of the nominal model.
+        states: motors and IMU.
+        hands: each hand.
+        end: time of the last state; None until it has been read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open the bag at `path`.
+
+        Raises:
+            BagError: there is none, it is damaged, or it holds no state of a robot.
+            CodecError, WireError: a message is not what its topic says.
+        """
+        self._bag = bag = Bag(path)
+        if STATE not in bag.topics:
+            raise BagError(
+                f"The bag {path} has no messages on {STATE}, so it cannot stand in for a robot; it has "
+                f"{', '.join(sorted(bag.topics)) or 'none at all'}."
+            )
+        self.states: Track[LowState] = Track()
+        self.hands: dict[Side, Track[HandState]] = {side: Track() for side in SIDES}
+        self.end: float | None = None
+        self.cameras, self.calibration = _cameras(bag)
+        self._tracks = {name: CameraTrack() for name in self.cameras}
+        self._take: dict[str, Callable[[Message], None]] = {STATE: self._state}
+        for side in SIDES:
+            self._take[public.gripper(side, "state")] = partial(self._hand, side)
+        for name in self.cameras:
+            self._take[public.image(name, public.COLOR)] = partial(self._color, name)
+            self._take[public.image(name, public.DEPTH)] = partial(self._depth, name)
+        self._origin = next(bag.messages([STATE])).log_time
+        self._messages = bag.messages(self._take)
+        self._read = self._newest = -math.inf
+        self.read(0.0)
+
+    def read(self, t: float) -> None:
+        """Read on until everything measured up to `t` [s] is there, and forget what it replaces; errors as above."""
+        while self.end is None and self._read < t + AHEAD:
+            message = next(self._messages, None)
+            at = -math.inf if message is None else self._time(message.log_time)
+            if message is None or at < self._read - RESTART:
+                self.end = self._newest
+            else:
+                self._read = at
+                self._take[message.topic.name](message)
+        for track in (
+            self.states,
+            *self.hands.values(),
+            *(camera.pictures for camera in self._tracks.values()),
+        ):
+            track.at(t)
+
+    def picture(self, camera: str, t: float) -> Picture | None:
+        """Return what `camera` saw at its last exposure up to `t` [s]; None before the first."""
+        return self._tracks[camera].pictures.at(t)
+
+    def _time(self, time: int) -> float:
+        return (time - self._origin) / NANO
+
+    def _stamp(self, header: Header) -> float:
+        return self._time(header.stamp.sec * NANO + header.stamp.nanosec)
+
+    def _state(self, message: Message) -> None:
+        self._newest = self._time(message.log_time)
+        self.states.add(self._newest, decode_low_state(message.payload))
+
+    def _hand(self, side: Side, message: Message) -> None:
+        state = convert.to_hand_state(codec.deserialize(message.payload, HandMessage))
+        self.hands[side].add(self._time(message.log_time), state)
+
+    def _color(self, camera: str, message: Message) -> None:
+        image = codec.deserialize(message.payload, Image)
+        self._tracks[camera].add_color(self._stamp(image.header), images.to_rgb(image))
+
+    def _depth(self, camera: str, message: Message) -> None:
+        image = codec.deserialize(message.payload, Image)
+        self._tracks[camera].add_depth(self._stamp(image.header), images.to_depth(image))
+
+
+def _cameras(bag: Bag) -> tuple[dict[str, CameraInfo], dict[str, Array]]:
+    """Return the recorded cameras and their calibration; what ROS does not say of a camera, its table does."""
+    infos = {public.image(name, public.CAMERA_INFO): name for name in CAMERAS}
+    missing = {topic for topic in (*infos, STATIC) if topic in bag.topics}
+    found: dict[str, CameraInfo] = {}
+    claimed: dict[str, Array] = {}
+    for message in bag.messages(tuple(missing)):
+        topic = message.topic.name
+        if topic == STATIC:
+            for transform in codec.deserialize(message.payload, TFMessage).transforms:
+                p, q = transform.transform.translation, transform.transform.rotation
+                claimed[transform.child_frame_id] = convert.matrix(Pose(Point(p.x, p.y, p.z), q))
+        elif infos[topic] not in found:
+            nominal = CAMERAS[infos[topic]]
+            info = codec.deserialize(message.payload, InfoMessage)
+            camera = images.to_camera(info, nominal.name, nominal.near, nominal.far, nominal.rate)
+            found[camera.name] = camera
+        missing.discard(topic)
+        if not missing:
+            break
+    return found, {name: claimed.get(public.optical_frame(name), np.eye(4)) for name in found}
