@@ -34,6 +34,31 @@ class IMUState(Message):
 
 
 @dataclass(slots=True, eq=False)
+class PathPoint(Message):
+    """A point of a planned path.
+
+    Attributes:
+        t_from_start: [s]
+        x: [m]
+        y: [m]
+        yaw: [rad]
+        vx: [m/s]
+        vy: [m/s]
+        vyaw: [rad/s]
+    """
+
+    __msgtype__: ClassVar[str] = "unitree_go/msg/PathPoint"
+
+    t_from_start: float = 0.0
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+    vx: float = 0.0
+    vy: float = 0.0
+    vyaw: float = 0.0
+
+
+@dataclass(slots=True, eq=False)
 class TimeSpec(Message):
     """A time on the robot's clock.
 
@@ -66,6 +91,7 @@ class SportModeState(Message):
         foot_force: vendor's own units
         foot_position_body: x, y, z of each foot in the body's frame [m]
         foot_speed_body: x, y, z of each foot in the body's frame [m/s]
+        path_point: planned path
     """
 
     __msgtype__: ClassVar[str] = "unitree_go/msg/SportModeState"
@@ -85,6 +111,7 @@ class SportModeState(Message):
     foot_force: NDArray[np.int16] = field(default_factory=lambda: np.zeros(4, np.int16))
     foot_position_body: NDArray[np.float32] = field(default_factory=lambda: np.zeros(12, np.float32))
     foot_speed_body: NDArray[np.float32] = field(default_factory=lambda: np.zeros(12, np.float32))
+    path_point: list[PathPoint] = field(default_factory=lambda: [PathPoint() for _ in range(10)])
 
 
 @dataclass(slots=True, eq=False)
