@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+pytest.importorskip("rosbags")
+
 from golem.middleware.dds.base import ENCAPSULATION, LATCHED, Qos
 from golem.middleware.ros.action_client import DdsActionClient
 from golem.middleware.ros.action_server import DdsActionServer

@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+pytest.importorskip("rosbags")
+
 from golem.errors import ConfigError
 from golem.middleware.dds.base import LATCHED, SENSOR, Qos
 from golem.middleware.ros.base import Client, Node

@@ -6,6 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+
+pytest.importorskip("rosbags")
+
 from rosbags.typesys import Stores, get_typestore
 
 from golem.errors import ConfigError

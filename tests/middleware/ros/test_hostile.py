@@ -6,6 +6,9 @@ import gc
 import random
 
 import pytest
+
+pytest.importorskip("rosbags")
+
 from tests.middleware.ros.samples import mutated
 
 from golem.middleware.dds.base import LATCHED, Qos, Reader, Writer

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytest.importorskip("rosbags")
+
 from golem.middleware.ros.action_client import DdsActionClient
 from golem.middleware.ros.codec import action, service
 from golem.middleware.ros.future import RosError

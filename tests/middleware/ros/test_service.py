@@ -5,6 +5,10 @@ from __future__ import annotations
 import struct
 import time
 
+import pytest
+
+pytest.importorskip("rosbags")
+
 from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore

@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+pytest.importorskip("rosbags")
+
 from golem.middleware.ros.base import ServerGoal
 from golem.middleware.ros.codec import action
 from golem.middleware.ros.goals import CancelCode, GoalStatus

@@ -11,7 +11,7 @@ from golem.errors import GolemError
 T = TypeVar("T")
 U = TypeVar("U")
 LOOK = 0.02
-"""How often a node that waits for an answer is asked whether it came [s]."""
+"""How often a waiting node looks after what no sample announces, e.g. that a server has gone [s]."""
 
 
 class RosError(GolemError):

@@ -13,14 +13,12 @@ from golem.middleware.ros.action_server import DdsActionServer
 from golem.middleware.ros.base import RESULT_TIMEOUT, ActionHandler
 from golem.middleware.ros.codec import DEFAULT as DEFAULT_DISTRO
 from golem.middleware.ros.endpoints import Endpoints
-from golem.middleware.ros.future import Future, spin_until
+from golem.middleware.ros.future import LOOK, Future, spin_until
 from golem.middleware.ros.graph import DiscoveryInfo
 from golem.middleware.ros.service import DdsClient, DdsService
 from golem.middleware.ros.topics import DdsPublisher, DdsSubscription
 
 T = TypeVar("T")
-KEEP_PERIOD = 0.02
-"""How often a waiting node looks after what no sample announces, e.g. a server that has gone [s]."""
 
 
 class DdsNode:
@@ -97,7 +95,7 @@ class DdsNode:
             left = end - time.monotonic()
             if handled or left <= 0.0:
                 return handled
-            self._endpoints.waitset.wait(min(left, KEEP_PERIOD))
+            self._endpoints.waitset.wait(min(left, LOOK))
 
     def wait(self, future: Future[T], timeout: float) -> T:
         """Spin until `future` is done; see `base.Node.wait`."""
