@@ -7,6 +7,7 @@ would make it crash. What comes back must be what was sent, to the byte.
 from __future__ import annotations
 
 import os
+import random
 import shutil
 import subprocess
 import time
@@ -15,12 +16,17 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip("cyclonedds")
+pytest.importorskip("rosbags")
 
 from tests.middleware.dds.cdr import MESSAGES, message
+from tests.middleware.dds.idl import idl, wire_name
+from tests.middleware.ros.samples import random_message
 
+from golem.middleware import public
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.ros.codec import codec, serialize
 
 PEER = Path(__file__).parent / "peer"
 COUNT = 20
@@ -30,20 +36,53 @@ URI = f"<CycloneDDS><Domain>{LOOPBACK}</Domain></CycloneDDS>"
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def c_peer(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+def build(work: Path, idl: Path) -> list[str]:
+    """Return the command of the C peer for the types in a file."""
     if not shutil.which("idlc") or not shutil.which("gcc"):
         pytest.skip("needs Cyclone DDS 0.10 in C: apt-get install gcc cyclonedds-dev cyclonedds-tools")
     version = subprocess.run(["idlc", "-v"], capture_output=True, text=True, check=False)
     if "0.10" not in version.stdout + version.stderr:
         pytest.skip("needs Cyclone DDS 0.10 in C; the idlc found first is another: " + version.stdout)
-    work = tmp_path_factory.mktemp("c_peer")
     for command in (
-        ["idlc", str(PEER / "messages.idl")],
-        ["gcc", "-I.", str(PEER / "peer.c"), "messages.c", "-lddsc", "-o", "peer"],
+        ["idlc", str(idl)],
+        [
+            "gcc",
+            "-rdynamic",
+            str(PEER / "peer.c"),
+            idl.with_suffix(".c").name,
+            "-lddsc",
+            "-ldl",
+            "-o",
+            "peer",
+        ],
     ):
         subprocess.run(command, cwd=work, check=True, capture_output=True)
     return [str(work / "peer")]
+
+
+@pytest.fixture(scope="module")
+def c_peer(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    return build(tmp_path_factory.mktemp("c_peer"), PEER / "messages.idl")
+
+
+@pytest.fixture(scope="module")
+def c_peer_of_all(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    work = tmp_path_factory.mktemp("c_peer_of_all")
+    file = work / "interfaces.idl"
+    file.write_text(idl(interfaces(), codec()._types), encoding="utf-8")
+    return build(work, file)
+
+
+def interfaces() -> list[str]:
+    """Return the ROS names of every type that is on one of our topics, those under services and actions included."""
+    known = codec()
+    names = {row.type for row in public.TOPICS} | {"rmw_dds_common/msg/ParticipantEntitiesInfo"}
+    services = {row.type for row in public.SERVICES}
+    for row in public.ACTIONS:
+        kind = known.action(row.type)
+        services |= {kind.SendGoal.name, kind.GetResult.name, "action_msgs/srv/CancelGoal"}
+        names |= {f"{row.type}_FeedbackMessage", "action_msgs/msg/GoalStatusArray"}
+    return sorted(names | {f"{service}_{part}" for service in services for part in ("Request", "Response")})
 
 
 @pytest.fixture(scope="module")
@@ -67,15 +106,33 @@ def python_peer(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 @pytest.mark.parametrize("language", ["c", "python"])
 @pytest.mark.parametrize("type_name", MESSAGES)
-def test_an_old_peer_reads_and_writes_our_topics(
+def test_an_old_peer_sends_back_what_we_send(
     type_name: str, language: str, domain: int, request: pytest.FixtureRequest
 ) -> None:
     command: list[str] = request.getfixturevalue(f"{language}_peer")
-    sent = [message(type_name, seed) for seed in range(COUNT)]
+    exchange(command, domain, type_name, [message(type_name, seed) for seed in range(COUNT)])
+
+
+@pytest.mark.parametrize("name", interfaces())
+def test_an_old_peer_takes_part_in_every_topic_of_ours(
+    name: str, domain: int, c_peer_of_all: list[str]
+) -> None:
+    rng = random.Random(name)
+    sent = [serialize(random_message(codec(), name, rng)) for _ in range(COUNT)]
+    if name.endswith(("_Request", "_Response")):
+        header = rng.randbytes(
+            16
+        )  # client and sequence number, before the body (rmw_cyclonedds, cdds_request_header)
+        sent = [payload[:4] + header + payload[4:] for payload in sent]
+    exchange(c_peer_of_all, domain, wire_name(name), sent)
+
+
+def exchange(command: list[str], domain: int, type_name: str, sent: list[bytes]) -> None:
+    """Send samples to a peer that sends them back; both must be whole, and the peer must end well."""
     participant = connect(DdsConfig(domain))
     reader = participant.reader("rt/back", type_name, Qos(depth=None))
     writer = participant.writer("rt/there", type_name, Qos(depth=None))
-    arguments = [*command, str(domain), type_name, str(COUNT)]
+    arguments = [*command, str(domain), type_name, str(len(sent))]
     peer = subprocess.Popen(arguments, env={**os.environ, "CYCLONEDDS_URI": URI})
     back: list[bytes] = []
     try:
@@ -84,7 +141,7 @@ def test_an_old_peer_reads_and_writes_our_topics(
             time.sleep(0.01)
         for payload in sent:
             writer.write(payload)
-        while len(back) < COUNT and time.monotonic() < end:
+        while len(back) < len(sent) and time.monotonic() < end:
             back += [sample.payload for sample in reader.take() if sample.alive]
             time.sleep(0.005)
         assert peer.wait(timeout=15.0) == 0

@@ -1,23 +1,27 @@
+#define _GNU_SOURCE
 /* A peer on Cyclone DDS 0.10 with generated types: peer DOMAIN TYPE COUNT
    Sends every sample it receives on rt/there back on rt/back, COUNT of them, then exits with 0. */
+#include <dlfcn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "dds/dds.h"
-#include "messages.h"
 
-static const dds_topic_descriptor_t *const TYPES[] = {
-  &std_msgs_msg_dds__String__desc, &geometry_msgs_msg_dds__Twist__desc, &sensor_msgs_msg_dds__JointState__desc,
-  &sensor_msgs_msg_dds__Image__desc, &sensor_msgs_msg_dds__PointCloud2__desc,
-  &unitree_hg_msg_dds__LowState__desc, &unitree_hg_msg_dds__LowCmd__desc,
-};
+/* The descriptor that idlc generated for a type, e.g. std_msgs_msg_dds__String__desc for std_msgs::msg::dds_::String_. */
+static const dds_topic_descriptor_t *find (const char *type)
+{
+  char symbol[256];
+  size_t n = 0;
+  for (const char *c = type; *c && n < sizeof (symbol) - 8; c++)
+    if (c[0] == ':') { symbol[n++] = '_'; c++; } else symbol[n++] = *c;
+  strcpy (symbol + n, "_desc");
+  return dlsym (NULL, symbol);
+}
 
 int main (int argc, char **argv)
 {
-  const dds_topic_descriptor_t *type = NULL;
   if (argc != 4) return 64;
-  for (size_t i = 0; i < sizeof (TYPES) / sizeof (TYPES[0]); i++)
-    if (strcmp (TYPES[i]->m_typename, argv[2]) == 0) type = TYPES[i];
+  const dds_topic_descriptor_t *type = find (argv[2]);
   if (type == NULL) return 65;
   dds_qos_t *qos = dds_create_qos ();
   dds_qset_reliability (qos, DDS_RELIABILITY_RELIABLE, DDS_SECS (5));
