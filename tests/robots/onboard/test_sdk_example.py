@@ -20,7 +20,7 @@ MACHINE = 6
 WANTED = 300
 """Commands to look at."""
 DEADLINE = 40.0
-DURATION, DT = 3.0, 0.002
+DURATION, PERIOD = 3.0, 0.002
 """Time over which the example moves to zero, and its period [s]; both as its source says."""
 
 Q: Array = np.cos(np.pi * np.arange(NUM_JOINTS)) * np.linspace(0.1, 0.9, NUM_JOINTS)
@@ -70,7 +70,7 @@ def test_the_vendors_example_reads_and_commands_this_robot(sdk: Started, domain:
         while len(twin.payloads) < WANTED and time.monotonic() - start < DEADLINE:
             assert process.poll() is None, process.communicate()[0]
             twin.step(time.monotonic() - start)
-            time.sleep(DT)
+            time.sleep(PERIOD)
     finally:
         twin.close()
     process.kill()
@@ -80,7 +80,7 @@ def test_the_vendors_example_reads_and_commands_this_robot(sdk: Started, domain:
     commands = [convert.decode_low_command(payload, 0.0, MACHINE) for payload in twin.payloads]
     ratios = [_check(command) for command in commands]
     # Each command moves the posture it read towards zero, by one period; a busy machine may miss a few.
-    periods = -np.diff(ratios) * DURATION / DT
+    periods = -np.diff(ratios) * DURATION / PERIOD
     np.testing.assert_allclose(periods, np.round(periods), atol=1e-3)
     assert periods.min() > 0.5 and np.median(np.round(periods)) == 1.0
     assert "[0.0, 0.0, 0.0]" in said  # roll, pitch and yaw, which it prints every 500 states
