@@ -133,6 +133,65 @@ TRAINERS = {"detector": "golem.training.detector.__main__", "legs": "golem.train
 """What can be trained, and the module that does it."""
 
 
+def _twin(words: list[str]) -> int:
+    """Put the simulated robot on a DDS domain, with the wall clock."""
+    _prepare_graphics()
+    from golem.runtime.live.process import TwinConfig, run_twin
+
+    run_twin(_parse(TwinConfig, "twin", words))
+    return 0
+
+
+def _safety(words: list[str]) -> int:
+    """Guard the robot on a domain; `safety activate|stop|reset|press|release|status` asks the one that does."""
+    from golem.runtime.live import operator
+
+    if words and words[0] in operator.REQUESTS:
+        config = _parse(operator.RequestConfig, f"safety {words[0]}", words[1:])
+        return 0 if operator.run_request(words[0], config) else FAILED
+    from golem.runtime.live.process import SafetyConfig, run_safety
+
+    run_safety(_parse(SafetyConfig, "safety", words))
+    return 0
+
+
+def _up(words: list[str]) -> int:
+    """Run everything of a stack file that decides what the robot on a domain does."""
+    from golem.runtime.live.process import UpConfig, run_up
+
+    run_up(_parse(UpConfig, "up", words))
+    return 0
+
+
+def _launch(words: list[str]) -> int:
+    """Start twin, safety and up for a stack file, and watch over them."""
+    from golem.runtime.live.launch import LaunchConfig, run_launch
+
+    return 0 if run_launch(_parse(LaunchConfig, "launch", words)) else FAILED
+
+
+def _restart(words: list[str]) -> int:
+    """Restart one process of a launched robot: twin, safety or up."""
+    from golem.runtime.live.operator import RestartConfig, run_restart
+
+    return 0 if run_restart(_parse(RestartConfig, "restart", words)) else FAILED
+
+
+def _skill(words: list[str]) -> int:
+    """Let the robot on a domain do something: pick, walk or stand."""
+    from golem.runtime.live.errand import read_errand, run_errand
+
+    return run_errand(read_errand(words))
+
+
+def _topics(words: list[str]) -> int:
+    """List what is on a domain, with rates and bytes."""
+    from golem.runtime.live.survey import SurveyConfig, run_survey
+
+    run_survey(_parse(SurveyConfig, "topics", words))
+    return 0
+
+
 def _record(words: list[str]) -> int:
     """Record a domain into a bag that ROS 2 tools and Foxglove read."""
     from golem.middleware.record.commands import RecordConfig, run_record
@@ -176,6 +235,13 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "model": _model,
     "bench": _bench,
     "train": _train,
+    "twin": _twin,
+    "safety": _safety,
+    "up": _up,
+    "launch": _launch,
+    "restart": _restart,
+    "skill": _skill,
+    "topics": _topics,
     "record": _record,
     "replay": _replay,
     "view": _view,

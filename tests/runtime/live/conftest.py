@@ -8,13 +8,12 @@ from typing import Any
 
 import pytest
 
-from golem import registry
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import GateState, SafetyLimits
 from golem.middleware.dds.local import LocalDomain, LocalParticipant
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, Trigger_Request
 from golem.middleware.ros.node import DdsNode
-from golem.runtime.assembly import start_posture
+from golem.runtime.assembly import build_robot
 from golem.runtime.executor import TICK
 from golem.runtime.live.gate import LiveGate
 from golem.runtime.live.stack import LiveStack
@@ -51,15 +50,7 @@ class Live:
 
     def start_twin(self, seed: int = 0) -> None:
         """Put a new robot on the domain."""
-        choice = self.stack.robot
-        self.robot = registry.create(
-            "robot",
-            choice.use,
-            choice.options,
-            profile=self.stack.profile,
-            seed=seed,
-            posture=start_posture(self.stack.on_ground),
-        )
+        self.robot = build_robot(self.stack, seed)
         self.twin = Twin(self.stack, self.robot, *self.member("twin"))
 
     def start_gate(self) -> None:
@@ -69,8 +60,7 @@ class Live:
 
     def start_up(self) -> None:
         """Put a new stack on the domain."""
-        banded = self.stack.on_ground
-        self.up = LiveStack(self.stack, *self.member("up"), banded=banded, clock=lambda: self.clock)
+        self.up = LiveStack(self.stack, *self.member("up"), clock=lambda: self.clock)
 
     def leave(self, node: str) -> None:
         """Take a process off the domain, as if it had been killed."""

@@ -29,6 +29,7 @@ from golem.middleware.wire.layout import WireError
 from golem.runtime.executor import in_order
 from golem.runtime.live.clock import RobotClock
 from golem.runtime.live.surface import Surface
+from golem.runtime.live.verdict import status_message, told
 from golem.runtime.sides import SafetySide
 from golem.types import BaseEstimate, LowCommand, LowState
 
@@ -249,24 +250,3 @@ class Every:
             return False
         self._last = now
         return True
-
-
-def told(status: GateStatus) -> str:
-    """Return the state of the gate and why, for a person."""
-    why = ": ".join(part for part in (status.reason or "", status.detail) if part)
-    return f"{status.state} ({why})" if why else str(status.state)
-
-
-def status_message(status: GateStatus) -> golem_interfaces.SafetyStatus:
-    """Return what the gate lets everybody know."""
-    return golem_interfaces.SafetyStatus(header(status.t), status.state, status.reason or "", status.detail)
-
-
-def to_status(message: golem_interfaces.SafetyStatus, t: float) -> GateStatus:
-    """Return what the gate said, as of time `t` [s]; a state or a reason nobody knows is a shut gate."""
-    try:
-        return GateStatus(
-            t, GateState(message.state), Reason(message.reason) if message.reason else None, message.detail
-        )
-    except ValueError:
-        return GateStatus(t, GateState.INIT, None, f"the gate says '{message.state}', '{message.reason}'")

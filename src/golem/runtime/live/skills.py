@@ -18,8 +18,8 @@ from golem.middleware.ros.base import ServerGoal
 from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs import golem_interfaces
 from golem.runtime.executor import TICK
-from golem.runtime.live.gate import told
 from golem.runtime.live.surface import Surface
+from golem.runtime.live.verdict import told
 from golem.runtime.sides import StackSide
 from golem.skills.base import Feedback, Skill, SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickGoal

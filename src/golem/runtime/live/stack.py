@@ -25,6 +25,7 @@ from golem.runtime.live import stack_out as out
 from golem.runtime.live.clock import RobotClock
 from golem.runtime.live.motors import RequestOut
 from golem.runtime.live.onboard import AnswersIn, CallsOut, Identities, LegsIn
+from golem.runtime.live.robot_out import FramesOut, JointsOut, describe
 from golem.runtime.live.skills import Skills
 from golem.runtime.live.stack_in import CameraIn, GateIn, RemoteBand, listen
 from golem.runtime.live.surface import Surface
@@ -33,6 +34,8 @@ from golem.runtime.sides import StackSide
 from golem.stack import Stack
 from golem.types import SIDES, Array
 
+SHOWN = ("/joint_states", "/tf", "/tf_static", "/robot_description")
+"""What of the robot's surface follows from its state, and is not the vendor's to publish."""
 CATCH_UP = 5
 """Ticks that are made up for when states were late or lost; more are left out."""
 
@@ -54,8 +57,7 @@ class LiveStack:
         participant: Participant,
         node: Node,
         *,
-        banded: bool,
-        realtime: bool = False,
+        real: bool = False,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Join the domain; the modules are built when the robot reports.
@@ -64,11 +66,12 @@ class LiveStack:
             stack: which modules.
             participant: member of the domain.
             node: its ROS node.
-            banded: whether the robot is a twin that stands in a band.
-            realtime: whether leg controllers are held to their period by the wall clock.
+            real: whether the robot is none of ours. Nobody then calls to let a band go, the wall clock holds leg
+                controllers to their period, and joints and frames are shown by this process, since none of the
+                robot's does.
             clock: this process's own [s].
         """
-        self._stack, self._node, self._realtime = stack, node, realtime
+        self._stack, self._node, self._real = stack, node, real
         self._bus = Bus()
         self._robot = RobotClock()
         self._calibration: dict[str, Array] = {name: np.eye(4) for name in public.CAMERAS}
@@ -77,7 +80,7 @@ class LiveStack:
         self.restarts, self.ignored, self.why = 0, 0, ""
         self._executor: Executor | None = None
         self._mode_machine = 0
-        self._band = RemoteBand(node) if banded else None
+        self._band = RemoteBand(node) if stack.on_ground and not real else None
         self._gate = GateIn(self._bus, surface, clock)
         self._cameras = [CameraIn(self._bus, surface, name) for name in public.CAMERAS]
         service = LOCO_APIS["h1"].service
@@ -87,6 +90,9 @@ class LiveStack:
         self._skills = Skills(surface)
         surface.serve({k: v for s in SIDES for k, v in out.hand_services(self._bus, s, self._now).items()})
         listen(self._bus, surface, self._calibration, self._now)
+        self._drivers = Surface("robot", participant, node, only=SHOWN) if real else None
+        if self._drivers is not None:
+            describe(self._drivers, {})
         self.states = WaitSet()
         surface.receive("/lowstate", self.states, self._state)
 
@@ -123,7 +129,7 @@ class LiveStack:
         if self._band is not None:
             self._band.renew()
         side = self.side = StackSide(bus, self._stack, self._calibration, self._band, 0.0)
-        side.legs.realtime = self._realtime
+        side.legs.realtime = self._real
         self._skills.attach(side)
         service, identities = LOCO_APIS["h1"].service, Identities()
         placed: list[Placed] = [
@@ -144,4 +150,7 @@ class LiveStack:
             *((Phase.SEND, out.HandCommandOut(bus, surface, hand)) for hand in SIDES),
             *((Phase.SEND, out.HandStatusOut(bus, surface, hand)) for hand in SIDES),
         ]
+        if self._drivers is not None:
+            placed.append((Phase.SEND, JointsOut(bus, self._drivers)))
+            placed.append((Phase.SEND, FramesOut(bus, self._drivers)))
         return Executor(bus, in_order(placed))

@@ -19,8 +19,8 @@ from golem.middleware.topics import Exposure
 from golem.robots.sensors.cameras import CAMERAS
 from golem.runtime.cameras import looked_for
 from golem.runtime.executor import TICK
-from golem.runtime.live.gate import to_status
 from golem.runtime.live.surface import Surface
+from golem.runtime.live.verdict import to_status
 from golem.types import SIDES, Array, CameraInfo, Side
 
 SILENT = 0.25

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -23,13 +23,24 @@ class Surface:
         node: its ROS node.
     """
 
-    def __init__(self, role: Role, participant: Participant, node: Node) -> None:
-        """Publish every topic of `role`; the vendor's own through `participant`, the others through `node`."""
+    def __init__(
+        self, role: Role, participant: Participant, node: Node, only: Collection[str] | None = None
+    ) -> None:
+        """Publish every topic of `role`, or `only` some of them.
+
+        Args:
+            role: whose surface it is.
+            participant: what the vendor's own topics are created by.
+            node: what all others are created by.
+            only: names of topics; None is all.
+        """
         self.node = node
         self._role, self._participant = role, participant
         self._publishers: dict[str, Publisher] = {}
         self._writers: dict[str, Writer] = {}
         for row in public.TOPICS:
+            if only is not None and row.name not in only:
+                continue
             if row.by == role and row.vendor:
                 self._writers[row.name] = participant.writer(
                     names.topic(row.name), dds_name(row.type), row.qos

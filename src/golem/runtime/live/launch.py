@@ -1,0 +1,223 @@
+"""`golem launch`: starts the processes of a robot, watches over them, and restarts one on request.
+
+It is no part of what keeps the robot safe: a stack that dies is noticed by the safety gate, which damps, and a safety
+process that dies by the drives, which go limp. What is done here is to say which of them died, and what became of the
+robot.
+"""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from tyro.conf import OmitArgPrefixes, Positional
+
+from golem.errors import ConfigError
+from golem.hardware.safety.base import GateState, GateStatus
+from golem.middleware import public
+from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.record.commands import interrupted
+from golem.middleware.ros.base import Node
+from golem.middleware.ros.future import Future
+from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
+from golem.robots.mujoco.config import World
+from golem.runtime.live.member import member, say
+from golem.runtime.live.verdict import to_status, told
+from golem.stack import load_stack
+
+Part = Literal["twin", "safety", "up"]
+PARTS: tuple[Part, ...] = ("twin", "safety", "up")
+"""In the order they are started; they end in the opposite one, so that the gate outlives what it guards against."""
+GRACE = 6.0
+"""Time a process gets to end by itself [s]: the gate damps for three."""
+PERIOD = 0.1
+"""Time between two looks at the processes [s]."""
+
+
+@dataclass(frozen=True)
+class LaunchConfig:
+    """Start twin, safety and up for a stack file, let its commands through, and watch over them until Ctrl-C."""
+
+    stack: Positional[str] = "tether"
+    """Path of a stack file, or the name of a shipped one."""
+    world: World | None = None
+    """World of the twin: pack, open, slope or rubble; default: the stack file's."""
+    profile: str | None = None
+    """Realism profile: ideal, bench or field; default: the stack file's."""
+    seed: int = 0
+    """Seed of the episode."""
+    activate: bool = True
+    """Let commands through as soon as the gate is armed. After a stop, that is for you to do: golem safety reset,
+    golem safety activate."""
+    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
+
+
+def commands(config: LaunchConfig) -> dict[Part, list[str]]:
+    """Return the words after `golem` that start each process.
+
+    Raises:
+        ConfigError: the stack file is wrong, or the real robot is meant.
+    """
+    if config.dds.robot:
+        raise ConfigError(
+            "golem launch starts a simulation. On the real robot start, each in a terminal of its own: "
+            "golem safety --robot --domain 0 --interface NAME; golem up STACK --robot --domain 0 --interface NAME."
+        )
+    stack = load_stack(config.stack, profile=config.profile)
+    dds = ["--domain", str(config.dds.domain), "--interface", config.dds.interface]
+    if config.dds.peers:
+        dds += ["--peers", *config.dds.peers]
+    profile = ["--profile", config.profile] if config.profile else []
+    world = ["--world", config.world] if config.world else []
+    return {
+        "twin": ["twin", config.stack, "--seed", str(config.seed), *profile, *world, *dds],
+        "safety": ["safety", "--limits", stack.limits, *dds],
+        "up": ["up", config.stack, *profile, *dds],
+    }
+
+
+class Process:
+    """One process, and what it prints, with its name in front.
+
+    Attributes:
+        name: which.
+    """
+
+    def __init__(self, name: str, words: Sequence[str]) -> None:
+        """Start `golem WORDS`."""
+        self.name = name
+        # A group of its own: Ctrl-C in the terminal is for the launcher, which ends them in order.
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "golem", *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+        self._reader = threading.Thread(target=self._pass_on, daemon=True)
+        self._reader.start()
+
+    @property
+    def code(self) -> int | None:
+        """The exit code; None while it runs."""
+        return self._process.poll()
+
+    @property
+    def pid(self) -> int:
+        """The operating system's number of it."""
+        return self._process.pid
+
+    def end(self) -> None:
+        """Ask it to end, and make it if it does not."""
+        if self.code is None:
+            self._process.send_signal(signal.SIGTERM)
+            try:
+                self._process.wait(GRACE)
+            except subprocess.TimeoutExpired:
+                say(f"{self.name} does not end; it is killed.")
+                self._process.kill()
+                self._process.wait()
+        self._reader.join(1.0)
+
+    def _pass_on(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            say(f"[{self.name}] {line.rstrip()}")
+
+
+class Launcher:
+    """The processes of one robot.
+
+    Attributes:
+        processes: by name.
+        gate: newest verdict of the safety gate; None before the first.
+    """
+
+    def __init__(self, words: dict[Part, list[str]], node: Node, activate: bool) -> None:
+        """Start the processes, `words` being their command lines; watch the gate through `node`."""
+        self._words, self._node, self._activate = words, node, activate
+        self._activation: Future[Any] | None = None
+        self._client = node.client("/safety/activate", public.TRIGGER)
+        self._dead: set[str] = set()
+        self.gate: GateStatus | None = None
+        row = public.topic("/safety/status")
+        node.subscription(row.name, row.type, self._heard, row.qos)
+        for name in PARTS:
+            node.service(f"/launch/restart_{name}", public.TRIGGER, self._restarter(name))
+        self.processes: dict[Part, Process] = {name: Process(name, words[name]) for name in PARTS}
+
+    def step(self, timeout: float) -> None:
+        """Look after everything for up to `timeout` [s]."""
+        self._node.spin_once(timeout)
+        for name, process in self.processes.items():
+            if process.code is not None and name not in self._dead:
+                self._dead.add(name)
+                say(f"{name} has died (exit code {process.code}). {self._consequence(name)}")
+                say(f"Restart it with: golem restart {name}")
+        if self._activate and self.gate is not None and self.gate.state is GateState.ARMED:
+            if self._activation is None and self._client.ready():
+                self._activation = self._client.call(Trigger_Request())
+                self._activation.then(self._activated)
+
+    def restart(self, name: Part) -> None:
+        """End one process, if it still runs, and start it again; the others go on."""
+        self.processes[name].end()
+        self._dead.discard(name)
+        self.processes[name] = Process(name, self._words[name])
+        say(f"{name} was restarted (process {self.processes[name].pid}).")
+
+    def close(self) -> None:
+        """End all processes: what commands, then the gate, which damps, then the robot."""
+        for name in reversed(PARTS):
+            self.processes[name].end()
+
+    def _consequence(self, name: str) -> str:
+        """Return what becomes of the robot once a process has died, as far as it is seen here."""
+        if name == "safety":
+            return "The drives go limp within 0.1 s."
+        end = time.monotonic() + 1.0
+        while time.monotonic() < end and (self.gate is None or self.gate.state is GateState.ACTIVE):
+            self._node.spin_once(0.02)
+        return "The safety gate is silent." if self.gate is None else f"The safety gate is {told(self.gate)}."
+
+    def _restarter(self, name: Part) -> Callable[[Any], Trigger_Response]:
+        def answer(request: Any) -> Trigger_Response:
+            self.restart(name)
+            return Trigger_Response(True, f"{name} is process {self.processes[name].pid} now.")
+
+        return answer
+
+    def _heard(self, message: Any) -> None:
+        self.gate = to_status(message, time.monotonic())
+
+    def _activated(self, answer: Future[Any]) -> None:
+        self._activation = None
+        try:
+            self._activate = not answer.result().success
+        except Exception:  # asked again: whoever should have answered is not there yet
+            return
+
+
+def run_launch(config: LaunchConfig) -> bool:
+    """Start everything and watch over it until Ctrl-C; return whether nothing had died by then.
+
+    Raises:
+        ConfigError: an option or the stack file is wrong.
+        DdsError: the domain cannot be joined.
+    """
+    words = commands(config)
+    with interrupted() as stop, member("launch", config.dds) as (_, node):
+        launcher = Launcher(words, node, config.activate)
+        try:
+            while not stop.is_set():
+                launcher.step(PERIOD)
+        finally:
+            alive = all(process.code is None for process in launcher.processes.values())
+            launcher.close()
+    return alive

@@ -1,0 +1,111 @@
+"""What an operator asks of running processes: of the safety gate, and of what started them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from tyro.conf import OmitArgPrefixes, Positional
+
+from golem.hardware.safety.base import GateState
+from golem.middleware import public
+from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.ros.base import Node
+from golem.middleware.ros.future import RosError
+from golem.middleware.ros.msgs.std_srvs import SetBool_Request, Trigger_Request
+from golem.runtime.live.member import member, say
+from golem.runtime.live.verdict import to_status, told
+
+TIMEOUT = 3.0
+"""How long is waited for a server, and for its answer [s]."""
+REQUESTS: dict[str, tuple[str, Any]] = {
+    "activate": ("/safety/activate", Trigger_Request()),
+    "stop": ("/safety/stop", Trigger_Request()),
+    "reset": ("/safety/reset", Trigger_Request()),
+    "press": ("/estop/press", SetBool_Request(True)),
+    "release": ("/estop/press", SetBool_Request(False)),
+    "status": ("", None),
+}
+"""What can be asked of the safety process: service and request."""
+
+
+@dataclass(frozen=True)
+class RequestConfig:
+    """Ask something of the safety process on a domain."""
+
+    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
+
+
+@dataclass(frozen=True)
+class RestartConfig:
+    """Restart one process that `golem launch` started; the others go on."""
+
+    process: Positional[Literal["twin", "safety", "up"]]
+    """Which one."""
+    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
+
+
+def run_request(what: str, config: RequestConfig) -> bool:
+    """Ask the safety process for `what`, a key of `REQUESTS`, and say what it answers; return whether it agreed.
+
+    Raises:
+        RosError: there is none, or it does not answer.
+    """
+    service, request = REQUESTS[what]
+    with member("operator", config.dds) as (_, node):
+        if not service:
+            return _status(node, config.dds)
+        kind = next(row.type for row in public.SERVICES if row.name == service)
+        response = ask(node, service, kind, request, f"start it with: golem safety, on {config.dds}")
+        say(response.message)
+        return response.success
+
+
+def run_restart(config: RestartConfig) -> bool:
+    """Have a process restarted, and say what is answered; return whether it was.
+
+    Raises:
+        RosError: nothing here was launched.
+    """
+    with member("operator", config.dds) as (_, node):
+        name = f"/launch/restart_{config.process}"
+        remedy = f"only what 'golem launch' started on {config.dds} can be restarted so"
+        response = ask(node, name, public.TRIGGER, Trigger_Request(), remedy)
+        say(response.message)
+        return response.success
+
+
+def ask(node: Node, service: str, kind: str, request: Any, remedy: str, timeout: float = TIMEOUT) -> Any:
+    """Call a service and return the response.
+
+    Args:
+        node: who calls.
+        service: its name.
+        kind: its type.
+        request: what is sent.
+        remedy: what the user can do when nobody offers it.
+        timeout: how long to wait for a server, and for its answer [s].
+
+    Raises:
+        RosError: nobody offers it, or it does not answer in time.
+    """
+    client = node.client(service, kind)
+    end = node.now() + timeout
+    while not client.ready():
+        if node.now() > end:
+            raise RosError(f"Nobody offers '{service}'; {remedy}.")
+        node.spin_once(0.02)
+    return node.wait(client.call(request), timeout)
+
+
+def _status(node: Node, dds: DdsConfig) -> bool:
+    row = public.topic("/safety/status")
+    subscription = node.subscription(row.name, row.type, None, row.qos)
+    end = node.now() + TIMEOUT
+    while (message := subscription.latest()) is None:
+        if node.now() > end:
+            raise RosError(f"No safety gate on {dds}; start one with: golem safety.")
+        node.spin_once(0.02)
+    status = to_status(message, 0.0)
+    say(told(status))
+    return status.state is GateState.ACTIVE

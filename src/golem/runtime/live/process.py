@@ -1,0 +1,161 @@
+"""`golem twin`, `golem safety` and `golem up`: the processes of a live robot."""
+
+from __future__ import annotations
+
+import time
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+
+from tyro.conf import OmitArgPrefixes, Positional
+
+from golem.errors import ConfigError
+from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.safety.base import GateState, GateStatus, SafetyLimits
+from golem.middleware.dds import discovery
+from golem.middleware.dds.domain import ROBOT_DOMAIN, DdsConfig
+from golem.middleware.record.commands import interrupted
+from golem.robots.mujoco.config import World
+from golem.runtime.assembly import build_robot
+from golem.runtime.executor import TICK
+from golem.runtime.live.gate import LiveGate
+from golem.runtime.live.member import DISCOVERY, member, owner, say
+from golem.runtime.live.stack import LiveStack
+from golem.runtime.live.twin import Twin
+from golem.runtime.live.verdict import told
+from golem.stack import Stack, load_stack
+
+PATIENCE = 5.0
+"""Time without a robot after which the stack says what it waits for [s]."""
+
+
+@dataclass(frozen=True)
+class TwinConfig:
+    """Put the simulated robot of a stack file on a domain, with the wall clock."""
+
+    stack: Positional[str] = "tether"
+    """Path of a stack file, or the name of a shipped one; of it the robot counts, and its on-board computer."""
+    world: World | None = None
+    """World of the twin: pack, open, slope or rubble; default: the stack file's."""
+    profile: str | None = None
+    """Realism profile: ideal, bench or field; default: the stack file's."""
+    seed: int = 0
+    """Seed of the episode."""
+    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
+
+
+@dataclass(frozen=True)
+class SafetyConfig:
+    """Guard the robot on a domain: emergency stop and safety gate, and nothing else in this process."""
+
+    limits: str = "urdf"
+    """Limit profile to enforce: urdf or paper."""
+    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
+
+
+@dataclass(frozen=True)
+class UpConfig:
+    """Run everything of a stack file that decides what the robot on a domain does."""
+
+    stack: Positional[str] = "tether"
+    """Path of a stack file, or the name of a shipped one."""
+    profile: str | None = None
+    """Realism profile that the twin was given, if not the stack file's."""
+    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
+
+
+def twin_stack(config: TwinConfig) -> Stack:
+    """Return the stack whose robot the twin is.
+
+    Raises:
+        ConfigError: the stack file is wrong.
+    """
+    stack = load_stack(config.stack, profile=config.profile)
+    if config.world is not None:
+        options = {**stack.robot.options, "world": config.world}
+        stack = replace(stack, robot=replace(stack.robot, options=options))
+    return stack
+
+
+def run_twin(config: TwinConfig) -> None:
+    """Simulate until Ctrl-C.
+
+    Raises:
+        ConfigError: an option or the stack file is wrong, or a robot is on the domain already.
+        DdsError: the domain cannot be joined.
+    """
+    if config.dds.robot or config.dds.domain == ROBOT_DOMAIN:
+        raise ConfigError(
+            f"A twin never joins domain {ROBOT_DOMAIN}, which is the real robot's; choose another."
+        )
+    stack = twin_stack(config)
+    with interrupted() as stop, member("twin", config.dds) as (participant, node):
+        time.sleep(DISCOVERY)
+        others = [e for e in discovery.writers(participant) if e.topic == "rt/lowstate"]
+        if others:
+            raise ConfigError(
+                f"There is a robot on {config.dds} already: {owner(participant, others[0].guid)}; "
+                "end it, or choose another domain."
+            )
+        with closing(build_robot(stack, config.seed)) as robot:
+            twin = Twin(stack, robot, participant, node)
+            say(f"The twin of '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
+            twin.run(stop.is_set)
+
+
+def run_safety(config: SafetyConfig) -> None:
+    """Guard until Ctrl-C; a robot in motion is damped first.
+
+    Raises:
+        ConfigError: an option is wrong.
+        DdsError: the domain cannot be joined.
+    """
+    limits = SafetyLimits.from_profile(config.limits)
+    estop = None if config.dds.robot else VirtualEstop()
+    with interrupted() as stop, member("safety", config.dds) as (participant, node):
+        gate = LiveGate(participant, node, limits, estop, who=lambda guid: owner(participant, guid))
+        say(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
+        if estop is None:
+            say("No driver of an emergency stop is here: the gate stays shut.")
+        said = gate.status
+        while not stop.is_set():
+            gate.commands.wait(TICK)
+            gate.step()
+            said = report(said, gate.status)
+        while not gate.stop():
+            gate.commands.wait(TICK)
+        report(said, gate.status)
+
+
+def run_up(config: UpConfig) -> None:
+    """Run the stack until Ctrl-C.
+
+    Raises:
+        ConfigError: an option or the stack file is wrong.
+        DdsError: the domain cannot be joined.
+        ModuleFault: a module broke its contract; the safety gate, which hears no more commands, damps the robot.
+    """
+    stack = load_stack(config.stack, profile=config.profile)
+    with interrupted() as stop, member("up", config.dds) as (participant, node):
+        live = LiveStack(stack, participant, node, real=config.dds.robot)
+        say(f"The stack '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
+        waiting_since: float | None = time.monotonic()
+        said, restarts = GateStatus(0.0, GateState.INIT), 0
+        while not stop.is_set():
+            live.states.wait(0.02)
+            live.step()
+            if live.side is None:
+                if waiting_since is not None and time.monotonic() - waiting_since > PATIENCE:
+                    waiting_since = None
+                    say(f"No robot on {config.dds} yet; start one with: golem twin {config.stack}")
+                continue
+            if live.restarts != restarts:
+                restarts = live.restarts
+                say("The robot was started anew, and so was the stack.")
+            said = report(said, live.side.safety or said)
+
+
+def report(before: GateStatus, now: GateStatus) -> GateStatus:
+    """Say what the gate is now if it changed; return it."""
+    if (now.state, now.reason) != (before.state, before.reason):
+        say(f"Safety gate: {told(now)}")
+    return now
