@@ -1,6 +1,8 @@
-"""What the torso IMU says about base_link, which lies below the waist joint."""
+"""What the torso IMU says about base_link, which lies below the waist joint, and the other way round."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -18,3 +20,20 @@ def base_rate(gyro: Array, waist: Array, waist_rate: Array) -> Array:
     c, s = np.cos(waist), np.sin(waist)
     x, y, z = gyro[..., 0], gyro[..., 1], gyro[..., 2]
     return np.stack([c * x - s * y, s * x + c * y, z - waist_rate], axis=-1)
+
+
+def torso_motion(quat: Array, rate: Array, waist: float, waist_rate: float) -> tuple[Array, Array]:
+    """Return the orientation (4,) wxyz of imu_link and its angular rate (3,) in imu_link [rad/s].
+
+    Args:
+        quat: (4,) orientation of base_link, wxyz.
+        rate: (3,) its angular rate in base_link [rad/s].
+        waist: position of `torso_joint` [rad].
+        waist_rate: its velocity [rad/s].
+    """
+    w, x, y, z = quat.tolist()
+    c, s = math.cos(0.5 * waist), math.sin(0.5 * waist)
+    turned = np.array([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s])
+    c, s = math.cos(waist), math.sin(waist)
+    a, b, yaw = rate.tolist()
+    return turned, np.array([c * a + s * b, c * b - s * a, yaw + waist_rate])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.robots.model import magpie
+from golem.robots.model.imu import torso_motion
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import BASE_LINK
@@ -92,10 +93,11 @@ class MujocoRobot:
         self._screws = np.array([model.body(name).id for name in self.scene.names.screws], dtype=int)
         first = np.array([model.joint(name).dofadr[0] for name in self.scene.names.screws], dtype=int)
         self._screw_v = (first[:, None] + np.arange(6)).ravel()
-        self._sensors = [_sensor(model, n) for n in ("imu_quat", "imu_gyro", "imu_acc")]
+        self._acc = _sensor(model, "imu_acc")
 
         mujoco.mj_resetData(model, self.data)
-        base = model.joint("base").qposadr[0]
+        self._base, self._torso = model.joint("base"), model.joint("torso_joint")
+        base = self._base.qposadr[0]
         self.data.qpos[base : base + 3] = (0.0, 0.0, hoist.height)
         self._motors.place(self.data, posture)
         for hand in self._hands.values():
@@ -149,8 +151,16 @@ class MujocoRobot:
 
     def imu(self) -> Imu:
         """Return the present IMU sample; see `Robot`."""
-        quat, gyro, acc = (self.data.sensordata[where] for where in self._sensors)
-        return self._imu_model.measure(quat, gyro, acc)
+        # MuJoCo's sensors describe the beginning of the last step. Orientation and rate must be of the encoders'
+        # instant: 2 ms apart they make planted feet seem to move by a centimetre per second.
+        base, torso = self._base, self._torso
+        quat, gyro = torso_motion(
+            self.data.qpos[base.qposadr[0] + 3 : base.qposadr[0] + 7],
+            self.data.qvel[base.dofadr[0] + 3 : base.dofadr[0] + 6],
+            float(self.data.qpos[torso.qposadr[0]]),
+            float(self.data.qvel[torso.dofadr[0]]),
+        )
+        return self._imu_model.measure(quat, gyro, self.data.sensordata[self._acc])
 
     def hand(self, side: Side, t: float) -> HandState:
         """Return what one hand reports; see `Robot`."""
