@@ -33,7 +33,9 @@ class LocomotionConfig:
     """Options of the base layer.
 
     Attributes:
-        dead_band: norm of (vx, vy, wz) below which a twist counts as zero [m/s, rad/s]: ALMI's (and the paper's) 0.1.
+        dead_band: norm of (vx, vy, wz) below which a twist does not start a robot that stands [m/s, rad/s]: ALMI's (and
+            the paper's) 0.1.
+        least: norm below which a twist counts as zero for a robot that walks: it may approach a goal slowly.
         acceleration: bounds on the change of vx, vy [m/s^2] and wz [rad/s^2] [own: full speed in less than a second].
         timeout: age of the newest twist from which it counts as zero [s]: whoever sent it may have died.
         blend: time over which the targets go from one controller's to the next one's after a hand-over [s] [own: a
@@ -43,6 +45,7 @@ class LocomotionConfig:
     """
 
     dead_band: float = 0.1
+    least: float = 0.02
     acceleration: tuple[float, float, float] = (1.0, 1.0, 2.0)
     timeout: float = 0.5
     blend: float = 0.15
@@ -149,10 +152,15 @@ class Locomotion:
         wanted = self.controller.envelope.clamp(asked)
         self.clamped = wanted != asked
         self.reason = "the commanded twist is outside the envelope" if self.clamped else ""
-        if _size(wanted) < self.config.dead_band:
+        if _size(wanted) < self._threshold:
             self.reason = self.reason or "the commanded twist is inside the dead band"
             return ZERO
         return wanted
+
+    @property
+    def _threshold(self) -> float:
+        """Norm below which a twist counts as zero now."""
+        return self.config.least if self.applied != ZERO else self.config.dead_band
 
     def _slew(self, wanted: Twist, dt: float) -> None:
         """Bring the applied twist towards `wanted`; on its way to a stop it ends at the dead band."""
@@ -177,10 +185,11 @@ class Locomotion:
         capture, misplaced = balance_errors(R, com, velocity, soles @ R.T, self._stance)
         self.gait.config = self.controller.gait
         self.gait.step(np.asarray(self.applied != ZERO), capture, misplaced, dt)
-        if self.applied == ZERO:
+        if self.applied == ZERO and not self.gait.stepping:
             self._trim.reset()
             self._trimmed = ZERO
         else:
+            # Also through the last steps of a stop, and those after a push: they shall not carry it away.
             wanted = np.array(_values(self.applied))
             self._trimmed = Twist(*self._trim.step(wanted, R, base.velocity, rate, dt).tolist())
 

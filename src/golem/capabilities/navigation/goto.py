@@ -1,9 +1,8 @@
 """Goes straight to a pose, in all directions, and stands there: no map, no obstacles.
 
-Walking robots do not follow small twists: below a dead band they stand. The last centimetres therefore go in bounded
-pulses at a speed above it, each ended early by what the robot still moves while it stops. And a robot told to stand
-takes another step or two, which move it again: the loop stays closed until it stands, and starts over if that
-brought it too far off.
+A robot that walks follows twists as small as they come, so it approaches the goal ever more slowly and marks time there
+until it is sure to be right. Told to stand it takes another step or two, which may move it again: the loop stays
+closed until it stands; if that brought it too far off it starts over, and aims off by as much.
 """
 
 from __future__ import annotations
@@ -27,11 +26,13 @@ class GoToConfig:
         speed: bounds of vx, vy [m/s] and wz [rad/s], backward as forward.
         gain: twist per error [1/s].
         face: distance beyond which the robot turns towards the goal instead of into its final heading [m].
-        pulse: least size of a twist, as the norm of vx, vy and wz; above the dead band of the legs, 0.1.
+        pulse: least size of a twist that sets a standing robot in motion, as the norm of vx, vy and wz; above the dead
+            band of the legs, 0.1.
+        creep: least size of a twist on the way; above what counts as zero for walking legs, 0.02.
         smoothing: time constant of the filter on the measured pose [s]: half a step, so that the sway of walking
             and the noise of odometry do not reach the twist.
-        coast: time for which the robot goes on at its present velocity once it is told to stop [s].
-        close, aligned: errors of the predicted stop at which it is told to [m], [rad].
+        close, aligned: errors within which the robot has to stay to be told to stand [m], [rad].
+        dwell: for so long [s]: half a period of the gait and more.
         accept, straight: errors after the stop with which it stays [m], [rad].
         widen: factor on these two with every time it started over: a robot that stops no better is not chased for ever.
         rest: time without a step after which the robot stands [s].
@@ -40,13 +41,14 @@ class GoToConfig:
     speed: tuple[float, float, float] = (0.5, 0.25, 0.5)
     gain: float = 1.0
     face: float = 1.0
-    pulse: float = 0.15
+    pulse: float = 0.12
+    creep: float = 0.025
     smoothing: float = 0.3
-    coast: float = 0.2
     close: float = 0.015
     aligned: float = 0.015
-    accept: float = 0.03
-    straight: float = 0.03
+    dwell: float = 0.4
+    accept: float = 0.025
+    straight: float = 0.025
     widen: float = 1.2
     rest: float = 1.0
 
@@ -72,31 +74,36 @@ class GoTo:
         config = self.config
         self._filter(pose, dt)
         self._rested = 0.0 if stepping else self._rested + dt
-        left, stop = self._at(0.0).to(self._goal), self._at(config.coast).to(self._goal)
-        stood = not (self._moving or self._turning)
+        here = self._at()
+        left = here.to(self._goal)
+        if self._walking:
+            # Where it would stand if it were told to now.
+            left = (here @ self._coast).to(self._goal)
+        distance, turn = math.hypot(left.x, left.y), abs(left.yaw)
+        if self._walking:
+            near = distance < self._slack * config.close and turn < self._slack * config.aligned
+            self._near = self._near + dt if near else 0.0
+            self._walking = self._near < config.dwell
+            self._told = here
         # The filter takes a while to see that the robot has stopped.
-        blind = stood and 0.0 < self._rested < 0.5 * config.rest
-        if self._moving:
-            past = stop.x * left.x + stop.y * left.y <= 0.0
-            self._moving = not past and math.hypot(stop.x, stop.y) > config.close
-        elif not blind:
-            self._moving = math.hypot(left.x, left.y) > self._slack * config.accept
-        if self._turning:
-            self._turning = stop.yaw * left.yaw > 0.0 and abs(stop.yaw) > config.aligned
-        elif not blind:
-            self._turning = abs(left.yaw) > self._slack * config.straight
-        if stood and self._rested > 0.0 and (self._moving or self._turning):
-            self._slack *= config.widen
-        if self._moving or self._turning:
-            return Course(self._towards(left), False, left)
+        elif self._rested >= 0.5 * config.rest:
+            off = distance > self._slack * config.accept or turn > self._slack * config.straight
+            if off:
+                self._walking, self._near = True, 0.0
+                self._coast = self._told.to(here)
+                self._slack *= config.widen
+        if self._walking:
+            return Course(self._towards(left, config.creep if stepping else config.pulse), False, left)
         return Course(ZERO, self._rested >= config.rest, left)
 
     def _forget(self) -> None:
         self._pose: Array | None = None
         self._velocity: Array = np.zeros(3)
         self._rested = 0.0
+        self._told = self._coast = PlanarPose(0.0, 0.0, 0.0)
         self._slack = 1.0
-        self._moving = self._turning = True
+        self._near = 0.0
+        self._walking = True
 
     def _filter(self, pose: PlanarPose, dt: float) -> None:
         """Track pose and velocity by the critically damped g-h filter with fading memory (Brookner, 1998)."""
@@ -111,22 +118,20 @@ class GoTo:
         self._pose = predicted + (1.0 - memory**2) * surprise
         self._velocity = self._velocity + (1.0 - memory) ** 2 / dt * surprise
 
-    def _at(self, ahead: float) -> PlanarPose:
-        """Return the smoothed pose, `ahead` [s] from now at the present velocity."""
+    def _at(self) -> PlanarPose:
+        """Return the smoothed pose."""
         assert self._pose is not None
-        return PlanarPose(*(self._pose + ahead * self._velocity).tolist())
+        return PlanarPose(*self._pose.tolist())
 
-    def _towards(self, left: PlanarPose) -> Twist:
-        """Return the twist along the straight line to the goal that is `left`, within bounds."""
+    def _towards(self, left: PlanarPose, least: float) -> Twist:
+        """Return the twist along the straight line to the goal that is `left`, within bounds, and of size `least`."""
         config = self.config
         distance = math.hypot(left.x, left.y)
         turn = math.atan2(left.y, left.x) if distance > config.face else left.yaw
-        line = config.gain * np.array([left.x, left.y]) * self._moving
-        spin = config.gain * turn * (self._turning or distance > config.face)
+        line = config.gain * np.array([left.x, left.y])
         # One factor for both components keeps the robot on the line.
-        excess = max(1.0, *(np.abs(line) / config.speed[:2]))
-        line = line / excess
-        spin = min(max(spin, -config.speed[2]), config.speed[2])
+        line = line / max(1.0, *(np.abs(line) / config.speed[:2]))
+        spin = min(max(config.gain * turn, -config.speed[2]), config.speed[2])
         size = math.hypot(*line, spin)
-        boost = config.pulse / size if 0.0 < size < config.pulse else 1.0
+        boost = least / size if 0.0 < size < least else 1.0
         return Twist(float(line[0] * boost), float(line[1] * boost), float(spin * boost))
