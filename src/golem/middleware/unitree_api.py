@@ -153,7 +153,7 @@ def decode(payload: str) -> dict[str, object]:
     except RecursionError as error:
         raise ValueError("a payload is a JSON object, not this deep") from error
     if not isinstance(values, dict):
-        raise ValueError(f"a payload is a JSON object, not {payload!r}")
+        raise ValueError(f"a payload is a JSON object, not {payload!r:.60}")
     return values
 
 
@@ -165,7 +165,7 @@ def decode_int(payload: str) -> int:
     """
     value = decode(payload).get("data")
     if not isinstance(value, int) or isinstance(value, bool):
-        raise ValueError(f"'data' is an integer, not {value!r}")
+        raise ValueError(f"'data' is an integer, not {value!r:.60}")
     return value
 
 
@@ -178,9 +178,9 @@ def decode_velocity(payload: str) -> tuple[tuple[float, float, float], float]:
     values = decode(payload)
     velocity, duration = values.get("velocity"), values.get("duration")
     if not isinstance(velocity, list) or len(velocity) != 3 or not all(map(_is_finite, velocity)):
-        raise ValueError(f"'velocity' is a list of three finite numbers, not {velocity!r}")
+        raise ValueError(f"'velocity' is a list of three finite numbers, not {velocity!r:.60}")
     if not isinstance(duration, int | float) or not _is_finite(duration) or duration < 0.0:
-        raise ValueError(f"'duration' is a time in seconds, not {duration!r}")
+        raise ValueError(f"'duration' is a time in seconds, not {duration!r:.60}")
     return (float(velocity[0]), float(velocity[1]), float(velocity[2])), float(duration)
 
 

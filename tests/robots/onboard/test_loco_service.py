@@ -89,6 +89,15 @@ def test_calls_that_cannot_be_followed_are_refused() -> None:
     assert call(service, 8205).code == NOT_IMPLEMENTED
 
 
+def test_nonsense_of_any_length_gets_a_short_answer() -> None:
+    long = "x" * 1_000_000
+    for parameter in (long, encode({"data": long}), encode({"velocity": [long]}), f'"{long}"'):
+        for api_id in (API.set_fsm_id, API.set_velocity):
+            answer = LocoService(API).answer(Request(1, api_id, parameter), 0.0)
+            assert answer.code == BAD_PARAMETER
+            assert len(answer.data) < 200
+
+
 def test_legs_that_failed_are_damped_and_do_not_start_again() -> None:
     service = started()
     service.fail("the knee is gone")

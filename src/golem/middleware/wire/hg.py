@@ -1,9 +1,9 @@
 """unitree_hg: state and command of the humanoids' motors, and the IMU.
 
 Members and types: unitree_sdk2_python, unitree_sdk2py/idl/unitree_hg/msg/dds_. Both motor messages have 35 slots. A
-motor's `mode` byte stands 4 bytes before its `q`, behind padding, except the first motor's: the two bytes before it end
-on an address where a byte may follow at once, so that it stands 2 bytes before its `q`. `first_mode` is that byte;
-`motor["mode"][0]` is not a mode but a byte of the member before.
+motor's `mode` byte stands 4 bytes before its `q`, except the first motor's: two bytes stand before it in the same word,
+so that it is only 2 bytes before its `q`. `first_mode` is that byte; `motor["mode"][0]` is not a mode but a byte of the
+member before.
 """
 
 from __future__ import annotations

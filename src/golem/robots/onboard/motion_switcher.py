@@ -58,7 +58,7 @@ class MotionSwitcher:
         if request.api_id == SELECT_MODE:
             wanted = decode(request.parameter).get("name")
             if wanted != MODE:
-                return UNKNOWN_MODE, f"no mode {wanted!r}; there is '{MODE}'"
+                return UNKNOWN_MODE, f"no mode {wanted!r:.60}; there is '{MODE}'"
             if self._loco is not None and not self.mode:
                 self._loco.resume()
             self.mode = MODE
