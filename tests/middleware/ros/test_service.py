@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import struct
 import time
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 
@@ -16,9 +18,10 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from golem.middleware.dds.base import ENCAPSULATION, Qos
 from golem.middleware.ros.codec import dds_name, serialize, service
 from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.node import DdsNode
 from golem.middleware.ros.service import Header, pack, unpack
 
-from .conftest import SET_BOOL, World
+from .conftest import SET_BOOL, World, domain_id
 
 SetBool = service(SET_BOOL)
 
@@ -76,3 +79,47 @@ def test_a_reply_waits_until_its_reader_is_known(world: World) -> None:
 
     world.until(arrived)
     assert unpack(samples[0])[0] == Header(writer.handle, 1)
+
+
+@pytest.fixture
+def cyclone() -> Iterator[DdsNode]:
+    pytest.importorskip("cyclonedds")
+    from golem.middleware.dds.connect import connect
+    from golem.middleware.dds.domain import DdsConfig
+
+    participant = connect(DdsConfig(domain=domain_id()))
+    yield DdsNode(participant, "here")
+    participant.close()
+
+
+def until(node: DdsNode, condition: Callable[[], object]) -> Any:
+    """Spin `node` until `condition()` is something, and return that."""
+    for _ in range(1000):
+        node.spin_once(0.01)
+        if found := condition():
+            return found
+    raise AssertionError("nothing happened for too long")
+
+
+def test_another_implementation_is_answered(cyclone: DdsNode) -> None:
+    from .typed_peer import Endpoints, Request
+
+    cyclone.service("set", SET_BOOL, lambda request: SetBool.Response(request.data, "here"))
+    client = Endpoints(domain_id(), server=False)
+    until(cyclone, client.matched)
+    client.writer.write(Request(2**63 + 5, 77, True))
+    (reply,) = until(cyclone, lambda: client.reader.take(1))
+    assert (reply.guid, reply.seq, reply.success, reply.message) == (2**63 + 5, 77, True, "here")
+
+
+def test_another_implementation_answers(cyclone: DdsNode) -> None:
+    from .typed_peer import Endpoints, Response
+
+    client = cyclone.client("set", SET_BOOL)
+    server = Endpoints(domain_id(), server=True)
+    until(cyclone, lambda: client.ready() and server.matched())
+    answer = client.call(SetBool.Request(True))
+    (request,) = until(cyclone, lambda: server.reader.take(1))
+    server.writer.write(Response(request.guid + 1, request.seq, False, "for somebody else"))
+    server.writer.write(Response(request.guid, request.seq, request.data, "there"))
+    assert cyclone.wait(answer, 5.0) == SetBool.Response(True, "there")
