@@ -1,0 +1,49 @@
+"""The vendor's way of moving the legs, across processes: calls go over the domain, and the legs' targets come back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.runtime.live.conftest import Live
+
+from golem.capabilities.legs.hold import STANCES
+from golem.hardware.safety.base import GateState
+from golem.middleware import topics
+from golem.middleware.topics import LegStatus
+from golem.middleware.unitree_api import Request
+from golem.middleware.wire.rpc import reach
+from golem.robots.onboard.motion_switcher import RELEASE_MODE, SERVICE
+from golem.stack import Choice
+from golem.types import LEGS
+
+
+def legs(live: Live) -> LegStatus:
+    assert live.up is not None and live.up.side is not None
+    status = live.up.side.bus.latest(topics.LEG_STATUS, LegStatus)
+    assert status is not None
+    return status
+
+
+@pytest.mark.slow
+def test_the_onboard_controller_moves_the_legs_until_its_mode_is_released(live: Live) -> None:
+    for node in ("up", "safety", "twin"):
+        live.leave(node)
+    onboard = Choice("hold", {"stance": "straight", "speed": 2.0})
+    live.stack = replace(live.stack, lower_body=Choice("vendor"), onboard=onboard)
+    live.start_twin()
+    live.start_gate()
+    live.start_up()
+    live.activate()
+    live.run(3.0)
+    assert live.state is GateState.ACTIVE
+    assert legs(live).fault is None
+    np.testing.assert_allclose(live.robot.joints()[0][LEGS], np.tile(STANCES["straight"], 2), atol=0.1)
+
+    stranger, node = live.member("stranger")
+    reach(stranger, SERVICE).send(Request(1, RELEASE_MODE))
+    live.run(1.0)
+    live.leave_quietly(node)
+    fault = legs(live).fault
+    assert fault is not None and "the motion mode is released" in fault
