@@ -5,12 +5,15 @@ import subprocess
 import sys
 import tomllib
 import xml.etree.ElementTree as ElementTree
+from enum import StrEnum
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip("rosbags")
 
+from golem.hardware.hands.base import GripState
+from golem.hardware.safety.base import GateState
 from golem.middleware.ros import definitions, generate
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -68,6 +71,15 @@ def test_names_are_those_that_rosidl_allows(name: str) -> None:
         assert re.fullmatch("(?!.*__)(?!.*_$)[a-z][a-z0-9_]*", field)
     for constant, *_ in constants:
         assert re.fullmatch("(?!.*__)(?!.*_$)[A-Z]([A-Z0-9_]?[A-Z0-9]+)*", constant)
+
+
+@pytest.mark.parametrize(
+    ("name", "states"),
+    [("golem_interfaces/msg/SafetyStatus", GateState), ("golem_interfaces/msg/HandStatus", GripState)],
+)
+def test_states_are_those_of_the_software(name: str, states: type[StrEnum]) -> None:
+    constants, _ = TYPES[name]
+    assert {constant: value for constant, _, value in constants} == {s.name: s.value for s in states}
 
 
 def test_the_generated_classes_are_current() -> None:

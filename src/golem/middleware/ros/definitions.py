@@ -194,8 +194,13 @@ def _spelled(kind: tuple[int, Any]) -> str:
 
 
 def _short(name: str) -> str:
-    """Return a type's name as .msg files write it: `std_msgs/Header`."""
-    return name.replace("/msg/", "/")
+    """Return a type's name as .msg files write it, `std_msgs/Header`.
+
+    A .msg cannot name the parts of an action; they are called as if they were messages, `golem_interfaces/PickGoal`,
+    since readers of bags take no other names and look them up in the same text only.
+    """
+    package, _, stem = name.split("/")
+    return f"{package}/{stem.replace('_', '')}"
 
 
 def _literal(value: object) -> str:
