@@ -1,0 +1,101 @@
+"""What running processes offer and read is what the table says: nothing more, nothing less."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.runtime.live.conftest import BLIND, Live
+
+from golem.middleware import public, topics
+from golem.middleware.dds.base import Qos
+from golem.middleware.dds.local import LocalDomain, LocalParticipant
+from golem.middleware.public import Role
+from golem.middleware.ros import names
+from golem.middleware.ros.codec import action, dds_name, service
+from golem.middleware.topics import LookRequest
+from golem.stack import Choice, Stack
+
+Ends = set[tuple[str, str, str]]
+"""Way (`w` or `r`), topic and type on the wire."""
+
+
+class Spy(LocalParticipant):
+    """Remembers what its member creates."""
+
+    def __init__(self, domain: LocalDomain) -> None:
+        super().__init__(domain)
+        self.seen: Ends = set()
+
+    def writer(self, topic: str, type_name: str, qos: Qos, user_data: str = "") -> Any:
+        self.seen.add(("w", topic, type_name))
+        return super().writer(topic, type_name, qos, user_data)
+
+    def reader(self, topic: str, type_name: str, qos: Qos, user_data: str = "", on_data: Any = None) -> Any:
+        self.seen.add(("r", topic, type_name))
+        return super().reader(topic, type_name, qos, user_data, on_data)
+
+
+class SpyDomain(LocalDomain):
+    """Whose members are spied on."""
+
+    def participant(self) -> Spy:
+        return Spy(self)
+
+
+def of_service(name: str, kind: Any, served: bool) -> Ends:
+    """Return the two endpoints of a server, or of a client."""
+    ways = "rw" if served else "wr"
+    return {
+        (ways[0], names.request(name), dds_name(kind.Request)),
+        (ways[1], names.reply(name), dds_name(kind.Response)),
+    }
+
+
+def of_role(role: Role) -> Ends:
+    """Return every endpoint that the table gives a role, but for ROS's own."""
+    ends: Ends = set()
+    for row in public.TOPICS:
+        if row.by == role:
+            ends.add(("w", names.topic(row.name), dds_name(row.type)))
+        if role in row.to:
+            ends.add(("r", names.topic(row.name), dds_name(row.type)))
+    for row in public.SERVICES:
+        if row.by == role:
+            ends |= of_service(row.name, service(row.type), served=True)
+    for row in public.ACTIONS:
+        if row.by != role:
+            continue
+        parts, kinds = names.action(row.name), action(row.type)
+        ends |= of_service(parts.send_goal, kinds.SendGoal, served=True)
+        ends |= of_service(parts.get_result, kinds.GetResult, served=True)
+        ends |= of_service(parts.cancel_goal, service("action_msgs/srv/CancelGoal"), served=True)
+        ends.add(("w", names.topic(parts.feedback), dds_name(kinds.FeedbackMessage)))
+        ends.add(("w", names.topic(parts.status), dds_name("action_msgs/msg/GoalStatusArray")))
+    return ends
+
+
+@pytest.mark.parametrize("support", ["hoist", "ground"])
+def test_processes_offer_what_the_table_says(support: str, tmp_path: Path) -> None:
+    (tmp_path / "blind.py").write_text(BLIND)
+    robot = Choice("mujoco", {"world": "open", "support": support})
+    stack = Stack(
+        robot, localizer=Choice(f"{tmp_path / 'blind.py'}:Blind"), fallback=Choice("hold"), profile="ideal"
+    )
+    live = Live(stack, SpyDomain())
+    live.start_twin()
+    live.start_gate()
+    live.start_up()
+    live.run(0.01)
+    assert live.up is not None and live.up.side is not None
+    for camera in public.CAMERAS:  # images are read only while a skill looks
+        live.up.side.bus.publish(topics.look(camera), LookRequest(("screw",)), 0.01)
+    live.run(0.01)
+    seen = {node.name: member.seen for member, node in live.members if isinstance(member, Spy)}
+    own = {("w", names.DISCOVERY_INFO, "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_")}
+    band = of_service("/elastic_band/release", service(public.TRIGGER), served=False)
+    live.close()
+    assert seen["twin"] - own == of_role("robot")
+    assert seen["safety"] - own == of_role("safety")
+    assert seen["up"] - own == of_role("stack") | (band if support == "ground" else set())
