@@ -5,6 +5,7 @@ Cyclone 0.10 peers would crash.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
@@ -36,11 +37,11 @@ class Endpoints:
         participant = DomainParticipant(domain)
         reliable = Policy.Reliability.Reliable(1_000_000_000)
         qos = Qos(reliable, Policy.DataRepresentation(use_cdrv0_representation=True))
-        request, reply = (
+        topics: list[Any] = [
             Topic(participant, "rq/setRequest", Request),
             Topic(participant, "rr/setReply", Response),
-        )
-        out, back = (reply, request) if server else (request, reply)
+        ]
+        out, back = reversed(topics) if server else topics
         self.writer, self.reader = DataWriter(participant, out, qos), DataReader(participant, back, qos)
 
     def matched(self) -> bool:
