@@ -17,6 +17,7 @@ from tests.middleware.ros.samples import random_message, travelling
 from golem.middleware.ros import codec
 from golem.middleware.ros.codec import Codec
 from golem.middleware.ros.definitions import EMPTY_MEMBER
+from golem.middleware.ros.generate import python_name
 from golem.middleware.ros.message import CodecError, Message
 from golem.middleware.ros.msgs.geometry_msgs import Quaternion, Twist, Vector3
 from golem.middleware.ros.msgs.golem_interfaces import HandState, Pick_Goal, SafetyStatus
@@ -189,6 +190,15 @@ def test_distributions_differ_in_the_gid() -> None:
         known = codec.codec(distro)
         gid = known.message("rmw_dds_common/msg/Gid")()
         assert len(gid.data) == size and len(known.serialize(gid)) == 4 + size
+
+
+def test_the_generated_classes_fit_every_distribution() -> None:
+    for distro in ("humble", "jazzy"):
+        known = codec.codec(distro)
+        for name in travelling(known):
+            kind = known.message(name)
+            wanted = [python_name(field) for field, _ in known._types[name][1]]
+            assert [field.name for field in fields(kind)] == wanted, (distro, name)
 
 
 def test_messages_are_equal_by_their_fields() -> None:
