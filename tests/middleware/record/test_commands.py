@@ -91,13 +91,15 @@ def until(true: Callable[[], bool]) -> None:
 
 @pytest.mark.slow
 def test_ctrl_c_completes_the_bag(robot: CycloneParticipant, domain: int, tmp_path: Path) -> None:
-    """Latched, fast and large topics arrive byte for byte, none lost, in a finished bag."""
+    """Latched, fast, large and private topics arrive byte for byte, none lost, in a finished bag."""
+    chatter = robot.writer("rt/chatter", "std_msgs::msg::dds_::String_", Qos(depth=100))
     description, color, low = (writer(robot, name) for name in (DESCRIPTION, COLOR, STATE))
     model = codec.serialize(String(data="<robot/>"))
     description.write(model)
-    sent: dict[str, list[bytes]] = {DESCRIPTION: [model], COLOR: [], STATE: []}
-    with golem("record", str(tmp_path / "bag"), "--domain", str(domain)) as recorder:
-        until(lambda: bool(color.matched() and low.matched() and description.matched()))
+    sent: dict[str, list[bytes]] = {DESCRIPTION: [model], COLOR: [], STATE: [], "/chatter": [model]}
+    with golem("record", str(tmp_path / "bag"), "--all", "--domain", str(domain)) as recorder:
+        until(lambda: all(w.matched() for w in (color, low, description, chatter)))
+        chatter.write(model)
         for i in range(500):
             sent[STATE].append(state(i * 0.002))
             low.write(sent[STATE][-1])
@@ -115,7 +117,7 @@ def test_ctrl_c_completes_the_bag(robot: CycloneParticipant, domain: int, tmp_pa
     for message in bag.messages():
         got.setdefault(message.topic.name, []).append(bytes(message.payload))
     assert got == sent
-    assert f"{len(sent[COLOR]) + 501} messages" in out and "lost" not in out
+    assert f"{len(sent[COLOR]) + 502} messages" in out and "lost" not in out
     assert decode_low_state(got[STATE][7]).q[3] == pytest.approx(0.014)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -13,10 +13,10 @@ pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
 from golem.errors import ConfigError
-from golem.middleware.dds.base import LATCHED, Participant, Qos, Reader
+from golem.middleware.dds.base import DEFAULT, LATCHED, Participant, Qos, Reader
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.record.base import NANO, Message, Topic
-from golem.middleware.record.catalog import public_topics, topic
+from golem.middleware.record.catalog import offered, public_topics, topic
 from golem.middleware.record.player import PlayConfig, Player
 from golem.middleware.record.reader import Bag
 from golem.middleware.record.recorder import MANY, Recorder, clock_time
@@ -251,9 +251,31 @@ def test_public_topics_are_chosen_by_name() -> None:
     assert {"/lowstate", "/clock", "/realsense/head/color/image_raw"} <= set(every)
     assert every["/lowstate"].kind == "unitree_hg/msg/LowState"
     assert "MSG: unitree_hg/MotorState" in every["/lowstate"].definition
-    assert [t.name for t in public_topics(["/tf", "/tf"])] == ["/tf"]
-    with pytest.raises(ConfigError, match="Did you mean '/lowstate'"):
-        public_topics(["lowstate"])
+    assert not any(name.endswith("compressed") for name in every)
+    assert [t.name for t in public_topics(["/tf", "/tf", "/somebody/elses"])] == ["/tf"]
+
+
+@dataclass
+class Found:
+    topic: str
+    type_name: str
+    qos: Qos
+
+
+def test_what_is_found_on_a_domain_is_recorded_as_it_is_offered() -> None:
+    writers = [
+        Found("rt/chatter", "std_msgs::msg::dds_::String_", LATCHED),
+        Found(
+            "rt/skill/pick/_action/feedback", "golem_interfaces::action::dds_::Pick_FeedbackMessage_", DEFAULT
+        ),
+        Found("rt/secret", "their_msgs::msg::dds_::Unknown_", DEFAULT),
+        Found("rt/plain", "Plain", DEFAULT),
+        Found("rq/somethingRequest", "std_srvs::srv::dds_::Trigger_Request_", DEFAULT),
+        Found("ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_", DEFAULT),
+    ]
+    chatter, feedback = offered(writers)
+    assert chatter == topic("/chatter", "std_msgs/msg/String", LATCHED)
+    assert feedback.name == "/skill/pick/_action/feedback"
 
 
 @pytest.mark.parametrize(

@@ -1,16 +1,36 @@
-"""The public topics of a robot as topics of a bag."""
+"""Topics of a bag: those that are public, and those that are found on a domain."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Collection, Iterable
+from typing import Protocol
 
-from golem.errors import unknown_name
 from golem.middleware import public
 from golem.middleware.dds.base import DEFAULT, Qos
 from golem.middleware.record.base import Topic
-from golem.middleware.ros import codec
+from golem.middleware.ros import codec, names
 
 COMPRESSED = "sensor_msgs/msg/CompressedImage"
+
+
+class Endpoint(Protocol):
+    """A writer as discovery describes it: `golem.middleware.dds.discovery.Endpoint`."""
+
+    @property
+    def topic(self) -> str:
+        """Name of its topic on the wire."""
+        ...
+
+    @property
+    def type_name(self) -> str:
+        """Name of its type on the wire."""
+        ...
+
+    @property
+    def qos(self) -> Qos:
+        """What it offers."""
+        ...
 
 
 def topic(name: str, kind: str, qos: Qos = DEFAULT) -> Topic:
@@ -23,16 +43,30 @@ def topic(name: str, kind: str, qos: Qos = DEFAULT) -> Topic:
     return Topic(name, kind, codec.definition(kind), qos, codec.type_hash(kind))
 
 
-def public_topics(chosen: Iterable[str] = ()) -> list[Topic]:
-    """Return the public topics called `chosen`; default: all, but images in one form only: as they are.
+def public_topics(chosen: Collection[str] = ()) -> list[Topic]:
+    """Return the public topics among `chosen`; default: all, but images in one form only: as they are.
 
     Raises:
-        ConfigError: there is no such topic.
         MissingExtra: as for `topic`.
     """
     rows = {row.name: row for row in public.TOPICS}
-    names = list(chosen) or [name for name, row in rows.items() if row.type != COMPRESSED]
-    for name in names:
-        if name not in rows:
-            raise unknown_name("topic", name, rows)
-    return [topic(name, rows[name].type, rows[name].qos) for name in dict.fromkeys(names)]
+    wanted = chosen or [name for name, row in rows.items() if row.type != COMPRESSED]
+    return [topic(name, rows[name].type, rows[name].qos) for name in dict.fromkeys(wanted) if name in rows]
+
+
+def offered(writers: Iterable[Endpoint]) -> list[Topic]:
+    """Return the topics of `writers` that ROS could read and whose types are known here."""
+    known = set(codec.codec().names())
+    found: dict[str, Topic] = {}
+    for writer in writers:
+        sort, name = names.from_wire(writer.topic)
+        kind = _kind(writer.type_name)
+        if sort == "topic" and kind in known and name not in found:
+            found[name] = topic(name, kind, writer.qos)
+    return list(found.values())
+
+
+def _kind(type_name: str) -> str:
+    """Return the ROS name of a type from that on the wire, `sensor_msgs::msg::dds_::Image_`; empty if it has none."""
+    match = re.fullmatch(r"(\w+)::(\w+)::dds_::(\w+)_", type_name)
+    return "/".join(match.groups()) if match else ""

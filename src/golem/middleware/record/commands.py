@@ -14,9 +14,10 @@ from pathlib import Path
 from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.errors import ConfigError
+from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.record.catalog import public_topics
+from golem.middleware.record.catalog import offered, public_topics
 from golem.middleware.record.player import PlayConfig, Player
 from golem.middleware.record.reader import Bag, repair
 from golem.middleware.record.recorder import Recorder
@@ -31,7 +32,9 @@ class RecordConfig:
     bag: Positional[Path | None] = None
     """Folder to create; default: runs/bags/ and the time."""
     topics: tuple[str, ...] = ()
-    """Topics to record, by their ROS names; default: all public ones."""
+    """Topics to record, by their ROS names; default: all public ones, images as they are."""
+    all: bool = False
+    """Record whatever anybody publishes, compressed images too, as far as its type is known."""
     compression: Compression = "none"
     """Of the messages: none, lz4 or zstd. zstd makes an image smaller for about 1 ms of CPU."""
     split: int = 2048
@@ -72,17 +75,23 @@ def run_record(config: RecordConfig) -> int:
     """
     if config.repair:
         return _repair(config)
-    topics = public_topics(config.topics)
     folder = config.bag or Path("runs/bags") / time.strftime("%Y_%m_%d-%H_%M_%S")
     with closing(connect(config.dds, PARTICIPANT_USER_DATA)) as participant, interrupted() as stop:
         bag = BagWriter(folder, BagConfig(config.compression, split=config.split * 2**20))
         with closing(bag), closing(Recorder(participant, bag)) as recorder:
-            recorder.add(topics)
+            recorder.add(public_topics(config.topics))
+
+            def every_second() -> None:
+                bag.flush()
+                if config.topics or config.all:
+                    found = offered(discovery.writers(participant))
+                    recorder.add(t for t in found if config.all or t.name in config.topics)
+
             print(f"Recording {config.dds} to {folder}. Ctrl-C ends it.", flush=True)
-            recorder.run(stop, bag.flush, config.seconds)
-    for name, count in sorted(recorder.received.items()):
+            recorder.run(stop, every_second, config.seconds)
+    for name in sorted({*recorder.received, *config.topics}):
         lost = "  more than could be kept; some were lost" if name in recorder.overruns else ""
-        print(f"{count:9d}  {name}{lost}")
+        print(f"{recorder.received.get(name, 0):9d}  {name}{lost}")
     size = sum(file.stat().st_size for file in folder.iterdir())
     nothing = f" Nobody published anything on {config.dds}." if bag.messages == 0 else ""
     print(f"{bag.messages} messages, {size / 1e6:.1f} MB, in {folder}.{nothing}", flush=True)

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 
 from tyro.conf import OmitArgPrefixes
 
-from golem.errors import ConfigError
+from golem.errors import ConfigError, unknown_name
+from golem.middleware import public
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
@@ -31,7 +32,7 @@ class ViewConfig:
     foxglove: bool = False
     """Serve Foxglove's protocol; open the address that is printed in Foxglove."""
     topics: tuple[str, ...] = ()
-    """Topics to offer, by their ROS names; default: all public ones."""
+    """Public topics to offer, by their ROS names; default: all, images as they are."""
     host: str = "127.0.0.1"
     """Address to listen on; 0.0.0.0 lets other machines in."""
     port: int = 8765
@@ -52,6 +53,9 @@ def run_view(config: ViewConfig) -> None:
             "golem run STACK --view."
         )
     topics = public_topics(config.topics)
+    for name in config.topics:
+        if name not in {topic.name for topic in topics}:
+            raise unknown_name("public topic", name, (row.name for row in public.TOPICS))
     with closing(connect(config.dds, PARTICIPANT_USER_DATA)) as participant, interrupted() as stop:
         with closing(FoxgloveServer(ServerConfig(config.host, config.port))) as server:
             print(
