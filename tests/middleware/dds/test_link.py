@@ -1,0 +1,120 @@
+"""Two network namespaces joined by a cable that is pulled out and put back."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import pytest
+
+pytest.importorskip("cyclonedds")
+
+pytestmark = pytest.mark.slow
+
+WRITER = """
+import json, sys, time
+from golem.middleware.dds.base import ENCAPSULATION, SENSOR, Qos
+from golem.middleware.dds.checks import wait_for_peer
+from golem.middleware.dds.connect import connect
+from golem.middleware.dds.domain import DdsConfig
+participant = connect(DdsConfig(7, sys.argv[1]))
+states, images = participant.writer("rt/state", "T", Qos(depth=8)), participant.writer("rt/image", "T", SENSOR)
+wait_for_peer(participant, states, "start it", 10.0)
+wait_for_peer(participant, images, "start it", 10.0)
+print("matched", flush=True)
+longest = 0.0
+end = time.monotonic() + 6.0
+i = 0
+while time.monotonic() < end:
+    start = time.monotonic()
+    states.write(ENCAPSULATION + str(i).encode().ljust(2088))
+    if i % 30 == 0:
+        images.write(ENCAPSULATION + bytes(921_600))
+    longest = max(longest, time.monotonic() - start)
+    i += 1
+    time.sleep(0.002)
+print(json.dumps({"longest": longest, "dropped": states.dropped}))
+"""
+READER = """
+import json, sys, time
+from golem.middleware.dds.base import SENSOR, Qos
+from golem.middleware.dds.checks import wait_for_peer
+from golem.middleware.dds.connect import connect
+from golem.middleware.dds.domain import DdsConfig
+participant = connect(DdsConfig(7, sys.argv[1]))
+times, images = [], []
+
+def on_state():
+    times.extend(time.monotonic() for sample in reader.take() if sample.alive)
+
+def on_image():
+    images.extend(len(sample.payload) for sample in image_reader.take() if sample.alive)
+
+reader = participant.reader("rt/state", "T", Qos(depth=64), on_data=on_state)
+image_reader = participant.reader("rt/image", "T", SENSOR, on_data=on_image)
+wait_for_peer(participant, reader, "start it", 10.0)
+while reader.matched():
+    time.sleep(0.02)
+gaps = [later - earlier for earlier, later in zip(times, times[1:])]
+at = gaps.index(max(gaps))
+print(json.dumps({"gap": gaps[at], "after": len(times) - at, "images": len(images)}))
+"""
+
+
+def ip(*words: str) -> None:
+    subprocess.run(["ip", *words], check=True, capture_output=True)
+
+
+@pytest.fixture
+def cable() -> Iterator[tuple[tuple[str, str], tuple[str, str]]]:
+    """Give two namespaces, each with its end of a cable."""
+    number = os.getpid() % 10000
+    ends = tuple((f"golem{side}{number}", f"ve{side}{number}") for side in "ab")
+    if shutil.which("ip") is None:
+        pytest.skip("needs the program ip (iproute2)")
+    made = subprocess.run(["ip", "netns", "add", ends[0][0]], capture_output=True, text=True, check=False)
+    if made.returncode != 0:
+        pytest.skip(f"needs the right to make network namespaces: {made.stderr.strip()}")
+    try:
+        ip("netns", "add", ends[1][0])
+        ip("link", "add", ends[0][1], "type", "veth", "peer", "name", ends[1][1])
+        for i, (space, end) in enumerate(ends):
+            ip("link", "set", end, "netns", space)
+            ip("-n", space, "addr", "add", f"10.77.0.{i + 1}/24", "dev", end)
+            ip("-n", space, "link", "set", end, "up")
+            ip("-n", space, "link", "set", "lo", "up")
+        yield ends  # type: ignore[misc]
+    finally:
+        for space, _ in ends:
+            subprocess.run(["ip", "netns", "delete", space], check=False, capture_output=True)
+
+
+def run(end: tuple[str, str], script: str) -> subprocess.Popen[str]:
+    command = ["ip", "netns", "exec", end[0], sys.executable, "-c", script, end[1]]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+
+
+def test_a_cut_link_neither_holds_up_the_writer_nor_ends_the_stream(
+    cable: tuple[tuple[str, str], tuple[str, str]],
+) -> None:
+    here, there = cable
+    reader, writer = run(there, READER), run(here, WRITER)
+    try:
+        assert writer.stdout is not None and writer.stdout.readline().strip() == "matched"
+        time.sleep(1.5)
+        ip("-n", there[0], "link", "set", there[1], "down")
+        time.sleep(1.0)
+        ip("-n", there[0], "link", "set", there[1], "up")
+        wrote = json.loads(writer.communicate(timeout=30.0)[0])
+        read = json.loads(reader.communicate(timeout=30.0)[0])
+    finally:
+        writer.kill()
+        reader.kill()
+    assert wrote["longest"] < 0.6, "the writer waited for the link"  # 1 to 2 s with the default send buffer
+    assert read["gap"] > 0.7, "the link was not cut"
+    assert read["after"] > 200 and read["images"] > 20
