@@ -96,12 +96,12 @@ def test_peers_are_told_hashes_and_identities() -> None:
     from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
 
-    participant = connect(DdsConfig(domain=domain_id()), PARTICIPANT_USER_DATA)
+    participant = connect(DdsConfig(domain=domain_id(foreign=True)), PARTICIPANT_USER_DATA)
     node = DdsNode(participant, "twin")
     node.publisher("chatter", STRING)
     node.service("set", SET_BOOL, lambda request: request)
     node.client("set", SET_BOOL)
-    told = user_data(domain_id())
+    told = user_data(domain_id(foreign=True))
     node.close()
     participant.close()
     assert told["rt/chatter", "writer"] == {"typehash": type_hash(STRING)}

@@ -87,7 +87,7 @@ def cyclone() -> Iterator[DdsNode]:
     from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
 
-    participant = connect(DdsConfig(domain=domain_id()))
+    participant = connect(DdsConfig(domain=domain_id(foreign=True)))
     yield DdsNode(participant, "here")
     participant.close()
 
@@ -105,7 +105,7 @@ def test_another_implementation_is_answered(cyclone: DdsNode) -> None:
     from .typed_peer import Endpoints, Request
 
     cyclone.service("set", SET_BOOL, lambda request: SetBool.Response(request.data, "here"))
-    client = Endpoints(domain_id(), server=False)
+    client = Endpoints(domain_id(foreign=True), server=False)
     until(cyclone, client.matched)
     client.writer.write(Request(2**63 + 5, 77, True))
     (reply,) = until(cyclone, lambda: client.reader.take(1))
@@ -116,7 +116,7 @@ def test_another_implementation_answers(cyclone: DdsNode) -> None:
     from .typed_peer import Endpoints, Response
 
     client = cyclone.client("set", SET_BOOL)
-    server = Endpoints(domain_id(), server=True)
+    server = Endpoints(domain_id(foreign=True), server=True)
     until(cyclone, lambda: client.ready() and server.matched())
     answer = client.call(SetBool.Request(True))
     (request,) = until(cyclone, lambda: server.reader.take(1))
