@@ -209,6 +209,14 @@ def test_requests_and_replies_that_are_none_do_no_harm(world: World) -> None:
     assert world.get(client.call(SetBool.Request(True))).success
 
 
+def test_a_node_may_be_closed_after_its_participant(world: World) -> None:
+    node = world.node("late")
+    node.service("set", SET_BOOL, echo)
+    node.client("set", SET_BOOL)
+    world.participant(node).close()
+    node.close()
+
+
 def test_a_closed_node_leaves(world: World) -> None:
     talker, listener = world.node("talker"), world.node("listener")
     publisher = talker.publisher("chatter", STRING)

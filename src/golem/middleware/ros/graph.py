@@ -8,11 +8,12 @@ them. Topics, services and actions do not depend on it.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
-from golem.middleware.dds.base import LATCHED, Participant
+from golem.middleware.dds.base import LATCHED, DdsError, Participant
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import codec, dds_name
 
@@ -54,7 +55,8 @@ class DiscoveryInfo:
 
     def close(self) -> None:
         """Withdraw the node."""
-        self._publish([])
+        with suppress(DdsError):  # the participant may have left already, and its node with it
+            self._publish([])
         self._writer.close()
 
     def _publish(self, nodes: list[Any]) -> None:
