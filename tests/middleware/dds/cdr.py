@@ -55,13 +55,13 @@ def joint_state(cdr: Cdr, rng: random.Random) -> None:
         cdr.put("d", *(rng.uniform(-9, 9) for _ in range(27)))
 
 
-def image(cdr: Cdr, rng: random.Random) -> None:
+def image(cdr: Cdr, rng: random.Random, height: int = 48, width: int = 64) -> None:
     header(cdr, rng)
-    cdr.put("I", 48, 64)
+    cdr.put("I", height, width)
     cdr.text("rgb8")
     cdr.put("B", 0)
-    cdr.put("I", 192)
-    cdr.octets(rng.randbytes(48 * 192))
+    cdr.put("I", 3 * width)
+    cdr.octets(rng.randbytes(height * 3 * width))
 
 
 def cloud(cdr: Cdr, rng: random.Random) -> None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ctypes
 import logging
+import os
 import struct
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from importlib import metadata
 
@@ -18,7 +20,7 @@ from tests.middleware.dds.test_contract import TYPE, eventually, texts
 
 from golem.errors import ConfigError, MissingExtra
 from golem.middleware.dds import checks, discovery, domain, endpoints, library
-from golem.middleware.dds.base import ENCAPSULATION, DdsError, Qos
+from golem.middleware.dds.base import ENCAPSULATION, DdsError, Qos, Sample
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig, configuration
 from golem.middleware.dds.interfaces import Interface, find_interface, interfaces
@@ -109,6 +111,44 @@ def test_a_callback_that_raises_is_logged_and_called_again(
     writer.write(ENCAPSULATION + b"more")
     eventually(lambda: second)
     assert second == ["more"] and len(calls) == 2
+
+
+def test_threads_may_share_a_writer_and_a_reader(participant: CycloneParticipant) -> None:
+    reader = participant.reader("rt/a", TYPE, Qos(depth=None))
+    writer = participant.writer("rt/a", TYPE, Qos(depth=None))
+    payloads = [ENCAPSULATION + bytes([65 + i]) * (5 + i) for i in range(4)]
+    taken: list[str] = []
+
+    def write(payload: bytes) -> None:
+        for _ in range(300):
+            writer.write(payload)
+
+    def take() -> None:
+        eventually(lambda: taken.extend(texts(reader.take(7))) or len(taken) >= 1200)
+
+    threads = [threading.Thread(target=write, args=(payload,)) for payload in payloads]
+    threads += [threading.Thread(target=take) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(taken) == sorted(texts([Sample(p, 0.0, 0) for p in payloads]) * 300)
+
+
+def test_closed_endpoints_leave_nothing_behind(participant: CycloneParticipant) -> None:
+    def turn() -> None:
+        reader = participant.reader("rt/a", TYPE, Qos(), on_data=lambda: None)
+        participant.writer("rt/a", TYPE, Qos()).close()
+        reader.close()
+
+    def held() -> tuple[int, int]:
+        return len(os.listdir("/proc/self/fd")), threading.active_count()
+
+    turn()
+    before = held()
+    for _ in range(100):
+        turn()
+    assert held() == before and not participant._endpoints
 
 
 def test_discovery_tells_who_is_there(participant: CycloneParticipant, domain: int) -> None:

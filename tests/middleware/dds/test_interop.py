@@ -18,7 +18,7 @@ import pytest
 pytest.importorskip("cyclonedds")
 pytest.importorskip("rosbags")
 
-from tests.middleware.dds.cdr import MESSAGES, message
+from tests.middleware.dds.cdr import MESSAGES, Cdr, image, message
 from tests.middleware.dds.idl import idl, wire_name
 from tests.middleware.ros.samples import random_message
 
@@ -111,6 +111,18 @@ def test_an_old_peer_sends_back_what_we_send(
 ) -> None:
     command: list[str] = request.getfixturevalue(f"{language}_peer")
     exchange(command, domain, type_name, [message(type_name, seed) for seed in range(COUNT)])
+
+
+@pytest.mark.parametrize("language", ["c", "python"])
+def test_an_old_peer_copes_with_our_large_datagrams(
+    language: str, domain: int, request: pytest.FixtureRequest
+) -> None:
+    sent = []
+    for seed in range(5):
+        cdr = Cdr()
+        image(cdr, random.Random(seed), 480, 640)
+        sent.append(cdr.sample())
+    exchange(request.getfixturevalue(f"{language}_peer"), domain, "sensor_msgs::msg::dds_::Image_", sent)
 
 
 @pytest.mark.parametrize("name", interfaces())
