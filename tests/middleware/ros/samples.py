@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from golem.middleware.ros.codec import Codec
-from golem.middleware.ros.definitions import ARRAY, BASE, NAME
+from golem.middleware.ros.definitions import ARRAY, BASE, EMPTY_MEMBER, NAME
 
 INTEGERS = {
     "byte": "b",
@@ -42,7 +42,9 @@ def travelling(codec: Codec) -> list[str]:
 def random_message(codec: Codec, name: str, rng: random.Random) -> Any:
     """Return a message of type `name` whose fields hold random values."""
     _, fields = codec._types[name]
-    return codec.message(name)(*(_value(codec, kind, rng) for _, kind in fields))
+    return codec.message(name)(
+        *(0 if field == EMPTY_MEMBER else _value(codec, kind, rng) for field, kind in fields)
+    )
 
 
 def _value(codec: Codec, kind: tuple[int, Any], rng: random.Random) -> Any:
