@@ -35,6 +35,7 @@ EXTRAS = {
     "pink": ("pink", "qpsolvers"),
     "dds": ("cyclonedds", "rosbags"),
     "record": ("mcap", "rosbags"),
+    "foxglove": ("foxglove",),
     "train": ("torch", "onnx"),
     "docs": ("mkdocs",),
     "dev": ("pytest",),

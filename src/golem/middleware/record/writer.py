@@ -104,7 +104,7 @@ class BagWriter:
             raise self._unwritable(error) from error
 
     def flush(self) -> None:
-        """Hand everything to the operating system: it survives the death of this process from now on."""
+        """Hand everything to the operating system: it survives the death of this process, not that of the machine."""
         try:
             if self._file is not None:
                 self._file.flush()
@@ -184,8 +184,6 @@ class McapFile:
         about = information({name: self._contents}, self._custom)
         self._mcap.add_metadata("rosbag2", {"serialized_metadata": dump(about)})
         self._mcap.finish()
-        self._out.flush()
-        os.fsync(self._out.fileno())
         self._out.close()
 
     def _register(self, topic: Topic) -> int:
