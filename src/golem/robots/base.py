@@ -73,3 +73,16 @@ class Banded(Protocol):
     def release(self) -> None:
         """Let the band go, smoothly; an operator's act. Without a band it does nothing."""
         ...
+
+
+@runtime_checkable
+class Recallable(Robot, Protocol):
+    """A simulated robot whose moment can be shown by another that was built alike, in another process."""
+
+    def snapshot(self) -> bytes:
+        """Return the present moment."""
+        ...
+
+    def recall(self, snapshot: bytes) -> None:
+        """Be in the moment of a snapshot: `capture` then shows what it showed there."""
+        ...

@@ -83,9 +83,16 @@ class RobotSide:
     """
 
     def __init__(
-        self, bus: Bus, stack: Stack, robot: Robot, wanted: Callable[[str], Callable[[], bool]]
+        self, bus: Bus, stack: Stack, robot: Robot, wanted: Callable[[str], Callable[[], bool]] | None
     ) -> None:
-        """Connect `robot` to `bus`; `wanted(camera)` returns what says whether a camera is to be exposed.
+        """Connect `robot` to `bus`.
+
+        Args:
+            bus: where its nodes meet others.
+            stack: what it was built from.
+            robot: the robot.
+            wanted: called with the name of a camera, returns what says whether it is to be exposed; None where that
+                is another process's business.
 
         Raises:
             ConfigError, ModuleFault: see `Workshop.make`; about the on-board legs.
@@ -93,9 +100,10 @@ class RobotSide:
         guard = Guard("robot", stack.robot.use)
         self.act = nodes.ActNode(bus, robot, guard)
         self.nodes: list[Placed] = [(Phase.MEASURE, nodes.SenseNode(bus, robot, guard))]
-        for name in robot.cameras:
-            camera = cameras.CameraNode(bus, robot, name, wanted(name), guard)
-            self.nodes.append((Phase.EXPOSE, camera))
+        if wanted is not None:
+            for name in robot.cameras:
+                camera = cameras.CameraNode(bus, robot, name, wanted(name), guard)
+                self.nodes.append((Phase.EXPOSE, camera))
         loco: LocoServiceNode | None = None
         if stack.legs_on_board is not None:
             legs = Legs(*Workshop(stack).make("lower_body", stack.legs_on_board))

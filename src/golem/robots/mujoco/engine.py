@@ -35,6 +35,9 @@ MOVING = 0.02
 STILL = np.zeros(2)
 """Sway of a hoist that stands still [m]."""
 
+_MOMENT = mujoco.mjtState.mjSTATE_INTEGRATION
+"""What of the state a snapshot holds: all of it."""
+
 
 class MujocoRobot:
     """The twin; see `golem.robots.base.Robot`.
@@ -175,6 +178,16 @@ class MujocoRobot:
         mujoco.mj_camlight(self._model, self.data)
         rgb, depth = self._rig.render(self.data, camera)
         return rgb, self._depth[camera].measure(depth)
+
+    def snapshot(self) -> bytes:
+        """Return the present moment; see `Recallable`."""
+        state = np.empty(mujoco.mj_stateSize(self._model, _MOMENT))
+        mujoco.mj_getState(self._model, self.data, state, _MOMENT)
+        return state.tobytes()
+
+    def recall(self, snapshot: bytes) -> None:
+        """Be in the moment of `snapshot`; see `Recallable`."""
+        mujoco.mj_setState(self._model, self.data, np.frombuffer(snapshot), _MOMENT)
 
     def close(self) -> None:
         """Release the rendering context."""

@@ -26,7 +26,6 @@ from golem.middleware.record.commands import interrupted
 from golem.middleware.ros.base import Node
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
-from golem.robots.mujoco.config import World
 from golem.runtime.live.member import member, say
 from golem.runtime.live.verdict import to_status, told
 from golem.stack import load_stack
@@ -46,7 +45,7 @@ class LaunchConfig:
 
     stack: Positional[str] = "tether"
     """Path of a stack file, or the name of a shipped one."""
-    world: World | None = None
+    world: str | None = None
     """World of the twin: pack, open, slope or rubble; default: the stack file's."""
     profile: str | None = None
     """Realism profile: ideal, bench or field; default: the stack file's."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 
 from tyro.conf import OmitArgPrefixes, Positional
@@ -14,9 +14,10 @@ from golem.hardware.safety.base import GateState, GateStatus, SafetyLimits
 from golem.middleware.dds import discovery
 from golem.middleware.dds.domain import ROBOT_DOMAIN, DdsConfig
 from golem.middleware.record.commands import interrupted
-from golem.robots.mujoco.config import World
+from golem.robots.base import Recallable
 from golem.runtime.assembly import build_robot
 from golem.runtime.executor import TICK
+from golem.runtime.live.darkroom import Darkroom
 from golem.runtime.live.gate import LiveGate
 from golem.runtime.live.member import DISCOVERY, member, owner, say
 from golem.runtime.live.stack import LiveStack
@@ -34,7 +35,7 @@ class TwinConfig:
 
     stack: Positional[str] = "tether"
     """Path of a stack file, or the name of a shipped one; of it the robot counts, and its on-board computer."""
-    world: World | None = None
+    world: str | None = None
     """World of the twin: pack, open, slope or rubble; default: the stack file's."""
     profile: str | None = None
     """Realism profile: ideal, bench or field; default: the stack file's."""
@@ -96,8 +97,15 @@ def run_twin(config: TwinConfig) -> None:
                 f"There is a robot on {config.dds} already: {owner(participant, others[0].guid)}; "
                 "end it, or choose another domain."
             )
-        with closing(build_robot(stack, config.seed)) as robot:
-            twin = Twin(stack, robot, participant, node)
+        with closing(build_robot(stack, config.seed)) as robot, ExitStack() as closing_time:
+            darkroom = None
+            if isinstance(robot, Recallable):
+                darkroom = closing_time.enter_context(
+                    closing(Darkroom(stack, config.seed, robot, config.dds))
+                )
+            twin = Twin(stack, robot, participant, node, darkroom)
+            if darkroom is not None:
+                darkroom.wait()
             say(f"The twin of '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
             twin.run(stop.is_set)
 

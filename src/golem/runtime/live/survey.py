@@ -84,8 +84,10 @@ def survey(participant: CycloneParticipant, seconds: float, everything: bool = F
     topics = {(e.topic, e.type_name) for e in (*writers, *readers) if everything or _is_topic(e.topic)}
     ears: dict[tuple[str, str], Reader] = {}
     known: set[str] = set()
+    read = {e.topic for e in readers}
     for topic, type_name in sorted(topics):
-        if topic not in known:  # two types of one name: the first is listened to
+        # Of two types of one name the first is listened to; and nobody shall make images for us alone.
+        if topic not in known and (topic in read or not type_name.startswith("sensor_msgs::msg::dds_::")):
             known.add(topic)
             ears[topic, type_name] = participant.reader(topic, type_name, EAR)
     counts: dict[tuple[str, str], tuple[int, int]] = {key: (0, 0) for key in ears}

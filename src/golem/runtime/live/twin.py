@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from golem.middleware import public
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant
 from golem.middleware.ros.base import Node
@@ -15,6 +16,7 @@ from golem.robots.base import Banded, Robot
 from golem.robots.onboard import motion_switcher
 from golem.runtime import nodes
 from golem.runtime.executor import TICK, Executor, Phase, Placed, in_order
+from golem.runtime.live.darkroom import Darkroom, image_topics
 from golem.runtime.live.motors import CommandIn, StateOut
 from golem.runtime.live.onboard import AnswersOut, CallsIn, LegsOut
 from golem.runtime.live.robot_out import (
@@ -57,18 +59,34 @@ class Twin:
         commands: what takes the motors' command.
     """
 
-    def __init__(self, stack: Stack, robot: Robot, participant: Participant, node: Node) -> None:
-        """Put `robot`, which was built for `stack`, on the domain.
+    def __init__(
+        self,
+        stack: Stack,
+        robot: Robot,
+        participant: Participant,
+        node: Node,
+        darkroom: Darkroom | None = None,
+    ) -> None:
+        """Put a robot on the domain.
+
+        Args:
+            stack: what it was built for.
+            robot: the robot.
+            participant: member of the domain.
+            node: its ROS node.
+            darkroom: where its images are made; None is here, which holds everything else up for as long as it takes.
 
         Raises:
             ConfigError, ModuleFault: about the on-board legs.
         """
         bus = Bus()
-        surface = Surface("robot", participant, node)
+        images = image_topics()
+        only = None if darkroom is None else {row.name for row in public.TOPICS} - images
+        surface = Surface("robot", participant, node, only)
         self._robot = robot
-        cameras = {name: CameraOut(bus, surface, name) for name in robot.cameras}
+        cameras = {name: CameraOut(bus, surface, name) for name in robot.cameras} if darkroom is None else {}
         self.commands = CommandIn(bus, surface)
-        side = RobotSide(bus, stack, robot, lambda camera: cameras[camera].wanted)
+        side = RobotSide(bus, stack, robot, (lambda c: cameras[c].wanted) if darkroom is None else None)
         placed: list[Placed] = [
             (Phase.RECEIVE, Poll(node)),
             (Phase.RECEIVE, self.commands),
@@ -87,6 +105,8 @@ class Twin:
             server = RpcServer(surface.reader(f"/{requests}"), surface.writer(f"/{responses}"))
             placed.append((Phase.RECEIVE, CallsIn(bus, service, server)))
             placed.append((Phase.SEND, AnswersOut(bus, service, server)))
+        if darkroom is not None:
+            placed.append((Phase.EXPOSE, darkroom))
         if stack.legs_on_board is not None:
             estimator = nodes.EstimatorNode(bus, *Workshop(stack).make("estimator"))
             placed.append((Phase.ESTIMATE, estimator))

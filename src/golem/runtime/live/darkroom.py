@@ -1,0 +1,132 @@
+"""Images of the twin, made in a process of their own: rendering one takes longer than a whole lot of ticks.
+
+The twin hands over snapshots; a second robot that was built alike is put into each moment and photographed there, and
+its images go to the domain from that process. One exposure at a time: where rendering is slow, there are fewer.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections import deque
+from contextlib import closing
+from multiprocessing.connection import Connection
+from typing import Any
+
+from golem.errors import GolemError
+from golem.middleware import public, topics
+from golem.middleware.bus import Bus
+from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.topics import Exposure
+from golem.robots.base import Recallable
+from golem.runtime.assembly import build_robot
+from golem.runtime.executor import TICK
+from golem.runtime.live.member import member
+from golem.runtime.live.robot_out import CameraOut
+from golem.runtime.live.surface import Surface
+from golem.stack import Stack
+
+GRACE = 3.0
+"""Time the process gets to end by itself [s]."""
+
+
+def image_topics() -> set[str]:
+    """Return the names of all images' topics."""
+    return {public.image(camera, what) for camera in public.CAMERAS for what in public.IMAGES}
+
+
+class Darkroom:
+    """The twin's end: hands a snapshot over when a camera is due and the darkroom free."""
+
+    period = TICK
+
+    def __init__(self, stack: Stack, seed: int, robot: Recallable, dds: DdsConfig) -> None:
+        """Start the process.
+
+        Args:
+            stack: what `robot` was built from.
+            seed: of its episode.
+            robot: the robot.
+            dds: where the images go.
+        """
+        self._robot = robot
+        self._periods = {name: 1.0 / info.rate for name, info in robot.cameras.items()}
+        self._due = dict.fromkeys(self._periods, 0.0)
+        self._waiting: deque[str] = deque()
+        # Not forked: the transport's threads would be missing in the child.
+        context = multiprocessing.get_context("spawn")
+        self._link, theirs = context.Pipe()
+        self._process = context.Process(target=_work, args=(stack, seed, dds, theirs), daemon=True)
+        self._process.start()
+        theirs.close()
+        self._free = False
+
+    def step(self, t: float) -> None:
+        """Hand over what is due.
+
+        Raises:
+            GolemError: the process has died.
+        """
+        for name, due in self._due.items():
+            if t >= due - 1e-9:
+                self._due[name] = due + self._periods[name]
+                if name not in self._waiting:
+                    self._waiting.append(name)
+        try:
+            if self._link.poll():
+                self._link.recv_bytes()
+                self._free = True
+            if self._free and self._waiting:
+                self._free = False
+                self._link.send((self._waiting.popleft(), t, self._robot.snapshot()))
+        except (EOFError, OSError) as error:
+            code = self._process.exitcode
+            raise GolemError(f"The process that renders the cameras has died (exit code {code}).") from error
+
+    def wait(self) -> None:
+        """Wait until the process is ready: building its world takes a second that the twin's clock shall not miss."""
+        while not self._link.poll(0.1) and self._process.is_alive():
+            continue
+
+    def close(self) -> None:
+        """End the process; calling it again does nothing."""
+        self._link.close()
+        self._process.join(GRACE)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+
+
+def _work(stack: Stack, seed: int, dds: DdsConfig, link: Connection) -> None:
+    """Make images until the twin hangs up."""
+    # Ctrl-C is for the twin, which then hangs up.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    with member("cameras", dds) as (participant, node), closing(build_robot(stack, seed)) as robot:
+        bus = Bus()
+        surface = Surface("robot", participant, node, image_topics())
+        cameras = {name: CameraOut(bus, surface, name) for name in robot.cameras}
+        try:
+            while True:
+                link.send_bytes(b"free")
+                expose(robot, cameras, bus, *link.recv())
+        except (EOFError, OSError):
+            return
+
+
+def expose(robot: Any, cameras: dict[str, CameraOut], bus: Bus, name: str, t: float, snapshot: bytes) -> None:
+    """Send the images of one moment, if anybody wants them.
+
+    Args:
+        robot: a robot that recalls.
+        cameras: what sends them, by camera.
+        bus: what those read.
+        name: which camera.
+        t: time of the moment [s].
+        snapshot: the moment.
+    """
+    if cameras[name].wanted():
+        robot.recall(snapshot)
+        rgb, depth = robot.capture(name)
+        bus.publish(topics.exposures(name), Exposure(t, robot.cameras[name], rgb, depth), t)
+        cameras[name].step(t)
