@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import logging
 import os
+import signal
 import struct
 import subprocess
 import sys
@@ -222,6 +223,34 @@ def test_another_series_of_cyclone_is_refused(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(MissingExtra, match=r"golem-humanoid\[dds\]"):
         library.cyclone()
+
+
+STALLED = """
+import sys
+from golem.middleware.dds.base import Qos
+from golem.middleware.dds.connect import connect
+from golem.middleware.dds.domain import DdsConfig
+reader = connect(DdsConfig(int(sys.argv[1]))).reader("rt/a", sys.argv[2], Qos(depth=1))
+sys.stdin.read()
+"""
+
+
+def test_a_stalled_reader_costs_samples_but_neither_an_error_nor_the_loop(
+    participant: CycloneParticipant, domain: int
+) -> None:
+    writer = participant.writer("rt/a", TYPE, Qos(depth=None))
+    other = subprocess.Popen([sys.executable, "-c", STALLED, str(domain), TYPE], stdin=subprocess.PIPE)
+    try:
+        eventually(writer.matched)
+        other.send_signal(signal.SIGSTOP)
+        for _ in range(100):
+            writer.write(ENCAPSULATION + bytes(100_000))
+            if writer.dropped >= 2:
+                break
+        assert writer.dropped == 2
+    finally:
+        other.send_signal(signal.SIGCONT)
+        other.kill()
 
 
 OTHER = """

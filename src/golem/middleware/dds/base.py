@@ -199,7 +199,8 @@ class Participant(Protocol):
             qos: what it requests.
             user_data: USER_DATA that peers see during discovery.
             on_data: called when there is something to take, one call at a time for all readers of the participant.
-                It must take, may write, and must not wait for another callback.
+                It must take, may write, and must not wait for another callback. The first call may come before this
+                method has returned; then it may leave the samples, and take them itself once it has the reader.
 
         Raises:
             DdsError: as for a writer.
