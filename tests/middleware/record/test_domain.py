@@ -19,7 +19,7 @@ from golem.middleware.record.base import NANO, Message, Topic
 from golem.middleware.record.catalog import offered, public_topics, topic
 from golem.middleware.record.player import PlayConfig, Player
 from golem.middleware.record.reader import Bag
-from golem.middleware.record.recorder import MANY, Recorder, clock_time
+from golem.middleware.record.recorder import HOLD, MANY, Recorder, clock_time
 from golem.middleware.record.writer import BagWriter
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.msgs.builtin_interfaces import Time
@@ -73,11 +73,19 @@ def tick(participant: Participant, seconds: float) -> None:
     writer.write(codec.serialize(Clock(clock=Time(sec=int(seconds), nanosec=round(seconds % 1 * NANO)))))
 
 
+def settled(domain: LocalDomain, pile: Pile, wall: Wall, *topics: Topic) -> Recorder:
+    """Return a recorder that has waited long enough for a /clock."""
+    recorder = Recorder(domain.participant(), pile, wall)
+    recorder.add(topics)
+    assert recorder.poll() == 0
+    wall.now += HOLD
+    return recorder
+
+
 def test_recorded_by_the_wall_clock_without_clock() -> None:
     wall, pile = Wall(), Pile()
     domain = LocalDomain(wall)
-    recorder = Recorder(domain.participant(), pile, wall)
-    recorder.add([WORDS, MODEL])
+    recorder = settled(domain, pile, wall, WORDS, MODEL)
     other = domain.participant()
     say(other, WORDS, "a")
     wall.now += 0.004
@@ -86,7 +94,7 @@ def test_recorded_by_the_wall_clock_without_clock() -> None:
     say(other, WORDS, "c")
     wall.now += 0.02
     assert recorder.poll() == 3 and recorder.poll() == 0
-    assert [(name, round(t - WALL, 3), text) for name, t, text in pile.said()] == [
+    assert [(name, round(t - WALL - HOLD, 3), text) for name, t, text in pile.said()] == [
         ("/words", 0.0, "a"),
         ("/robot_description", 0.004, "b"),
         ("/words", 0.01, "c"),
@@ -115,22 +123,46 @@ def test_recorded_by_the_time_of_the_domain() -> None:
     assert {m.publish_time > WALL * NANO for m in pile.messages} == {True}
 
 
+def test_what_comes_before_the_first_clock_waits_for_it() -> None:
+    """Else a bag of a simulation would begin in another time than it goes on in."""
+    wall, pile = Wall(), Pile()
+    domain = LocalDomain(wall)
+    recorder = Recorder(domain.participant(), pile, wall)
+    recorder.add([WORDS])
+    other = domain.participant()
+    say(other, WORDS, "a")
+    assert recorder.poll() == 0
+    wall.now += 0.5
+    tick(other, 7.25)
+    wall.now += 0.1
+    say(other, WORDS, "b")
+    assert recorder.poll() == 2  # /clock itself is not asked for, it tells the time all the same
+    assert pile.said() == [("/words", 7.25, "a"), ("/words", 7.25, "b")]
+
+
+def test_a_recording_that_ends_at_once_holds_what_came() -> None:
+    wall, pile = Wall(), Pile()
+    domain = LocalDomain(wall)
+    recorder = Recorder(domain.participant(), pile, wall)
+    recorder.add([WORDS])
+    say(domain.participant(), WORDS, "a")
+    assert recorder.poll(last=True) == 1
+
+
 def test_a_stranger_to_the_time_is_taken_at_its_arrival() -> None:
     """The clock of the writer's machine may be wrong by years."""
     wall, pile = Wall(), Pile()
     domain = LocalDomain(lambda: -5.0)
-    recorder = Recorder(domain.participant(), pile, wall)
-    recorder.add([WORDS])
+    recorder = settled(domain, pile, wall, WORDS)
     say(domain.participant(), WORDS, "a")
     recorder.poll()
-    assert pile.said() == [("/words", WALL, "a")]
+    assert pile.said() == [("/words", WALL + HOLD, "a")]
 
 
 def test_too_much_to_keep_is_counted_and_bounded() -> None:
     wall, pile = Wall(), Pile()
     domain = LocalDomain(wall)
-    recorder = Recorder(domain.participant(), pile, wall)
-    recorder.add([WORDS])
+    recorder = settled(domain, pile, wall, WORDS)
     writer = domain.participant().writer("rt/words", codec.dds_name(WORDS.kind), WORDS.qos)
     for _ in range(MANY + 500):
         writer.write(codec.serialize(String(data="x")))

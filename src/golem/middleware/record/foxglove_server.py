@@ -12,7 +12,7 @@ from typing import Any
 
 from golem.errors import ConfigError, MissingExtra
 from golem.middleware.record.base import Message, Topic
-from golem.middleware.record.recorder import CLOCK, Recorder
+from golem.middleware.record.recorder import Recorder
 
 try:
     import foxglove
@@ -99,9 +99,9 @@ class FoxgloveServer:
                 self._channel(held.topic).log(bytes(held.payload), log_time=max(self._now, held.log_time))
 
     def choose(self, recorder: Recorder, topics: Iterable[Topic]) -> None:
-        """Let `recorder`, whose sink this is, take those of `topics` that a viewer wants, and the time."""
+        """Let `recorder`, whose sink this is, take those of `topics` that a viewer wants."""
         for topic in topics:
-            if self.wanted(topic) or topic.name == CLOCK:
+            if self.wanted(topic):
                 recorder.add([topic])
             else:
                 recorder.remove(topic.name)

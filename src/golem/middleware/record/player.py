@@ -14,10 +14,9 @@ from golem.middleware.dds.base import ENCAPSULATION, Participant, Payload, Qos, 
 from golem.middleware.record.base import NANO, Message, Topic
 from golem.middleware.record.catalog import topic as describe
 from golem.middleware.record.reader import Bag
-from golem.middleware.record.recorder import CLOCK
+from golem.middleware.record.recorder import CLOCK, CLOCK_KIND
 from golem.middleware.ros import codec, names
 
-CLOCK_KIND = "rosgraph_msgs/msg/Clock"
 CLOCK_STEP = NANO // 100
 """Time between two messages on a /clock that the bag does not hold [ns] [own]."""
 

@@ -13,7 +13,7 @@ from golem.middleware.record.base import NANO, Message, Sink, Topic
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import dds_name
 
-CLOCK = "/clock"
+CLOCK, CLOCK_KIND = "/clock", "rosgraph_msgs/msg/Clock"
 PERIOD = 0.05
 """Time between two looks at what has come [s] [own]."""
 FLUSH = 1.0
@@ -31,7 +31,9 @@ BULKY = frozenset(
 FEW, MANY = 60, 2000
 """Messages that wait to be taken, of large and of other types [own]: 4 s at 15 Hz and at 500 Hz. They bound memory:
 60 VGA images are 55 MB."""
-SKEW = 1.0
+HOLD = 1.0
+"""How long a recording waits for a first /clock before it goes by the wall clock [s] [own]; nothing is lost by it."""
+SKEW = 2.0
 """Difference between two machines' clocks beyond which the writer's time of a message is not relied on [s] [own]."""
 
 
@@ -57,7 +59,12 @@ class Recorder:
         """Record from the domain of `participant` to `sink`; `wall` tells the time [s since 1970]."""
         self._participant, self._sink, self._wall = participant, sink, wall
         self._subscriptions: dict[str, _Subscription] = {}
+        qos = Qos(
+            reliable=False, depth=MANY
+        )  # whatever the writer offers: it tells the time, recorded or not
+        self._ticks = participant.reader(names.topic(CLOCK), dds_name(CLOCK_KIND), qos)
         self._clock: int | None = None
+        self._held_since: float | None = None
         self.received: dict[str, int] = {}
         self.overruns: dict[str, int] = {}
 
@@ -70,6 +77,9 @@ class Recorder:
         for topic in topics:
             if topic.name in self._subscriptions:
                 continue
+            if topic.name == CLOCK:
+                self._subscriptions[CLOCK] = _Subscription(topic, self._ticks, MANY)
+                continue
             depth = FEW if topic.kind in BULKY else MANY
             qos = Qos(topic.qos.reliable, topic.qos.transient_local, depth)
             wire, kind = names.topic(topic.name), dds_name(topic.kind)
@@ -79,36 +89,49 @@ class Recorder:
     def remove(self, topic: str) -> None:
         """Record the topic called `topic` no longer."""
         subscription = self._subscriptions.pop(topic, None)
-        if subscription is not None:
+        if subscription is not None and subscription.reader is not self._ticks:
             subscription.reader.close()
 
-    def poll(self) -> int:
+    def poll(self, last: bool = False) -> int:
         """Pass on what has come, in the order in which it was written; return how many messages.
+
+        At first nothing is passed on until /clock or the wall clock is known to tell the domain's time, unless this
+        is the `last` time.
 
         Raises:
             OutputError: the sink cannot be written.
         """
         now = self._wall()
-        batch: list[tuple[float, Topic, Payload]] = []
+        ticks = [(self._written(tick, now), tick.payload) for tick in _take_all(self._ticks, MANY)]
+        if self._clock is None:
+            self._clock = next((t for _, payload in ticks if (t := clock_time(payload)) is not None), None)
+            if self._clock is None and not last and self._held(now):
+                return 0
+        batch = [(written, None, payload) for written, payload in ticks]
         for subscription in self._subscriptions.values():
             topic = subscription.topic
-            samples = _take_all(subscription)
+            if topic.name == CLOCK:
+                continue
+            samples = _take_all(subscription.reader, subscription.depth)
             if len(samples) >= subscription.depth:
                 self.overruns[topic.name] = self.overruns.get(topic.name, 0) + 1
-            if samples:
-                self.received[topic.name] = self.received.get(topic.name, 0) + len(samples)
-            for sample in samples:
-                written = sample.source_time if abs(sample.source_time - now) < SKEW else now
-                batch.append((written, topic, sample.payload))
+            batch += [(self._written(sample, now), topic, sample.payload) for sample in samples]
         batch.sort(
-            key=lambda entry: (entry[0], entry[1].name != CLOCK)
+            key=lambda entry: (entry[0], entry[1] is not None)
         )  # what happens at a time, happens after it
+        clock = self._subscriptions.get(CLOCK)
+        passed = 0
         for written, topic, payload in batch:
-            if topic.name == CLOCK:
-                self._clock = clock_time(payload)
-            at = round(written * NANO)
-            self._sink.write(Message(topic, at if self._clock is None else self._clock, at, payload))
-        return len(batch)
+            if topic is None:
+                at = clock_time(payload)
+                self._clock = self._clock if at is None else at
+                topic = clock and clock.topic
+            if topic is not None:
+                at = round(written * NANO)
+                self._sink.write(Message(topic, at if self._clock is None else self._clock, at, payload))
+                self.received[topic.name] = self.received.get(topic.name, 0) + 1
+                passed += 1
+        return passed
 
     def run(self, stop: threading.Event, flush: Callable[[], None], limit: float = float("inf")) -> None:
         """Record until `stop` is set or `limit` [s] is over, and call `flush` every second; errors as for `poll`."""
@@ -119,12 +142,23 @@ class Recorder:
             if time.monotonic() - flushed >= FLUSH:
                 flushed = time.monotonic()
                 flush()
-        self.poll()
+        self.poll(last=True)
 
     def close(self) -> None:
         """Stop reading; the sink stays open."""
         for name in list(self._subscriptions):
             self.remove(name)
+        self._ticks.close()
+
+    def _held(self, now: float) -> bool:
+        """Return whether to wait a little longer for the domain's time."""
+        if self._held_since is None:
+            self._held_since = now
+        return now - self._held_since < HOLD
+
+    def _written(self, sample: Sample, now: float) -> float:
+        """Return when a sample was written by the wall clock, or arrived where its writer's clock is off [s]."""
+        return sample.source_time if abs(sample.source_time - now) < SKEW else now
 
 
 def clock_time(payload: Payload) -> int | None:
@@ -136,11 +170,11 @@ def clock_time(payload: Payload) -> int | None:
     return max(0, seconds * NANO + nanoseconds)
 
 
-def _take_all(subscription: _Subscription) -> list[Sample]:
+def _take_all(reader: Reader, most: int) -> list[Sample]:
     """Return what has come to a reader, at most as much as it keeps: a writer faster than us must not hold us up."""
     out: list[Sample] = []
-    while len(out) < subscription.depth:
-        samples = subscription.reader.take(min(64, subscription.depth - len(out)))
+    while len(out) < most:
+        samples = reader.take(min(64, most - len(out)))
         if not samples:
             break
         out += samples

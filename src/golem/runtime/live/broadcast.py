@@ -96,7 +96,7 @@ class Broadcast:
     def close(self) -> None:
         """Show the last tick, too; the sink stays open."""
         self()
-        self._recorder.poll()
+        self._recorder.poll(last=True)
         self._recorder.close()
 
     def _time(self) -> float:
