@@ -23,12 +23,16 @@ def test_losses_latency_and_jitter_are_those_of_what_came() -> None:
         "images": {"image": [0.001, 0.003], "cloud": [0.0]},
     }
     heard = {
-        "controller": {"came": [(1, ms), (2, 3 * ms), (2, 3 * ms), (4, 9 * ms)], "cpu": 0.002},
+        "controller": {
+            "came": [(1, ms, 50.0), (2, 3 * ms, 60.0), (2, 3 * ms, 60.0), (4, 9 * ms, 70.0)],
+            "cpu": 0.002,
+        },
         "viewer": {"came": {"a": 1, "b": 2}, "cpu": 0.004},
     }
     loop = _measures("x", sent, heard)
     assert (loop.rate, loop.states, loop.lost_states, loop.lost_commands) == (500.0, 4, 1, 2)
     assert loop.latency[0] == 1000.0 and loop.latency[1] == pytest.approx(2960.0)
+    assert loop.transport[0] == 60.0
     assert loop.jitter[0] == 2000.0
     assert loop.cpu == pytest.approx({"robot": 12.5, "controller": 25.0, "viewer": 50.0})
     assert loop.image_ms is not None and loop.image_ms[0] == 2.0

@@ -84,16 +84,21 @@ def robot(participant: CycloneParticipant, seconds: float, cameras: bool) -> dic
 
 
 def controller(participant: CycloneParticipant) -> dict[str, object]:
-    """Decode and answer every state until standard input ends; return when each had been decoded."""
-    came: list[tuple[int, int]] = []
+    """Decode and answer every state until standard input ends.
+
+    Returns when each had been decoded [ns], and how long after it was written its bytes were there [us].
+    """
+    came: list[tuple[int, int, float]] = []
     command = LowCommand(0.0, *(np.zeros(NUM_JOINTS) for _ in range(5)))
     writer = participant.writer("rt/lowcmd", hg.LOW_CMD.type_name, OFFERED)
 
     def on_state() -> None:
-        for sample in reader.take():
+        samples, taken = reader.take(), time.time()
+        for sample in samples:
             if sample.alive:
                 state = convert.decode_low_state(sample.payload)
-                came.append((round(state.t * 1e3), time.monotonic_ns()))
+                way = (taken - sample.source_time) * 1e6
+                came.append((round(state.t * 1e3), time.monotonic_ns(), way))
                 writer.write(convert.encode_low_command(command, convert.MODE_MACHINE, state.t))
 
     reader = participant.reader("rt/lowstate", hg.LOW_STATE.type_name, PATIENT, on_data=on_state)

@@ -55,14 +55,18 @@ def robot(seconds: float) -> dict:
 
 
 def controller() -> dict:
-    """Read and answer every state until standard input ends; return when each had been decoded."""
+    """Read and answer every state until standard input ends.
+
+    Returns when each had been decoded [ns], and how long that was after it was written [us].
+    """
     came = []
     command, crc = unitree_hg_msg_dds__LowCmd_(), CRC()
     publisher = ChannelPublisher("rt/lowcmd", LowCmd_)
     publisher.Init()
 
     def on_state(state: LowState_) -> None:
-        came.append((state.tick, time.monotonic_ns()))
+        way = (time.time() - state.sample_info.source_timestamp * 1e-9) * 1e6
+        came.append((state.tick, time.monotonic_ns(), way))
         command.reserve[0] = state.tick
         command.crc = crc.Crc(command)
         publisher.Write(command)
