@@ -163,6 +163,27 @@ def test_an_unfinished_bag_can_be_repaired(tmp_path: Path) -> None:
         assert other.message_count == 40
 
 
+def test_a_full_disk_is_named_and_what_was_written_is_kept(tmp_path: Path) -> None:
+    """The limit on the size of files stands for a full disk: the same error, in the middle of a chunk."""
+    resource = pytest.importorskip("resource")
+    writer = BagWriter(tmp_path / "bag", BagConfig(chunk=2000))
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    sent = [numbers(i) for i in range(100)]
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
+    try:
+        with pytest.raises(OutputError, match="Cannot write the bag .*: File too large"):
+            for message in sent:
+                writer.write(message)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    writer.close()
+    with pytest.raises(OutputError, match="is closed"):
+        writer.write(sent[0])
+    bag = Bag(tmp_path / "bag")
+    read = list(bag.messages())
+    assert not bag.finished and len(read) > 10 and same(read, sent[: len(read)])
+
+
 def test_an_empty_bag_is_a_bag(tmp_path: Path) -> None:
     write(tmp_path / "bag", 0)
     bag = Bag(tmp_path / "bag")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Literal
@@ -137,6 +138,11 @@ class BagWriter:
         write_metadata(self.folder, self._files, self._custom)
 
     def _unwritable(self, error: OSError) -> OutputError:
+        """Leave the file as it is, unfinished: whatever came after half a chunk could not be read."""
+        self._closed = True
+        if self._file is not None:
+            self._file.abandon()
+            self._file = None
         return OutputError(f"Cannot write the bag {self.folder}: {error.strerror}.")
 
 
@@ -185,6 +191,11 @@ class McapFile:
         self._mcap.add_metadata("rosbag2", {"serialized_metadata": dump(about)})
         self._mcap.finish()
         self._out.close()
+
+    def abandon(self) -> None:
+        """Close without an index."""
+        with suppress(OSError):
+            self._out.close()
 
     def _register(self, topic: Topic) -> int:
         key = (topic.kind, topic.definition)
