@@ -35,7 +35,7 @@ EXTRAS = {
     "pink": ("pink", "qpsolvers"),
     "dds": ("cyclonedds", "rosbags"),
     "record": ("mcap", "rosbags"),
-    "foxglove": ("foxglove",),
+    "foxglove": ("foxglove", "rosbags"),
     "train": ("torch", "onnx"),
     "docs": ("mkdocs",),
     "dev": ("pytest",),

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import importlib
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,7 +14,7 @@ import yaml
 from rosbags.rosbag2 import Reader as RosbagsReader
 from rosbags.typesys import Stores, get_typestore
 
-from golem.errors import ConfigError, OutputError
+from golem.errors import ConfigError, MissingExtra, OutputError
 from golem.middleware.dds.base import DEFAULT, LATCHED, SENSOR, Qos
 from golem.middleware.record.base import BagError, Message, Topic
 from golem.middleware.record.metadata import offered_qos, parse_qos
@@ -228,3 +230,21 @@ def test_what_a_user_can_do_wrong(tmp_path: Path) -> None:
     writer.close()
     with pytest.raises(OutputError, match="is closed"):
         writer.write(words(0))
+
+
+@pytest.mark.parametrize(
+    ("module", "absent", "extra"),
+    [
+        ("writer", "mcap.writer", "record"),
+        ("reader", "mcap.reader", "record"),
+        ("foxglove_server", "foxglove", "foxglove"),
+    ],
+)
+def test_a_missing_extra_is_named(
+    monkeypatch: pytest.MonkeyPatch, module: str, absent: str, extra: str
+) -> None:
+    name = f"golem.middleware.record.{module}"
+    monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setitem(sys.modules, absent, None)
+    with pytest.raises(MissingExtra, match=rf"golem-humanoid\[{extra}\]"):
+        importlib.import_module(name)

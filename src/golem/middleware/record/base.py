@@ -76,4 +76,4 @@ class Sink(Protocol):
 
 def missing(error: ModuleNotFoundError) -> MissingExtra:
     """Return the error for a package that the extra `record` brings."""
-    return MissingExtra(error.name or "mcap", "record")
+    return MissingExtra((error.name or "mcap").partition(".")[0], "record")

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import math
-import signal
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,6 +14,7 @@ from golem.errors import ConfigError
 from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.interrupt import interrupted
 from golem.middleware.record.catalog import offered, public_topics
 from golem.middleware.record.player import PlayConfig, Player
 from golem.middleware.record.reader import Bag, repair
@@ -121,18 +119,6 @@ def run_replay(config: ReplayConfig) -> int:
             written = player.run(stop)
     print(f"{written} messages.", flush=True)
     return written
-
-
-@contextmanager
-def interrupted() -> Iterator[threading.Event]:
-    """Yield an event that Ctrl-C (or SIGTERM) sets, so that what is being written is completed first."""
-    stop = threading.Event()
-    before = {s: signal.signal(s, lambda *_: stop.set()) for s in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _repair(config: RecordConfig) -> int:

@@ -14,9 +14,9 @@ from golem.middleware import public
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.interrupt import interrupted
 from golem.middleware.record.base import Topic
 from golem.middleware.record.catalog import public_topics
-from golem.middleware.record.commands import interrupted
 from golem.middleware.record.foxglove_server import FoxgloveServer, ServerConfig
 from golem.middleware.record.recorder import Recorder
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA

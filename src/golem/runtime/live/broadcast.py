@@ -155,17 +155,18 @@ def broadcast(
             casts.append(Broadcast(running, robot, sink, choose))
             stack.callback(casts[-1].close)
 
-        topics = public_topics() if bag is not None or foxglove is not None else []
         if bag is not None:
             from golem.middleware.record.writer import BagWriter
 
-            add(stack.enter_context(closing(BagWriter(bag))), lambda recorder: recorder.add(topics))
+            every = public_topics()
+            add(stack.enter_context(closing(BagWriter(bag))), lambda recorder: recorder.add(every))
         if foxglove is not None:
             from golem.middleware.record.foxglove_server import FoxgloveServer, ServerConfig
 
+            offered = public_topics()
             server = stack.enter_context(closing(FoxgloveServer(ServerConfig(port=foxglove))))
             print(f"Foxglove: {server.url}", flush=True)
-            add(server, lambda recorder: server.choose(recorder, topics))
+            add(server, lambda recorder: server.choose(recorder, offered))
 
         def every_tick() -> None:
             for cast in casts:

@@ -12,7 +12,7 @@ from tyro.conf import OmitArgPrefixes, Positional
 from golem.errors import ConfigError, unknown_name
 from golem.middleware import public
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.record.commands import interrupted
+from golem.middleware.interrupt import interrupted
 from golem.middleware.ros import convert
 from golem.middleware.ros.base import ClientGoal, Node
 from golem.middleware.ros.future import Future, RosError

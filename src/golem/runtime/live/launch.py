@@ -22,7 +22,7 @@ from golem.errors import ConfigError
 from golem.hardware.safety.base import GateState, GateStatus
 from golem.middleware import public
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.record.commands import interrupted
+from golem.middleware.interrupt import interrupted
 from golem.middleware.ros.base import Node
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response

@@ -13,7 +13,7 @@ from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import GateState, GateStatus, SafetyLimits
 from golem.middleware.dds import discovery
 from golem.middleware.dds.domain import ROBOT_DOMAIN, DdsConfig
-from golem.middleware.record.commands import interrupted
+from golem.middleware.interrupt import interrupted
 from golem.robots.base import Recallable
 from golem.runtime.assembly import build_robot
 from golem.runtime.executor import TICK

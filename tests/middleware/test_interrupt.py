@@ -1,0 +1,17 @@
+from __future__ import annotations
+
+import signal
+
+import pytest
+
+from golem.middleware.interrupt import interrupted
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_sets_the_event_and_is_given_back(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+    with interrupted() as stop:
+        assert not stop.is_set()
+        signal.raise_signal(number)
+        assert stop.is_set()
+    assert signal.getsignal(number) is before
