@@ -16,24 +16,26 @@ RUNS = Path("runs/legs")
 def run(
     out: Path = RUNS / "seed0",
     seed: int = 0,
-    steps: float = 16e6,
+    steps: float = 24e6,
     adversary: Adversary = "learned",
     robots: int = 512,
     threads: int = 2,
     start: Path | None = None,
+    motion_ramp: tuple[float, float] = TrainConfig.motion_ramp,
 ) -> None:
     """Train a leg policy, or go on where a run was stopped.
 
     Args:
         out: folder of checkpoint and curve.
         seed: of weights, episodes and noise.
-        steps: actions of all robots together.
+        steps: actions of all robots together, those of `start` included.
         adversary: what moves the upper body: none, motions (a curriculum), or learned (motions, then a policy as well).
         robots: how many are simulated at once.
         threads: of physics and networks.
-        start: checkpoint of another run to begin with.
+        start: checkpoint of another run to go on from, under this command's options.
+        motion_ramp: steps between which motions and payloads of the upper body grow from light to their full range.
     """
-    config = TrainConfig(out, seed, steps, robots, threads, adversary, start=start)
+    config = TrainConfig(out, seed, steps, robots, threads, adversary, start=start, motion_ramp=motion_ramp)
     print(run_training(config))
 
 

@@ -37,15 +37,6 @@ class Difficulty:
     push: float = 0.1
     payload: float = 0.0
 
-    def update(self, survival: float, rate: float) -> None:
-        """Make the upper body harder while `survival` (mean share of an episode that is lasted) is high, else easier.
-
-        ALMI's rule with 70 instead of 80 %: up while episodes last, down twice as fast otherwise.
-        """
-        change = rate if survival > 0.7 else -2.0 * rate
-        for name in ("amplitude", "speed", "payload"):
-            setattr(self, name, float(np.clip(getattr(self, name) + change, 0.05, 1.0)))
-
 
 class UpperBodyMotion:
     """Targets of torso and arms for `n` robots, in motor order of the upper body.
@@ -146,7 +137,9 @@ class Pushes:
         # Mostly near the edge of what the robot is known to take: easy pushes teach little.
         impulse = self._largest * difficulty * np.sqrt(rng.random(m))
         force = impulse / duration * np.where(slow, 0.5 * np.pi, 1.0)
-        angle = rng.uniform(-np.pi, np.pi, m)
+        # Across, the legs are in each other's way: that takes the most practice.
+        across = rng.choice([-0.5, 0.5], m) * np.pi + rng.uniform(-0.3, 0.3, m)
+        angle = np.where(rng.random(m) < 0.3, across, rng.uniform(-np.pi, np.pi, m))
         self._peak[where] = force[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         self._duration[where] = duration
         self._slow[where] = slow

@@ -40,10 +40,9 @@ class TrainConfig:
         adversary: what moves the upper body: `none` (it rests in random postures), `motions` (the curriculum), or
             `learned` (motions, and a policy that moves half of the robots once `learned_from` steps are done).
         learned_from: steps after which the learned adversary begins.
-        rate: change of the upper body's difficulties per update.
-        push_ramp: steps before which pushes are light, and after which they have their full range. They
-            grow whether or not the robot survives: tied to survival they went up and down below half, and the legs
-            learned to take no more than that.
+        push_ramp, motion_ramp: steps before which pushes, and motions and payloads of the upper body, are light, and
+            after which they have their full range. They grow whether or not the robot survives: tied to survival, as
+            ALMI has it, the pushes went up and down below half, and beside full pushes the motions never grew.
     """
 
     out: Path = Path("runs/legs/seed0")
@@ -54,8 +53,8 @@ class TrainConfig:
     adversary: Adversary = "learned"
     learned_from: float = 4e6
     start: Path | None = None
-    rate: float = 0.006
     push_ramp: tuple[float, float] = (1e6, 10e6)
+    motion_ramp: tuple[float, float] = (2e6, 12e6)
     env: EnvConfig = field(default_factory=EnvConfig)
     ppo: PpoConfig = field(default_factory=PpoConfig)
 
@@ -98,8 +97,7 @@ class _Run:
         self.updates = 0
         self._cpu = 0.0
         self.env = LegsEnv(config.robots, config.env, config.seed, config.threads)
-        if config.adversary == "none":
-            self.env.difficulty.amplitude = self.env.difficulty.speed = 0.0
+        self._harden()
         seen = Mirror(self.env.layout.components)
         obs, known = self.env.observe()
         ppo = config.ppo
@@ -142,10 +140,7 @@ class _Run:
         if meter.finished:
             share = min(1.0, meter.finished / 64.0)
             self._survival += share * 0.5 * (meter.lasted / meter.finished - self._survival)
-        env.difficulty.update(self._survival, config.rate)
-        env.difficulty.push = float(np.interp(self.steps, config.push_ramp, (0.05, 1.0)))
-        if config.adversary == "none":
-            env.difficulty.amplitude = env.difficulty.speed = 0.0
+        self._harden()
         self._cpu += time.process_time() - began
         row = {"steps": self.steps, "cpu_s": self._cpu, "survival": self._survival}
         row |= {"learned_adversary": float(learned)} | asdict(env.difficulty) | stats | meter.row()
@@ -165,7 +160,6 @@ class _Run:
                 "updates": self.updates,
                 "cpu": self._cpu,
                 "survival": self._survival,
-                "difficulty": asdict(self.env.difficulty),
                 "config": _plain(self.config),
             },
             part,
@@ -187,16 +181,25 @@ class _Run:
         self.upper.load(saved["upper"])
         self.steps, self.updates, self._cpu = saved["steps"], saved["updates"], saved["cpu"]
         self._survival = saved["survival"]
-        for name, value in saved["difficulty"].items():
-            setattr(self.env.difficulty, name, value)
+        self._harden()
         self.env.begin()
         self._obs, self._known = self.env.observe()
 
     def begin_with(self, path: Path) -> None:
-        """Take over the networks of a checkpoint, and nothing else."""
+        """Take over networks and steps of another run's checkpoint; the configuration is this run's own."""
         saved = torch.load(path, weights_only=True)
         self.legs.load(saved["legs"])
         self.upper.load(saved["upper"])
+        self.steps = saved["steps"]
+        self._harden()
+
+    def _harden(self) -> None:
+        """Set the difficulty of the disturbances by the steps that were done."""
+        config, difficulty = self.config, self.env.difficulty
+        difficulty.push = float(np.interp(self.steps, config.push_ramp, (0.05, 1.0)))
+        motion = float(np.interp(self.steps, config.motion_ramp, (0.05, 1.0)))
+        difficulty.payload = motion
+        difficulty.amplitude = difficulty.speed = 0.0 if config.adversary == "none" else motion
 
     def _write(self) -> None:
         """Append what was logged to the curve, and print the newest row."""
