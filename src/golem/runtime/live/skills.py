@@ -118,7 +118,10 @@ class Skills:
 
     def attach(self, stack: StackSide) -> None:
         """Work with `stack` from now on; what was pursued with another has failed."""
-        self._give_up(SkillResult(False, "robot", "robot", "The robot was started anew."))
+        if self._pursuit is not None:
+            anew = SkillResult(False, "robot", "robot", "The robot was started anew.")
+            self._pursuit.run.fail("robot", anew.reason)
+            self._give_up(anew)
         self._stack = stack
 
     def begin(self, offer: Offer, goal: ServerGoal) -> None:

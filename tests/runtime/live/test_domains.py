@@ -1,0 +1,66 @@
+"""Which domain is whose: what is refused before anybody joins, and with which words."""
+
+from __future__ import annotations
+
+import pytest
+
+from golem.errors import ConfigError
+from golem.middleware.dds.domain import DdsConfig
+from golem.runtime.live.launch import LaunchConfig, commands, run_launch
+from golem.runtime.live.member import check_domain
+from golem.runtime.live.process import SafetyConfig, TwinConfig, UpConfig, run_safety, run_twin, run_up
+from golem.runtime.live.survey import SurveyConfig, run_survey
+
+ROBOT = DdsConfig(domain=0, interface="lo", robot=True)
+
+
+def test_domain_0_is_refused_unless_the_robot_is_meant() -> None:
+    with pytest.raises(ConfigError, match=r"domain 0 is the real robot's.*--robot"):
+        DdsConfig(domain=0)
+
+
+@pytest.mark.parametrize("dds", [ROBOT, DdsConfig(domain=5, robot=True)])
+def test_a_twin_never_joins_the_robots_domain(dds: DdsConfig) -> None:
+    with pytest.raises(ConfigError, match="A twin never joins domain 0"):
+        run_twin(TwinConfig(dds=dds))
+    with pytest.raises(ConfigError, match="golem launch starts a simulation"):
+        run_launch(LaunchConfig(dds=dds))
+
+
+def test_the_robot_is_demanded_by_name_and_by_number() -> None:
+    for run in (
+        lambda dds: run_up(UpConfig(dds=dds)),
+        lambda dds: run_safety(SafetyConfig(dds=dds)),
+        lambda dds: run_survey(SurveyConfig(dds=dds)),
+    ):
+        with pytest.raises(ConfigError, match="add --domain 0"):
+            run(DdsConfig(domain=1, robot=True))
+        with pytest.raises(ConfigError, match="not on this machine: add --interface"):
+            run(ROBOT)
+    check_domain(DdsConfig(domain=0, interface="eth7", robot=True))
+
+
+def test_a_wrong_stack_file_is_found_before_anything_is_started() -> None:
+    with pytest.raises(ConfigError, match="No stack file 'nonsense'"):
+        run_launch(LaunchConfig("nonsense"))
+    with pytest.raises(ConfigError, match="No stack file 'nonsense'"):
+        run_twin(TwinConfig("nonsense"))
+
+
+def test_every_process_is_told_what_concerns_it() -> None:
+    dds = DdsConfig(domain=7, interface="eth7", peers=("10.0.0.2",))
+    words = commands(LaunchConfig("stand", world="rubble", profile="ideal", seed=3, dds=dds))
+    where = ["--domain", "7", "--interface", "eth7", "--peers", "10.0.0.2"]
+    assert words["twin"] == [
+        "twin",
+        "stand",
+        "--seed",
+        "3",
+        "--profile",
+        "ideal",
+        "--world",
+        "rubble",
+        *where,
+    ]
+    assert words["safety"] == ["safety", "--limits", "urdf", *where]
+    assert words["up"] == ["up", "stand", "--profile", "ideal", *where]

@@ -1,0 +1,130 @@
+"""Real processes on a real domain: launched, killed, named, restarted, and ended in order."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from tests.runtime.live.conftest import BLIND
+
+pytest.importorskip("cyclonedds")
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
+
+DOMAIN = str(100 + os.getpid() % 100)
+STACK = """
+robot: {{use: mujoco, world: open}}
+localizer: {blind}:Blind
+profile: ideal
+"""
+
+
+def golem(*words: str) -> subprocess.CompletedProcess[str]:
+    """Run `golem WORDS` on the test's domain to its end."""
+    command = [sys.executable, "-m", "golem", *words, "--domain", DOMAIN]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+class Launched:
+    """`golem launch` and what it has printed."""
+
+    def __init__(self, stack: Path) -> None:
+        command = [sys.executable, "-m", "golem", "launch", str(stack), "--domain", DOMAIN]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.lines: list[str] = []
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip())
+
+    def wait_for(self, pattern: str, seconds: float = 60.0) -> str:
+        """Wait for a line that matches, and return it."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            for line in self.lines:
+                if re.search(pattern, line):
+                    return line
+            time.sleep(0.05)
+        raise AssertionError(f"no line like '{pattern}' in:\n" + "\n".join(self.lines))
+
+
+@pytest.fixture
+def launched(tmp_path: Path) -> Iterator[Launched]:
+    """A hanging robot that may move."""
+    (tmp_path / "blind.py").write_text(BLIND)
+    stack = tmp_path / "stack.yaml"
+    stack.write_text(STACK.format(blind=tmp_path / "blind.py"))
+    launched = Launched(stack)
+    try:
+        launched.wait_for(r"^\[safety\] Safety gate: active")
+        yield launched
+    finally:
+        if launched.process.poll() is None:
+            launched.process.send_signal(signal.SIGINT)
+            launched.process.wait(30)
+
+
+def pid_of(name: str) -> int:
+    """Return the process behind a name, as `golem topics` tells it."""
+    found = re.search(rf"golem {name}, \S+ \(process (\d+)", golem("topics", "--seconds", "0.2").stdout)
+    assert found is not None
+    return int(found[1])
+
+
+@pytest.mark.parametrize(("victim", "bystander"), [("up", "twin"), ("twin", "up")])
+def test_a_dead_process_is_named_the_robot_stopped_and_the_process_restarted(
+    launched: Launched, victim: str, bystander: str
+) -> None:
+    dead, alive = pid_of(victim), pid_of(bystander)
+    os.kill(dead, signal.SIGKILL)
+    line = launched.wait_for(f"^{victim} has died")
+    assert "exit code -9" in line
+    # On a machine this slow the gate may have stopped the robot for another reason before.
+    assert re.search(r"safety gate is stop[01] \(\w+: \d+ ms old\)", line)
+    launched.wait_for(f"Restart it with: golem restart {victim}")
+    answer = golem("restart", victim)
+    assert answer.returncode == 0 and f"{victim} is process" in answer.stdout
+    launched.wait_for(r"^\[up\] The robot was started anew" if victim == "twin" else r"^up was restarted")
+    assert pid_of(bystander) == alive and pid_of(victim) != dead
+    for _ in range(10):
+        golem("safety", "reset")
+        if golem("safety", "activate").returncode == 0:
+            break
+    else:
+        raise AssertionError("the robot cannot be set free again:\n" + "\n".join(launched.lines))
+
+
+def test_ctrl_c_ends_everything_in_order(launched: Launched) -> None:
+    launched.process.send_signal(signal.SIGINT)
+    assert launched.process.wait(40) == 0
+    assert any("stop" in line for line in launched.lines if line.startswith("[safety]"))
+    assert "Nobody is on domain" in golem("topics", "--seconds", "0.2").stdout
+
+
+def test_a_second_twin_is_refused_and_told_who_is_there(launched: Launched) -> None:
+    answer = golem("twin", "tether")
+    assert (
+        answer.returncode == 2
+        and "There is a robot on domain" in answer.stderr
+        and "golem twin" in answer.stderr
+    )
+    status = golem("safety", "status")
+    assert status.stdout.strip()
+
+
+def test_what_is_not_there_is_said_with_a_remedy() -> None:
+    status = golem("safety", "status")
+    assert status.returncode == 2 and "start one with: golem safety" in status.stderr
+    skill = golem("skill", "stand", "1")
+    assert skill.returncode == 2 and "start a stack with: golem up STACK" in skill.stderr
+    restart = golem("restart", "up")
+    assert restart.returncode == 2 and "only what 'golem launch' started" in restart.stderr

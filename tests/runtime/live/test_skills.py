@@ -1,0 +1,186 @@
+"""Skills as actions across a domain: one at a time, with feedback, cancelled, stopped, refused with a reason."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import pytest
+from tests.runtime.live.conftest import Live
+
+from golem.middleware import public, topics
+from golem.middleware.ros import convert
+from golem.middleware.ros.base import ClientGoal
+from golem.middleware.ros.goals import GoalStatus
+from golem.middleware.ros.msgs.geometry_msgs import PoseStamped
+from golem.middleware.ros.msgs.golem_interfaces import (
+    Pick_Goal,
+    SetForce_Request,
+    SetGap_Request,
+    Stand_Goal,
+    Walk_Goal,
+)
+from golem.middleware.ros.msgs.std_srvs import Trigger_Request
+from golem.middleware.ros.node import DdsNode
+from golem.middleware.topics import HandGoal
+from golem.runtime.executor import TICK
+from golem.skills.base import SkillResult
+
+
+@dataclass
+class Client:
+    """Somebody who gives goals, in simulated time."""
+
+    live: Live
+    node: DdsNode
+    said: list[str] = field(default_factory=list)
+
+    def until(self, condition: Callable[[], bool], seconds: float = 2.0) -> None:
+        """Let time pass until `condition()`."""
+        end = self.live.clock + seconds
+        while not condition():
+            assert self.live.clock < end, "nothing happened"
+            self.live.run(TICK)
+            self.node.poll()
+
+    def send(self, action: str, goal: Any) -> ClientGoal:
+        """Give a goal, and return it once it was decided about."""
+        kind = next(row.type for row in public.ACTIONS if row.name == action)
+        client = self.node.action_client(action, kind)
+        self.until(client.ready)
+        future = client.send_goal(goal, lambda message: self.said.append(message.feedback.text))
+        self.until(lambda: future.done)
+        assert future.result().accepted
+        return future.result()
+
+    def outcome(self, goal: ClientGoal, seconds: float = 2.0) -> tuple[GoalStatus, Any]:
+        """Wait for the end of a goal; return its status and its result."""
+        future = goal.result()
+        self.until(lambda: future.done, seconds)
+        return future.result().status, future.result().result.result
+
+    def call(self, name: str, request: Any) -> Any:
+        """Call a service of the stack."""
+        client = self.node.client(name, next(row.type for row in public.SERVICES if row.name == name))
+        self.until(client.ready)
+        future = client.call(request)
+        self.until(lambda: future.done)
+        return future.result()
+
+
+@pytest.fixture
+def client(live: Live) -> Client:
+    """Somebody on the domain of a robot that may move."""
+    live.activate()
+    live.run(0.02)  # the stack hears of it
+    return Client(live, live.member("client")[1])
+
+
+def stand(seconds: float) -> Stand_Goal:
+    return Stand_Goal(convert.duration(seconds))
+
+
+def test_a_goal_is_pursued_to_its_end(client: Client) -> None:
+    goal = client.send("/skill/stand", stand(0.2))
+    status, result = client.outcome(goal)
+    assert (status, result.success, result.stage) == (GoalStatus.SUCCEEDED, True, "done")
+    assert client.said == ["Standing for 0.2 s."]
+    assert [t.name for t in result.timings] == ["stand"] and result.timings[0].seconds == pytest.approx(
+        0.2, abs=0.02
+    )
+
+
+def test_a_second_goal_is_refused_with_the_reason_and_the_first_goes_on(client: Client) -> None:
+    first = client.send("/skill/stand", stand(0.3))
+    status, result = client.outcome(client.send("/skill/stand", stand(0.1)))
+    assert status is GoalStatus.ABORTED and "Another skill is running" in result.reason
+    assert client.outcome(first)[0] is GoalStatus.SUCCEEDED
+
+
+def test_a_cancelled_skill_ends_as_cancelled_and_makes_room(client: Client) -> None:
+    goal = client.send("/skill/stand", stand(5.0))
+    canceling = goal.cancel()
+    client.until(lambda: canceling.done)
+    status, result = client.outcome(goal)
+    assert (status, result.stage) == (GoalStatus.CANCELED, "cancelled")
+    assert client.outcome(client.send("/skill/stand", stand(0.05)))[0] is GoalStatus.SUCCEEDED
+
+
+def test_a_stopped_robot_aborts_its_skill_and_begins_none(client: Client) -> None:
+    goal = client.send("/skill/stand", stand(5.0))
+    client.live.ask("stop")
+    status, result = client.outcome(goal)
+    assert (status, result.slot) == (GoalStatus.ABORTED, "safety") and "stop_requested" in result.reason
+    status, result = client.outcome(client.send("/skill/stand", stand(0.1)))
+    assert status is GoalStatus.ABORTED and "stop_requested" in result.reason
+
+
+def test_a_robot_that_is_started_anew_aborts_its_skill(client: Client) -> None:
+    goal = client.send("/skill/stand", stand(50.0))
+    client.live.leave("twin")
+    client.live.run(0.02)
+    client.live.start_twin(seed=1)
+    status, result = client.outcome(goal)
+    assert status is GoalStatus.ABORTED and "started anew" in result.reason
+
+
+@pytest.mark.parametrize(
+    ("action", "goal", "reason"),
+    [
+        ("/skill/pick", Pick_Goal("screw", "tray", "middle"), "'left' or 'right'"),
+        ("/skill/pick", Pick_Goal("", "tray", "left"), "names a label"),
+        ("/skill/walk", Walk_Goal(PoseStamped(convert.header(0.0, "map"))), "odom or base_link"),
+    ],
+)
+def test_a_goal_without_sense_is_refused_with_the_reason(
+    client: Client, action: str, goal: Any, reason: str
+) -> None:
+    status, result = client.outcome(client.send(action, goal))
+    assert (status, result.stage) == (GoalStatus.ABORTED, "refused") and reason in result.reason
+
+
+def test_hands_obey_services_while_the_gate_is_open(client: Client) -> None:
+    side = client.live.up and client.live.up.side
+    assert side is not None
+
+    def goal() -> HandGoal | None:
+        return side.bus.latest(topics.hand_goal("left"), HandGoal)
+
+    assert client.call("/left/gripper/set_position", SetGap_Request(0.03)).success and goal() == HandGoal(
+        0.03
+    )
+    assert client.call("/left/gripper/set_force", SetForce_Request(5.0)).success and goal() == HandGoal(
+        None, 5.0
+    )
+    assert (
+        "between 0 and 0.108 m"
+        in client.call("/left/gripper/set_position", SetGap_Request(float("nan"))).message
+    )
+    client.live.ask("stop")
+    client.live.run(0.02)
+    answer = client.call("/left/gripper/open", Trigger_Request())
+    assert not answer.success and "gate is shut" in answer.message
+
+
+def test_a_skill_that_outlives_its_goal_is_ended(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    from golem.runtime.live import skills
+
+    class Forever:
+        name = "forever"
+
+        async def run(self, context: Any, goal: Any) -> SkillResult:
+            await context.sleep(1e6)
+            return SkillResult(True, "done", None, "")
+
+    offer = skills.OFFERS["/skill/stand"]
+    hangs = replace(offer, make=lambda stack: Forever(), allowance=lambda goal: 0.1)
+    monkeypatch.setitem(skills.OFFERS, "/skill/stand", hangs)
+    client.live.leave("up")
+    client.live.start_up()
+    client.live.run(0.1)
+    client.live.ask("reset")
+    client.live.ask("activate")
+    client.live.run(0.02)
+    status, result = client.outcome(client.send("/skill/stand", stand(1.0)))
+    assert (status, result.stage) == (GoalStatus.ABORTED, "timeout")
