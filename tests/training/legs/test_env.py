@@ -6,6 +6,7 @@ import pytest
 
 pytest.importorskip("torch", reason="training needs the extra 'train'")
 
+from golem.capabilities.legs.gait import GaitConfig
 from golem.training.legs.env import PERIOD, EnvConfig, LegsEnv
 from golem.training.legs.model import STANCE
 from golem.training.legs.world import WorldConfig
@@ -32,7 +33,7 @@ def test_the_same_seed_gives_the_same_episodes_on_any_number_of_threads() -> Non
 
 
 def test_the_estimator_in_the_loop_follows_the_truth() -> None:
-    env = LegsEnv(16, EnvConfig(), 0, 1)
+    env = LegsEnv(16, EnvConfig(gait=GaitConfig(start="never")), 0, 1)
     for _ in range(20):
         env.step(np.zeros((16, 12)), NOBODY, np.zeros((0, 15)))
     world = env.world

@@ -22,7 +22,7 @@ from golem.training.legs.export import export, load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.model import STANCE
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
-from golem.training.legs.train import CHECKPOINT, CURVE, TrainConfig, train
+from golem.training.legs.train import CHECKPOINT, CURVE, Adversary, TrainConfig, train
 
 
 def small(out: Path, seed: int = 0, updates: int = 2, **changes: object) -> TrainConfig:
@@ -96,14 +96,18 @@ def test_ppo_learns_which_way_to_act() -> None:
     assert np.mean(errors[-5:]) < 0.5 * np.mean(errors[:5])
 
 
-def test_difficulty_follows_survival_and_bounds_what_the_adversary_does() -> None:
-    difficulty = Difficulty()
-    before = difficulty.amplitude
-    difficulty.update(0.9, 0.01)
-    assert difficulty.amplitude == pytest.approx(before + 0.01)
-    difficulty.update(0.5, 0.01)
-    assert difficulty.amplitude == pytest.approx(before - 0.01)
+@pytest.mark.parametrize("adversary", ["motions", "none"])
+def test_disturbances_grow_with_the_steps(adversary: Adversary, tmp_path: Path) -> None:
+    ramps = {"push_ramp": (0.0, 384.0), "motion_ramp": (384.0, 768.0)}
+    train(small(tmp_path, updates=10, adversary=adversary, **ramps))
+    with (tmp_path / CURVE).open() as file:
+        rows = list(csv.DictReader(file))
+    push, motion = ([float(row[name]) for row in rows] for name in ("push", "amplitude"))
+    assert push[0] == pytest.approx(0.525) and push[1:] == [1.0] * 9
+    assert motion == ([0.05, 0.05, 0.525] + [1.0] * 7 if adversary == "motions" else [0.0] * 10)
 
+
+def test_bounds_of_the_difficulty_hold_for_the_adversary() -> None:
     rng = np.random.default_rng(0)
     motion = UpperBodyMotion(4, rng)
     motion.reset(np.arange(4), 0.0)
