@@ -6,6 +6,7 @@ Only the chosen command is imported: help answers at once, and spawned workers i
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -256,6 +257,9 @@ def main() -> None:
     except GolemError as error:
         print(f"golem: {error}", file=sys.stderr)
         code = BAD_INPUT
+    except BrokenPipeError:  # whoever read what is printed has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = FAILED
     except KeyboardInterrupt as interrupt:
         print(f"golem: {interrupt or 'interrupted'}", file=sys.stderr)
         code = INTERRUPTED

@@ -58,9 +58,9 @@ class Live:
         limits = SafetyLimits.from_profile(self.stack.limits)
         self.gate = LiveGate(*self.member("safety"), limits, VirtualEstop(), clock=lambda: self.clock)
 
-    def start_up(self) -> None:
+    def start_up(self, real: bool = False) -> None:
         """Put a new stack on the domain."""
-        self.up = LiveStack(self.stack, *self.member("up"), clock=lambda: self.clock)
+        self.up = LiveStack(self.stack, *self.member("up"), real=real, clock=lambda: self.clock)
 
     def leave(self, node: str) -> None:
         """Take a process off the domain, as if it had been killed."""

@@ -15,6 +15,7 @@ from golem.middleware.public import Role
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import action, dds_name, service
 from golem.middleware.topics import LookRequest
+from golem.runtime.live.stack import SHOWN
 from golem.stack import Choice, Stack
 
 Ends = set[tuple[str, str, str]]
@@ -99,3 +100,29 @@ def test_processes_offer_what_the_table_says(support: str, tmp_path: Path) -> No
     assert seen["twin"] - own == of_role("robot")
     assert seen["safety"] - own == of_role("safety")
     assert seen["up"] - own == of_role("stack") | (band if support == "ground" else set())
+
+
+def test_beside_the_real_robot_the_stack_shows_what_follows_from_its_state(tmp_path: Path) -> None:
+    (tmp_path / "blind.py").write_text(BLIND)
+    robot = Choice("mujoco", {"world": "open", "support": "ground"})
+    eyes = Choice(f"{tmp_path / 'blind.py'}:Blind")
+    live = Live(Stack(robot, localizer=eyes, fallback=Choice("hold"), profile="ideal"), SpyDomain())
+    live.start_twin()  # stands for the robot
+    live.start_up(real=True)
+    _, listener = live.member("listener")
+    joints, links = (
+        listener.subscription(row.name, row.type, None, row.qos)
+        for row in (public.topic("/joint_states"), public.topic("/tf_static"))
+    )
+    live.run(0.05)
+    member = next(member for member, node in live.members if node.name == "up")
+    assert isinstance(member, Spy)
+    shown = {end for end in of_role("robot") if end[0] == "w" and end[1][2:] in SHOWN}
+    band = of_service("/elastic_band/release", service(public.TRIGGER), served=False)
+    assert len(shown) == len(SHOWN) and shown <= member.seen and not band & member.seen
+    state, tree = joints.latest(), links.latest()
+    assert state is not None and len(state.name) == 35
+    assert tree is not None
+    frames = {link.child_frame_id for link in tree.transforms}
+    assert {"pelvis", "imu_link", "lidar_link", "left_gripper"} <= frames
+    live.close()

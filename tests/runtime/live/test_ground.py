@@ -1,0 +1,36 @@
+"""A robot on its feet: the stack lets its band go across the domain, and it stands, also on the vendor's legs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.runtime.live.conftest import BLIND, Live
+
+from golem.hardware.safety.base import GateState
+from golem.middleware import topics
+from golem.middleware.topics import LegStatus
+from golem.stack import Choice, load_stack
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("legs", ["almi", "vendor"])
+def test_it_stands_without_its_band(legs: str, tmp_path: Path) -> None:
+    (tmp_path / "blind.py").write_text(BLIND)
+    stack = load_stack("stand", profile="ideal")
+    stack = replace(stack, lower_body=Choice(legs), localizer=Choice(f"{tmp_path / 'blind.py'}:Blind"))
+    live = Live(stack)
+    live.start_twin()
+    live.start_gate()
+    live.start_up()
+    live.activate()
+    assert live.robot.banded
+    live.run(4.0)
+    assert not live.robot.banded
+    assert live.state is GateState.ACTIVE
+    assert live.up is not None and live.up.side is not None
+    status = live.up.side.bus.latest(topics.LEG_STATUS, LegStatus)
+    assert status is not None and (status.controller, status.fault) == (legs, None)
+    assert live.robot.data.qpos[2] > 0.93  # the height of the pelvis [m]
+    live.close()
