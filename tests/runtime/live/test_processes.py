@@ -10,10 +10,16 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 from tests.runtime.live.conftest import BLIND
+
+from golem.middleware.dds.base import Qos
+from golem.middleware.dds.connect import connect
+from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.wire import hg
 
 pytest.importorskip("cyclonedds")
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
@@ -101,6 +107,13 @@ def test_a_dead_process_is_named_the_robot_stopped_and_the_process_restarted(
             break
     else:
         raise AssertionError("the robot cannot be set free again:\n" + "\n".join(launched.lines))
+
+
+def test_another_writer_of_the_motors_command_is_named_by_its_process(launched: Launched) -> None:
+    with closing(connect(DdsConfig(domain=int(DOMAIN)))) as participant:
+        participant.writer("rt/lowcmd", hg.LOW_CMD.type_name, Qos(depth=1))
+        line = launched.wait_for(r"^\[safety\] Safety gate: \w+ \(two_writers")
+    assert f"process {os.getpid()} on" in line
 
 
 def test_ctrl_c_ends_everything_in_order(launched: Launched) -> None:

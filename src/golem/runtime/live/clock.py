@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 BACK = 0.1
-"""How far back a stamp must be to mean a restart, rather than a sample that was overtaken [s]."""
+"""How far back a stamp of one writer must be to mean a restart, not a sample that was overtaken [s]."""
 
 
 class RobotClock:
@@ -21,8 +21,12 @@ class RobotClock:
         self._writer: int | None = None
 
     def restarted(self, t: float, writer: int) -> bool:
-        """Return whether a state with stamp `t` [s] from `writer` is of a robot that was started anew."""
-        return self._writer is not None and (writer != self._writer or t < self.t - BACK)
+        """Return whether a state with stamp `t` [s] from `writer` is of a robot that was started anew.
+
+        A writer that is merely another does not mean that: one that was lost for long comes back as another.
+        """
+        overtaken = writer == self._writer and t >= self.t - BACK
+        return t < self.t and not overtaken
 
     def advances(self, t: float, writer: int) -> bool:
         """Return whether a state is new, and remember it if so; one that repeats or was overtaken is not."""

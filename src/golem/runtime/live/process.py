@@ -46,7 +46,10 @@ class TwinConfig:
 
 @dataclass(frozen=True)
 class SafetyConfig:
-    """Guard the robot on a domain: emergency stop and safety gate, and nothing else in this process."""
+    """Guard the robot on a domain: emergency stop and safety gate, and nothing else in this process.
+
+    To ask something of the one that runs: golem safety activate, stop, reset, press, release or status.
+    """
 
     limits: str = "urdf"
     """Limit profile to enforce: urdf or paper."""
