@@ -182,7 +182,8 @@ def _skill(words: list[str]) -> int:
     """Let the robot on a domain do something: pick, walk or stand."""
     from golem.runtime.live.errand import read_errand, run_errand
 
-    return run_errand(read_errand(words))
+    errand = read_errand(words)
+    return 0 if errand is None else run_errand(errand)
 
 
 def _topics(words: list[str]) -> int:

@@ -97,16 +97,19 @@ ERRANDS: dict[str, tuple[str, type[Errand]]] = {
 """Action and options by the word on the command line."""
 
 
-def read_errand(words: list[str]) -> tuple[str, Errand]:
-    """Return the action and the errand that the words of a command line ask for.
+def read_errand(words: list[str]) -> tuple[str, Errand] | None:
+    """Return the action and the errand that the words of a command line ask for; None where they ask for help.
 
     Raises:
         ConfigError: there is no such skill.
     """
-    if not words or words[0] in ("-h", "--help"):
-        raise ConfigError(
-            f"Say which skill: {', '.join(ERRANDS)}; golem skill NAME --help tells the options."
-        )
+    if words[:1] in (["-h"], ["--help"]):
+        say("usage: golem skill NAME [options]     (golem skill NAME --help tells the options)\n")
+        for name, (action, kind) in ERRANDS.items():
+            say(f"  {name:8s} {action:12s} {kind.__doc__}")
+        return None
+    if not words:
+        raise ConfigError(f"Say which skill: {', '.join(ERRANDS)}.")
     if words[0] not in ERRANDS:
         raise unknown_name("skill", words[0], ERRANDS)
     action, kind = ERRANDS[words[0]]
