@@ -35,7 +35,7 @@ class Walker:
     def step(self, twist: Twist) -> None:
         self.twists.append(twist)
         values = np.array([twist.vx, twist.vy, twist.wz])
-        if np.linalg.norm(values) < DEAD_BAND:
+        if np.linalg.norm(values) < (0.02 if self.stepping else DEAD_BAND):
             values[:] = 0.0
             self._left -= DT
         else:
@@ -108,7 +108,8 @@ def test_no_twist_is_beyond_its_bounds_or_lost_in_the_dead_band() -> None:
     twists = np.array([(t.vx, t.vy, t.wz) for t in walker.twists])
     assert (np.abs(twists) <= np.array(GoToConfig().speed) + 1e-9).all()
     sizes = np.linalg.norm(twists, axis=1)
-    assert ((sizes == 0.0) | (sizes >= GoToConfig().pulse - 1e-9)).all()
+    assert ((sizes == 0.0) | (sizes >= GoToConfig().creep - 1e-9)).all()
+    assert sizes[0] >= GoToConfig().pulse
 
 
 def test_a_goal_near_by_is_reached_on_a_straight_line_without_turning_away() -> None:
@@ -141,8 +142,9 @@ def test_it_is_not_there_before_the_robot_stands() -> None:
         course = navigator.step(here, True, DT)
         assert not course.arrived
         assert course.twist == Twist()
-    rest = [navigator.step(here, False, DT).arrived for _ in range(120)]
-    assert rest.index(True) == pytest.approx(GoToConfig().rest / DT, abs=1)
+    rest = [navigator.step(here, False, DT).arrived for _ in range(200)]
+    config = GoToConfig()
+    assert rest.index(True) == pytest.approx((config.settle + config.rest) / DT, abs=1)
 
 
 def test_a_robot_that_is_moved_while_it_stops_starts_over() -> None:
@@ -161,11 +163,11 @@ def test_it_turns_the_short_way_round_past_half_a_turn() -> None:
     walker.pose = PlanarPose(0.0, 0.0, 3.0)
     go(GoTo(), walker, PlanarPose(0.0, 0.0, -3.0))
     assert all(t.wz >= 0.0 for t in walker.twists)
-    assert len(walker.twists) < 400
+    assert len(walker.twists) < 500
 
 
 def test_a_robot_that_stops_badly_is_not_chased_for_ever() -> None:
     goal = PlanarPose(1.0, 0.0, 0.0)
-    go(GoTo(), Walker(seed=2, noise=1.0, slip=6.0), goal, seconds=20.0)
-    with pytest.raises(AssertionError, match="not there after 20 s"):
-        go(GoTo(GoToConfig(widen=1.0)), Walker(seed=2, noise=1.0, slip=6.0), goal, seconds=20.0)
+    go(GoTo(), Walker(seed=2, noise=1.0, slip=6.0), goal, seconds=40.0)
+    with pytest.raises(AssertionError, match="not there after 40 s"):
+        go(GoTo(GoToConfig(widen=1.0)), Walker(seed=2, noise=1.0, slip=6.0), goal, seconds=40.0)

@@ -35,7 +35,9 @@ class GoToConfig:
         dwell: for so long [s]: half a period of the gait and more.
         accept, straight: errors after the stop with which it stays [m], [rad].
         widen: factor on these two with every time it started over: a robot that stops no better is not chased for ever.
-        rest: time without a step after which the robot stands [s].
+        rest: time without a step over which the pose is averaged, and after which the robot is judged to stand or
+            starts over [s].
+        settle: time without a step before that, in which the body comes to rest and old poses arrive [s].
     """
 
     speed: tuple[float, float, float] = (0.5, 0.25, 0.5)
@@ -48,9 +50,10 @@ class GoToConfig:
     aligned: float = 0.015
     dwell: float = 0.4
     accept: float = 0.025
-    straight: float = 0.025
+    straight: float = 0.03
     widen: float = 1.2
     rest: float = 1.0
+    settle: float = 0.3
 
 
 class GoTo:
@@ -74,7 +77,7 @@ class GoTo:
         config = self.config
         self._filter(pose, dt)
         self._rested = 0.0 if stepping else self._rested + dt
-        here = self._at()
+        here = self._stood(pose, dt) or self._at()
         left = here.to(self._goal)
         if self._walking:
             # Where it would stand if it were told to now.
@@ -85,8 +88,7 @@ class GoTo:
             self._near = self._near + dt if near else 0.0
             self._walking = self._near < config.dwell
             self._told = here
-        # The filter takes a while to see that the robot has stopped.
-        elif self._rested >= 0.5 * config.rest:
+        elif self._rested >= config.settle + config.rest:
             off = distance > self._slack * config.accept or turn > self._slack * config.straight
             if off:
                 self._walking, self._near = True, 0.0
@@ -94,12 +96,13 @@ class GoTo:
                 self._slack *= config.widen
         if self._walking:
             return Course(self._towards(left, config.creep if stepping else config.pulse), False, left)
-        return Course(ZERO, self._rested >= config.rest, left)
+        return Course(ZERO, self._rested >= config.settle + config.rest, left)
 
     def _forget(self) -> None:
         self._pose: Array | None = None
         self._velocity: Array = np.zeros(3)
         self._rested = 0.0
+        self._sum: Array = np.zeros(3)
         self._told = self._coast = PlanarPose(0.0, 0.0, 0.0)
         self._slack = 1.0
         self._near = 0.0
@@ -117,6 +120,17 @@ class GoTo:
         surprise[2] = wrap(surprise[2])
         self._pose = predicted + (1.0 - memory**2) * surprise
         self._velocity = self._velocity + (1.0 - memory) ** 2 / dt * surprise
+
+    def _stood(self, pose: PlanarPose, dt: float) -> PlanarPose | None:
+        """Return the mean pose since the robot came to rest, or None while it has not: noise is all that changes it."""
+        rested = self._rested - self.config.settle
+        if rested <= 0.0 or self._goal is None:
+            self._sum = np.zeros(3)
+            return None
+        # Relative to the goal, where the heading does not wrap.
+        off = self._goal.to(pose)
+        self._sum = self._sum + np.array([off.x, off.y, off.yaw]) * min(dt, rested)
+        return self._goal @ PlanarPose(*(self._sum / rested).tolist())
 
     def _at(self) -> PlanarPose:
         """Return the smoothed pose."""
