@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 
 import pytest
+from tests.cable import End, NoNamespaces, cable
 
 pytest.importorskip("cyclonedds")
 
@@ -66,50 +66,31 @@ print(json.dumps({"gap": gaps[at], "after": len(times) - at, "images": len(image
 """
 
 
-def ip(*words: str) -> None:
-    subprocess.run(["ip", *words], check=True, capture_output=True)
-
-
 @pytest.fixture
-def cable() -> Iterator[tuple[tuple[str, str], tuple[str, str]]]:
-    """Give two namespaces, each with its end of a cable."""
-    number = os.getpid() % 10000
-    ends = tuple((f"golem{side}{number}", f"ve{side}{number}") for side in "ab")
-    if shutil.which("ip") is None:
-        pytest.skip("needs the program ip (iproute2)")
-    made = subprocess.run(["ip", "netns", "add", ends[0][0]], capture_output=True, text=True, check=False)
-    if made.returncode != 0:
-        pytest.skip(f"needs the right to make network namespaces: {made.stderr.strip()}")
-    try:
-        ip("netns", "add", ends[1][0])
-        ip("link", "add", ends[0][1], "type", "veth", "peer", "name", ends[1][1])
-        for i, (space, end) in enumerate(ends):
-            ip("link", "set", end, "netns", space)
-            ip("-n", space, "addr", "add", f"10.77.0.{i + 1}/24", "dev", end)
-            ip("-n", space, "link", "set", end, "up")
-            ip("-n", space, "link", "set", "lo", "up")
-        yield ends  # type: ignore[misc]
-    finally:
-        for space, _ in ends:
-            subprocess.run(["ip", "netns", "delete", space], check=False, capture_output=True)
+def ends() -> Iterator[tuple[End, End]]:
+    """Give the ends of a cable between two namespaces."""
+    with ExitStack() as stack:
+        try:
+            pair = stack.enter_context(cable())
+        except NoNamespaces as error:
+            pytest.skip(str(error))
+        yield pair
 
 
-def run(end: tuple[str, str], script: str) -> subprocess.Popen[str]:
-    command = ["ip", "netns", "exec", end[0], sys.executable, "-c", script, end[1]]
+def run(end: End, script: str) -> subprocess.Popen[str]:
+    command = [*end.inside, sys.executable, "-c", script, end.interface]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
 
-def test_a_cut_link_neither_holds_up_the_writer_nor_ends_the_stream(
-    cable: tuple[tuple[str, str], tuple[str, str]],
-) -> None:
-    here, there = cable
+def test_a_cut_link_neither_holds_up_the_writer_nor_ends_the_stream(ends: tuple[End, End]) -> None:
+    here, there = ends
     reader, writer = run(there, READER), run(here, WRITER)
     try:
         assert writer.stdout is not None and writer.stdout.readline().strip() == "matched"
         time.sleep(1.5)
-        ip("-n", there[0], "link", "set", there[1], "down")
+        there.plug(False)
         time.sleep(1.0)
-        ip("-n", there[0], "link", "set", there[1], "up")
+        there.plug(True)
         wrote = json.loads(writer.communicate(timeout=30.0)[0])
         read = json.loads(reader.communicate(timeout=30.0)[0])
     finally:
