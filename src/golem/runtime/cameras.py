@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 
 from golem.capabilities.localization.base import Localizer
 from golem.middleware import topics
@@ -81,34 +82,57 @@ class FrameNode:
 
 
 class LocalizerNode:
-    """Runs the localizer on every new frame of one camera."""
+    """Runs the localizer on every new frame of one camera; live, beside the clock, on a thread of its own."""
 
     period = TICK
 
-    def __init__(self, bus: Bus, localizer: Localizer, camera: str, guard: Guard) -> None:
-        """Run `localizer` on the frames of `camera`."""
+    def __init__(
+        self,
+        bus: Bus,
+        localizer: Localizer,
+        camera: str,
+        guard: Guard,
+        beside: ThreadPoolExecutor | None = None,
+    ) -> None:
+        """Run a localizer.
+
+        Args:
+            bus: where frames and sightings are.
+            localizer: what is run.
+            camera: whose frames.
+            guard: watches it.
+            beside: where it runs; None is here, at the price of the latency that it declares.
+        """
         self._bus, self._localizer, self._camera, self._guard = bus, localizer, camera, guard
-        self._latency = guard.number("latency", localizer.latency, least=0.0)
-        self._seen = 0
+        self._latency = guard.number("latency", localizer.latency, least=0.0) if beside is None else 0.0
+        self._frames = News(bus, topics.frames(camera), Frame)
+        self._beside = beside
+        self._job: Future[Sightings] | None = None
 
     def step(self, t: float) -> None:
-        """Publish what is in the newest frame, if it is new."""
-        count = self._bus.count(topics.frames(self._camera))
-        if count == self._seen:
-            return
-        self._seen = count
-        frame = self._bus.latest(topics.frames(self._camera), Frame)
+        """Publish what is in the newest frame, if it is new, or what the thread has found."""
+        if self._job is not None:
+            if not self._job.done():
+                return
+            job, self._job = self._job, None
+            self._bus.publish(topics.sightings(self._camera), job.result(), t)
+        frame = self._frames.read()
         request = self._bus.latest(topics.look(self._camera), LookRequest)
         if frame is None or request is None or not request.labels:
             return
-        labels = request.labels
+        if self._beside is not None:
+            self._job = self._beside.submit(self._locate, frame, request.labels)
+            return
+        sightings = self._locate(frame, request.labels)
+        self._bus.publish(topics.sightings(self._camera), sightings, t, self._latency)
+
+    def _locate(self, frame: Frame, labels: tuple[str, ...]) -> Sightings:
         objects = self._guard.call(lambda: tuple(self._localizer.locate(frame, labels)))
         for o in objects:
             self._guard.kind("a located object", o, LocalizedObject)
             self._guard.array("position", o.position, 3)
             self._guard.array("points", o.points, None, 3)
-        message = Sightings(frame.t, self._camera, objects)
-        self._bus.publish(topics.sightings(self._camera), message, t, self._latency)
+        return Sightings(frame.t, self._camera, objects)
 
 
 def looked_for(bus: Bus, camera: str) -> Callable[[], bool]:

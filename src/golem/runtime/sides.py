@@ -6,6 +6,7 @@ In lock-step they share one process, one bus and one clock; live, each has its o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -146,7 +147,13 @@ class StackSide:
     """
 
     def __init__(
-        self, bus: Bus, stack: Stack, calibration: Mapping[str, Array], band: Banded | None, latency: float
+        self,
+        bus: Bus,
+        stack: Stack,
+        calibration: Mapping[str, Array],
+        band: Banded | None,
+        latency: float,
+        beside: ThreadPoolExecutor | None = None,
     ) -> None:
         """Build the modules of `stack` around `bus`.
 
@@ -156,6 +163,7 @@ class StackSide:
             calibration: of each camera; see `Robot.calibration`.
             band: what is let go once the robot stands, or None.
             latency: what a camera's frame takes on top of its way over the bus [s].
+            beside: where the localizer runs; None is on the clock, see `LocalizerNode`.
 
         Raises:
             ConfigError: a name or an option of the stack is wrong.
@@ -173,7 +181,10 @@ class StackSide:
         self.nodes: list[Placed] = [
             (Phase.ESTIMATE, nodes.EstimatorNode(bus, *make("estimator"))),
             (Phase.PERCEIVE, cameras.FrameNode(bus, calibration, latency)),
-            *((Phase.PERCEIVE, cameras.LocalizerNode(bus, localizer, name, guard)) for name in calibration),
+            *(
+                (Phase.PERCEIVE, cameras.LocalizerNode(bus, localizer, name, guard, beside))
+                for name in calibration
+            ),
             (Phase.DECIDE, self._skills),
             (Phase.CONTROL, self.legs),
             (Phase.CONTROL, nodes.UpperBodyNode(bus, *make("upper_body"))),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 
@@ -146,8 +147,12 @@ def run_up(config: UpConfig) -> None:
         ModuleFault: a module broke its contract; the safety gate, which hears no more commands, damps the robot.
     """
     stack = load_stack(config.stack, profile=config.profile)
-    with interrupted() as stop, member("up", config.dds) as (participant, node):
-        live = LiveStack(stack, participant, node, real=config.dds.robot)
+    with (
+        interrupted() as stop,
+        ThreadPoolExecutor(1, "localizer") as beside,
+        member("up", config.dds) as (participant, node),
+    ):
+        live = LiveStack(stack, participant, node, real=config.dds.robot, beside=beside)
         say(f"The stack '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
         waiting_since: float | None = time.monotonic()
         said, restarts = GateStatus(0.0, GateState.INIT), 0

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -58,6 +59,7 @@ class LiveStack:
         node: Node,
         *,
         real: bool = False,
+        beside: ThreadPoolExecutor | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Join the domain; the modules are built when the robot reports.
@@ -69,6 +71,7 @@ class LiveStack:
             real: whether the robot is none of ours. Nobody then calls to let a band go, the wall clock holds leg
                 controllers to their period, and joints and frames are shown by this process, since none of the
                 robot's does.
+            beside: where the localizer runs; see `LocalizerNode`.
             clock: this process's own [s].
         """
         self._stack, self._node, self._real = stack, node, real
@@ -80,6 +83,7 @@ class LiveStack:
         self.restarts, self.ignored, self.why = 0, 0, ""
         self._executor: Executor | None = None
         self._mode_machine = 0
+        self._beside = beside
         self._band = RemoteBand(node) if stack.on_ground and not real else None
         self._gate = GateIn(self._bus, surface, clock)
         self._cameras = [CameraIn(self._bus, surface, name) for name in public.CAMERAS]
@@ -128,7 +132,7 @@ class LiveStack:
             camera.close()
         if self._band is not None:
             self._band.renew()
-        side = self.side = StackSide(bus, self._stack, self._calibration, self._band, 0.0)
+        side = self.side = StackSide(bus, self._stack, self._calibration, self._band, 0.0, self._beside)
         side.legs.realtime = self._real
         self._skills.attach(side)
         service, identities = LOCO_APIS["h1"].service, Identities()

@@ -1,0 +1,73 @@
+"""A localizer beside the clock: it holds nobody up, its faults arrive, and it finds the same."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from golem.errors import ModuleFault
+from golem.middleware import topics
+from golem.middleware.bus import Bus
+from golem.middleware.topics import LookRequest, Sightings
+from golem.robots.sensors.cameras import HEAD
+from golem.runtime.cameras import LocalizerNode
+from golem.runtime.guard import Guard
+from golem.types import Detection, Frame, LocalizedObject
+
+
+class Eyes:
+    """Finds one thing, once it is let."""
+
+    latency = 0.5
+
+    def __init__(self) -> None:
+        self.let = threading.Event()
+        self.calls = 0
+
+    def locate(self, frame: Frame, labels: Sequence[str]) -> list[LocalizedObject]:
+        self.calls += 1
+        assert self.let.wait(5.0)
+        if labels[0] == "trouble":
+            raise RuntimeError("gone")
+        detection = Detection(labels[0], 1.0, np.zeros(4), np.zeros(2))
+        return [LocalizedObject(detection, frame.t, np.zeros(3), np.zeros((1, 3)))]
+
+
+def frame(t: float) -> Frame:
+    return Frame(t, HEAD, np.zeros((2, 2, 3), np.uint8), np.zeros((2, 2), np.float32), np.eye(4))
+
+
+def test_the_clock_goes_on_while_it_looks() -> None:
+    bus, eyes = Bus(), Eyes()
+    bus.publish(topics.look("head"), LookRequest(("screw",)), 0.0)
+    with ThreadPoolExecutor(1) as pool:
+        node = LocalizerNode(bus, eyes, "head", Guard("localizer", "eyes"), pool)
+        bus.publish(topics.frames("head"), frame(1.0), 1.0)
+        for tick in range(20):
+            bus.publish(topics.frames("head"), frame(1.0 + 0.002 * tick), 1.0)
+            node.step(1.0 + 0.002 * tick)
+        assert bus.latest(topics.sightings("head"), Sightings) is None
+        eyes.let.set()
+        pool.submit(lambda: None).result()
+        node.step(1.1)
+        found = bus.latest(topics.sightings("head"), Sightings)
+        assert found is not None and found.t == 1.0 and found.objects[0].label == "screw"
+        pool.submit(lambda: None).result()
+    assert eyes.calls == 2  # of what came meanwhile, the newest frame only
+
+
+def test_its_fault_arrives() -> None:
+    bus, eyes = Bus(), Eyes()
+    eyes.let.set()
+    bus.publish(topics.look("head"), LookRequest(("trouble",)), 0.0)
+    with ThreadPoolExecutor(1) as pool:
+        node = LocalizerNode(bus, eyes, "head", Guard("localizer", "eyes"), pool)
+        bus.publish(topics.frames("head"), frame(1.0), 1.0)
+        node.step(1.0)
+        pool.submit(lambda: None).result()
+        with pytest.raises(ModuleFault, match="localizer: eyes failed: RuntimeError: gone"):
+            node.step(1.002)
