@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -98,7 +99,7 @@ def test_ppo_learns_which_way_to_act() -> None:
 
 @pytest.mark.parametrize("adversary", ["motions", "none"])
 def test_disturbances_grow_with_the_steps(adversary: Adversary, tmp_path: Path) -> None:
-    ramps = {"push_ramp": (0.0, 384.0), "motion_ramp": (384.0, 768.0)}
+    ramps: dict[str, Any] = {"push_ramp": (0.0, 384.0), "motion_ramp": (384.0, 768.0)}
     train(small(tmp_path, updates=10, adversary=adversary, **ramps))
     with (tmp_path / CURVE).open() as file:
         rows = list(csv.DictReader(file))
