@@ -14,11 +14,12 @@ from golem.training.legs.train import CURVE
 PANELS = (
     ("falls", "falls per robot second", 1.0),
     ("error_moving", "velocity error while walking [m/s]", 0.7),
-    ("push", "difficulty of the pushes (1: up to 100 N s)", 1.0),
+    ("push", "pushes, share of the largest", 1.0),
+    ("amplitude", "upper-body motions, share of the range", 1.0),
 )
 """Column, title and top of the axis of each panel."""
-SIZE = (420, 300)
-MARGIN = (50, 30, 14, 40)
+SIZE = (360, 300)
+MARGIN = (50, 30, 22, 40)
 """Left, top, right, bottom of a panel [px]."""
 COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
 
