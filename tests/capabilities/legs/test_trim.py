@@ -35,7 +35,7 @@ def test_a_push_hardly_counts() -> None:
     trim = Trim(config)
     walk(trim, np.zeros(3), 1.0, push=1.5)
     told = trim.step(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), DT)
-    assert np.abs(told[0]) <= config.gain * config.heed * 1.0 + 1e-9
+    assert np.abs(told[0]) <= config.gain * config.heed[0] * 1.0 + 1e-9
 
 
 def test_the_correction_is_bounded_and_forgotten() -> None:

@@ -21,14 +21,14 @@ class TrimConfig:
     Attributes:
         gain: correction per velocity error and time [1/s]; 0 corrects nothing.
         most: bound of the correction of vx, vy [m/s] and wz [rad/s]; by so much the twist may leave the envelope.
-        heed: bound of the error that is integrated: a push is not the controller's doing.
+        heed: bound of each error that is integrated: a push is not the controller's doing.
         smoothing: time constant of the filter on command and measurement [s]: a period of the gait, whose sway shall
             not reach the twist.
     """
 
     gain: float = 0.8
-    most: tuple[float, float, float] = (0.15, 0.15, 0.15)
-    heed: float = 0.15
+    most: tuple[float, float, float] = (0.15, 0.15, 0.3)
+    heed: tuple[float, float, float] = (0.15, 0.15, 0.3)
     smoothing: float = 0.7
 
 
@@ -59,6 +59,6 @@ class Trim:
         measured = np.append(heading_frame(R).T @ velocity[:2], rate[2])
         # Command and measurement pass the same filter, so that its lag is no error.
         self._surplus += (twist - measured - self._surplus) * (dt / (config.smoothing + dt))
-        change = config.gain * dt * np.clip(self._surplus, -config.heed, config.heed)
+        change = config.gain * dt * np.clip(self._surplus, -np.array(config.heed), config.heed)
         self._correction = np.clip(self._correction + change, -np.array(config.most), config.most)
         return twist + self._correction
