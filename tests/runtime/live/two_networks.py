@@ -17,7 +17,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
@@ -257,8 +257,8 @@ class Scene:
             part.check()
 
 
-def prove(config: Config) -> Proof:
-    """Go through it all; see the module.
+def prove(config: Config, say: Callable[[str], None] = lambda _: None) -> Proof:
+    """Go through it all; see the module. `say` is told of every step.
 
     Raises:
         NoNamespaces: this machine or this user makes none.
@@ -286,6 +286,7 @@ def prove(config: Config) -> Proof:
                 scene.free()
                 answer = desk.ask(" ".join(("skill", *config.errand)))
                 proof.errands.append((answer["success"], answer["message"]))
+                say(f"errand {'succeeded' if answer['success'] else 'failed'}: {answer['message']}")
                 if answer["success"]:
                     return
                 late = "state_stale" in answer["message"] or "command_stale" in answer["message"]
@@ -294,9 +295,15 @@ def prove(config: Config) -> Proof:
         scene.free()
         if config.soak:
             proof.states = desk.ask(f"listen {config.soak}")
+            say(f"states heard {proof.states['got']}, missing {proof.states['missing']}")
         run_errand()
         for i, seconds in enumerate(config.cuts):
-            proof.cuts.append(scene.cut(seconds, ("robot", "table")[i % 2]))
+            cut = scene.cut(seconds, ("robot", "table")[i % 2])
+            proof.cuts.append(cut)
+            say(
+                f"cable out for {cut.seconds:g} s at the {cut.where}'s end: after {cut.after * 1e3:.0f} ms "
+                f"'{cut.stopped}', free again {cut.rearmed:.2f} s after it was back"
+            )
         scene.free()
         assert desk.ask("listen 1")["got"] > 100, "the robot's states do not come any more"
         run_errand()
@@ -305,18 +312,8 @@ def prove(config: Config) -> Proof:
 
 
 def main() -> None:
-    """Print the proof."""
-    proof = prove(tyro.cli(Config))
-    if proof.states:
-        print(f"states heard {proof.states['got']}, missing {proof.states['missing']}")
-    for succeeded, said in proof.errands:
-        print(f"errand {'succeeded' if succeeded else 'failed'}: {said}")
-    for cut in proof.cuts:
-        print(
-            f"cable out for {cut.seconds:g} s at the {cut.where}'s end: "
-            f"after {cut.after * 1e3:.0f} ms '{cut.stopped}', "
-            f"free again {cut.rearmed:.2f} s after it was back"
-        )
+    """Print the proof as it comes about."""
+    prove(tyro.cli(Config), lambda text: print(text, flush=True))
 
 
 if __name__ == "__main__":
