@@ -20,7 +20,7 @@ from golem.middleware.topics import LegStatus
 from golem.runtime.assembly import Running, build
 from golem.skills.base import Feedback
 from golem.stack import Stack
-from golem.types import Twist
+from golem.types import LowCommand, Twist
 
 MESHES: dict[int, list[BodyMesh]] = {}
 
@@ -89,7 +89,8 @@ def test_the_button_stops_the_robot_through_the_gate_and_a_reset_revives_it(
     view.panel.press(Button.PRESS)
     until_state(view, running, GateState.STOP1)
     assert running.safety is not None and running.safety.reason is Reason.ESTOP_PRESSED
-    assert (running.safety.command.kp == 0.0).all()
+    command = running.bus.latest(topics.LOW_CMD, LowCommand)
+    assert command is not None and (command.kp == 0.0).all()
     view.panel.press(Button.REVIVE)  # refused: still pressed
     end = running.executor.t + 0.7
     view.idle(lambda: running.executor.t > end)

@@ -116,9 +116,9 @@ def test_a_fall_is_seen_and_a_crouch_is_not() -> None:
 
 def test_tilt_alone_is_a_fall() -> None:
     robot = twin()
-    robot.data.qpos[3:7] = (np.cos(0.45), 0.0, np.sin(0.45), 0.0)
-    assert robot.truth.base().tilt == pytest.approx(0.9)
-    assert robot.truth.fallen() and not robot.truth.fallen(tilt=1.0)
+    robot.data.qpos[3:7] = (np.cos(0.55), 0.0, np.sin(0.55), 0.0)
+    assert robot.truth.base().tilt == pytest.approx(1.1)
+    assert robot.truth.fallen() and not robot.truth.fallen(tilt=1.2)
 
 
 def test_a_limb_that_meets_another_does_not_touch_the_world() -> None:

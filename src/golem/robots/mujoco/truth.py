@@ -105,7 +105,7 @@ class Truth:
                 names.add(self._model.body(self._model.geom_bodyid[geom]).name)
         return tuple(sorted(names))
 
-    def fallen(self, height: float = 0.6, tilt: float = 0.8) -> bool:
+    def fallen(self, height: float = 0.6, tilt: float = 1.0) -> bool:
         """Return whether base_link is less than `height` [m] above the lower sole or leans more than `tilt` [rad]."""
         base = self.base()
         floor = self._data.xpos[self._feet, 2].min() + SOLE.z
