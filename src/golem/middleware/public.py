@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from golem.middleware.dds.base import DEFAULT, LATCHED, SENSOR, Qos
+from golem.middleware.dds.base import CALLS, DEFAULT, LATCHED, SENSOR, Qos
 from golem.types import SIDES
 
 Role = Literal["robot", "safety", "stack", "user"]
@@ -166,13 +166,13 @@ TOPICS: tuple[Topic, ...] = (
     Topic("/livox/imu", "sensor_msgs/msg/Imu", "robot", (), SENSOR, 200, "lidar_link",
           "IMU inside the LiDAR. Silent like /livox/lidar: it is part of that device, not of the torso's IMU."),
     *(row for side in SIDES for row in _hand(side)),
-    Topic("/api/motion_switcher/request", "unitree_api/msg/Request", "user", ("robot",), DEFAULT, None, "",
+    Topic("/api/motion_switcher/request", "unitree_api/msg/Request", "user", ("robot",), CALLS, None, "",
           "Calls 1001 check, 1002 select, 1003 release: which on-board controller runs."),
-    Topic("/api/motion_switcher/response", "unitree_api/msg/Response", "robot", (), DEFAULT, None, "",
+    Topic("/api/motion_switcher/response", "unitree_api/msg/Response", "robot", (), CALLS, None, "",
           "The answers."),
-    Topic("/api/loco/request", "unitree_api/msg/Request", "stack", ("robot",), DEFAULT, None, "",
+    Topic("/api/loco/request", "unitree_api/msg/Request", "stack", ("robot",), CALLS, None, "",
           "Calls of the on-board leg controller: state, velocity."),
-    Topic("/api/loco/response", "unitree_api/msg/Response", "robot", ("stack",), DEFAULT, None, "",
+    Topic("/api/loco/response", "unitree_api/msg/Response", "robot", ("stack",), CALLS, None, "",
           "The answers."),
     Topic("/safety/lowcmd_in", "unitree_hg/msg/LowCmd", "stack", ("safety",), LOW, 500, "",
           "What the stack wants of the motors, for the gate to judge. reserve[0] repeats the tick of the state "

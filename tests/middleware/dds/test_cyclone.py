@@ -46,7 +46,6 @@ def test_a_domain_that_does_not_exist_is_refused(number: int) -> None:
 def test_the_robots_domain_must_be_meant() -> None:
     with pytest.raises(ConfigError, match=r"0 is the real robot's.*--robot"):
         DdsConfig(0)
-    assert DdsConfig(0, robot=True).domain == 0
 
 
 def test_a_wrong_interface_is_named_with_those_there_are(domain: int) -> None:

@@ -66,6 +66,8 @@ SENSOR = Qos(reliable=False, depth=5)
 """ROS 2's sensor data profile."""
 DEFAULT = Qos()
 """ROS 2's default profile, which its services use too."""
+CALLS = Qos(depth=256)
+"""For remote calls: as deep as answers to everybody may pile up while one client is busy elsewhere [own]."""
 LATCHED = Qos(transient_local=True, depth=1)
 """For what is said once and holds: /tf_static, /robot_description, a status."""
 

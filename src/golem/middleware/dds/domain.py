@@ -32,7 +32,7 @@ class DdsConfig:
     peers: tuple[str, ...] = ()
     """Addresses of machines to look for besides those that multicast finds; for networks without multicast."""
     robot: bool = False
-    """Take part in the real robot's domain."""
+    """Take part in the real robot's domain; its domain and interface have to be named as well."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.domain <= LAST_DOMAIN:
@@ -41,6 +41,14 @@ class DdsConfig:
             raise ConfigError(
                 f"DDS domain {ROBOT_DOMAIN} is the real robot's; choose one of 1 to {LAST_DOMAIN}, "
                 "or say that the robot is meant (--robot)."
+            )
+        if self.robot and self.domain != ROBOT_DOMAIN:
+            raise ConfigError(
+                f"--robot is the real robot, which is on domain {ROBOT_DOMAIN}: add --domain {ROBOT_DOMAIN}."
+            )
+        if self.robot and self.interface == "lo":
+            raise ConfigError(
+                "The real robot is not on this machine: add --interface with the one its cable is in."
             )
 
     def __str__(self) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 
-from golem.middleware.dds.base import Participant, Qos, Reader, Sample, Writer
+from golem.middleware.dds.base import CALLS, Participant, Reader, Sample, Writer
 from golem.middleware.unitree_api import (
     SEND_FAILED,
     TIMEOUT,
@@ -19,8 +19,6 @@ from golem.middleware.unitree_api import (
 from golem.middleware.wire import api
 from golem.middleware.wire.layout import WireError
 
-CALLS = Qos(depth=256)
-"""Reliable; as deep as answers to everybody may pile up while one client is busy elsewhere [own]."""
 _POLL = 0.001
 """How often a call that waits looks for its answer [s]."""
 

@@ -5,32 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
-from golem.errors import ConfigError
 from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
-from golem.middleware.dds.domain import ROBOT_DOMAIN, DdsConfig
+from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import DdsNode
 
 DISCOVERY = 0.3
 """Time that whoever is on the domain already gets to be seen [s]."""
-
-
-def check_domain(dds: DdsConfig) -> None:
-    """Check that the real robot is meant by both of its signs, or by none.
-
-    Raises:
-        ConfigError: one is missing.
-    """
-    if dds.robot and dds.domain != ROBOT_DOMAIN:
-        raise ConfigError(
-            f"--robot is the real robot, which is on domain {ROBOT_DOMAIN}: add --domain {ROBOT_DOMAIN}."
-        )
-    if dds.robot and dds.interface == "lo":
-        raise ConfigError(
-            "The real robot is not on this machine: add --interface with the one its cable is in."
-        )
 
 
 @contextmanager
@@ -41,7 +24,6 @@ def member(name: str, dds: DdsConfig) -> Iterator[tuple[CycloneParticipant, DdsN
         MissingExtra: cyclonedds is not installed.
         ConfigError, DdsError: the domain cannot be joined.
     """
-    check_domain(dds)
     with closing(connect(dds, f"{PARTICIPANT_USER_DATA}golem={name};")) as participant:
         with closing(DdsNode(participant, name)) as node:
             yield participant, node

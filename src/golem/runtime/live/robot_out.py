@@ -23,7 +23,6 @@ from golem.runtime.live.surface import Surface
 from golem.types import SIDES, Array, HandState, LowState, Side
 
 JOINTS = tuple(hinge.joint for hinge in tree.HINGES)
-PARENT = {edge.child: edge.parent for edge in tree.FIXED}
 
 
 def describe(surface: Surface, calibration: Mapping[str, Array]) -> None:
