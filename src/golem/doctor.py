@@ -128,7 +128,9 @@ def check_extras() -> list[Check]:
     rows: list[Check] = []
     for extra, modules in EXTRAS.items():
         absent = [module for module in modules if importlib.util.find_spec(module) is None]
-        line = f"make venv-{LOCKS.get(extra, extra)}" if _CHECKOUT else f"pip install 'golem-humanoid[{extra}]'"
+        line = (
+            f"make venv-{LOCKS.get(extra, extra)}" if _CHECKOUT else f"pip install 'golem-humanoid[{extra}]'"
+        )
         found = f"without {', '.join(absent)}" if absent else "installed"
         rows.append(Check(f"extra {extra}", found, line if absent else "", needed=False))
     return rows
