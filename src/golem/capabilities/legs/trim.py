@@ -27,8 +27,8 @@ class TrimConfig:
     """
 
     gain: float = 0.8
-    most: tuple[float, float, float] = (0.15, 0.15, 0.3)
-    heed: tuple[float, float, float] = (0.15, 0.15, 0.3)
+    most: tuple[float, float, float] = (0.15, 0.15, 0.15)
+    heed: tuple[float, float, float] = (0.15, 0.15, 0.15)
     smoothing: float = 0.7
 
 

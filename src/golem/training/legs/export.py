@@ -25,7 +25,7 @@ from golem.training.legs.ppo import Actor, PpoConfig
 
 OPSET = 17
 IR_VERSION = 8
-DECLARED = Envelope((-0.4, 0.8), (-0.3, 0.3), (-0.6, 0.6))
+DECLARED = Envelope((-0.4, 0.6), (-0.3, 0.3), (-0.6, 0.6))
 """The twists the shipped controller promises to follow; training commands a little more."""
 
 
