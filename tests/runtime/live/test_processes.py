@@ -81,9 +81,12 @@ def launched(tmp_path: Path) -> Iterator[Launched]:
 
 def pid_of(name: str) -> int:
     """Return the process behind a name, as `golem topics` tells it."""
-    found = re.search(rf"golem {name}, \S+ \(process (\d+)", golem("topics", "--seconds", "0.2").stdout)
-    assert found is not None
-    return int(found[1])
+    # A process that has just joined is not discovered at once by another that has.
+    for seconds in ("0.2", "1", "5"):
+        found = re.search(rf"golem {name}, \S+ \(process (\d+)", golem("topics", "--seconds", seconds).stdout)
+        if found is not None:
+            return int(found[1])
+    raise AssertionError(f"nobody called {name} is on the domain")
 
 
 @pytest.mark.parametrize(("victim", "bystander"), [("up", "twin"), ("twin", "up")])
@@ -98,9 +101,10 @@ def test_a_dead_process_is_named_the_robot_stopped_and_the_process_restarted(
     assert re.search(r"safety gate is stop[01] \(\w+: \d+ ms old\)", line)
     launched.wait_for(f"Restart it with: golem restart {victim}")
     answer = golem("restart", victim)
-    assert answer.returncode == 0 and f"{victim} is process" in answer.stdout
+    new = re.search(rf"{victim} is process (\d+)", answer.stdout)
+    assert answer.returncode == 0 and new is not None and int(new[1]) != dead
     launched.wait_for(r"^\[up\] The robot was started anew" if victim == "twin" else r"^up was restarted")
-    assert pid_of(bystander) == alive and pid_of(victim) != dead
+    assert pid_of(bystander) == alive
     for _ in range(10):
         golem("safety", "reset")
         if golem("safety", "activate").returncode == 0:
