@@ -38,6 +38,7 @@ class Trim:
     def __init__(self, config: TrimConfig | None = None) -> None:
         """Begin without a correction."""
         self.config = config or TrimConfig()
+        self._most, self._heed = np.array(self.config.most), np.array(self.config.heed)
         self.reset()
 
     def reset(self) -> None:
@@ -59,6 +60,6 @@ class Trim:
         measured = np.append(heading_frame(R).T @ velocity[:2], rate[2])
         # Command and measurement pass the same filter, so that its lag is no error.
         self._surplus += (twist - measured - self._surplus) * (dt / (config.smoothing + dt))
-        change = config.gain * dt * np.clip(self._surplus, -np.array(config.heed), config.heed)
-        self._correction = np.clip(self._correction + change, -np.array(config.most), config.most)
+        change = config.gain * dt * np.clip(self._surplus, -self._heed, self._heed)
+        self._correction = np.clip(self._correction + change, -self._most, self._most)
         return twist + self._correction

@@ -78,10 +78,8 @@ class GoTo:
         self._filter(pose, dt)
         self._rested = 0.0 if stepping else self._rested + dt
         here = self._stood(pose, dt) or self._at()
-        left = here.to(self._goal)
-        if self._walking:
-            # Where it would stand if it were told to now.
-            left = (here @ self._coast).to(self._goal)
+        # A robot that walks is where it would stand if it were told to now.
+        left = (here @ self._coast if self._walking else here).to(self._goal)
         distance, turn = math.hypot(left.x, left.y), abs(left.yaw)
         if self._walking:
             near = distance < self._slack * config.close and turn < self._slack * config.aligned

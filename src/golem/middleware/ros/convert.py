@@ -82,6 +82,12 @@ def matrix(pose: geometry_msgs.Pose) -> Array:
     return T
 
 
+def transform_matrix(transform: geometry_msgs.Transform) -> Array:
+    """Return a transform as (4, 4); the same limits as for `matrix`."""
+    p = transform.translation
+    return matrix(geometry_msgs.Pose(geometry_msgs.Point(p.x, p.y, p.z), transform.rotation))
+
+
 def transforms(t: float, links: Sequence[tuple[str, str]], T_parent_child: Array) -> TFMessage:
     """Return poses of frames for /tf.
 

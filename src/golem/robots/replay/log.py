@@ -16,7 +16,6 @@ from golem.middleware import public
 from golem.middleware.record.base import NANO, BagError, Message
 from golem.middleware.record.reader import Bag
 from golem.middleware.ros import codec, convert, images
-from golem.middleware.ros.msgs.geometry_msgs import Point, Pose
 from golem.middleware.ros.msgs.golem_interfaces import HandState as HandMessage
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo as InfoMessage
 from golem.middleware.ros.msgs.sensor_msgs import Image
@@ -178,9 +177,8 @@ def _cameras(bag: Bag) -> tuple[dict[str, CameraInfo], dict[str, Array]]:
     for message in bag.messages(tuple(missing)):
         topic = message.topic.name
         if topic == STATIC:
-            for transform in codec.deserialize(message.payload, TFMessage).transforms:
-                p, q = transform.transform.translation, transform.transform.rotation
-                claimed[transform.child_frame_id] = convert.matrix(Pose(Point(p.x, p.y, p.z), q))
+            for link in codec.deserialize(message.payload, TFMessage).transforms:
+                claimed[link.child_frame_id] = convert.transform_matrix(link.transform)
         elif infos[topic] not in found:
             nominal = CAMERAS[infos[topic]]
             info = codec.deserialize(message.payload, InfoMessage)

@@ -163,9 +163,7 @@ def listen(bus: Bus, surface: Surface, calibration: dict[str, Array], now: Calla
     def take_frames(message: TFMessage) -> None:
         for link in message.transforms:
             if link.child_frame_id in cameras:
-                v, q = link.transform.translation, link.transform.rotation
-                at = convert.geometry_msgs.Point(v.x, v.y, v.z)
-                calibration[cameras[link.child_frame_id]] = convert.matrix(convert.geometry_msgs.Pose(at, q))
+                calibration[cameras[link.child_frame_id]] = convert.transform_matrix(link.transform)
 
     def take_twist(message: Twist) -> None:
         bus.publish(topics.TWIST, convert.to_twist(message), now())
