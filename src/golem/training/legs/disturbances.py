@@ -17,6 +17,8 @@ from golem.robots.model.limits import load_limits
 from golem.types import UPPER, Array
 
 NUM_UPPER = UPPER.stop - UPPER.start
+CALM = 0.3
+"""Share of the pushes that are left out: who is always being pushed never learns to walk as told."""
 TOP_SPEED = 2.5
 """Speed of a target at full difficulty [rad/s]; the safety gate lets 3 pass."""
 
@@ -135,7 +137,7 @@ class Pushes:
         slow = rng.random(m) < 0.25
         duration = np.where(slow, rng.uniform(0.5, 1.2, m), rng.uniform(0.1, 0.4, m))
         # Mostly near the edge of what the robot is known to take: easy pushes teach little.
-        impulse = self._largest * difficulty * np.sqrt(rng.random(m))
+        impulse = self._largest * difficulty * np.sqrt(rng.random(m)) * (rng.random(m) >= CALM)
         force = impulse / duration * np.where(slow, 0.5 * np.pi, 1.0)
         # Across, the legs are in each other's way: that takes the most practice.
         across = rng.choice([-0.5, 0.5], m) * np.pi + rng.uniform(-0.3, 0.3, m)

@@ -45,6 +45,8 @@ class EnvConfig:
     Attributes:
         envelope: twists that are commanded, a little more than what the controller will declare.
         standing: share of the commands that are zero.
+        corners: share of the others in which each axis is at an end of its range or zero. A uniform draw hardly ever
+            asks for everything at once, and there the robot falls.
         accelerate: how fast a command may change [m/s^2, m/s^2, rad/s^2]; the base layer limits it likewise.
         hold: shortest and longest time a command lasts [s].
         episode: length of an episode [s].
@@ -56,8 +58,9 @@ class EnvConfig:
         weights: of the rewards.
     """
 
-    envelope: Envelope = field(default_factory=lambda: Envelope((-0.5, 0.9), (-0.4, 0.4), (-0.7, 0.7)))
-    standing: float = 0.4
+    envelope: Envelope = field(default_factory=lambda: Envelope((-0.45, 0.85), (-0.35, 0.35), (-0.65, 0.65)))
+    standing: float = 0.35
+    corners: float = 0.35
     accelerate: tuple[float, float, float] = (1.0, 1.0, 2.0)
     hold: tuple[float, float] = (2.0, 7.0)
     episode: float = 20.0
@@ -247,6 +250,8 @@ class LegsEnv:
         keep = rng.integers(-2, 3, m)
         for axis in range(3):
             twist[:, axis] = np.where((keep < 0) | (keep == axis), twist[:, axis], 0.0)
+        ends = np.stack([low, np.zeros(3), high])[rng.integers(0, 3, (m, 3)), np.arange(3)]
+        twist = np.where(rng.random((m, 1)) < self.config.corners, ends, twist)
         still = (rng.random(m) < self.config.standing) | (np.linalg.norm(twist, axis=1) < 0.1)
         self._goal[where] = np.where(still[:, None], 0.0, twist)
         self._left[where] = rng.uniform(*self.config.hold, m)

@@ -54,7 +54,7 @@ class Weights:
     """
 
     linear: float = 2.0
-    angular: float = 1.2
+    angular: float = 1.6
     linear_now: float = 0.8
     angular_now: float = 0.3
     alive: float = 0.5
