@@ -17,7 +17,7 @@ from golem.capabilities.legs.observation import Layout
 from golem.errors import ConfigError
 from golem.robots.model.leg_kinematics import leg_poses
 from golem.training.legs.curve import draw_curves
-from golem.training.legs.disturbances import Difficulty, Pushes, UpperBodyMotion
+from golem.training.legs.disturbances import WALKING, Difficulty, Pushes, UpperBodyMotion
 from golem.training.legs.env import LAYOUT
 from golem.training.legs.export import export, load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror
@@ -125,9 +125,10 @@ def test_pushes_have_the_impulse_they_were_drawn_with_at_most() -> None:
     pushes.reset(np.arange(200), 1.0)
     impulse, largest = np.zeros((200, 2)), np.zeros(200)
     for _ in range(2000):
-        pushes.step(1.0, 0.005)
+        pushes.step(1.0, np.arange(200) % 2 == 1, 0.005)
         quiet = ~pushes.force.any(axis=1)
         impulse[quiet] = 0.0
         impulse += pushes.force[:, :2] * 0.005
         largest = np.maximum(largest, np.linalg.norm(impulse, axis=1))
-    assert 40.0 < largest.max() < 52.0
+    standing, walking = largest[::2].max(), largest[1::2].max()
+    assert 40.0 < standing < 52.0 and 0.8 * WALKING < walking / 50.0 < 1.04 * WALKING

@@ -19,6 +19,9 @@ from golem.types import UPPER, Array
 NUM_UPPER = UPPER.stop - UPPER.start
 CALM = 0.3
 """Share of the pushes that are left out: who is always being pushed never learns to walk as told."""
+WALKING = 0.6
+"""What robots that walk feel of a push: the whole of it is more than they can take on one leg, and teaches them to
+keep both on the ground."""
 TOP_SPEED = 2.5
 """Speed of a target at full difficulty [rad/s]; the safety gate lets 3 pass."""
 
@@ -122,15 +125,16 @@ class Pushes:
         self._t[where] = 0.0
         self._draw(where, difficulty)
 
-    def step(self, difficulty: float, dt: float) -> None:
-        """Advance the time, and draw anew where a push is over."""
+    def step(self, difficulty: float, walking: NDArray[np.bool_], dt: float) -> None:
+        """Advance the time, and draw anew where a push is over; robots that are `walking` (n,) are pushed less."""
         self._t += dt
         over = np.flatnonzero(self._t > self._start + self._duration)
         if len(over):
             self._draw(over, difficulty)
         share = (self._t - self._start) / self._duration
         profile = np.where(self._slow, np.sin(np.pi * np.clip(share, 0.0, 1.0)), 1.0)
-        self.force[:, :2] = self._peak * (profile * ((share >= 0.0) & (share <= 1.0)))[:, None]
+        profile = profile * ((share >= 0.0) & (share <= 1.0)) * np.where(walking, WALKING, 1.0)
+        self.force[:, :2] = self._peak * profile[:, None]
 
     def _draw(self, where: NDArray[np.intp], difficulty: float) -> None:
         rng, m = self._rng, len(where)

@@ -30,7 +30,8 @@ class Weights:
         linear, angular: mean velocity as commanded, exp(-error^2 / 0.03).
         linear_now, angular_now: present velocity as commanded, exp(-error^2 / 0.25).
         alive: not fallen.
-        contact: feet on the ground when their phase says so, and off it when not.
+        contact: feet on the ground when their phase says so, and off it when not. With 0.4, and 0.4 of `slip`, the
+            robot dragged the trailing foot, with 100 to 200 N on it, when it walked sideways.
         swing_height: error of the height of a swinging sole [m^2].
         flat: tilt of soles in the air, 1 - cos: a foot that lands on an edge slaps down faster than the gate allows.
         upright: horizontal part of gravity in base_link, squared.
@@ -58,8 +59,8 @@ class Weights:
     linear_now: float = 0.8
     angular_now: float = 0.3
     alive: float = 0.5
-    contact: float = 0.4
-    swing_height: float = -40.0
+    contact: float = 1.0
+    swing_height: float = -60.0
     flat: float = -15.0
     upright: float = -3.0
     height: float = -40.0
@@ -73,7 +74,7 @@ class Weights:
     limits: float = -5.0
     fast: float = -2.0
     hips: float = -1.0
-    slip: float = -0.4
+    slip: float = -1.5
     feet: float = -4.0
     impact: float = -0.002
     stand_posture: float = -0.5
