@@ -92,7 +92,7 @@ def targets() -> dict[str, Target]:
         "LowCmd_, damaged": Target(lambda p: convert.decode_low_command(p, 0.0), commands),
         "mode_machine": Target(convert.mode_machine, states),
         "answered": Target(convert.answered, commands),
-        "IMUState_": Target(convert.decode_imu, [convert.encode_imu(samples.imu(rng)) for _ in range(4)]),
+        "IMUState_": Target(hg.IMU_STATE.read, [random_images.payload(hg.IMU_STATE, rng) for _ in range(4)]),
         "SportModeState_": Target(
             go.SPORT_MODE_STATE.read, [random_images.payload(go.SPORT_MODE_STATE, rng) for _ in range(4)]
         ),

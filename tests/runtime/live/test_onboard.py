@@ -133,5 +133,5 @@ def test_targets_of_the_legs_cross_over(tau: Array | None) -> None:
 def test_the_other_motors_get_nothing() -> None:
     payload = encode_legs(legs(None))
     motor = hg.LOW_CMD.read(payload)["motor"]
-    assert not motor["target"][12:].any()
+    assert not any(motor[name][12:].any() for name in ("q", "dq", "tau", "kp", "kd"))
     assert decode_legs(payload).tau is None

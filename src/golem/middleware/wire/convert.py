@@ -7,13 +7,15 @@ to decode the other refuses to encode.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 
-from golem.middleware.dds.base import Payload
+from golem.middleware.dds.base import ENCAPSULATION, Payload
 from golem.middleware.wire import hg
 from golem.middleware.wire.crc import Checksum
-from golem.middleware.wire.layout import Image, Layout, WireError
+from golem.middleware.wire.layout import Layout, WireError
 from golem.types import NUM_JOINTS, Array, Imu, LowCommand, LowState
 
 MODE_MACHINE = 0
@@ -22,19 +24,12 @@ _TICKS = 1000.0
 """Ticks per second: the vendor's simulator counts milliseconds (unitree_mujoco, simulate/src/unitree_sdk2_bridge.h)."""
 _UNIT = 1e-3
 """How far from one the norm of a unit quaternion in single precision may be [own]."""
-
-
-def _enabled(layout: Layout) -> bytes:
-    """Return a payload of `layout` whose used motors are on."""
-    payload = layout.blank()
-    image = layout.read(payload)
-    image["first_mode"] = hg.ENABLE
-    image["motor"]["mode"][1:NUM_JOINTS] = hg.ENABLE
-    return bytes(payload)
-
-
-_STATE = _enabled(hg.LOW_STATE)
-_COMMAND = _enabled(hg.LOW_CMD)
+_LARGEST = 1e38
+"""Bound on the norm of all that motors say or are told [own]: single precision ends at 3.4e38."""
+_ON = (hg.ENABLE,) * NUM_JOINTS
+_ZEROS = (0.0,) * NUM_JOINTS
+_MEASURED = ("mode", "q", "dq", "ddq", "tau_est")
+_TARGET = ("mode", "q", "dq", "tau", "kp", "kd")
 
 
 def encode_low_state(state: LowState, mode_machine: int = MODE_MACHINE) -> bytes:
@@ -45,19 +40,15 @@ def encode_low_state(state: LowState, mode_machine: int = MODE_MACHINE) -> bytes
         mode_machine: the machine type it reports.
 
     Raises:
-        WireError: a value is not finite in single precision, or the time is negative.
+        WireError: a value is not finite in single precision, the quaternion is none, or the time is negative.
     """
-    payload = bytearray(_STATE)
-    image = hg.LOW_STATE.read(payload)
-    image["mode_machine"] = mode_machine
-    image["tick"] = _tick(state.t)
-    measured = image["motor"]["measured"][:NUM_JOINTS]
-    with np.errstate(over="ignore"):
-        measured[:, 0] = state.q
-        measured[:, 1] = state.dq
-        measured[:, 3] = state.tau
-    _check_motors(measured, ("q", "dq", "ddq", "tau_est"), hg.LOW_STATE)
-    _fill_imu(image["imu"], state.imu, hg.LOW_STATE)
+    quat, gyro, acc = state.imu.quat.tolist(), state.imu.gyro.tolist(), state.imu.acc.tolist()
+    _check_imu(quat, gyro, acc, hg.LOW_STATE)
+    columns = _ON, state.q.tolist(), state.dq.tolist(), _ZEROS, state.tau.tolist()
+    motors = tuple(chain.from_iterable(zip(*columns, strict=True)))
+    _check_motors(motors, _MEASURED, hg.LOW_STATE)
+    head = ENCAPSULATION, hg.PR, mode_machine, _tick(state.t)
+    payload = bytearray(hg.STATE_NUMBERS.pack(*head, *quat, *gyro, *acc, *rpy(state.imu.quat), 0, *motors))
     hg.STATE_CHECKSUM.seal(payload)
     return bytes(payload)
 
@@ -68,11 +59,15 @@ def decode_low_state(payload: Payload) -> LowState:
     Raises:
         WireError: encapsulation, length or checksum is wrong, a value is not finite, or the quaternion is none.
     """
-    image = _checked(payload, hg.LOW_STATE, hg.STATE_CHECKSUM)
-    measured = image["motor"]["measured"][:NUM_JOINTS]
-    _check_motors(measured, ("q", "dq", "ddq", "tau_est"), hg.LOW_STATE)
-    q, dq, _, tau = measured.T.astype(np.float64, order="C")
-    return LowState(int(image["tick"]) / _TICKS, q, dq, tau, _read_imu(image["imu"], hg.LOW_STATE))
+    _check(payload, hg.LOW_STATE, hg.STATE_CHECKSUM)
+    _, _, _, tick, *numbers = hg.STATE_NUMBERS.unpack(payload)
+    quat, gyro, acc, motors = numbers[:4], numbers[4:7], numbers[7:10], numbers[14:]
+    _check_imu(quat, gyro, acc, hg.LOW_STATE)
+    _check_motors(motors, _MEASURED, hg.LOW_STATE)
+    q, dq, tau = (
+        np.array(motors[_MEASURED.index(name) :: len(_MEASURED)]) for name in ("q", "dq", "tau_est")
+    )
+    return LowState(tick / _TICKS, q, dq, tau, Imu(np.array(quat), np.array(gyro), np.array(acc)))
 
 
 def mode_machine(payload: Payload) -> int:
@@ -95,18 +90,11 @@ def encode_low_command(command: LowCommand, mode_machine: int, answers: float = 
     Raises:
         WireError: a value is not finite in single precision.
     """
-    payload = bytearray(_COMMAND)
-    image = hg.LOW_CMD.read(payload)
-    image["mode_machine"] = mode_machine
-    image["reserve"][0] = _tick(answers)
-    target = image["motor"]["target"][:NUM_JOINTS]
-    with np.errstate(over="ignore"):
-        target[:, 0] = command.q
-        target[:, 1] = command.dq
-        target[:, 2] = command.tau
-        target[:, 3] = command.kp
-        target[:, 4] = command.kd
-    _check_motors(target, ("q", "dq", "tau", "kp", "kd"), hg.LOW_CMD)
+    columns = (getattr(command, name).tolist() for name in _TARGET[1:])
+    motors = tuple(chain.from_iterable(zip(_ON, *columns, strict=True)))
+    _check_motors(motors, _TARGET, hg.LOW_CMD)
+    head = ENCAPSULATION, hg.PR, mode_machine
+    payload = bytearray(hg.COMMAND_NUMBERS.pack(*head, *motors, _tick(answers)))
     hg.COMMAND_CHECKSUM.seal(payload)
     return bytes(payload)
 
@@ -124,23 +112,22 @@ def decode_low_command(payload: Payload, t: float, mode_machine: int = MODE_MACH
         WireError: encapsulation, length or checksum is wrong, the ankles are not in pitch and roll, the machine type
             is another, or a value for a motor that is on is not finite.
     """
-    image = _checked(payload, hg.LOW_CMD, hg.COMMAND_CHECKSUM)
-    if image["mode_pr"] != hg.PR:
+    _check(payload, hg.LOW_CMD, hg.COMMAND_CHECKSUM)
+    _, mode_pr, machine, *motors, _ = hg.COMMAND_NUMBERS.unpack(payload)
+    if mode_pr != hg.PR:
         raise WireError(
-            f"The command has mode_pr {image['mode_pr']}; only {hg.PR} (ankle pitch and roll) is supported."
+            f"The command has mode_pr {mode_pr}; only {hg.PR} (ankle pitch and roll) is supported."
         )
-    if image["mode_machine"] != mode_machine:
+    if machine != mode_machine:
         raise WireError(
-            f"The command has mode_machine {image['mode_machine']}, this robot reports {mode_machine}: "
-            "copy it from the LowState."
+            f"The command has mode_machine {machine}, this robot reports {mode_machine}: copy it from the LowState."
         )
-    motor = image["motor"][:NUM_JOINTS]
-    target = motor["target"].copy()
-    off = motor["mode"] != hg.ENABLE
-    off[0] = image["first_mode"] != hg.ENABLE
-    target[off] = 0.0
-    _check_motors(target, ("q", "dq", "tau", "kp", "kd"), hg.LOW_CMD)
-    return LowCommand(t, *target.T.astype(np.float64, order="C"))
+    stride = len(_TARGET)
+    for i in range(0, len(motors), stride):
+        if motors[i] != hg.ENABLE:
+            motors[i : i + stride] = [0.0] * stride
+    _check_motors(motors, _TARGET, hg.LOW_CMD)
+    return LowCommand(t, *(np.array(motors[i::stride]) for i in range(1, stride)))
 
 
 def answered(payload: Payload) -> float:
@@ -152,26 +139,6 @@ def answered(payload: Payload) -> float:
     return int(hg.LOW_CMD.read(payload)["reserve"][0]) / _TICKS
 
 
-def encode_imu(imu: Imu) -> bytes:
-    """Return `imu` as an `IMUState_`.
-
-    Raises:
-        WireError: a value is not finite, or the quaternion is none.
-    """
-    payload = hg.IMU_STATE.blank()
-    _fill_imu(hg.IMU_STATE.read(payload), imu, hg.IMU_STATE)
-    return bytes(payload)
-
-
-def decode_imu(payload: Payload) -> Imu:
-    """Return the sample in an `IMUState_`.
-
-    Raises:
-        WireError: encapsulation or length is wrong, a value is not finite, or the quaternion is none.
-    """
-    return _read_imu(hg.IMU_STATE.read(payload), hg.IMU_STATE)
-
-
 def rpy(quat: Array) -> tuple[float, float, float]:
     """Return roll, pitch and yaw [rad] of a unit quaternion wxyz: yaw about z first, then pitch, then roll."""
     w, x, y, z = map(float, quat)
@@ -181,14 +148,13 @@ def rpy(quat: Array) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def _checked(payload: Payload, layout: Layout, checksum: Checksum) -> Image:
-    image = layout.read(payload)
+def _check(payload: Payload, layout: Layout, checksum: Checksum) -> None:
+    layout.check(payload)
     if not checksum.holds(payload):
         raise WireError(
-            f"The checksum of a {layout.type_name} is {int(image['crc']):#010x}, "
+            f"The checksum of a {layout.type_name} is {int.from_bytes(payload[-4:], 'little'):#010x}, "
             f"not {checksum.of(payload):#010x}: it was damaged, or its sender did not set it."
         )
-    return image
 
 
 def _tick(t: float) -> int:
@@ -197,30 +163,18 @@ def _tick(t: float) -> int:
     return round(t * _TICKS) % 2**32
 
 
-def _check_motors(values: np.ndarray, names: tuple[str, ...], layout: Layout) -> None:
-    """Refuse (27, len(names)) values of motors unless all are finite."""
-    finite = np.isfinite(values)
-    if not finite.all():
-        motor, column = np.argwhere(~finite)[0]
+def _check_motors(values: Sequence[float], names: Sequence[str], layout: Layout) -> None:
+    """Refuse the values of motors, those with `names` of the first motor first, unless all are finite."""
+    if not math.hypot(*values) <= _LARGEST:
+        worst = max(range(len(values)), key=lambda i: math.inf if math.isnan(values[i]) else abs(values[i]))
+        motor, column = divmod(worst, len(names))
         raise WireError(
-            f"{names[column]} of motor {motor} in a {layout.type_name} is {values[motor, column]}, not finite."
+            f"{names[column]} of motor {motor} in a {layout.type_name} is {values[worst]}: not finite, or too large."
         )
 
 
-def _fill_imu(image: Image, imu: Imu, layout: Layout) -> None:
-    with np.errstate(over="ignore"):
-        image["quaternion"] = imu.quat
-        image["gyroscope"] = imu.gyro
-        image["accelerometer"] = imu.acc
-    _read_imu(image, layout)
-    image["rpy"] = rpy(imu.quat)
-
-
-def _read_imu(image: Image, layout: Layout) -> Imu:
-    values = [image[name] for name in ("quaternion", "gyroscope", "accelerometer")]
-    if not all(np.isfinite(value).all() for value in values):  # a cast of a signalling NaN would warn
-        raise WireError(f"The IMU in a {layout.type_name} is not finite: {values}.")
-    quat, gyro, acc = (value.astype(np.float64) for value in values)
-    if abs(float(quat @ quat) - 1.0) > 2.0 * _UNIT:
+def _check_imu(quat: list[float], gyro: list[float], acc: list[float], layout: Layout) -> None:
+    if not math.hypot(*gyro, *acc) <= _LARGEST:
+        raise WireError(f"The IMU in a {layout.type_name} is not finite: {gyro}, {acc}.")
+    if not abs(math.hypot(*quat) - 1.0) <= _UNIT:
         raise WireError(f"The quaternion of the IMU in a {layout.type_name} is no unit quaternion: {quat}.")
-    return Imu(quat, gyro, acc)

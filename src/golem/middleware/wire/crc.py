@@ -9,8 +9,7 @@ of the result after turns one into the other.
 from __future__ import annotations
 
 import zlib
-
-import numpy as np
+from array import array
 
 from golem.middleware.dds.base import ENCAPSULATION, Payload
 
@@ -20,8 +19,7 @@ _WORD = 4
 
 def crc32(words: bytes) -> int:
     """Return the checksum of 32-bit words given as big-endian bytes."""
-    crc = zlib.crc32(words.translate(_REVERSED)) ^ 0xFFFFFFFF
-    return int.from_bytes(crc.to_bytes(4, "little").translate(_REVERSED), "big")
+    return _crc32(words.translate(_REVERSED))
 
 
 class Checksum:
@@ -32,34 +30,31 @@ class Checksum:
     zero.
     """
 
-    def __init__(
-        self, size: int, first_mode: int, stride: int, motors: int, halves: tuple[int, ...] = ()
-    ) -> None:
+    def __init__(self, first_mode: int, stride: int, motors: int, halves: tuple[int, ...] = ()) -> None:
         """Describe the type.
 
         Args:
-            size: bytes of a payload, header included; the last word is the checksum itself.
-            first_mode: offset of the first motor's mode byte in the body.
+            first_mode: offset of the first motor's mode byte in the body, the third of its word.
             stride: bytes from one motor to the next.
             motors: how many there are.
             halves: offsets in the body of words of which only the lower half is used.
         """
-        self._split = first_mode // _WORD
-        self._mask = np.full((size - len(ENCAPSULATION)) // _WORD, 0xFFFFFFFF, np.uint32)
-        modes = self._split + stride // _WORD * np.arange(1, motors)
-        self._mask[modes] = 0xFF
-        self._mask[np.array(halves, int) // _WORD] = 0xFFFF
+        self._split = first_mode - 2
+        second, end = self._split + stride, self._split + stride * motors
+        padding = [slice(second + i, end, stride) for i in (1, 2, 3)]
+        self._padding = [(where, bytes(motors - 1)) for where in padding]
+        self._padding += [(slice(offset + 2, offset + 4), bytes(2)) for offset in halves]
 
     def of(self, payload: Payload) -> int:
         """Return the checksum that `payload`, of the right length, should carry."""
+        body = bytearray(bytes(payload[len(ENCAPSULATION) : -_WORD]).translate(_REVERSED))
+        for where, zeros in self._padding:
+            body[where] = zeros
         split = self._split
-        body = np.frombuffer(payload, "<u4", offset=len(ENCAPSULATION)) & self._mask
-        words = np.empty(len(body), ">u4")
-        words[:split] = body[:split]
-        words[split] = body[split] & 0xFFFF
-        words[split + 1] = body[split] >> 16 & 0xFF
-        words[split + 2 :] = body[split + 1 : -1]
-        return crc32(words.tobytes())
+        body[split : split + 4] = b"%b\0\0%b\0\0\0" % (body[split : split + 2], body[split + 2 : split + 3])
+        words = array("I", bytes(body))
+        words.byteswap()
+        return _crc32(words)
 
     def seal(self, payload: bytearray) -> None:
         """Write the checksum of `payload` into it."""
@@ -68,3 +63,9 @@ class Checksum:
     def holds(self, payload: Payload) -> bool:
         """Return whether `payload` carries the right checksum."""
         return int.from_bytes(payload[-_WORD:], "little") == self.of(payload)
+
+
+def _crc32(reversed_words: bytes | array[int]) -> int:
+    """Return the checksum of 32-bit words given as big-endian bytes with the bits of each reversed."""
+    crc = zlib.crc32(reversed_words) ^ 0xFFFFFFFF
+    return int.from_bytes(crc.to_bytes(4, "little").translate(_REVERSED), "big")

@@ -6,10 +6,10 @@ Members and types: unitree_sdk2_python, unitree_sdk2py/idl/unitree_go/msg/dds_.
 from __future__ import annotations
 
 from golem.middleware.wire import hg
-from golem.middleware.wire.layout import Fields, Layout, struct
+from golem.middleware.wire.layout import Fields, Layout, structure
 
 _IMU: Fields = {**hg.IMU, "temperature": (52, "u1")}
-_PATH_POINT = struct(
+_PATH_POINT = structure(
     28, {name: (4 * i, "<f4") for i, name in enumerate(("t_from_start", "x", "y", "yaw", "vx", "vy", "vyaw"))}
 )
 
@@ -20,7 +20,7 @@ SPORT_MODE_STATE = Layout(
         "sec": (0, "<i4"),
         "nanosec": (4, "<u4"),
         "error_code": (8, "<u4"),
-        "imu": (12, struct(53, _IMU)),
+        "imu": (12, structure(53, _IMU)),
         "mode": (65, "u1"),
         "progress": (68, "<f4"),
         "gait_type": (72, "u1"),

@@ -8,8 +8,11 @@ member before.
 
 from __future__ import annotations
 
+from struct import Struct
+
 from golem.middleware.wire.crc import Checksum
-from golem.middleware.wire.layout import Fields, Layout, struct
+from golem.middleware.wire.layout import Fields, Layout, structure
+from golem.types import NUM_JOINTS
 
 MOTORS = 35
 """Motor slots of a message; the H1-2 uses the first 27."""
@@ -25,7 +28,7 @@ IMU: Fields = {
     "rpy": (40, ("<f4", 3)),
     "temperature": (52, "<i2"),
 }
-_MOTOR_STATE = struct(
+_MOTOR_STATE = structure(
     56,
     {
         "mode": (0, "u1"),
@@ -38,10 +41,9 @@ _MOTOR_STATE = struct(
         "sensor": (28, ("<u4", 2)),
         "motorstate": (36, "<u4"),
         "reserve": (40, ("<u4", 4)),
-        "measured": (4, ("<f4", 4)),  # q, dq, ddq, tau_est at once
     },
 )
-_MOTOR_CMD = struct(
+_MOTOR_CMD = structure(
     28,
     {
         "mode": (0, "u1"),
@@ -51,7 +53,6 @@ _MOTOR_CMD = struct(
         "kp": (16, "<f4"),
         "kd": (20, "<f4"),
         "reserve": (24, "<u4"),
-        "target": (4, ("<f4", 5)),  # q, dq, tau, kp, kd at once
     },
 )
 
@@ -64,7 +65,7 @@ LOW_STATE = Layout(
         "mode_pr": (8, "u1"),
         "mode_machine": (9, "u1"),
         "tick": (12, "<u4"),
-        "imu": (16, struct(54, IMU)),
+        "imu": (16, structure(54, IMU)),
         "first_mode": (70, "u1"),
         "motor": (68, (_MOTOR_STATE, MOTORS)),
         "wireless_remote": (2028, ("u1", 40)),
@@ -85,5 +86,14 @@ LOW_CMD = Layout(
     },
 )
 
-STATE_CHECKSUM = Checksum(LOW_STATE.size, first_mode=70, stride=56, motors=MOTORS, halves=(8,))
-COMMAND_CHECKSUM = Checksum(LOW_CMD.size, first_mode=2, stride=28, motors=MOTORS)
+STATE_CHECKSUM = Checksum(first_mode=70, stride=56, motors=MOTORS, halves=(8,))
+COMMAND_CHECKSUM = Checksum(first_mode=2, stride=28, motors=MOTORS)
+
+STATE_NUMBERS = Struct(
+    f"<4s 8x BB2x I 13f hB x 4f36x {(NUM_JOINTS - 1) * 'B3x4f36x'} {(MOTORS - NUM_JOINTS) * 56 + 60}x"
+)
+"""What is used of a `LowState_`: encapsulation; mode_pr, mode_machine; tick; floats and temperature of the IMU; and of
+each motor mode, q, dq, ddq, tau_est. To go through the image instead takes twice the time [measured]."""
+COMMAND_NUMBERS = Struct(f"<4s BB B x 5f4x {(NUM_JOINTS - 1) * 'B3x5f4x'} {(MOTORS - NUM_JOINTS) * 28}x I16x")
+"""What is used of a `LowCmd_`: encapsulation; mode_pr, mode_machine; of each motor mode, q, dq, tau, kp, kd; the first
+word of `reserve`."""

@@ -24,7 +24,7 @@ class WireError(GolemError):
     """A payload is not what its type says it is, or a value cannot be sent."""
 
 
-def struct(size: int, fields: Fields) -> np.dtype[np.void]:
+def structure(size: int, fields: Fields) -> np.dtype[np.void]:
     """Return the dtype of a structure of `size` bytes; fields may overlap, bytes without a field are padding."""
     return np.dtype(
         {
@@ -66,11 +66,22 @@ class Layout:
         self.type_name = type_name
         self.size = header + size
         shifted = {name: (header + offset, kind) for name, (offset, kind) in fields.items()}
-        self.dtype = struct(self.size, shifted)
+        self.dtype = structure(self.size, shifted)
 
     def blank(self) -> bytearray:
         """Return a new payload with all fields zero, to be filled through `read`."""
         return bytearray(ENCAPSULATION + bytes(self.size - len(ENCAPSULATION)))
+
+    def check(self, payload: Payload) -> None:
+        """Check encapsulation and length of `payload`.
+
+        Raises:
+            WireError: one of them is wrong.
+        """
+        check_encapsulation(payload, self.type_name)
+        # Cyclone pads every payload to a multiple of four.
+        if len(payload) not in (self.size, -(-self.size // 4) * 4):
+            raise WireError(f"A {self.type_name} has {self.size} bytes, not {len(payload)}.")
 
     def read(self, payload: Payload) -> Image:
         """Return the image that `payload` holds, as a view of it: what is written to it changes a `bytearray`.
@@ -80,8 +91,5 @@ class Layout:
         Raises:
             WireError: its encapsulation or its length is wrong.
         """
-        check_encapsulation(payload, self.type_name)
-        # Cyclone pads every payload to a multiple of four.
-        if len(payload) not in (self.size, -(-self.size // 4) * 4):
-            raise WireError(f"A {self.type_name} has {self.size} bytes, not {len(payload)}.")
+        self.check(payload)
         return np.frombuffer(payload, self.dtype, count=1).reshape(())
