@@ -29,12 +29,15 @@ class FeetConfig:
         least_force: force above which the centre of pressure is computed [N]; below, it is the middle of the sole.
         turning: angular rate of a foot at which it is believed half as much [rad/s]. A foot that rolls over its edge
             turns about a line that is not known well: 3 cm of doubt at this rate are the noise of a planted foot.
+        sliding: speed of the feet relative to each other at which the less loaded one is believed half as much [m/s].
+            One of them moves, and a foot that is dragged may well carry 150 N.
     """
 
     force: FootForceConfig = field(default_factory=FootForceConfig)
     contact: ContactConfig = field(default_factory=ContactConfig)
     least_force: float = 50.0
     turning: float = 1.67
+    sliding: float = 0.1
 
 
 class Feet:
@@ -95,6 +98,9 @@ class Feet:
         lever = (legs.rotations @ self.local[..., None])[..., 0]
         self.points = legs.soles + lever
         self.rates = legs.twists[:, :3] + (skew(turn) @ lever[..., None])[..., 0]
+        apart = self.rates[0] - self.rates[1] + skew(omega) @ (self.points[0] - self.points[1])
+        lesser = int(self.force[1] < self.force[0])
+        self.weight[lesser] /= 1.0 + float(apart @ apart) / config.sliding**2
 
     def _pressure(self, force: list[float], moment: list[float]) -> tuple[float, float, float]:
         normal = force[2]
