@@ -64,9 +64,7 @@ def decode_low_state(payload: Payload) -> LowState:
     quat, gyro, acc, motors = numbers[:4], numbers[4:7], numbers[7:10], numbers[14:]
     _check_imu(quat, gyro, acc, hg.LOW_STATE)
     _check_motors(motors, _MEASURED, hg.LOW_STATE)
-    q, dq, tau = (
-        np.array(motors[_MEASURED.index(name) :: len(_MEASURED)]) for name in ("q", "dq", "tau_est")
-    )
+    q, dq, tau = (np.array(motors[i :: len(_MEASURED)]) for i in (1, 2, 4))
     return LowState(tick / _TICKS, q, dq, tau, Imu(np.array(quat), np.array(gyro), np.array(acc)))
 
 
