@@ -6,11 +6,11 @@ import time
 
 import numpy as np
 import pytest
+from tests.middleware.wire.rpc import serve
 from tests.robots.onboard.conftest import Started
 
 from golem.middleware.dds.base import Qos
 from golem.middleware.wire import convert, hg
-from golem.middleware.wire.rpc import serve
 from golem.robots.onboard import motion_switcher
 from golem.robots.onboard.motion_switcher import CHECK_MODE, RELEASE_MODE, MotionSwitcher
 from golem.types import NUM_JOINTS, Array, Imu, LowCommand, LowState

@@ -2,15 +2,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.middleware.wire.rpc import reach, serve
 
 from golem.capabilities.legs.base import LegCommand
 from golem.capabilities.legs.hold import Hold
 from golem.middleware.bus import Bus
-from golem.middleware.dds.base import DEFAULT
+from golem.middleware.dds.base import CALLS, DEFAULT
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.unitree_api import LOCO_APIS, OK, Request, Response, decode_int, encode
 from golem.middleware.wire import hg
-from golem.middleware.wire.rpc import CALLS, reach, serve
 from golem.robots.onboard import motion_switcher
 from golem.robots.onboard.motion_switcher import CHECK_MODE, MotionSwitcher
 from golem.runtime.executor import Executor

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.middleware.wire.rpc import reach
 from tests.runtime.live.conftest import Live
 
 from golem.capabilities.legs.hold import STANCES
@@ -13,7 +14,6 @@ from golem.hardware.safety.base import GateState
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
 from golem.middleware.unitree_api import Request
-from golem.middleware.wire.rpc import reach
 from golem.robots.onboard.motion_switcher import RELEASE_MODE, SERVICE
 from golem.stack import Choice
 from golem.types import LEGS

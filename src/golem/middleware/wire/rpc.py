@@ -5,42 +5,10 @@ Everybody who calls a service reads the answers to everybody: an answer belongs 
 
 from __future__ import annotations
 
-import time
-
-from golem.middleware.dds.base import CALLS, Participant, Reader, Sample, Writer
-from golem.middleware.unitree_api import (
-    SEND_FAILED,
-    TIMEOUT,
-    Request,
-    Response,
-    request_topic,
-    response_topic,
-)
+from golem.middleware.dds.base import Reader, Sample, Writer
+from golem.middleware.unitree_api import Request, Response
 from golem.middleware.wire import api
 from golem.middleware.wire.layout import WireError
-
-_POLL = 0.001
-"""How often a call that waits looks for its answer [s]."""
-
-
-def on_the_wire(topic: str) -> str:
-    """Return the DDS name of a topic of the vendor's."""
-    return f"rt/{topic}"
-
-
-def serve(participant: Participant, service: str) -> RpcServer:
-    """Join a domain as the server of `service`."""
-    # The writer first: a client that sees the reader calls at once.
-    responses = participant.writer(on_the_wire(response_topic(service)), api.RESPONSE, CALLS)
-    requests = participant.reader(on_the_wire(request_topic(service)), api.REQUEST, CALLS)
-    return RpcServer(requests, responses)
-
-
-def reach(participant: Participant, service: str) -> RpcClient:
-    """Join a domain as a client of `service`; finding the server takes a moment."""
-    responses = participant.reader(on_the_wire(response_topic(service)), api.RESPONSE, CALLS)
-    requests = participant.writer(on_the_wire(request_topic(service)), api.REQUEST, CALLS)
-    return RpcClient(requests, responses)
 
 
 class RpcServer:
@@ -105,32 +73,6 @@ class RpcClient:
     def take(self) -> list[Response]:
         """Return the answers that came since the last time, oldest first, to whomever they are."""
         return [response for sample in self._reader.take() if (response := _response(sample)) is not None]
-
-    def call(self, api_id: int, parameter: str = "{}", timeout: float = 1.0) -> Response:
-        """Call and wait for the answer.
-
-        Args:
-            api_id: the function to call.
-            parameter: its argument, JSON.
-            timeout: time for finding the service and for its answer, together [s].
-
-        Returns:
-            The answer, or one that says `SEND_FAILED` if nobody offers the service, `TIMEOUT` if it does not answer.
-        """
-        deadline = time.monotonic() + timeout
-        number = time.monotonic_ns()  # as the vendor's client does: it tells calls of several clients apart
-        while not self.connected:
-            if time.monotonic() >= deadline:
-                return Response(number, api_id, SEND_FAILED)
-            time.sleep(_POLL)
-        self.send(Request(number, api_id, parameter))
-        while True:
-            for response in self.take():
-                if (response.id, response.api_id) == (number, api_id):
-                    return response
-            if time.monotonic() >= deadline:
-                return Response(number, api_id, TIMEOUT)
-            time.sleep(_POLL)
 
     def close(self) -> None:
         """Leave the domain."""

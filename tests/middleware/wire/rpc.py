@@ -1,0 +1,40 @@
+"""Servers and clients of remote calls on endpoints of their own, and calls that wait for their answer."""
+
+from __future__ import annotations
+
+import time
+
+from golem.middleware.dds.base import CALLS, Participant
+from golem.middleware.unitree_api import Request, Response, request_topic, response_topic
+from golem.middleware.wire import api
+from golem.middleware.wire.rpc import RpcClient, RpcServer
+
+POLL = 0.0005
+
+
+def serve(participant: Participant, service: str) -> RpcServer:
+    """Join a domain as the server of `service`."""
+    # The writer first: a client that sees the reader calls at once.
+    responses = participant.writer(f"rt/{response_topic(service)}", api.RESPONSE, CALLS)
+    return RpcServer(participant.reader(f"rt/{request_topic(service)}", api.REQUEST, CALLS), responses)
+
+
+def reach(participant: Participant, service: str) -> RpcClient:
+    """Join a domain as a client of `service`."""
+    responses = participant.reader(f"rt/{response_topic(service)}", api.RESPONSE, CALLS)
+    return RpcClient(participant.writer(f"rt/{request_topic(service)}", api.REQUEST, CALLS), responses)
+
+
+def call(client: RpcClient, api_id: int, parameter: str = "{}", timeout: float = 5.0) -> Response:
+    """Call and return the answer; after `timeout` seconds there is none."""
+    end, number = time.monotonic() + timeout, time.monotonic_ns()
+    while not client.connected:
+        assert time.monotonic() < end, "nobody offers the service"
+        time.sleep(POLL)
+    client.send(Request(number, api_id, parameter))
+    while True:
+        for response in client.take():
+            if (response.id, response.api_id) == (number, api_id):
+                return response
+        assert time.monotonic() < end, "no answer"
+        time.sleep(POLL)
