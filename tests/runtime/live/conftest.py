@@ -51,7 +51,8 @@ class Live:
     def start_twin(self, seed: int = 0) -> None:
         """Put a new robot on the domain."""
         self.robot = build_robot(self.stack, seed)
-        self.twin = Twin(self.stack, self.robot, *self.member("twin"))
+        # In this one process nobody could answer while the twin waits.
+        self.twin = Twin(self.stack, self.robot, *self.member("twin"), patience=0.0)
 
     def start_gate(self) -> None:
         """Put a new gate on the domain."""

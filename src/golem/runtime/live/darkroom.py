@@ -22,10 +22,13 @@ from golem.robots.base import Recallable
 from golem.runtime.assembly import build_robot
 from golem.runtime.executor import TICK
 from golem.runtime.live.member import member
+from golem.runtime.live.pace import PATIENCE
 from golem.runtime.live.robot_out import CameraOut
 from golem.runtime.live.surface import Surface
 from golem.stack import Stack
 
+EXPOSURE = 1.0 / 15.0
+"""Robot time that one may take [s]: a camera's period; then the robot's time waits for it, see `live.pace`."""
 GRACE = 3.0
 """Time the process gets to end by itself [s]."""
 
@@ -59,7 +62,8 @@ class Darkroom:
         self._process = context.Process(target=_work, args=(stack, seed, dds, theirs), daemon=True)
         self._process.start()
         theirs.close()
-        self._free = False
+        self._free, self._given_up = False, True
+        self._since = 0.0
 
     def step(self, t: float) -> None:
         """Hand over what is due.
@@ -73,11 +77,14 @@ class Darkroom:
                 if name not in self._waiting:
                     self._waiting.append(name)
         try:
-            if self._link.poll():
+            late = not self._free and not self._given_up and t - self._since > EXPOSURE
+            if self._link.poll(PATIENCE if late else 0.0):
                 self._link.recv_bytes()
                 self._free = True
+            else:
+                self._given_up |= late
             if self._free and self._waiting:
-                self._free = False
+                self._free, self._given_up, self._since = False, False, t
                 self._link.send((self._waiting.popleft(), t, self._robot.snapshot()))
         except (EOFError, OSError) as error:
             code = self._process.exitcode
@@ -106,6 +113,8 @@ def _work(stack: Stack, seed: int, dds: DdsConfig, link: Connection) -> None:
         bus = Bus()
         surface = Surface("robot", participant, node, image_topics())
         cameras = {name: CameraOut(bus, surface, name) for name in robot.cameras}
+        for name in cameras:
+            robot.capture(name)  # the first image takes a second
         try:
             while True:
                 link.send_bytes(b"free")

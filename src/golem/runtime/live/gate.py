@@ -49,6 +49,7 @@ class Arrivals:
     Attributes:
         commands: what the process waits on.
         mode_machine: machine type that the robot reports; None before its first state.
+        answered: robot time of the state that the newest command answers [s]; 0 where its sender does not say.
     """
 
     def __init__(self, bus: Bus, surface: Surface, clock: Callable[[], float]) -> None:
@@ -58,6 +59,7 @@ class Arrivals:
         self._arrived: OrderedDict[float, float] = OrderedDict()
         self.commands, self._states = WaitSet(), WaitSet()
         self.mode_machine: int | None = None
+        self.answered = 0.0
         surface.receive("/lowstate", self._states, self._state)
         surface.receive("/safety/lowcmd_in", self.commands, self._command)
 
@@ -93,6 +95,7 @@ class Arrivals:
         if answered:
             # As old as the state it answers; one that answers a state nobody remembers is too old for anything.
             command = replace(command, t=self._arrived.get(answered, -math.inf))
+        self.answered = answered
         self._bus.publish(topics.LOW_CMD_REQUEST, command, now)
 
     def _refuse(self, reason: Reason, error: WireError, now: float) -> None:
@@ -188,7 +191,8 @@ class LiveGate:
         assert status is not None and command is not None
         self.status = status
         if self._arrivals.mode_machine is not None:
-            self._out.write(convert.encode_low_command(command, self._arrivals.mode_machine))
+            answers = self._arrivals.answered if status.state is GateState.ACTIVE else 0.0
+            self._out.write(convert.encode_low_command(command, self._arrivals.mode_machine, answers))
         frame = self._estops.read()
         if frame is not None and self._surface.heard("/estop"):
             message = golem_interfaces.EstopFrame(header(now), frame.sequence, frame.pressed)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 from golem.middleware import topics
 from golem.middleware.bus import Bus, News
 from golem.middleware.dds.base import Sample
 from golem.middleware.ros.waitset import WaitSet
-from golem.middleware.wire.convert import decode_low_command, encode_low_command, encode_low_state
+from golem.middleware.wire.convert import answered, decode_low_command, encode_low_command, encode_low_state
 from golem.middleware.wire.layout import WireError
 from golem.runtime.executor import TICK
+from golem.runtime.live.pace import LAG, PATIENCE
 from golem.runtime.live.surface import Surface
 from golem.types import LowCommand, LowState
 
@@ -34,6 +36,8 @@ class StateOut:
 class CommandIn:
     """Takes what the motors are told, as the robot does: what is damaged or for another machine is ignored.
 
+    The robot's time stands still while an active stack is more than `LAG` behind it: see `golem.runtime.live.pace`.
+
     Attributes:
         ignored: how many commands were.
         why: the reason of the last one.
@@ -41,22 +45,37 @@ class CommandIn:
 
     period = TICK
 
-    def __init__(self, bus: Bus, surface: Surface) -> None:
-        """Bring commands to `bus`."""
-        self._bus = bus
+    def __init__(self, bus: Bus, surface: Surface, patience: float = PATIENCE) -> None:
+        """Bring commands to `bus`; wait for one up to `patience` [s] by the wall clock."""
+        self._bus, self._patience = bus, patience
         self._t = 0.0
+        self._answered = self._given_up = 0.0
         self.ignored, self.why = 0, ""
         self._waitset = WaitSet()
         self._inbox = surface.receive("/lowcmd", self._waitset, self._take)
 
     def step(self, t: float) -> None:
-        """Take what has come."""
+        """Take what has come, and wait for what should have."""
         self._t = t
         self._waitset.poll()
+        end = time.monotonic() + self._patience
+        while self._late():
+            left = end - time.monotonic()
+            if left <= 0.0:
+                self._given_up = self._answered
+                return
+            self._waitset.wait(left)
+            self._waitset.poll()
+
+    def _late(self) -> bool:
+        """Return whether whoever has answered states, and was not given up since, has yet to answer one long past."""
+        answered = self._answered
+        return answered not in (0.0, self._given_up) and self._t - answered > LAG + TICK / 2.0
 
     def _take(self, sample: Sample) -> None:
         try:
             command = decode_low_command(sample.payload, self._t)
+            self._answered = answered(sample.payload)
         except WireError as error:
             self.ignored, self.why = self.ignored + 1, str(error)
             return

@@ -21,6 +21,7 @@ from golem.runtime.executor import TICK
 from golem.runtime.live.darkroom import Darkroom
 from golem.runtime.live.gate import LiveGate
 from golem.runtime.live.member import DISCOVERY, member, owner, say
+from golem.runtime.live.pace import patient
 from golem.runtime.live.stack import LiveStack
 from golem.runtime.live.twin import Twin
 from golem.runtime.live.verdict import told
@@ -54,6 +55,8 @@ class SafetyConfig:
 
     limits: str = "urdf"
     """Limit profile to enforce: urdf or paper."""
+    strict: bool = False
+    """Stop a simulated robot as early as the real one for what is late: a busy machine then stops it."""
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
 
 
@@ -122,6 +125,8 @@ def run_safety(config: SafetyConfig) -> None:
         DdsError: the domain cannot be joined.
     """
     limits = SafetyLimits.from_profile(config.limits)
+    if not (config.strict or config.dds.robot):
+        limits = patient(limits)
     estop = None if config.dds.robot else VirtualEstop()
     with interrupted() as stop, member("safety", config.dds) as (participant, node):
         gate = LiveGate(participant, node, limits, estop, who=lambda guid: owner(participant, guid))

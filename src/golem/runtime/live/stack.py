@@ -26,6 +26,7 @@ from golem.runtime.live import stack_out as out
 from golem.runtime.live.clock import RobotClock
 from golem.runtime.live.motors import RequestOut
 from golem.runtime.live.onboard import AnswersIn, CallsOut, Identities, LegsIn
+from golem.runtime.live.pace import CATCH_UP
 from golem.runtime.live.robot_out import FramesOut, JointsOut, describe
 from golem.runtime.live.skills import Skills
 from golem.runtime.live.stack_in import CameraIn, GateIn, RemoteBand, listen
@@ -37,8 +38,6 @@ from golem.types import SIDES, Array
 
 SHOWN = ("/joint_states", "/tf", "/tf_static", "/robot_description")
 """What of the robot's surface follows from its state, and is not the vendor's to publish."""
-CATCH_UP = 5
-"""Ticks that are made up for when states were late or lost; more are left out."""
 
 
 class LiveStack:

@@ -19,12 +19,10 @@ from golem.middleware.topics import Exposure
 from golem.robots.sensors.cameras import CAMERAS
 from golem.runtime.cameras import looked_for
 from golem.runtime.executor import TICK
+from golem.runtime.live.pace import SILENCE
 from golem.runtime.live.surface import Surface
 from golem.runtime.live.verdict import to_status
 from golem.types import SIDES, Array, CameraInfo, Side
-
-SILENT = 0.25
-"""Silence after which the safety process counts as gone [s]: five of its reports."""
 
 
 class CameraIn:
@@ -95,14 +93,14 @@ class GateIn:
     def __init__(self, bus: Bus, surface: Surface, clock: Callable[[], float] = time.monotonic) -> None:
         """Bring them to `bus`; `clock` is this process's own [s]."""
         self._bus, self._clock = bus, clock
-        self._heard_at, self._t = -SILENT, 0.0
+        self._heard_at, self._t = -SILENCE, 0.0
         self._status: GateStatus | None = None
         surface.subscribe("/safety/status", self._take)
 
     def step(self, t: float) -> None:
         """Publish the newest verdict."""
         self._t = t
-        silent = self._clock() - self._heard_at > SILENT
+        silent = self._clock() - self._heard_at > SILENCE
         if silent or self._status is None:
             self._bus.publish(
                 topics.SAFETY, GateStatus(t, GateState.INIT, None, "the safety process is silent"), t

@@ -19,6 +19,7 @@ from golem.runtime.executor import TICK, Executor, Phase, Placed, in_order
 from golem.runtime.live.darkroom import Darkroom, image_topics
 from golem.runtime.live.motors import CommandIn, StateOut
 from golem.runtime.live.onboard import AnswersOut, CallsIn, LegsOut
+from golem.runtime.live.pace import PATIENCE
 from golem.runtime.live.robot_out import (
     CameraOut,
     ClockOut,
@@ -66,6 +67,7 @@ class Twin:
         participant: Participant,
         node: Node,
         darkroom: Darkroom | None = None,
+        patience: float = PATIENCE,
     ) -> None:
         """Put a robot on the domain.
 
@@ -75,6 +77,7 @@ class Twin:
             participant: member of the domain.
             node: its ROS node.
             darkroom: where its images are made; None is here, which holds everything else up for as long as it takes.
+            patience: how long its time stands still at most for a stack that is behind [s].
 
         Raises:
             ConfigError, ModuleFault: about the on-board legs.
@@ -85,7 +88,7 @@ class Twin:
         surface = Surface("robot", participant, node, only)
         self._robot = robot
         cameras = {name: CameraOut(bus, surface, name) for name in robot.cameras} if darkroom is None else {}
-        self.commands = CommandIn(bus, surface)
+        self.commands = CommandIn(bus, surface, patience)
         side = RobotSide(bus, stack, robot, (lambda c: cameras[c].wanted) if darkroom is None else None)
         placed: list[Placed] = [
             (Phase.RECEIVE, Poll(node)),
