@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 from golem.middleware.dds.base import CALLS, Participant
@@ -25,16 +26,21 @@ def reach(participant: Participant, service: str) -> RpcClient:
     return RpcClient(participant.writer(f"rt/{request_topic(service)}", api.REQUEST, CALLS), responses)
 
 
-def call(client: RpcClient, api_id: int, parameter: str = "{}", timeout: float = 5.0) -> Response:
-    """Call and return the answer; after `timeout` seconds there is none."""
-    end, number = time.monotonic() + timeout, time.monotonic_ns()
-    while not client.connected:
-        assert time.monotonic() < end, "nobody offers the service"
-        time.sleep(POLL)
-    client.send(Request(number, api_id, parameter))
-    while True:
+def call(
+    client: RpcClient, api_id: int, parameter: str = "{}", timeout: float = 5.0, again: float = math.inf
+) -> Response:
+    """Call and return the answer; after `timeout` seconds there is none.
+
+    A server that was just found may not know its client yet, and answer nobody: the call is sent `again` so often [s].
+    """
+    start, number = time.monotonic(), time.monotonic_ns()
+    due = start
+    while time.monotonic() < start + timeout:
+        if client.connected and time.monotonic() >= due:
+            client.send(Request(number, api_id, parameter))
+            due = time.monotonic() + again
         for response in client.take():
             if (response.id, response.api_id) == (number, api_id):
                 return response
-        assert time.monotonic() < end, "no answer"
         time.sleep(POLL)
+    raise AssertionError("no answer" if client.connected else "nobody offers the service")

@@ -74,7 +74,7 @@ def test_the_vendors_server_is_called(sdk: Started, domain: int) -> None:
         client = reach(participant, "test")
         assert not client.connected
         process = sdk("sdk_rpc.py", "server", str(domain))
-        assert call(client, 1, timeout=DEADLINE).data == "1.2.3.4"
+        assert call(client, 1, timeout=DEADLINE, again=1.0).data == "1.2.3.4"
         for number in range(20):
             answer = call(client, ECHO, json.dumps({"data": number}))
             assert (answer.code, answer.data) == (OK, json.dumps({"data": number}))
