@@ -15,13 +15,14 @@ pytest.importorskip("rosbags")
 from golem.errors import ConfigError
 from golem.middleware.dds.base import DEFAULT, LATCHED, Participant, Qos, Reader
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.record.base import NANO, Message, Topic
+from golem.middleware.record.base import Message, Topic
 from golem.middleware.record.catalog import offered, public_topics, topic
 from golem.middleware.record.player import PlayConfig, Player
 from golem.middleware.record.reader import Bag
 from golem.middleware.record.recorder import HOLD, MANY, Recorder, clock_time
 from golem.middleware.record.writer import BagWriter
 from golem.middleware.ros import codec, names
+from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.builtin_interfaces import Time
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.msgs.std_msgs import String

@@ -10,9 +10,7 @@ from golem.middleware.ros import convert
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.diagnostic_msgs import DiagnosticStatus
 from golem.middleware.ros.msgs.geometry_msgs import Point, Pose, Quaternion
-from golem.middleware.ros.msgs.golem_interfaces import LocalizedObject as LocalizedObjectMessage
-from golem.middleware.ros.msgs.golem_interfaces import Sightings as SightingsMessage
-from golem.middleware.topics import LegStatus, LookRequest, Sightings
+from golem.middleware.topics import LegStatus, Sightings
 from golem.types import BaseEstimate, Detection, HandCommand, HandState, Imu, LocalizedObject, Twist
 
 
@@ -160,21 +158,13 @@ def test_legs_say_why_they_stand() -> None:
     assert message.phase.tolist() == [0.0, 0.5] and message.clamped and message.stepping
 
 
-def test_a_request_to_look_names_its_classes() -> None:
-    assert convert.look_request(LookRequest(("screw", "tray"))).labels == ["screw", "tray"]
-
-
-def test_sightings_survive() -> None:
+def test_sightings_say_what_was_found_and_where() -> None:
     detection = Detection("screw", 0.9, np.arange(4.0), np.array([1.5, 2.5]))
     cloud = np.arange(12.0).reshape(4, 3)
     seen = Sightings(3.0, "head", (LocalizedObject(detection, 3.0, np.array([0.4, 0.0, 0.9]), cloud),))
-    (back,) = convert.to_sightings(convert.sightings(seen)).objects
-    assert (back.label, back.detection.score, back.t) == ("screw", 0.9, 3.0)
-    assert back.position.tolist() == [0.4, 0.0, 0.9] and back.points.tolist() == cloud.tolist()
-    assert back.detection.box.tolist() == [0.0, 1.0, 2.0, 3.0]
-
-
-def test_half_a_point_is_refused() -> None:
-    message = SightingsMessage(objects=[LocalizedObjectMessage(points=np.zeros(4, np.float32))])
-    with pytest.raises(CodecError, match="4 coordinates"):
-        convert.to_sightings(message)
+    message = convert.sightings(seen)
+    assert (message.header.stamp.sec, message.header.frame_id, message.camera) == (3, "odom", "head")
+    (found,) = message.objects
+    assert (found.label, found.score, found.position) == ("screw", 0.9, Point(0.4, 0.0, 0.9))
+    assert found.box.tolist() == [0.0, 1.0, 2.0, 3.0] and found.center.tolist() == [1.5, 2.5]
+    assert found.points.tolist() == list(range(12))

@@ -14,13 +14,12 @@ pytest.importorskip("rosbags")
 from tests.middleware.ros.samples import mutated, random_message, travelling
 
 from golem.middleware.ros import codec, images
-from golem.middleware.ros.convert import to_base_estimate, to_sightings, to_twist
+from golem.middleware.ros.convert import to_base_estimate, to_twist
 from golem.middleware.ros.message import CodecError
 
 READ = {
     "geometry_msgs/msg/Twist": to_twist,
     "golem_interfaces/msg/BaseEstimate": to_base_estimate,
-    "golem_interfaces/msg/Sightings": to_sightings,
     "sensor_msgs/msg/CameraInfo": lambda message: images.to_camera(message, "head", 0.1, 3.0, 15.0),
     "sensor_msgs/msg/Image": images.to_rgb,
     "sensor_msgs/msg/PointCloud2": images.to_points,

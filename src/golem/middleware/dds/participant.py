@@ -7,11 +7,11 @@ import threading
 from collections.abc import Callable
 
 from golem.middleware.dds.base import DdsError, Qos
+from golem.middleware.dds.dispatcher import Dispatcher
 from golem.middleware.dds.endpoints import CycloneReader, CycloneWriter, entity_guid
 from golem.middleware.dds.library import Cyclone
 from golem.middleware.dds.qos import cyclone_qos
 from golem.middleware.dds.topic import create_topic
-from golem.middleware.dds.waitset import Waitset
 
 
 class CycloneParticipant:
@@ -38,7 +38,7 @@ class CycloneParticipant:
         self._lock = threading.RLock()
         self._topics: dict[str, tuple[int, str]] = {}
         self._endpoints: dict[int, CycloneWriter | CycloneReader] = {}
-        self._waitset: Waitset | None = None
+        self._dispatcher: Dispatcher | None = None
         self._open = True
         atexit.register(self.close)
 
@@ -68,17 +68,17 @@ class CycloneParticipant:
             self.library.check(entity, f"'{topic}' cannot be read")
             reader = self._endpoints[entity] = CycloneReader(self, topic, type_name, qos, entity, on_data)
             if on_data is not None:
-                if self._waitset is None:
-                    self._waitset = Waitset(self.library, self.entity)
-                self._waitset.attach(reader)
+                if self._dispatcher is None:
+                    self._dispatcher = Dispatcher(self.library, self.entity)
+                self._dispatcher.attach(reader)
             return reader
 
     def forget(self, entity: int) -> None:
         """Take an endpoint that closes off the books."""
         with self._lock:
             self._endpoints.pop(entity, None)
-            if self._waitset is not None:
-                self._waitset.detach(entity)
+            if self._dispatcher is not None:
+                self._dispatcher.detach(entity)
 
     def close(self) -> None:
         """Close every writer and reader and leave the domain; a callback may call it too."""
@@ -87,8 +87,8 @@ class CycloneParticipant:
                 return
             self._open = False
         atexit.unregister(self.close)
-        if self._waitset is not None:
-            self._waitset.close()
+        if self._dispatcher is not None:
+            self._dispatcher.close()
         for endpoint in list(self._endpoints.values()):
             endpoint.close()
         self.library.blocking.dds_delete(self.entity)

@@ -8,9 +8,6 @@ from typing import Protocol
 from golem.errors import GolemError, MissingExtra
 from golem.middleware.dds.base import DEFAULT, Payload, Qos
 
-NANO = 1_000_000_000
-"""Nanoseconds in a second."""
-
 
 class BagError(GolemError):
     """A bag cannot be read: it is no bag, or a part of it is damaged."""

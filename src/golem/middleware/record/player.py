@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 from golem.errors import ConfigError, unknown_name
 from golem.middleware.dds.base import ENCAPSULATION, Participant, Payload, Qos, Writer
-from golem.middleware.record.base import NANO, Message, Topic
+from golem.middleware.record.base import Message, Topic
 from golem.middleware.record.catalog import topic as describe
 from golem.middleware.record.reader import Bag
 from golem.middleware.record.recorder import CLOCK, CLOCK_KIND
 from golem.middleware.ros import codec, names
+from golem.middleware.ros.message import NANO
 
 CLOCK_STEP = NANO // 100
 """Time between two messages on a /clock that the bag does not hold [ns] [own]."""

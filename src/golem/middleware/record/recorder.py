@@ -9,9 +9,10 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from golem.middleware.dds.base import Participant, Payload, Qos, Reader, Sample
-from golem.middleware.record.base import NANO, Message, Sink, Topic
+from golem.middleware.record.base import Message, Sink, Topic
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import dds_name
+from golem.middleware.ros.message import NANO
 
 CLOCK, CLOCK_KIND = "/clock", "rosgraph_msgs/msg/Clock"
 PERIOD = 0.05

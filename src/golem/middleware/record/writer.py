@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import IO, Literal
 
 from golem.errors import ConfigError, OutputError
-from golem.middleware.record.base import NANO, Message, Topic, missing
+from golem.middleware.record.base import Message, Topic, missing
 from golem.middleware.record.metadata import Contents, dump, information, offered_qos
+from golem.middleware.ros.message import NANO
 
 try:
     from mcap.writer import CompressionType, Writer

@@ -10,11 +10,9 @@ from typing import Any
 from golem.middleware.dds.base import DEFAULT, LATCHED, Sample
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.base import Canceling, ClientGoal, Outcome
-from golem.middleware.ros.endpoints import Endpoints
 from golem.middleware.ros.future import Future, RosError
 from golem.middleware.ros.goal_info import (
     CANCEL_GOAL,
-    SECOND,
     STATUS_ARRAY,
     canceling,
     from_uuid,
@@ -23,8 +21,9 @@ from golem.middleware.ros.goal_info import (
     to_uuid,
 )
 from golem.middleware.ros.goals import NO_ID, GoalStatus
-from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.message import NANO, CodecError
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, GoalStatusArray
+from golem.middleware.ros.node_endpoints import NodeEndpoints
 from golem.middleware.ros.service import DdsClient
 from golem.middleware.ros.typed import check
 
@@ -83,7 +82,7 @@ class DdsActionClient:
         malformed: feedback and status messages that could not be read.
     """
 
-    def __init__(self, endpoints: Endpoints, name: str, type: str) -> None:
+    def __init__(self, endpoints: NodeEndpoints, name: str, type: str) -> None:
         """Use the action with absolute `name`."""
         self.name, self.malformed = name, 0
         self._type, self._endpoints = codec.action(type), endpoints
@@ -124,7 +123,7 @@ class DdsActionClient:
 
     def cancel(self, id: bytes = NO_ID, before: float = 0.0) -> Future[Canceling]:
         """Ask to cancel goals; see `base.ActionClient.cancel`."""
-        request = CancelGoal_Request(goal_info(id, int(before * SECOND)))
+        request = CancelGoal_Request(goal_info(id, int(before * NANO)))
         return self._cancel.call(request).map(canceling)
 
     def get_result(self, goal: DdsClientGoal) -> Future[Outcome]:

@@ -14,11 +14,9 @@ from typing import Any
 from golem.middleware.dds.base import DEFAULT, LATCHED
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.base import RESULT_TIMEOUT, ActionHandler, ServerGoal
-from golem.middleware.ros.endpoints import Endpoints
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.goal_info import (
     CANCEL_GOAL,
-    SECOND,
     STATUS_ARRAY,
     from_time,
     from_uuid,
@@ -27,8 +25,10 @@ from golem.middleware.ros.goal_info import (
     to_uuid,
 )
 from golem.middleware.ros.goals import NO_ID, CancelCode, GoalEvent, GoalState, GoalStatus, GoalTable
+from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, CancelGoal_Response, GoalStatusArray
 from golem.middleware.ros.msgs.action_msgs import GoalStatus as StatusMessage
+from golem.middleware.ros.node_endpoints import NodeEndpoints
 from golem.middleware.ros.service import Origin, Responder
 from golem.middleware.ros.typed import check, serialize
 
@@ -84,7 +84,7 @@ class DdsActionServer:
 
     def __init__(
         self,
-        endpoints: Endpoints,
+        endpoints: NodeEndpoints,
         name: str,
         type: str,
         handler: ActionHandler,
@@ -167,7 +167,7 @@ class DdsActionServer:
         self._feedback.write(codec.serialize(self._type.FeedbackMessage(to_uuid(goal.id), feedback)))
 
     def _stamp(self) -> int:
-        return int(self._now() * SECOND)
+        return int(self._now() * NANO)
 
     def _on_goal(self, origin: Origin, request: Any) -> None:
         id, stamp = from_uuid(request.goal_id), self._stamp()

@@ -17,14 +17,14 @@ from typing import Any, NamedTuple, TypeVar, cast
 import numpy as np
 
 from golem.errors import unknown_name
+from golem.middleware.dds.base import Payload
 from golem.middleware.ros import definitions
 from golem.middleware.ros.definitions import ARRAY, BASE, NAME, SEQUENCE, Definition
 from golem.middleware.ros.generate import class_source, numpy_name, python_name, short
 from golem.middleware.ros.message import CodecError, Message
 
-DEFAULT = "jazzy"
+DEFAULT_DISTRO = "jazzy"
 """Distribution of the functions of this module; where the distribution matters, use `codec`."""
-Payload = bytes | bytearray | memoryview
 M = TypeVar("M", bound=Message)
 
 
@@ -85,7 +85,7 @@ class _Scratch(threading.local):
 class Codec:
     """Knows every type of one ROS 2 distribution, and GOLEM's."""
 
-    def __init__(self, distro: str = DEFAULT) -> None:
+    def __init__(self, distro: str = DEFAULT_DISTRO) -> None:
         """Know the standard types of `distro`.
 
         Raises:
@@ -289,7 +289,7 @@ def _told(error: Exception) -> str:
 
 
 @functools.cache
-def codec(distro: str = DEFAULT) -> Codec:
+def codec(distro: str = DEFAULT_DISTRO) -> Codec:
     """Return the codec of a distribution; each is made once.
 
     Raises:

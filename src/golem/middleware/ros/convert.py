@@ -10,17 +10,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.message import NANO, CodecError
 from golem.middleware.ros.msgs import diagnostic_msgs, geometry_msgs, golem_interfaces, sensor_msgs
 from golem.middleware.ros.msgs.builtin_interfaces import Duration, Time
 from golem.middleware.ros.msgs.nav_msgs import Odometry
 from golem.middleware.ros.msgs.std_msgs import Header
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
-from golem.middleware.topics import LegStatus, LookRequest, Sightings
-from golem.types import Array, BaseEstimate, Detection, HandCommand, HandState, Imu, LocalizedObject, Twist
-
-NANO = 1_000_000_000
-"""Nanoseconds in a second."""
+from golem.middleware.topics import LegStatus, Sightings
+from golem.types import Array, BaseEstimate, HandCommand, HandState, Imu, Twist
 
 
 def time(t: float) -> Time:
@@ -247,11 +244,6 @@ def leg_status(status: LegStatus) -> golem_interfaces.LegStatus:
     )
 
 
-def look_request(request: LookRequest) -> golem_interfaces.LookRequest:
-    """Return what a camera shall look for."""
-    return golem_interfaces.LookRequest(list(request.labels))
-
-
 def sightings(seen: Sightings) -> golem_interfaces.Sightings:
     """Return what a localizer found in one frame."""
     objects = [
@@ -266,23 +258,6 @@ def sightings(seen: Sightings) -> golem_interfaces.Sightings:
         for o in seen.objects
     ]
     return golem_interfaces.Sightings(header(seen.t, "odom"), seen.camera, objects)
-
-
-def to_sightings(message: golem_interfaces.Sightings) -> Sightings:
-    """Return what a localizer found in one frame.
-
-    Raises:
-        CodecError: the coordinates of a point cloud do not come in threes.
-    """
-    t = seconds(message.header.stamp)
-    objects: list[LocalizedObject] = []
-    for o in message.objects:
-        if o.points.size % 3:
-            raise CodecError(f"{o.points.size} coordinates are no points with x, y and z.")
-        detection = Detection(o.label, o.score, np.array(o.box), np.array(o.center))
-        position = np.array([o.position.x, o.position.y, o.position.z])
-        objects.append(LocalizedObject(detection, t, position, o.points.reshape(-1, 3).astype(np.float64)))
-    return Sightings(t, message.camera, tuple(objects))
 
 
 def _sec_nanosec(t: float) -> tuple[int, int]:

@@ -6,14 +6,13 @@ import numpy as np
 
 from golem.middleware.ros.base import Canceling
 from golem.middleware.ros.goals import CancelCode, GoalStatus
+from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Response, GoalInfo
 from golem.middleware.ros.msgs.builtin_interfaces import Time
 from golem.middleware.ros.msgs.unique_identifier_msgs import UUID
 
 CANCEL_GOAL = "action_msgs/srv/CancelGoal"
 STATUS_ARRAY = "action_msgs/msg/GoalStatusArray"
-SECOND = 1_000_000_000
-"""[ns]."""
 
 
 def to_uuid(id: bytes) -> UUID:
@@ -28,12 +27,12 @@ def from_uuid(message: UUID) -> bytes:
 
 def to_time(stamp: int) -> Time:
     """Return the message of a time [ns]."""
-    return Time(*divmod(stamp, SECOND))
+    return Time(*divmod(stamp, NANO))
 
 
 def from_time(message: Time) -> int:
     """Return the time of a message [ns]."""
-    return message.sec * SECOND + message.nanosec
+    return message.sec * NANO + message.nanosec
 
 
 def goal_info(id: bytes, stamp: int) -> GoalInfo:

@@ -13,6 +13,7 @@ from enum import Enum, IntEnum
 from itertools import islice
 
 from golem.middleware.ros.future import RosError
+from golem.middleware.ros.message import NANO
 
 
 class GoalStatus(IntEnum):
@@ -125,7 +126,7 @@ class GoalTable:
 
     def __init__(self, result_timeout: float) -> None:
         """Keep results for `result_timeout` [s] after the end of their goal."""
-        self._keep = result_timeout * 1e9
+        self._keep = result_timeout * NANO
         self._goals: dict[bytes, GoalState] = {}
         self._ended: deque[tuple[int, GoalState]] = deque()
 

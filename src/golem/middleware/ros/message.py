@@ -9,6 +9,9 @@ import numpy as np
 
 from golem.errors import GolemError
 
+NANO = 1_000_000_000
+"""Nanoseconds in a second: ROS counts time in both."""
+
 
 class CodecError(GolemError):
     """A message cannot be written as its type says, or bytes are not a message of the type they should be of."""

@@ -11,10 +11,10 @@ from golem.middleware.ros import names
 from golem.middleware.ros.action_client import DdsActionClient
 from golem.middleware.ros.action_server import DdsActionServer
 from golem.middleware.ros.base import RESULT_TIMEOUT, ActionHandler
-from golem.middleware.ros.codec import DEFAULT as DEFAULT_DISTRO
-from golem.middleware.ros.endpoints import Endpoints
+from golem.middleware.ros.codec import DEFAULT_DISTRO
 from golem.middleware.ros.future import LOOK, Future, spin_until
 from golem.middleware.ros.graph import DiscoveryInfo
+from golem.middleware.ros.node_endpoints import NodeEndpoints
 from golem.middleware.ros.service import DdsClient, DdsService
 from golem.middleware.ros.topics import DdsPublisher, DdsSubscription
 
@@ -51,7 +51,7 @@ class DdsNode:
             ConfigError: name, namespace or distro is invalid.
         """
         self.name, self.namespace, self.now = names.check_node(name), names.check_namespace(namespace), now
-        self._endpoints = Endpoints(participant, DiscoveryInfo(participant, namespace, name, distro))
+        self._endpoints = NodeEndpoints(participant, DiscoveryInfo(participant, namespace, name, distro))
 
     def publisher(self, topic: str, type: str, qos: Qos = DEFAULT) -> DdsPublisher:
         """Publish messages of `type` on `topic`."""

@@ -10,8 +10,9 @@ from typing import Any, TypeVar
 from golem.middleware.ros import codec
 from golem.middleware.ros.base import ActionHandler, Canceling, Client, ClientGoal, Outcome, ServerGoal
 from golem.middleware.ros.future import Future, RosError
-from golem.middleware.ros.goal_info import SECOND, canceling, goal_info, goal_status
+from golem.middleware.ros.goal_info import canceling, goal_info, goal_status
 from golem.middleware.ros.goals import NO_ID, GoalEvent, GoalStatus, after
+from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request
 from golem.middleware.ros.rclpy_types import Closing, Counter, from_rclpy, rclpy_module, rclpy_type, to_rclpy
 from golem.middleware.ros.typed import check
@@ -87,7 +88,7 @@ class RclpyActionClient(Closing):
 
     def cancel(self, id: bytes = NO_ID, before: float = 0.0) -> Future[Canceling]:
         """Ask to cancel goals; see `base.ActionClient.cancel`."""
-        return self._cancel.call(CancelGoal_Request(goal_info(id, int(before * SECOND)))).map(canceling)
+        return self._cancel.call(CancelGoal_Request(goal_info(id, int(before * NANO)))).map(canceling)
 
     def adopt(self, asked: Any, convert: Callable[[Any], T]) -> Future[T]:
         """Return a future of `convert` of what rclpy's future `asked` brings."""

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 
 from golem.middleware.dds.base import Payload, Qos, Sample
 from golem.middleware.ros import codec, names
-from golem.middleware.ros.endpoints import Endpoints
 from golem.middleware.ros.future import Future, RosError
 from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.node_endpoints import NodeEndpoints
 from golem.middleware.ros.typed import serialize
 
 SERVICES = Qos(depth=1000)
@@ -82,7 +82,7 @@ class DdsClient:
         malformed: replies that could not be read.
     """
 
-    def __init__(self, endpoints: Endpoints, name: str, type: str) -> None:
+    def __init__(self, endpoints: NodeEndpoints, name: str, type: str) -> None:
         """Call the service with absolute `name`."""
         self.name, self.malformed = name, 0
         self._endpoints = endpoints
@@ -158,7 +158,7 @@ class Responder:
     """
 
     def __init__(
-        self, endpoints: Endpoints, name: str, type: str, handle: Callable[[Origin, Any], None]
+        self, endpoints: NodeEndpoints, name: str, type: str, handle: Callable[[Origin, Any], None]
     ) -> None:
         """Give requests for the service with absolute `name` to `handle`, which shall `reply` some time."""
         self.name, self.malformed = name, 0
@@ -219,7 +219,9 @@ class Responder:
 class DdsService:
     """Answers the requests of one service at once; see `base.Service`."""
 
-    def __init__(self, endpoints: Endpoints, name: str, type: str, callback: Callable[[Any], Any]) -> None:
+    def __init__(
+        self, endpoints: NodeEndpoints, name: str, type: str, callback: Callable[[Any], Any]
+    ) -> None:
         """Answer requests for the service with absolute `name` by what `callback` returns."""
         self._response = codec.service(type).Response
         self._callback = callback

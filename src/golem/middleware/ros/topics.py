@@ -7,15 +7,15 @@ from typing import Any
 
 from golem.middleware.dds.base import Qos, Sample
 from golem.middleware.ros import codec, names
-from golem.middleware.ros.endpoints import Endpoints
 from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.node_endpoints import NodeEndpoints
 from golem.middleware.ros.typed import serialize
 
 
 class DdsPublisher:
     """Sends messages on one topic; see `base.Publisher`."""
 
-    def __init__(self, endpoints: Endpoints, name: str, type: str, qos: Qos) -> None:
+    def __init__(self, endpoints: NodeEndpoints, name: str, type: str, qos: Qos) -> None:
         """Publish messages of `type` on the topic with absolute `name`."""
         self.name, self._kind = name, codec.message(type)
         self._endpoints = endpoints
@@ -46,7 +46,7 @@ class DdsSubscription:
     """
 
     def __init__(
-        self, endpoints: Endpoints, name: str, type: str, callback: Callable[[Any], None] | None, qos: Qos
+        self, endpoints: NodeEndpoints, name: str, type: str, callback: Callable[[Any], None] | None, qos: Qos
     ) -> None:
         """Give messages of `type` on the topic with absolute `name` to `callback`, if there is one."""
         self.name, self.malformed = name, 0

@@ -343,19 +343,6 @@ class LocalizedObject(Message):
 
 
 @dataclass(slots=True, eq=False)
-class LookRequest(Message):
-    """Ask a camera and the localizer behind it to stream.
-
-    Attributes:
-        labels: classes to look for; empty stops the stream
-    """
-
-    __msgtype__: ClassVar[str] = "golem_interfaces/msg/LookRequest"
-
-    labels: list[str] = field(default_factory=list[str])
-
-
-@dataclass(slots=True, eq=False)
 class SafetyStatus(Message):
     """What the safety gate decided at one tick.
 

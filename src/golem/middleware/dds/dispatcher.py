@@ -30,7 +30,7 @@ class Watched(Protocol):
         ...
 
 
-class Waitset:
+class Dispatcher:
     """Calls `on_data` of the readers that have something to take, one after the other, in a thread of its own.
 
     A callback that raises is logged, and what its reader held is thrown away: else it would be called for the same

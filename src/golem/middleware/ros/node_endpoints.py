@@ -25,7 +25,7 @@ class Attended(Protocol):
         ...
 
 
-class Endpoints:
+class NodeEndpoints:
     """Makes and closes the endpoints of a node.
 
     Attributes:
