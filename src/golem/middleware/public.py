@@ -107,8 +107,8 @@ def gripper(side: str, what: str) -> str:
 COLOR, COLOR_JPEG = "color/image_raw", "color/image_raw/compressed"
 DEPTH, DEPTH_PNG = "aligned_depth_to_color/image_raw", "aligned_depth_to_color/image_raw/compressedDepth"
 CAMERA_INFO = "color/camera_info"
-IMAGES = (COLOR, COLOR_JPEG, DEPTH, DEPTH_PNG, CAMERA_INFO)
-"""What there is of each camera."""
+IMAGES = (CAMERA_INFO, COLOR, COLOR_JPEG, DEPTH, DEPTH_PNG)
+"""What there is of each camera; first what the others are read with."""
 
 
 def _camera(camera: str) -> tuple[Topic, ...]:

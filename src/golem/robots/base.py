@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from golem.types import Array, CameraInfo, HandCommand, HandState, Imu, LowCommand, Side
 
+SLACK = 5e-4
+"""Tolerance of a stamp [s]: half of the resolution in which the robot tells its time."""
+
 
 class Robot(Protocol):
     """One H1-2 with MAGPIE hands and its cameras, real or simulated.

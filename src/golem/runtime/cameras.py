@@ -10,7 +10,7 @@ from golem.capabilities.localization.base import Localizer
 from golem.middleware import topics
 from golem.middleware.bus import Bus, News
 from golem.middleware.topics import Exposure, LookRequest, Sightings
-from golem.robots.base import Robot
+from golem.robots.base import SLACK, Robot
 from golem.robots.model.kinematics import Kinematics
 from golem.runtime.executor import TICK
 from golem.runtime.guard import Guard
@@ -22,9 +22,6 @@ OPTICAL_FRAMES = {"head": "head_camera_optical"} | {f"{s}_hand": f"{s}_hand_came
 """Frame of the nominal model per camera."""
 MEMORY = 1.0
 """How old an exposure may be when its frame arrives [s]."""
-
-SLACK = 5e-4
-"""Tolerance of a stamp [s]: half of the robot's own resolution."""
 
 
 class CameraNode:

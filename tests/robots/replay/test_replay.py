@@ -18,11 +18,12 @@ from golem.middleware import topics
 from golem.middleware.bus import News
 from golem.middleware.dds.base import LATCHED, SENSOR, Payload
 from golem.middleware.public import CAMERA_INFO, COLOR, DEPTH, gripper, image, optical_frame
-from golem.middleware.record.base import NANO, BagError, Message, Topic
+from golem.middleware.record.base import BagError, Message, Topic
 from golem.middleware.record.catalog import topic
 from golem.middleware.record.reader import Bag
 from golem.middleware.record.writer import BagWriter
 from golem.middleware.ros import codec, convert, images
+from golem.middleware.ros.message import NANO
 from golem.middleware.topics import Exposure, Sightings
 from golem.middleware.wire.convert import encode_low_state
 from golem.robots.replay.robot import ReplayConfig, ReplayRobot
@@ -124,7 +125,7 @@ def test_memory_is_bounded_when_nobody_looks(tmp_path: Path) -> None:
     most = 0
     for _ in range(1000):
         robot.advance(COMMAND, {}, 0.002)
-        most = max(most, len(robot._log._tracks["head"].pictures._samples))
+        most = max(most, len(robot._log.pictures["head"]._samples))
     assert most <= 5
 
 

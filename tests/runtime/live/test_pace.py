@@ -82,7 +82,10 @@ def test_a_stack_that_was_waited_for_in_vain_is_waited_for_once() -> None:
     assert 0.1 <= time.monotonic() - begin < 10.0
 
 
-def test_only_an_active_gate_says_what_its_commands_answer(live: Live) -> None:
+@pytest.mark.parametrize("patient", [True, False])
+def test_only_a_patient_gate_that_is_active_says_what_its_commands_answer(live: Live, patient: bool) -> None:
+    live.leave("safety")
+    live.start_gate(patient)
     watcher, _ = live.member("watcher")
     reader = watcher.reader("rt/lowcmd", hg.LOW_CMD.type_name, Qos(depth=1))
     live.run(0.1)
@@ -92,7 +95,7 @@ def test_only_an_active_gate_says_what_its_commands_answer(live: Live) -> None:
     live.run(0.1)
     assert live.twin is not None
     (newest,) = reader.take()
-    assert answered(newest.payload) == pytest.approx(live.twin.executor.t - TICK)
+    assert answered(newest.payload) == pytest.approx(live.twin.executor.t - TICK if patient else 0.0)
 
 
 def test_the_gate_is_more_patient_than_the_robot_and_otherwise_as_strict() -> None:

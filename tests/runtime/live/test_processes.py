@@ -22,7 +22,7 @@ from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.wire import hg
 
 pytest.importorskip("cyclonedds")
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 DOMAIN = str(100 + os.getpid() % 100)
 STACK = """
@@ -35,7 +35,7 @@ profile: ideal
 def golem(*words: str) -> subprocess.CompletedProcess[str]:
     """Run `golem WORDS` on the test's domain to its end."""
     command = [sys.executable, "-m", "golem", *words, "--domain", DOMAIN]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
 class Launched:
@@ -52,8 +52,8 @@ class Launched:
         for line in self.process.stdout:
             self.lines.append(line.rstrip())
 
-    def wait_for(self, pattern: str, seconds: float = 60.0) -> str:
-        """Wait for a line that matches, and return it."""
+    def wait_for(self, pattern: str, seconds: float = 300.0) -> str:
+        """Wait for a line that matches, however busy the machine is, and return it."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             for line in self.lines:
@@ -76,7 +76,7 @@ def launched(tmp_path: Path) -> Iterator[Launched]:
     finally:
         if launched.process.poll() is None:
             launched.process.send_signal(signal.SIGINT)
-            launched.process.wait(30)
+            launched.process.wait(60)
 
 
 def pid_of(name: str) -> int:
@@ -122,7 +122,7 @@ def test_another_writer_of_the_motors_command_is_named_by_its_process(launched: 
 
 def test_ctrl_c_ends_everything_in_order(launched: Launched) -> None:
     launched.process.send_signal(signal.SIGINT)
-    assert launched.process.wait(40) == 0
+    assert launched.process.wait(60) == 0
     assert any("stop" in line for line in launched.lines if line.startswith("[safety]"))
     assert "Nobody is on domain" in golem("topics", "--seconds", "0.2").stdout
 

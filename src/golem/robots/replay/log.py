@@ -20,18 +20,17 @@ from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.golem_interfaces import HandState as HandMessage
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo as InfoMessage
 from golem.middleware.ros.msgs.sensor_msgs import Image
-from golem.middleware.ros.msgs.std_msgs import Header
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
 from golem.middleware.wire.convert import decode_low_state
+from golem.robots.base import SLACK
 from golem.robots.sensors.cameras import CAMERAS
+from golem.robots.sensors.pairing import Pairing
 from golem.types import SIDES, Array, CameraInfo, HandState, LowState, Side
 
 T = TypeVar("T")
 STATE, STATIC = "/lowstate", "/tf_static"
 AHEAD = 0.5
 """How far the log is read ahead [s] [own]: an image is recorded when it arrives, up to so long after its exposure."""
-SLACK = 5e-4
-"""Tolerance of a time [s]: half of the robot's own resolution."""
 RESTART = 1.0
 """Step back in time that means another robot, or one that was started anew [s] [own]."""
 
@@ -58,30 +57,6 @@ class Track(Generic[T]):
         return samples[0][1] if samples and samples[0][0] <= t + SLACK else None
 
 
-class CameraTrack:
-    """The exposures of one camera, put together from their images."""
-
-    def __init__(self) -> None:
-        """Start empty."""
-        self.pictures: Track[Picture] = Track()
-        self._color: tuple[float, NDArray[np.uint8]] | None = None
-        self._depth: tuple[float, NDArray[np.float32]] | None = None
-
-    def add_color(self, t: float, color: NDArray[np.uint8]) -> None:
-        """Take the colour of the exposure at `t` [s]."""
-        self._color = t, color
-        self._complete()
-
-    def add_depth(self, t: float, depth: NDArray[np.float32]) -> None:
-        """Take the depth of the exposure at `t` [s]."""
-        self._depth = t, depth
-        self._complete()
-
-    def _complete(self) -> None:
-        if self._color is not None and self._depth is not None and self._color[0] == self._depth[0]:
-            self.pictures.add(self._color[0], (self._color[1], self._depth[1]))
-
-
 class Log:
     """A bag that is read as time passes; times are seconds since its first state.
 
@@ -93,6 +68,7 @@ class Log:
             that of the nominal model.
         states: motors and IMU.
         hands: each hand.
+        pictures: what each camera saw.
         end: time of the last state; None until it has been read.
     """
 
@@ -113,13 +89,14 @@ class Log:
         self.hands: dict[Side, Track[HandState]] = {side: Track() for side in SIDES}
         self.end: float | None = None
         self.cameras, self.calibration = _cameras(bag)
-        self._tracks = {name: CameraTrack() for name in self.cameras}
+        self.pictures: dict[str, Track[Picture]] = {name: Track() for name in self.cameras}
         self._take: dict[str, Callable[[Message], None]] = {STATE: self._state}
         for side in SIDES:
             self._take[public.gripper(side, "state")] = partial(self._hand, side)
         for name in self.cameras:
-            self._take[public.image(name, public.COLOR)] = partial(self._color, name)
-            self._take[public.image(name, public.DEPTH)] = partial(self._depth, name)
+            pairing = Pairing(partial(self._picture, name))
+            self._take[public.image(name, public.COLOR)] = partial(_image, pairing.color)
+            self._take[public.image(name, public.DEPTH)] = partial(_image, pairing.depth)
         self._origin = next(bag.messages([STATE])).log_time
         self._messages = bag.messages(self._take)
         self._read = self._newest = -math.inf
@@ -135,22 +112,11 @@ class Log:
             else:
                 self._read = at
                 self._take[message.topic.name](message)
-        for track in (
-            self.states,
-            *self.hands.values(),
-            *(camera.pictures for camera in self._tracks.values()),
-        ):
+        for track in (self.states, *self.hands.values(), *self.pictures.values()):
             track.at(t)
-
-    def picture(self, camera: str, t: float) -> Picture | None:
-        """Return what `camera` saw at its last exposure up to `t` [s]; None before the first."""
-        return self._tracks[camera].pictures.at(t)
 
     def _time(self, time: int) -> float:
         return (time - self._origin) / NANO
-
-    def _stamp(self, header: Header) -> float:
-        return self._time(header.stamp.sec * NANO + header.stamp.nanosec)
 
     def _state(self, message: Message) -> None:
         self._newest = self._time(message.log_time)
@@ -160,13 +126,14 @@ class Log:
         state = convert.to_hand_state(codec.deserialize(message.payload, HandMessage))
         self.hands[side].add(self._time(message.log_time), state)
 
-    def _color(self, camera: str, message: Message) -> None:
-        image = codec.deserialize(message.payload, Image)
-        self._tracks[camera].add_color(self._stamp(image.header), images.to_rgb(image))
+    def _picture(self, camera: str, color: Image, depth: Image) -> None:
+        stamp = color.header.stamp
+        t = self._time(stamp.sec * NANO + stamp.nanosec)
+        self.pictures[camera].add(t, (images.to_rgb(color), images.to_depth(depth)))
 
-    def _depth(self, camera: str, message: Message) -> None:
-        image = codec.deserialize(message.payload, Image)
-        self._tracks[camera].add_depth(self._stamp(image.header), images.to_depth(image))
+
+def _image(take: Callable[[Image], None], message: Message) -> None:
+    take(codec.deserialize(message.payload, Image))
 
 
 def _cameras(bag: Bag) -> tuple[dict[str, CameraInfo], dict[str, Array]]:

@@ -69,7 +69,7 @@ class ReplayRobot:
 
     def capture(self, camera: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Return the last recorded exposure of `camera`; before the first it is black, and nothing is near."""
-        picture = self._log.picture(camera, self._t)
+        picture = self._log.pictures[camera].at(self._t)
         if picture is not None:
             return picture
         info = self.cameras[camera]

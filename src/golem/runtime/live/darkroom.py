@@ -11,7 +11,6 @@ import signal
 from collections import deque
 from contextlib import closing
 from multiprocessing.connection import Connection
-from typing import Any
 
 from golem.errors import GolemError
 from golem.middleware import public, topics
@@ -123,7 +122,9 @@ def _work(stack: Stack, seed: int, dds: DdsConfig, link: Connection) -> None:
             return
 
 
-def expose(robot: Any, cameras: dict[str, CameraOut], bus: Bus, name: str, t: float, snapshot: bytes) -> None:
+def expose(
+    robot: Recallable, cameras: dict[str, CameraOut], bus: Bus, name: str, t: float, snapshot: bytes
+) -> None:
     """Send the images of one moment, if anybody wants them.
 
     Args:

@@ -20,11 +20,9 @@ from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs import golem_interfaces
 from golem.middleware.ros.msgs.geometry_msgs import PoseStamped
 from golem.robots.model.spatial import rotation_rpy, transform
-from golem.runtime.live.member import member, say
+from golem.runtime.live.member import ANSWER, find, member, say
 from golem.types import Side
 
-TIMEOUT = 5.0
-"""How long is waited for the stack, and for its decision [s]."""
 DONE, FAILED, CANCELED = 0, 1, 130
 """Exit codes."""
 
@@ -150,11 +148,7 @@ def propose(node: Node, action: str, goal: Any, remedy: str) -> ClientGoal:
     """
     kind = next(row.type for row in public.ACTIONS if row.name == action)
     client = node.action_client(action, kind)
-    end = node.now() + TIMEOUT
-    while not client.ready():
-        if node.now() > end:
-            raise RosError(f"Nobody offers '{action}'; {remedy}.")
-        node.spin_once(0.02)
+    find(node, action, client, remedy)
     said: list[str] = []
 
     def feedback(message: Any) -> None:
@@ -164,7 +158,7 @@ def propose(node: Node, action: str, goal: Any, remedy: str) -> ClientGoal:
             say(f"{convert.seconds(f.stamp):7.2f} s  {f.stage:9s} {f.text}")
 
     sent: Future[ClientGoal] = client.send_goal(goal, feedback)
-    pursued = node.wait(sent, TIMEOUT)
+    pursued = node.wait(sent, ANSWER)
     if not pursued.accepted:
         raise RosError(f"'{action}' rejected the goal.")
     return pursued

@@ -27,6 +27,7 @@ from golem.middleware.ros.waitset import WaitSet
 from golem.middleware.wire import convert
 from golem.middleware.wire.layout import WireError
 from golem.runtime.executor import in_order
+from golem.runtime.live import pace
 from golem.runtime.live.clock import RobotClock
 from golem.runtime.live.surface import Surface
 from golem.runtime.live.verdict import status_message, told
@@ -119,6 +120,7 @@ class LiveGate:
         estop: VirtualEstop | None,
         clock: Callable[[], float] = time.monotonic,
         who: Callable[[bytes], str] = bytes.hex,
+        patient: bool = False,
     ) -> None:
         """Guard the robot on the domain.
 
@@ -130,7 +132,11 @@ class LiveGate:
                 the gate stays shut.
             clock: monotonic [s].
             who: names the owner of an endpoint by its guid.
+            patient: whether the robot's time may stand still for a stack that is behind; see `live.pace`.
         """
+        if patient:
+            limits = pace.patient(limits)
+        self._patient = patient
         self.bus = Bus()
         self._node, self._clock, self._who = node, clock, who
         self._surface = surface = Surface("safety", participant, node)
@@ -191,7 +197,8 @@ class LiveGate:
         assert status is not None and command is not None
         self.status = status
         if self._arrivals.mode_machine is not None:
-            answers = self._arrivals.answered if status.state is GateState.ACTIVE else 0.0
+            waited_for = self._patient and status.state is GateState.ACTIVE
+            answers = self._arrivals.answered if waited_for else 0.0
             self._out.write(convert.encode_low_command(command, self._arrivals.mode_machine, answers))
         frame = self._estops.read()
         if frame is not None and self._surface.heard("/estop"):

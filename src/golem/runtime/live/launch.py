@@ -11,50 +11,41 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
-
-from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.errors import ConfigError
 from golem.hardware.safety.base import GateState, GateStatus
 from golem.middleware import public
-from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.interrupt import interrupted
 from golem.middleware.ros.base import Node
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
-from golem.runtime.live.member import member, say
+from golem.runtime.live.member import member, say, until
+from golem.runtime.live.pace import SILENCE
+from golem.runtime.live.process import TwinConfig
 from golem.runtime.live.verdict import to_status, told
 from golem.stack import load_stack
 
 Part = Literal["twin", "safety", "up"]
 PARTS: tuple[Part, ...] = ("twin", "safety", "up")
 """In the order they are started; they end in the opposite one, so that the gate outlives what it guards against."""
-GRACE = 6.0
-"""Time a process gets to end by itself [s]: the gate damps for three."""
+GRACE = 15.0
+"""Time a process gets to end by itself [s]: the gate damps for three, on a busy machine longer."""
 PERIOD = 0.1
 """Time between two looks at the processes [s]."""
 
 
 @dataclass(frozen=True)
-class LaunchConfig:
+class LaunchConfig(TwinConfig):
     """Start twin, safety and up for a stack file, let its commands through, and watch over them until Ctrl-C."""
 
-    stack: Positional[str] = "tether"
-    """Path of a stack file, or the name of a shipped one."""
-    world: str | None = None
-    """World of the twin: pack, open, slope or rubble; default: the stack file's."""
-    profile: str | None = None
-    """Realism profile: ideal, bench or field; default: the stack file's."""
-    seed: int = 0
-    """Seed of the episode."""
+    strict: bool = False
+    """Stop the robot as early as the real one for what is late: a busy machine then stops it."""
     activate: bool = True
     """Let commands through as soon as the gate is armed. After a stop, that is for you to do: golem safety reset,
     golem safety activate."""
-    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
 
 
 def commands(config: LaunchConfig) -> dict[Part, list[str]]:
@@ -76,7 +67,7 @@ def commands(config: LaunchConfig) -> dict[Part, list[str]]:
     world = ["--world", config.world] if config.world else []
     return {
         "twin": ["twin", config.stack, "--seed", str(config.seed), *profile, *world, *dds],
-        "safety": ["safety", "--limits", stack.limits, *dds],
+        "safety": ["safety", "--limits", stack.limits, *(["--strict"] if config.strict else []), *dds],
         "up": ["up", config.stack, *profile, *dds],
     }
 
@@ -180,9 +171,11 @@ class Launcher:
         """Return what becomes of the robot once a process has died, as far as it is seen here."""
         if name == "safety":
             return "The drives go limp within 0.1 s."
-        end = time.monotonic() + 1.0
-        while time.monotonic() < end and (self.gate is None or self.gate.state is GateState.ACTIVE):
-            self._node.spin_once(0.02)
+        until(
+            self._node,
+            lambda: self.gate is not None and self.gate.state is not GateState.ACTIVE,
+            SILENCE + 1.0,
+        )
         return "The safety gate is silent." if self.gate is None else f"The safety gate is {told(self.gate)}."
 
     def _restarter(self, name: Part) -> Callable[[Any], Trigger_Response]:
@@ -193,7 +186,7 @@ class Launcher:
         return answer
 
     def _heard(self, message: Any) -> None:
-        self.gate = to_status(message, time.monotonic())
+        self.gate = to_status(message, 0.0)
 
     def _activated(self, answer: Future[Any]) -> None:
         self._activation = None

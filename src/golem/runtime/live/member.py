@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 
 from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
+from golem.middleware.ros.base import ActionClient, Client, Node
+from golem.middleware.ros.future import RosError
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import DdsNode
 
 DISCOVERY = 0.3
 """Time that whoever is on the domain already gets to be seen [s]."""
+SEARCH = 5.0
+"""How long is looked for whoever offers something [s]."""
+ANSWER = 30.0
+"""How long is waited for an answer of somebody who is there, but may be starting on a busy machine [s]."""
 
 
 @contextmanager
@@ -37,6 +43,26 @@ def owner(participant: CycloneParticipant, guid: bytes) -> str:
             process = found.process or guid.hex()
             return f"golem {name}, {process}" if name else process
     return guid.hex()
+
+
+def until(node: Node, condition: Callable[[], bool], timeout: float) -> bool:
+    """Spin `node` until `condition()` is true; return False if `timeout` [s] passed first."""
+    end = node.now() + timeout
+    while not condition():
+        if node.now() > end:
+            return False
+        node.spin_once(0.02)
+    return True
+
+
+def find(node: Node, name: str, client: Client | ActionClient, remedy: str) -> None:
+    """Wait until somebody offers what `client` asks for.
+
+    Raises:
+        RosError: nobody offers `name`; `remedy` says what the user can do.
+    """
+    if not until(node, client.ready, SEARCH):
+        raise RosError(f"Nobody offers '{name}'; {remedy}.")
 
 
 def say(text: str) -> None:

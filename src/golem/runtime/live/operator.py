@@ -13,11 +13,9 @@ from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros.base import Node
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, Trigger_Request
-from golem.runtime.live.member import member, say
+from golem.runtime.live.member import ANSWER, SEARCH, find, member, say, until
 from golem.runtime.live.verdict import to_status, told
 
-TIMEOUT = 3.0
-"""How long is waited for a server, and for its answer [s]."""
 REQUESTS: dict[str, tuple[str, Any]] = {
     "activate": ("/safety/activate", Trigger_Request()),
     "stop": ("/safety/stop", Trigger_Request()),
@@ -75,7 +73,7 @@ def run_restart(config: RestartConfig) -> bool:
         return response.success
 
 
-def ask(node: Node, service: str, kind: str, request: Any, remedy: str, timeout: float = TIMEOUT) -> Any:
+def ask(node: Node, service: str, kind: str, request: Any, remedy: str) -> Any:
     """Call a service and return the response.
 
     Args:
@@ -84,28 +82,22 @@ def ask(node: Node, service: str, kind: str, request: Any, remedy: str, timeout:
         kind: its type.
         request: what is sent.
         remedy: what the user can do when nobody offers it.
-        timeout: how long to wait for a server, and for its answer [s].
 
     Raises:
         RosError: nobody offers it, or it does not answer in time.
     """
     client = node.client(service, kind)
-    end = node.now() + timeout
-    while not client.ready():
-        if node.now() > end:
-            raise RosError(f"Nobody offers '{service}'; {remedy}.")
-        node.spin_once(0.02)
-    return node.wait(client.call(request), timeout)
+    find(node, service, client, remedy)
+    return node.wait(client.call(request), ANSWER)
 
 
 def _status(node: Node, dds: DdsConfig) -> bool:
     row = public.topic("/safety/status")
     subscription = node.subscription(row.name, row.type, None, row.qos)
-    end = node.now() + TIMEOUT
-    while (message := subscription.latest()) is None:
-        if node.now() > end:
-            raise RosError(f"No safety gate on {dds}; start one with: golem safety.")
-        node.spin_once(0.02)
+    if not until(node, lambda: subscription.latest() is not None, SEARCH):
+        raise RosError(f"No safety gate on {dds}; start one with: golem safety.")
+    message = subscription.latest()
+    assert message is not None
     status = to_status(message, 0.0)
     say(told(status))
     return status.state is GateState.ACTIVE

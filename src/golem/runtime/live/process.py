@@ -6,6 +6,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from tyro.conf import OmitArgPrefixes, Positional
 
@@ -21,7 +22,6 @@ from golem.runtime.executor import TICK
 from golem.runtime.live.darkroom import Darkroom
 from golem.runtime.live.gate import LiveGate
 from golem.runtime.live.member import DISCOVERY, member, owner, say
-from golem.runtime.live.pace import patient
 from golem.runtime.live.stack import LiveStack
 from golem.runtime.live.twin import Twin
 from golem.runtime.live.verdict import told
@@ -33,10 +33,10 @@ PATIENCE = 5.0
 
 @dataclass(frozen=True)
 class TwinConfig:
-    """Put the simulated robot of a stack file on a domain, with the wall clock."""
+    """Put the simulated robot of a stack file on a domain, with its on-board computer and the wall clock."""
 
     stack: Positional[str] = "tether"
-    """Path of a stack file, or the name of a shipped one; of it the robot counts, and its on-board computer."""
+    """Path of a stack file, or the name of a shipped one."""
     world: str | None = None
     """World of the twin: pack, open, slope or rubble; default: the stack file's."""
     profile: str | None = None
@@ -125,11 +125,11 @@ def run_safety(config: SafetyConfig) -> None:
         DdsError: the domain cannot be joined.
     """
     limits = SafetyLimits.from_profile(config.limits)
-    if not (config.strict or config.dds.robot):
-        limits = patient(limits)
+    patient = not (config.strict or config.dds.robot)
     estop = None if config.dds.robot else VirtualEstop()
     with interrupted() as stop, member("safety", config.dds) as (participant, node):
-        gate = LiveGate(participant, node, limits, estop, who=lambda guid: owner(participant, guid))
+        who = partial(owner, participant)
+        gate = LiveGate(participant, node, limits, estop, who=who, patient=patient)
         say(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
         if estop is None:
             say("No driver of an emergency stop is here: the gate stays shut.")

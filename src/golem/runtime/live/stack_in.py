@@ -17,6 +17,7 @@ from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
 from golem.middleware.topics import Exposure
 from golem.robots.sensors.cameras import CAMERAS
+from golem.robots.sensors.pairing import Pairing
 from golem.runtime.cameras import looked_for
 from golem.runtime.executor import TICK
 from golem.runtime.live.pace import SILENCE
@@ -36,8 +37,7 @@ class CameraIn:
         self._wanted = looked_for(bus, camera)
         self._open: list[Subscription] = []
         self._info: CameraInfo | None = None
-        self._color: sensor_msgs.Image | None = None
-        self._depth: sensor_msgs.Image | None = None
+        self._pairing = Pairing(self._take)
 
     def step(self, t: float) -> None:
         """Come or go, as skills want."""
@@ -48,8 +48,8 @@ class CameraIn:
             return
         callbacks = (
             (public.CAMERA_INFO, self._take_info),
-            (public.COLOR, self._take_color),
-            (public.DEPTH, self._take_depth),
+            (public.COLOR, self._pairing.color),
+            (public.DEPTH, self._pairing.depth),
         )
         for what, callback in callbacks:
             self._open.append(self._surface.subscribe(public.image(self._camera, what), callback))
@@ -59,28 +59,15 @@ class CameraIn:
         for subscription in self._open:
             subscription.close()
         self._open.clear()
-        self._color = self._depth = None
+        self._pairing.clear()
 
     def _take_info(self, message: sensor_msgs.CameraInfo) -> None:
         known = CAMERAS[self._camera]
         self._info = images.to_camera(message, self._camera, known.near, known.far, known.rate)
 
-    def _take_color(self, message: sensor_msgs.Image) -> None:
-        self._color = message
-        self._pair()
-
-    def _take_depth(self, message: sensor_msgs.Image) -> None:
-        self._depth = message
-        self._pair()
-
-    def _pair(self) -> None:
-        """Publish colour and depth of one exposure once both are there."""
-        color, depth, info = self._color, self._depth, self._info
-        if color is None or depth is None or info is None or color.header.stamp != depth.header.stamp:
-            return
-        self._color = self._depth = None
-        rgb, metres = images.to_rgb(color), images.to_depth(depth)
-        if rgb.shape[:2] == metres.shape == (info.height, info.width):
+    def _take(self, color: sensor_msgs.Image, depth: sensor_msgs.Image) -> None:
+        info, rgb, metres = self._info, images.to_rgb(color), images.to_depth(depth)
+        if info is not None and rgb.shape[:2] == metres.shape == (info.height, info.width):
             t = convert.seconds(color.header.stamp)
             self._bus.publish(topics.exposures(self._camera), Exposure(t, info, rgb, metres), t)
 
