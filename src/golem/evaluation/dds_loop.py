@@ -12,7 +12,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -62,7 +61,6 @@ def robot(participant: CycloneParticipant, seconds: float, cameras: bool) -> dic
         wait_for_peer(participant, endpoint, "the controller's process has failed", 20.0)
     imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
     zeros = np.zeros(NUM_JOINTS)
-    state = LowState(0.0, zeros, zeros, zeros, imu)
     count = int(seconds * 1e9 / PERIOD_NS)
     began, answered = np.zeros(count, np.int64), []
     side = Imagery(participant) if cameras else None
@@ -70,7 +68,8 @@ def robot(participant: CycloneParticipant, seconds: float, cameras: bool) -> dic
     for i in range(count):
         sleep_until(start + i * PERIOD_NS)
         began[i] = time.monotonic_ns()
-        writer.write(convert.encode_low_state(replace(state, t=(i + 1) * 1e-3)))
+        state = LowState((i + 1) * 1e-3, zeros, zeros, zeros, imu)
+        writer.write(convert.encode_low_state(state))
         for sample in reader.take():
             convert.decode_low_command(sample.payload, 0.0)
             answered.append(round(convert.answered(sample.payload) * 1e3))
