@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.robots.model import magpie
-from golem.robots.model.spatial import quat_of, transform
+from golem.robots.model.spatial import skew, transform
 from golem.robots.model.table import BASE_LINK, FRAMES, JOINTS, T_TORSO_HEAD_OPTICAL
 from golem.types import NUM_JOINTS, SIDES, Array
 
@@ -76,9 +76,8 @@ FIXED: tuple[Edge, ...] = (
 )
 """Every frame that does not move in its parent."""
 
-_ORIGIN = np.array([h.T_parent_child[:3, 3] for h in HINGES])
-_QUAT = np.array([quat_of(h.T_parent_child[:3, :3]) for h in HINGES])
-_AXIS = np.array([h.axis for h in HINGES])
+_T_PARENT_CHILD = np.array([h.T_parent_child for h in HINGES])
+_AXIS = np.array([skew(h.axis) for h in HINGES])
 
 
 def angles(q: Array, fingers: tuple[Array, Array]) -> Array:
@@ -92,17 +91,14 @@ def angles(q: Array, fingers: tuple[Array, Array]) -> Array:
     return np.concatenate([q[:NUM_JOINTS], np.column_stack([cranks, -cranks]).ravel()])
 
 
-def poses(angle: Array) -> tuple[Array, Array]:
-    """Return where every hinge's child is in its parent.
+def poses(angle: Array) -> Array:
+    """Return the (n, 4, 4) pose of every hinge's child in its parent, in the order of `HINGES`.
 
     Args:
         angle: of every hinge [rad]; see `angles`.
-
-    Returns:
-        (n, 3) positions [m] and (n, 4) quaternions wxyz, in the order of `HINGES`.
     """
-    half = 0.5 * angle[:, None]
-    w, v = np.cos(half), np.sin(half) * _AXIS
-    w0, v0 = _QUAT[:, :1], _QUAT[:, 1:]
-    scalar = w0 * w - (v0 * v).sum(axis=1, keepdims=True)
-    return _ORIGIN, np.hstack([scalar, w0 * v + w * v0 + np.cross(v0, v)])
+    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    T = _T_PARENT_CHILD.copy()
+    # Rodrigues' formula.
+    T[:, :3, :3] @= np.eye(3) + s * _AXIS + (1.0 - c) * (_AXIS @ _AXIS)
+    return T

@@ -9,11 +9,9 @@ import numpy as np
 from golem.middleware import public, topics
 from golem.middleware.bus import Bus, News
 from golem.middleware.ros import convert, images
-from golem.middleware.ros.msgs import geometry_msgs
 from golem.middleware.ros.msgs.golem_interfaces import HandCommand as HandCommandMessage
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
-from golem.middleware.ros.msgs.std_msgs import Header, String
-from golem.middleware.ros.msgs.tf2_msgs import TFMessage
+from golem.middleware.ros.msgs.std_msgs import String
 from golem.middleware.topics import Exposure
 from golem.robots.model import tree
 from golem.robots.model.export import export_urdf
@@ -23,6 +21,7 @@ from golem.runtime.live.surface import Surface
 from golem.types import SIDES, Array, HandState, LowState, Side
 
 JOINTS = tuple(hinge.joint for hinge in tree.HINGES)
+LINKS = tuple((hinge.parent, hinge.child) for hinge in tree.HINGES)
 
 
 def describe(surface: Surface, calibration: Mapping[str, Array]) -> None:
@@ -86,27 +85,9 @@ class FramesOut:
     def step(self, t: float) -> None:
         """Send the present poses."""
         state = self._bus.latest(topics.LOW_STATE, LowState)
-        if state is None or not self._surface.heard("/tf"):
-            return
-        positions, quats = tree.poses(_angles(self._bus, state))
-        stamp = convert.time(state.t)
-        self._surface.publish(
-            "/tf",
-            TFMessage(
-                [
-                    geometry_msgs.TransformStamped(
-                        Header(stamp, hinge.parent),
-                        hinge.child,
-                        geometry_msgs.Transform(
-                            geometry_msgs.Vector3(*position), geometry_msgs.Quaternion(x, y, z, w)
-                        ),
-                    )
-                    for hinge, position, (w, x, y, z) in zip(
-                        tree.HINGES, positions.tolist(), quats.tolist(), strict=True
-                    )
-                ]
-            ),
-        )
+        if state is not None and self._surface.heard("/tf"):
+            poses = tree.poses(_angles(self._bus, state))
+            self._surface.publish("/tf", convert.transforms(state.t, LINKS, poses))
 
 
 class CameraOut:
