@@ -145,7 +145,7 @@ TOPICS: tuple[Topic, ...] = (
           "robot."),
     Topic("/lowcmd", "unitree_hg/msg/LowCmd", "safety", ("robot", "safety"), LOW, 500, "",
           "What the motors are told, with checksum; from the safety gate and nobody else. The drives go limp "
-          "0.1 s after the last one."),
+          "0.1 s after the last one. reserve[0] as in /safety/lowcmd_in: a simulated robot waits for answers."),
     Topic("/clock", "rosgraph_msgs/msg/Clock", "robot", (), NEWEST, 500, "",
           "Robot time; simulated robots only."),
     Topic("/joint_states", "sensor_msgs/msg/JointState", "robot", (), SENSOR, 100, "",

@@ -23,9 +23,10 @@ from golem.robots.base import Robot
 from golem.runtime.assembly import Running
 from golem.runtime.executor import TICK, Executor, Node
 from golem.runtime.live import robot_out, stack_out
-from golem.runtime.live.gate import REPORT, status_message
+from golem.runtime.live.gate import REPORT
 from golem.runtime.live.motors import RequestOut, StateOut
 from golem.runtime.live.surface import Surface
+from golem.runtime.live.verdict import status_message
 from golem.types import SIDES, LowCommand
 
 

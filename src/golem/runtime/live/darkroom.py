@@ -6,9 +6,11 @@ its images go to the domain from that process. One exposure at a time: where ren
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import signal
 from collections import deque
+from collections.abc import Callable
 from contextlib import closing
 from multiprocessing.connection import Connection
 
@@ -26,8 +28,6 @@ from golem.runtime.live.robot_out import CameraOut
 from golem.runtime.live.surface import Surface
 from golem.stack import Stack
 
-EXPOSURE = 1.0 / 15.0
-"""Robot time that one may take [s]: a camera's period; then the robot's time waits for it, see `live.pace`."""
 GRACE = 3.0
 """Time the process gets to end by itself [s]."""
 
@@ -38,7 +38,10 @@ def image_topics() -> set[str]:
 
 
 class Darkroom:
-    """The twin's end: hands a snapshot over when a camera is due and the darkroom free."""
+    """The twin's end: hands a snapshot over when a camera is due and the darkroom free.
+
+    Once an exposure takes longer than its camera has until the next, the robot's time waits for it: see `live.pace`.
+    """
 
     period = TICK
 
@@ -61,8 +64,7 @@ class Darkroom:
         self._process = context.Process(target=_work, args=(stack, seed, dds, theirs), daemon=True)
         self._process.start()
         theirs.close()
-        self._free, self._given_up = False, True
-        self._since = 0.0
+        self._free, self._deadline = False, math.inf
 
     def step(self, t: float) -> None:
         """Hand over what is due.
@@ -76,22 +78,23 @@ class Darkroom:
                 if name not in self._waiting:
                     self._waiting.append(name)
         try:
-            late = not self._free and not self._given_up and t - self._since > EXPOSURE
+            late = t > self._deadline
             if self._link.poll(PATIENCE if late else 0.0):
                 self._link.recv_bytes()
-                self._free = True
-            else:
-                self._given_up |= late
+                self._free, self._deadline = True, math.inf
+            elif late:
+                self._deadline = math.inf
             if self._free and self._waiting:
-                self._free, self._given_up, self._since = False, False, t
-                self._link.send((self._waiting.popleft(), t, self._robot.snapshot()))
+                name = self._waiting.popleft()
+                self._free, self._deadline = False, t + self._periods[name]
+                self._link.send((name, t, self._robot.snapshot()))
         except (EOFError, OSError) as error:
             code = self._process.exitcode
             raise GolemError(f"The process that renders the cameras has died (exit code {code}).") from error
 
-    def wait(self) -> None:
-        """Wait until the process is ready: building its world takes a second that the twin's clock shall not miss."""
-        while not self._link.poll(0.1) and self._process.is_alive():
+    def wait(self, stop: Callable[[], bool]) -> None:
+        """Wait until the process is ready, or `stop()`: building its world takes seconds that no image shall take."""
+        while not (self._link.poll(0.1) or stop()) and self._process.is_alive():
             continue
 
     def close(self) -> None:

@@ -27,7 +27,7 @@ from golem.runtime.live.twin import Twin
 from golem.runtime.live.verdict import told
 from golem.stack import Stack, load_stack
 
-PATIENCE = 5.0
+ALONE = 5.0
 """Time without a robot after which the stack says what it waits for [s]."""
 
 
@@ -112,7 +112,7 @@ def run_twin(config: TwinConfig) -> None:
                 )
             twin = Twin(stack, robot, participant, node, darkroom)
             if darkroom is not None:
-                darkroom.wait()
+                darkroom.wait(stop.is_set)
             say(f"The twin of '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
             twin.run(stop.is_set)
 
@@ -165,7 +165,7 @@ def run_up(config: UpConfig) -> None:
             live.states.wait(0.02)
             live.step()
             if live.side is None:
-                if waiting_since is not None and time.monotonic() - waiting_since > PATIENCE:
+                if waiting_since is not None and time.monotonic() - waiting_since > ALONE:
                     waiting_since = None
                     say(f"No robot on {config.dds} yet; start one with: golem twin {config.stack}")
                 continue

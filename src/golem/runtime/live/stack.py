@@ -30,8 +30,7 @@ from golem.runtime.live.pace import CATCH_UP
 from golem.runtime.live.robot_out import FramesOut, JointsOut, describe
 from golem.runtime.live.skills import Skills
 from golem.runtime.live.stack_in import CameraIn, GateIn, RemoteBand, listen
-from golem.runtime.live.surface import Surface
-from golem.runtime.live.twin import Poll
+from golem.runtime.live.surface import Poll, Surface
 from golem.runtime.sides import StackSide
 from golem.stack import Stack
 from golem.types import SIDES, Array

@@ -14,6 +14,7 @@ from golem.middleware.ros.base import ActionHandler, ActionServer, Node, Publish
 from golem.middleware.ros.codec import dds_name
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.waitset import Inbox, WaitSet
+from golem.runtime.executor import TICK
 
 
 class Surface:
@@ -103,6 +104,20 @@ class Surface:
         if self._role not in row.to:
             raise ValueError(f"the table does not let '{self._role}' read {topic}")
         return row
+
+
+class Poll:
+    """Lets a ROS node handle what has arrived, once per tick."""
+
+    period = TICK
+
+    def __init__(self, node: Node) -> None:
+        """Poll `node`."""
+        self._node = node
+
+    def step(self, t: float) -> None:
+        """Handle what has arrived."""
+        self._node.poll()
 
 
 def _same(rows: Mapping[str, object], given: Mapping[str, object]) -> None:

@@ -15,7 +15,7 @@ from golem.middleware.wire.rpc import RpcServer
 from golem.robots.base import Banded, Robot
 from golem.robots.onboard import motion_switcher
 from golem.runtime import nodes
-from golem.runtime.executor import TICK, Executor, Phase, Placed, in_order
+from golem.runtime.executor import Executor, Phase, Placed, in_order
 from golem.runtime.live.darkroom import Darkroom, image_topics
 from golem.runtime.live.motors import CommandIn, StateOut
 from golem.runtime.live.onboard import AnswersOut, CallsIn, LegsOut
@@ -29,27 +29,13 @@ from golem.runtime.live.robot_out import (
     describe,
     take_hand_commands,
 )
-from golem.runtime.live.surface import Surface
+from golem.runtime.live.surface import Poll, Surface
 from golem.runtime.sides import RobotSide, Workshop
 from golem.stack import Stack
 from golem.types import SIDES
 
 FOREVER = 1e9
 """A time nobody sees [s]."""
-
-
-class Poll:
-    """Lets a ROS node handle what has arrived, once per tick."""
-
-    period = TICK
-
-    def __init__(self, node: Node) -> None:
-        """Poll `node`."""
-        self._node = node
-
-    def step(self, t: float) -> None:
-        """Handle what has arrived."""
-        self._node.poll()
 
 
 class Twin:
