@@ -64,6 +64,19 @@ gaps = [later - earlier for earlier, later in zip(times, times[1:])]
 at = gaps.index(max(gaps))
 print(json.dumps({"gap": gaps[at], "after": len(times) - at, "images": len(images)}))
 """
+FINDER = """
+import sys, time
+from golem.middleware.dds.base import Qos
+from golem.middleware.dds.checks import wait_for_peer
+from golem.middleware.dds.connect import connect
+from golem.middleware.dds.domain import DdsConfig
+_, interface, kind, *peers = sys.argv
+participant = connect(DdsConfig(7, interface, tuple(peers)))
+print("joined", flush=True)
+wait_for_peer(participant, getattr(participant, kind)("rt/state", "T", Qos()), "start it", 20.0)
+print("found", flush=True)
+time.sleep(20.0)
+"""
 
 
 @pytest.fixture
@@ -77,8 +90,8 @@ def ends() -> Iterator[tuple[End, End]]:
         yield pair
 
 
-def run(end: End, script: str) -> subprocess.Popen[str]:
-    command = [*end.inside, sys.executable, "-c", script, end.interface]
+def run(end: End, script: str, *arguments: str) -> subprocess.Popen[str]:
+    command = [*end.inside, sys.executable, "-c", script, end.interface, *arguments]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
 
@@ -99,3 +112,26 @@ def test_a_cut_link_neither_holds_up_the_writer_nor_ends_the_stream(ends: tuple[
     assert wrote["longest"] < 0.6, "the writer waited for the link"  # 1 to 2 s with the default send buffer
     assert read["gap"] > 0.7, "the link was not cut"
     assert read["after"] > 200 and read["images"] > 20
+
+
+def test_where_multicast_does_not_pass_one_side_has_to_name_the_other_which_may_come_late(
+    ends: tuple[End, End],
+) -> None:
+    here, there = ends
+    for end in ends:
+        rule = [*end.inside, "iptables", "-A", "INPUT", "-d", "224.0.0.0/4", "-j", "DROP"]
+        try:
+            subprocess.run(rule, check=True, capture_output=True)
+        except (subprocess.CalledProcessError, OSError):
+            pytest.skip("needs iptables")
+    finders = [run(here, FINDER, "writer", "10.77.0.2")]
+    try:
+        assert finders[0].stdout is not None and finders[0].stdout.readline().strip() == "joined"
+        finders.append(run(there, FINDER, "reader"))
+        for finder in finders:
+            assert finder.stdout is not None
+            assert "found" in (line.strip() for line in finder.stdout)
+    finally:
+        for finder in finders:
+            finder.kill()
+            finder.wait()
