@@ -21,7 +21,7 @@ from tests.middleware.dds.test_contract import TYPE, eventually, texts
 
 from golem.errors import ConfigError, MissingExtra
 from golem.middleware.dds import checks, discovery, domain, endpoints, library
-from golem.middleware.dds.base import ENCAPSULATION, DdsError, Qos, Reader, Sample
+from golem.middleware.dds.base import ENCAPSULATION, DdsError, Qos, Sample
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig, configuration
 from golem.middleware.dds.interfaces import Interface, find_interface, interfaces
@@ -76,19 +76,19 @@ def test_participants_of_a_process_share_a_domain_on_the_same_terms(
 
 
 def test_a_participant_can_be_closed_from_its_callback(participant: CycloneParticipant) -> None:
-    reader = participant.reader("rt/a", TYPE, Qos(), on_data=participant.close)
+    closed = threading.Event()
+
+    def close() -> None:
+        participant.close()
+        closed.set()
+
+    reader = participant.reader("rt/a", TYPE, Qos(), on_data=close)
     participant.writer("rt/a", TYPE, Qos()).write(SAMPLE)
-    eventually(lambda: _is_closed(reader))
+    assert closed.wait(5.0)
+    with pytest.raises(DdsError, match="closed"):
+        reader.take()
     with pytest.raises(DdsError, match="closed"):
         participant.writer("rt/b", TYPE, Qos())
-
-
-def _is_closed(reader: Reader) -> bool:
-    try:
-        reader.take()
-    except DdsError as error:
-        return "closed" in str(error)
-    return False
 
 
 def test_a_callback_that_raises_is_logged_and_called_again(
