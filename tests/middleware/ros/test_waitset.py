@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import signal
+import threading
+import time
+
 import pytest
 
 from golem.middleware.dds.base import ENCAPSULATION, Qos, Sample
@@ -104,3 +108,22 @@ def test_waiting_ends_with_the_first_sample(line: Line) -> None:
     line.send(1)
     line.waitset.wait(1e6)
     assert line.waitset.poll() == 1
+
+
+@pytest.mark.timeout(20)
+def test_a_signal_whose_handler_outlasts_the_timeout_does_not_make_the_wait_endless() -> None:
+    before = signal.signal(signal.SIGALRM, lambda *_: time.sleep(0.05))
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.01)
+        WaitSet().wait(0.03)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.timeout(20)
+def test_what_another_thread_sends_ends_the_wait(line: Line) -> None:
+    for number in range(3):
+        threading.Timer(0.02, line.send, [number]).start()
+        while not line.waitset.poll():
+            line.waitset.wait(100.0)
+    assert line.seen == [0, 1, 2]
