@@ -13,5 +13,5 @@ def test_a_signal_sets_the_event_and_is_given_back(number: signal.Signals) -> No
     with interrupted() as stop:
         assert not stop.is_set()
         signal.raise_signal(number)
-        assert stop.is_set()
+        assert stop.wait(10.0)
     assert signal.getsignal(number) is before

@@ -12,9 +12,12 @@ from contextlib import contextmanager
 def interrupted() -> Iterator[threading.Event]:
     """Yield an event that Ctrl-C or SIGTERM sets; to be entered in the main thread. Afterwards they are as before."""
     stop = threading.Event()
-    before = {
-        number: signal.signal(number, lambda *_: stop.set()) for number in (signal.SIGINT, signal.SIGTERM)
-    }
+
+    def interrupt(*_: object) -> None:
+        # By another thread: the handler may run while this one holds the event's lock.
+        threading.Thread(target=stop.set).start()
+
+    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield stop
     finally:
