@@ -27,7 +27,7 @@ states, images = participant.writer("rt/state", "T", Qos(depth=8)), participant.
 wait_for_peer(participant, states, "start it", 10.0)
 wait_for_peer(participant, images, "start it", 10.0)
 print("matched", flush=True)
-longest = 0.0
+longest, sent = 0.0, 0
 end = time.monotonic() + 6.0
 i = 0
 while time.monotonic() < end:
@@ -35,10 +35,11 @@ while time.monotonic() < end:
     states.write(ENCAPSULATION + str(i).encode().ljust(2088))
     if i % 30 == 0:
         images.write(ENCAPSULATION + bytes(921_600))
+        sent += 1
     longest = max(longest, time.monotonic() - start)
     i += 1
     time.sleep(0.002)
-print(json.dumps({"longest": longest, "dropped": states.dropped}))
+print(json.dumps({"longest": longest, "images": sent}))
 """
 READER = """
 import json, sys, time
@@ -111,7 +112,7 @@ def test_a_cut_link_neither_holds_up_the_writer_nor_ends_the_stream(ends: tuple[
         reader.kill()
     assert wrote["longest"] < 0.6, "the writer waited for the link"  # 1 to 2 s with the default send buffer
     assert read["gap"] > 0.7, "the link was not cut"
-    assert read["after"] > 200 and read["images"] > 20
+    assert read["after"] > 200 and read["images"] > wrote["images"] / 4
 
 
 def test_where_multicast_does_not_pass_one_side_has_to_name_the_other_which_may_come_late(
