@@ -56,3 +56,5 @@ def test_every_process_is_told_what_concerns_it() -> None:
     ]
     assert words["safety"] == ["safety", "--limits", "urdf", *where]
     assert words["up"] == ["up", "stand", "--profile", "ideal", *where]
+    strict = commands(LaunchConfig(strict=True, dds=dds))
+    assert strict["safety"] == ["safety", "--limits", "urdf", "--strict", *where]
