@@ -16,12 +16,11 @@ RUNS = Path("runs/legs")
 def run(
     out: Path = RUNS / "seed0",
     seed: int = 0,
-    steps: float = 24e6,
+    steps: float = TrainConfig.steps,
     adversary: Adversary = "learned",
     robots: int = 512,
     threads: int = 2,
     start: Path | None = None,
-    motion_ramp: tuple[float, float] = TrainConfig.motion_ramp,
 ) -> None:
     """Train a leg policy, or go on where a run was stopped.
 
@@ -33,9 +32,8 @@ def run(
         robots: how many are simulated at once.
         threads: of physics and networks.
         start: checkpoint of another run to go on from, under this command's options.
-        motion_ramp: steps between which motions and payloads of the upper body grow from light to their full range.
     """
-    config = TrainConfig(out, seed, steps, robots, threads, adversary, start=start, motion_ramp=motion_ramp)
+    config = TrainConfig(out, seed, steps, robots, threads, adversary, start=start)
     print(run_training(config))
 
 

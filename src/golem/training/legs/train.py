@@ -33,7 +33,7 @@ class TrainConfig:
     Attributes:
         out: folder of checkpoint and curve; a run whose folder holds a checkpoint goes on from it.
         seed: of weights, episodes and noise.
-        steps: actions of all robots together, e.g. 30e6.
+        steps: actions of all robots together, e.g. 36e6.
         robots: how many are simulated at once.
         threads: of the physics and of the networks.
         start: checkpoint of another run whose networks this one begins with.
@@ -47,7 +47,7 @@ class TrainConfig:
 
     out: Path = Path("runs/legs/seed0")
     seed: int = 0
-    steps: float = 30e6
+    steps: float = 36e6
     robots: int = 512
     threads: int = 2
     adversary: Adversary = "learned"
