@@ -17,7 +17,7 @@ from golem.capabilities.legs.observation import Layout
 from golem.errors import ConfigError
 from golem.robots.model.leg_kinematics import leg_poses
 from golem.training.legs.curve import draw_curves
-from golem.training.legs.disturbances import WALKING, Difficulty, Pushes, UpperBodyMotion
+from golem.training.legs.disturbances import ACROSS, WALKING, Difficulty, Pushes, UpperBodyMotion
 from golem.training.legs.env import LAYOUT
 from golem.training.legs.export import export, load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror
@@ -120,12 +120,26 @@ def test_bounds_of_the_difficulty_hold_for_the_adversary() -> None:
     assert moved[0] == moved[3] == 0.0 and 0.05 < moved[1:3].max() < 0.7
 
 
+def test_pushes_come_from_the_sides_of_the_robot_more_often_whichever_way_it_looks() -> None:
+    pushes = Pushes(2000, 50.0, np.random.default_rng(0))
+    facing = np.tile([[0.0, -1.0], [1.0, 0.0]], (2000, 1, 1))  # along the world's y
+    pushes.reset(np.arange(2000), 1.0)
+    ahead = np.zeros(2000)
+    for _ in range(1600):
+        pushes.step(1.0, facing, np.zeros(2000, dtype=bool), 0.005)
+        force = np.linalg.norm(pushes.force, axis=1)
+        ahead = np.where(force > 1.0, np.abs(pushes.force[:, 1]) / np.maximum(force, 1.0), ahead)
+    # All of those straight across and 0.6 / pi of the others are within 0.3 rad of the robot's y axis.
+    assert abs((ahead < np.sin(0.3)).mean() - (ACROSS + (1.0 - ACROSS) * 0.6 / np.pi)) < 0.05
+
+
 def test_pushes_have_the_impulse_they_were_drawn_with_at_most() -> None:
     pushes = Pushes(200, 50.0, np.random.default_rng(0))
+    facing = np.tile([[0.0, -1.0], [1.0, 0.0]], (200, 1, 1))
     pushes.reset(np.arange(200), 1.0)
     impulse, largest = np.zeros((200, 2)), np.zeros(200)
     for _ in range(2000):
-        pushes.step(1.0, np.arange(200) % 2 == 1, 0.005)
+        pushes.step(1.0, facing, np.arange(200) % 2 == 1, 0.005)
         quiet = ~pushes.force.any(axis=1)
         impulse[quiet] = 0.0
         impulse += pushes.force[:, :2] * 0.005

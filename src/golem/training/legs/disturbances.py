@@ -18,7 +18,7 @@ from golem.types import UPPER, Array
 
 NUM_UPPER = UPPER.stop - UPPER.start
 CALM = 0.3
-"""Share of the pushes that robots that walk do not feel at all: who is always being pushed never learns to walk as told."""
+"""Share of the pushes that walking robots do not feel: who is always being pushed never learns to walk as told."""
 ACROSS = 0.4
 """Share of the pushes straight to a side: there the legs are in each other's way, and that takes the most practice."""
 WALKING = 0.6
@@ -128,8 +128,16 @@ class Pushes:
         self._t[where] = 0.0
         self._draw(where, difficulty)
 
-    def step(self, difficulty: float, walking: NDArray[np.bool_], dt: float) -> None:
-        """Advance the time, and draw anew where a push is over; robots that are `walking` (n,) are pushed less."""
+    def step(self, difficulty: float, facing: Array, walking: NDArray[np.bool_], dt: float) -> None:
+        """Advance the time, and draw anew where a push is over.
+
+        Args:
+            difficulty: share of the largest impulse.
+            facing: (n, 2, 2) heading frame of each robot in the world, from `heading_frame`: a push has a direction
+                relative to the robot.
+            walking: (n,) which robots are pushed less.
+            dt: time since the previous step [s].
+        """
         self._t += dt
         over = np.flatnonzero(self._t > self._start + self._duration)
         if len(over):
@@ -137,7 +145,7 @@ class Pushes:
         share = (self._t - self._start) / self._duration
         profile = np.where(self._slow, np.sin(np.pi * np.clip(share, 0.0, 1.0)), 1.0)
         profile = profile * ((share >= 0.0) & (share <= 1.0)) * np.where(walking, self._walking, 1.0)
-        self.force[:, :2] = self._peak * profile[:, None]
+        self.force[:, :2] = np.einsum("nij,nj->ni", facing, self._peak) * profile[:, None]
 
     def _draw(self, where: NDArray[np.intp], difficulty: float) -> None:
         rng, m = self._rng, len(where)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.legs.balance import balance_errors
+from golem.capabilities.legs.balance import balance_errors, heading_frame
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import Gait, GaitConfig
 from golem.capabilities.legs.observation import Layout, Signals, Term
@@ -188,7 +188,7 @@ class LegsEnv:
         self.upper.step(self.difficulty, dt)
         if len(steered):
             self.upper.steer(steered, speeds, self.difficulty, dt)
-        self._pushes.step(self.difficulty.push, self.twist.any(axis=1), dt)
+        self._pushes.step(self.difficulty.push, heading_frame(self.world.truth.R), self.twist.any(axis=1), dt)
         action = np.clip(action, -10.0, 10.0)
         stance = config.gait.stance
         target = STANCE + config.action_scale * action + swing_offset(self.gait.phases, stance, config.swing)
