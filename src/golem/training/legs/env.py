@@ -188,7 +188,8 @@ class LegsEnv:
         self.upper.step(self.difficulty, dt)
         if len(steered):
             self.upper.steer(steered, speeds, self.difficulty, dt)
-        self._pushes.step(self.difficulty.push, heading_frame(self.world.truth.R), self.twist.any(axis=1), dt)
+        walking = np.abs(self.twist).max(axis=1) > 1e-6
+        self._pushes.step(self.difficulty.push, heading_frame(self.world.truth.R), walking, dt)
         action = np.clip(action, -10.0, 10.0)
         stance = config.gait.stance
         target = STANCE + config.action_scale * action + swing_offset(self.gait.phases, stance, config.swing)
