@@ -121,6 +121,11 @@ class LegsEnv:
         self._misplaced: Array = np.zeros(n)
         self.begin()
 
+    @property
+    def walking(self) -> NDArray[np.bool_]:
+        """(n,) which robots are commanded to move."""
+        return np.asarray(np.abs(self.twist).max(axis=1) > 1e-6)
+
     def begin(self) -> None:
         """Start every robot, each somewhere in its episode, so that they do not all end at once."""
         self.restart(np.arange(self.n))
@@ -188,8 +193,7 @@ class LegsEnv:
         self.upper.step(self.difficulty, dt)
         if len(steered):
             self.upper.steer(steered, speeds, self.difficulty, dt)
-        walking = np.abs(self.twist).max(axis=1) > 1e-6
-        self._pushes.step(self.difficulty.push, heading_frame(self.world.truth.R), walking, dt)
+        self._pushes.step(self.difficulty.push, heading_frame(self.world.truth.R), self.walking, dt)
         action = np.clip(action, -10.0, 10.0)
         stance = config.gait.stance
         target = STANCE + config.action_scale * action + swing_offset(self.gait.phases, stance, config.swing)
@@ -226,7 +230,7 @@ class LegsEnv:
     def _advance_gait(self, dt: float) -> None:
         self._balance()
         before = self.gait.phases >= self.config.gait.stance
-        self.gait.step(np.abs(self.twist).max(axis=1) > 1e-6, self._capture, self._misplaced, dt)
+        self.gait.step(self.walking, self._capture, self._misplaced, dt)
         swing = (self.gait.phases >= self.config.gait.stance) & self.gait.stepping[:, None]
         middle = np.abs(self.gait.phases - 0.5 * (1.0 + self.config.gait.stance)) < 0.06
         self.world.shim(before & swing & middle & (self.world.truth.force < 1.0))

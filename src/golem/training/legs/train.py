@@ -255,7 +255,7 @@ class _Meter:
         self.lasted += float(env.age[over].sum() / env.config.episode)
         self.finished += int(over.sum())
         self._seconds += PERIOD * env.n
-        moving = np.abs(env.twist).max(axis=1) > 1e-6
+        moving = env.walking
         error = np.linalg.norm((env.world.truth.heading_velocity() - env.twist)[:, :2], axis=1)
         self._moving.append(float(error[moving].mean()) if moving.any() else 0.0)
         self._standing.append(float(error[~moving].mean()) if (~moving).any() else 0.0)
