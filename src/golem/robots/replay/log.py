@@ -16,6 +16,7 @@ from golem.middleware import public
 from golem.middleware.record.base import BagError, Message
 from golem.middleware.record.reader import Bag
 from golem.middleware.ros import codec, convert, images
+from golem.middleware.ros.goal_info import from_time
 from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.golem_interfaces import HandState as HandMessage
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo as InfoMessage
@@ -127,8 +128,7 @@ class Log:
         self.hands[side].add(self._time(message.log_time), state)
 
     def _picture(self, camera: str, color: Image, depth: Image) -> None:
-        stamp = color.header.stamp
-        t = self._time(stamp.sec * NANO + stamp.nanosec)
+        t = self._time(from_time(color.header.stamp))
         self.pictures[camera].add(t, (images.to_rgb(color), images.to_depth(depth)))
 
 
