@@ -18,11 +18,11 @@ from golem.types import UPPER, Array
 
 NUM_UPPER = UPPER.stop - UPPER.start
 CALM = 0.3
-"""Share of the pushes that walking robots do not feel: who is always being pushed never learns to walk as told."""
+"""Share of the pushes that do not come: who is always being pushed never learns to walk as told and to stand quietly."""
 ACROSS = 0.4
 """Share of the pushes straight to a side: there the legs are in each other's way, and that takes the most practice."""
 WALKING = 0.6
-"""What they feel of the others: the whole of it is more than they can take on one leg, and teaches them to
+"""What walking robots feel of the others: the whole of it is more than they can take on one leg, and teaches them to
 keep both on the ground."""
 TOP_SPEED = 2.5
 """Speed of a target at full difficulty [rad/s]; the safety gate lets 3 pass."""
@@ -120,7 +120,6 @@ class Pushes:
         self._start: Array = np.full(n, np.inf)
         self._duration: Array = np.ones(n)
         self._slow: NDArray[np.bool_] = np.zeros(n, dtype=bool)
-        self._walking: Array = np.ones(n)
         self._t: Array = np.zeros(n)
 
     def reset(self, where: NDArray[np.intp], difficulty: float) -> None:
@@ -144,7 +143,7 @@ class Pushes:
             self._draw(over, difficulty)
         share = (self._t - self._start) / self._duration
         profile = np.where(self._slow, np.sin(np.pi * np.clip(share, 0.0, 1.0)), 1.0)
-        profile = profile * ((share >= 0.0) & (share <= 1.0)) * np.where(walking, self._walking, 1.0)
+        profile = profile * ((share >= 0.0) & (share <= 1.0)) * np.where(walking, WALKING, 1.0)
         self.force[:, :2] = np.einsum("nij,nj->ni", facing, self._peak) * profile[:, None]
 
     def _draw(self, where: NDArray[np.intp], difficulty: float) -> None:
@@ -153,12 +152,11 @@ class Pushes:
         duration = np.where(slow, rng.uniform(0.5, 1.2, m), rng.uniform(0.1, 0.4, m))
         # Mostly near the edge of what the robot is known to take: easy pushes teach little.
         impulse = self._largest * difficulty * np.sqrt(rng.random(m))
-        force = impulse / duration * np.where(slow, 0.5 * np.pi, 1.0)
+        force = impulse / duration * np.where(slow, 0.5 * np.pi, 1.0) * (rng.random(m) >= CALM)
         across = rng.choice([-0.5, 0.5], m) * np.pi + rng.uniform(-0.3, 0.3, m)
         angle = np.where(rng.random(m) < ACROSS, across, rng.uniform(-np.pi, np.pi, m))
         self._peak[where] = force[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         self._duration[where] = duration
         self._slow[where] = slow
         self._start[where] = self._t[where] + rng.uniform(1.5, 6.0, m)
-        self._walking[where] = WALKING * (rng.random(m) >= CALM)
         self.on_torso[where] = np.where(slow, rng.random(m) < 0.2, rng.random(m) < 0.8)

@@ -49,6 +49,7 @@ class Weights:
         stand_posture: deviation from the stance squared, standing.
         stand_still: base velocity squared, standing.
         stand_upright: as `upright`, standing: without it the trunk leans to bring its weight over the soles.
+        stand_square: the pelvis square to the feet, exp(-yaw^2 / 0.02^2), standing: else it turns slowly above them.
         stand_center, stand_exact: capture point over the middle of the feet, exp(-error^2 / w^2), standing; w is 3 cm,
             and 8 mm: what is off by little shall come back as quickly.
         stand_step: the gait clock runs although no velocity is commanded.
@@ -77,9 +78,10 @@ class Weights:
     slip: float = -1.5
     feet: float = -4.0
     impact: float = -0.002
-    stand_posture: float = -0.5
+    stand_posture: float = -2.0
     stand_still: float = -2.0
-    stand_upright: float = -20.0
+    stand_upright: float = -40.0
+    stand_square: float = 0.4
     stand_center: float = 0.5
     stand_exact: float = 0.4
     stand_step: float = -0.3
@@ -164,6 +166,7 @@ class Rewards:
             "stand_posture": np.square(legs - STANCE).sum(axis=1) * rest,
             "stand_still": (np.square(truth.velocity[:, :2]).sum(axis=1) + np.square(now[:, 2])) * rest,
             "stand_upright": lean * rest,
+            "stand_square": np.exp(-np.square(0.5 * (legs[:, 0] + legs[:, 6]) / 0.02)) * rest,
             "stand_center": np.exp(-off / 0.03**2) * rest,
             "stand_exact": np.exp(-off / 0.008**2) * rest,
             "stand_step": still * stepping,
