@@ -18,7 +18,7 @@ from golem.types import UPPER, Array
 
 NUM_UPPER = UPPER.stop - UPPER.start
 CALM = 0.3
-"""Share of the pushes that do not come: who is always being pushed never learns to walk as told and to stand quietly."""
+"""Share of the pushes that do not come: who is always pushed learns neither to walk as told nor to stand quietly."""
 ACROSS = 0.4
 """Share of the pushes straight to a side: there the legs are in each other's way, and that takes the most practice."""
 WALKING = 0.6
