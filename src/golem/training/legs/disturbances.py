@@ -17,12 +17,12 @@ from golem.robots.model.limits import load_limits
 from golem.types import UPPER, Array
 
 NUM_UPPER = UPPER.stop - UPPER.start
-CALM = 0.3
-"""Share of the pushes that do not come: who is always pushed learns neither to walk as told nor to stand quietly."""
+GENTLE = 0.3
+"""Fastest motion of the upper body in a calm episode [rad/s]."""
 ACROSS = 0.4
 """Share of the pushes straight to a side: there the legs are in each other's way, and that takes the most practice."""
 WALKING = 0.6
-"""What walking robots feel of the others: the whole of it is more than they can take on one leg, and teaches them to
+"""What walking robots feel of a push: the whole of it is more than they can take on one leg, and teaches them to
 keep both on the ground."""
 TOP_SPEED = 2.5
 """Speed of a target at full difficulty [rad/s]; the safety gate lets 3 pass."""
@@ -66,9 +66,11 @@ class UpperBodyMotion:
         self._speed: Array = np.zeros((n, 1))
         self._left: Array = np.zeros(n)
         self._centre: Array = self.target.copy()
+        self._calm: NDArray[np.bool_] = np.zeros(n, dtype=bool)
 
-    def reset(self, where: NDArray[np.intp], amplitude: float) -> None:
-        """Start the robots `where` at a posture of their own, still."""
+    def reset(self, where: NDArray[np.intp], amplitude: float, calm: NDArray[np.bool_]) -> None:
+        """Start the robots `where` at a posture of their own, still; those that are `calm` (m,) move gently."""
+        self._calm[where] = calm
         self._centre[where] = self._home[self._rng.integers(len(self._home), size=len(where))]
         self.target[where] = self._draw(where, amplitude)
         self._goal[where] = self.target[where]
@@ -80,15 +82,16 @@ class UpperBodyMotion:
         due = np.flatnonzero(self._left <= 0.0)
         if len(due):
             self._goal[due] = self._draw(due, difficulty.amplitude)
-            fastest = max(TOP_SPEED * difficulty.speed, 0.3)
-            self._speed[due, 0] = self._rng.uniform(0.2, fastest, len(due))
+            fastest = np.where(self._calm[due], GENTLE, max(TOP_SPEED * difficulty.speed, 0.3))
+            self._speed[due, 0] = self._rng.uniform(0.2, fastest)
             self._left[due] = self._rng.uniform(0.4, 4.0, len(due))
         reach = self._speed * dt
         self.target = self.target + np.clip(self._goal - self.target, -reach, reach)
 
     def steer(self, where: NDArray[np.intp], action: Array, difficulty: Difficulty, dt: float) -> None:
         """Let the learned adversary move the targets of `where`: `action` (m, 15) are speeds in units of the bound."""
-        speed = TOP_SPEED * max(difficulty.speed, 0.2) * np.clip(action, -1.0, 1.0)
+        fastest = np.where(self._calm[where], GENTLE, TOP_SPEED * max(difficulty.speed, 0.2))
+        speed = fastest[:, None] * np.clip(action, -1.0, 1.0)
         lower = self._centre[where] + difficulty.amplitude * (self._lower - self._centre[where])
         upper = self._centre[where] + difficulty.amplitude * (self._upper - self._centre[where])
         self.target[where] = np.clip(self.target[where] + speed * dt, lower, upper)
@@ -121,9 +124,11 @@ class Pushes:
         self._duration: Array = np.ones(n)
         self._slow: NDArray[np.bool_] = np.zeros(n, dtype=bool)
         self._t: Array = np.zeros(n)
+        self._calm: NDArray[np.bool_] = np.zeros(n, dtype=bool)
 
-    def reset(self, where: NDArray[np.intp], difficulty: float) -> None:
-        """Leave the robots `where` alone for a while."""
+    def reset(self, where: NDArray[np.intp], difficulty: float, calm: NDArray[np.bool_]) -> None:
+        """Leave the robots `where` alone for a while, and those that are `calm` (m,) for the whole episode."""
+        self._calm[where] = calm
         self._t[where] = 0.0
         self._draw(where, difficulty)
 
@@ -152,7 +157,7 @@ class Pushes:
         duration = np.where(slow, rng.uniform(0.5, 1.2, m), rng.uniform(0.1, 0.4, m))
         # Mostly near the edge of what the robot is known to take: easy pushes teach little.
         impulse = self._largest * difficulty * np.sqrt(rng.random(m))
-        force = impulse / duration * np.where(slow, 0.5 * np.pi, 1.0) * (rng.random(m) >= CALM)
+        force = impulse / duration * np.where(slow, 0.5 * np.pi, 1.0) * ~self._calm[where]
         across = rng.choice([-0.5, 0.5], m) * np.pi + rng.uniform(-0.3, 0.3, m)
         angle = np.where(rng.random(m) < ACROSS, across, rng.uniform(-np.pi, np.pi, m))
         self._peak[where] = force[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)

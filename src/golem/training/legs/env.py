@@ -52,6 +52,8 @@ class EnvConfig:
         episode: length of an episode [s].
         action_scale: joint target per unit of action [rad].
         swing: amplitude of the feed-forward swing [rad].
+        calm: share of the episodes without pushes and with slow arms: who is always disturbed learns neither to walk as
+            told nor to stand quietly.
         impulse: largest push at full difficulty [N s].
         gait: clock and gate.
         world: randomisation.
@@ -66,6 +68,7 @@ class EnvConfig:
     episode: float = 20.0
     action_scale: float = 0.25
     swing: float = 0.28
+    calm: float = 0.3
     impulse: float = 90.0
     gait: GaitConfig = field(default_factory=lambda: GaitConfig(period=0.64))
     world: WorldConfig = field(default_factory=WorldConfig)
@@ -135,9 +138,10 @@ class LegsEnv:
         """Start the robots `where` anew."""
         if not len(where):
             return
-        self.upper.reset(where, self.difficulty.amplitude)
+        calm = self._rng.random(len(where)) < self.config.calm
+        self.upper.reset(where, self.difficulty.amplitude, calm)
         self.world.reset(where, self.upper.target[where], self.difficulty.payload)
-        self._pushes.reset(where, self.difficulty.push)
+        self._pushes.reset(where, self.difficulty.push, calm)
         mask = np.zeros(self.n, dtype=bool)
         mask[where] = True
         self.gait.reset(mask)
