@@ -17,7 +17,7 @@ from golem.capabilities.legs.observation import Layout
 from golem.errors import ConfigError
 from golem.robots.model.leg_kinematics import leg_poses
 from golem.training.legs.curve import draw_curves
-from golem.training.legs.disturbances import ACROSS, WALKING, Difficulty, Pushes, UpperBodyMotion
+from golem.training.legs.disturbances import ACROSS, GENTLE, WALKING, Difficulty, Pushes, UpperBodyMotion
 from golem.training.legs.env import LAYOUT
 from golem.training.legs.export import export, load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror
@@ -111,7 +111,7 @@ def test_disturbances_grow_with_the_steps(adversary: Adversary, tmp_path: Path) 
 def test_bounds_of_the_difficulty_hold_for_the_adversary() -> None:
     rng = np.random.default_rng(0)
     motion = UpperBodyMotion(4, rng)
-    motion.reset(np.arange(4), 0.0)
+    motion.reset(np.arange(4), 0.0, np.array([False, False, True, False]))
     start = motion.target.copy()
     slow = Difficulty(amplitude=0.1, speed=0.2)
     for _ in range(500):
@@ -120,10 +120,29 @@ def test_bounds_of_the_difficulty_hold_for_the_adversary() -> None:
     assert moved[0] == moved[3] == 0.0 and 0.05 < moved[1:3].max() < 0.7
 
 
+def test_a_calm_episode_has_no_push_and_slow_arms() -> None:
+    rng, everyone = np.random.default_rng(0), np.arange(40)
+    calm = everyone % 2 == 0
+    pushes, motion = Pushes(40, 50.0, rng), UpperBodyMotion(40, rng)
+    pushes.reset(everyone, 1.0, calm)
+    motion.reset(everyone, 1.0, calm)
+    hard = Difficulty(amplitude=1.0, speed=1.0, push=1.0)
+    facing, pushed, fastest = np.tile(np.eye(2), (40, 1, 1)), np.zeros(40, dtype=bool), np.zeros(40)
+    for _ in range(500):
+        before = motion.target.copy()
+        motion.step(hard, 0.02)
+        motion.steer(everyone[:20], np.full((20, 15), 9.0), hard, 0.02)
+        pushes.step(1.0, facing, np.zeros(40, dtype=bool), 0.02)
+        pushed |= pushes.force.any(axis=1)
+        fastest = np.maximum(fastest, np.abs(motion.target - before).max(axis=1) / 0.02)
+    assert not pushed[calm].any() and pushed[~calm].all()
+    assert fastest[calm].max() < 2.01 * GENTLE < fastest[~calm].min()
+
+
 def test_pushes_come_from_the_sides_of_the_robot_more_often_whichever_way_it_looks() -> None:
     pushes = Pushes(2000, 50.0, np.random.default_rng(0))
     facing = np.tile([[0.0, -1.0], [1.0, 0.0]], (2000, 1, 1))  # along the world's y
-    pushes.reset(np.arange(2000), 1.0)
+    pushes.reset(np.arange(2000), 1.0, np.zeros(2000, dtype=bool))
     ahead = np.zeros(2000)
     for _ in range(1600):
         pushes.step(1.0, facing, np.zeros(2000, dtype=bool), 0.005)
@@ -136,7 +155,7 @@ def test_pushes_come_from_the_sides_of_the_robot_more_often_whichever_way_it_loo
 def test_pushes_have_the_impulse_they_were_drawn_with_at_most() -> None:
     pushes = Pushes(200, 50.0, np.random.default_rng(0))
     facing = np.tile([[0.0, -1.0], [1.0, 0.0]], (200, 1, 1))
-    pushes.reset(np.arange(200), 1.0)
+    pushes.reset(np.arange(200), 1.0, np.zeros(200, dtype=bool))
     impulse, largest = np.zeros((200, 2)), np.zeros(200)
     for _ in range(2000):
         pushes.step(1.0, facing, np.arange(200) % 2 == 1, 0.005)
