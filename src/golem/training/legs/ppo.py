@@ -165,6 +165,11 @@ class Ppo:
         stats["rate"] = self._optimiser.param_groups[0]["lr"]
         return stats
 
+    @torch.no_grad()
+    def bound_noise(self, most: float) -> None:
+        """Let the standard deviation of no action exceed `most`."""
+        self.actor.log_std.clamp_(max=float(np.log(most)))
+
     def state(self) -> dict[str, Any]:
         """Return everything that a checkpoint needs."""
         return {

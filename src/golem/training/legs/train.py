@@ -43,6 +43,8 @@ class TrainConfig:
         push_ramp, motion_ramp: steps before which pushes, and motions and payloads of the upper body, are light, and
             after which they have their full range. They grow whether or not the robot survives: tied to survival, as
             ALMI has it, the pushes went up and down below half, and beside full pushes the motions never grew.
+        noise_ramp, noise: steps between which the bound of the legs' exploration noise falls, and the bound before and
+            after. How to stand to the millimetre cannot be learned while the joints tremble by 0.1 rad.
     """
 
     out: Path = Path("runs/legs/seed0")
@@ -55,6 +57,8 @@ class TrainConfig:
     start: Path | None = None
     push_ramp: tuple[float, float] = (1e6, 10e6)
     motion_ramp: tuple[float, float] = (2e6, 12e6)
+    noise_ramp: tuple[float, float] = (20e6, 28e6)
+    noise: tuple[float, float] = (0.45, 0.2)
     env: EnvConfig = field(default_factory=EnvConfig)
     ppo: PpoConfig = field(default_factory=PpoConfig)
 
@@ -118,6 +122,8 @@ class _Run:
         began, config, env = time.process_time(), self.config, self.env
         learned = config.adversary == "learned" and self.steps >= config.learned_from
         steered: Rows = self._steered if learned else self._steered[:0]
+        if self.steps >= config.noise_ramp[0]:
+            self.legs.bound_noise(float(np.interp(self.steps, config.noise_ramp, config.noise)))
         meter = _Meter()
         for _ in range(config.ppo.steps):
             action = self.legs.act(self._obs, self._known)
