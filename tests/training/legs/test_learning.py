@@ -108,6 +108,15 @@ def test_disturbances_grow_with_the_steps(adversary: Adversary, tmp_path: Path) 
     assert motion == ([0.05, 0.05, 0.525] + [1.0] * 7 if adversary == "motions" else [0.0] * 10)
 
 
+def test_the_noise_is_bounded_late_in_a_run(tmp_path: Path) -> None:
+    train(small(tmp_path, updates=10, noise_ramp=(192.0, 576.0), noise=(0.7, 0.1)))
+    with (tmp_path / CURVE).open() as file:
+        std = [float(row["std"]) for row in csv.DictReader(file)]
+    # The first update is free, and a bound holds from the next update on.
+    assert std[0] == pytest.approx(0.8, rel=0.05)
+    assert std[1:] == pytest.approx([0.7, 0.4] + [0.1] * 7, rel=0.05)
+
+
 def test_bounds_of_the_difficulty_hold_for_the_adversary() -> None:
     rng = np.random.default_rng(0)
     motion = UpperBodyMotion(4, rng)
