@@ -68,7 +68,7 @@ class EnvConfig:
     episode: float = 20.0
     action_scale: float = 0.25
     swing: float = 0.28
-    calm: float = 0.3
+    calm: float = 0.4
     impulse: float = 90.0
     gait: GaitConfig = field(default_factory=lambda: GaitConfig(period=0.64))
     world: WorldConfig = field(default_factory=WorldConfig)
