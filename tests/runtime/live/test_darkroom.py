@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
+import signal
+import time
+
 import numpy as np
+import pytest
 
 from golem.middleware import public, topics
 from golem.middleware.bus import Bus
+from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.node import DdsNode
 from golem.middleware.topics import Exposure
 from golem.robots.base import Recallable
 from golem.runtime.assembly import build, build_robot
-from golem.runtime.live.darkroom import expose, image_topics
+from golem.runtime.executor import TICK
+from golem.runtime.live import darkroom as live_darkroom
+from golem.runtime.live.darkroom import Darkroom, expose, image_topics
 from golem.runtime.live.robot_out import CameraOut
 from golem.runtime.live.surface import Surface
 from golem.stack import Stack
@@ -50,3 +59,44 @@ def test_nothing_is_rendered_unless_somebody_listens() -> None:
     assert message is not None and (message.header.stamp.sec, message.header.stamp.nanosec) == (1, 500000000)
     assert message.header.frame_id == row.frame and bytes(message.data[:2]) == b"\xff\xd8"
     robot.close()
+
+
+@pytest.mark.slow
+def test_time_waits_for_a_late_image_and_once_for_one_that_does_not_come(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("cyclonedds")
+    monkeypatch.setattr(live_darkroom, "PATIENCE", 0.5)
+    stack = Stack(profile="ideal")
+    robot = build_robot(stack, 0)
+    assert isinstance(robot, Recallable)
+    darkroom = Darkroom(stack, 0, robot, DdsConfig(domain=20 + os.getpid() % 181))
+    (process,) = multiprocessing.active_children()
+    assert process.pid is not None
+
+    def longest(seconds: float, begin: float) -> float:
+        """Return the longest time that a step took [s] in `seconds` of the robot's time."""
+        steps = []
+        for k in range(round(seconds / TICK)):
+            before = time.monotonic()
+            darkroom.step(begin + k * TICK)
+            steps.append(time.monotonic() - before)
+        return max(steps)
+
+    try:
+        darkroom.wait(lambda: False)
+        darkroom.step(0.0)
+        os.kill(process.pid, signal.SIGSTOP)
+        # Only once the image is later than the next one of its camera, for as long as patience lasts, and not again.
+        assert longest(0.06, 0.0) < 0.4
+        assert 0.5 <= longest(0.1, 0.06) < 5.0
+        assert longest(0.2, 0.16) < 0.4
+        os.kill(process.pid, signal.SIGCONT)
+        begin = time.monotonic()
+        longest(0.1, 0.36)
+        assert time.monotonic() - begin < 30.0
+    finally:
+        os.kill(process.pid, signal.SIGCONT)
+        darkroom.close()
+        robot.close()
+    assert not process.is_alive()
