@@ -40,8 +40,8 @@ class GoToConfig:
         settle: time without a step before that, in which the body comes to rest and old poses arrive [s].
     """
 
-    speed: tuple[float, float, float] = (0.5, 0.25, 0.5)
-    gain: float = 1.0
+    speed: tuple[float, float, float] = (0.6, 0.3, 0.6)
+    gain: float = 1.2
     face: float = 1.0
     pulse: float = 0.12
     creep: float = 0.025
