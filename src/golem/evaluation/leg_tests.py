@@ -11,6 +11,7 @@ import itertools
 import math
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -63,22 +64,16 @@ SAMPLES = (8, 12, 16, 24, 32)
 
 def quiet(subject: Subject, seed: int, index: int) -> Figures:
     """Stand still for a minute: base range, sway, steps, margin."""
-    episode = subject.episode(seed, index)
-    try:
+    with closing(subject.episode(seed, index)) as episode:
         return _minute(episode, CALM)
-    finally:
-        episode.close()
 
 
 def arms(subject: Subject, seed: int, index: int) -> Figures:
     """Stand for a minute while both arms sweep their workspace with a kilogram in each hand."""
-    episode = subject.episode(seed, index, payload=PAYLOAD)
-    try:
+    with closing(subject.episode(seed, index, payload=PAYLOAD)) as episode:
         draw = subject.draw("legs/arms", seed, index)
         episode.start(Exercise(ArmMotion(draw.rng("arms"), WIDE_AREA)))
         return _minute(episode, SETTLE)
-    finally:
-        episode.close()
 
 
 def _minute(episode: Episode, settle: float) -> Figures:
@@ -91,8 +86,7 @@ def _minute(episode: Episode, settle: float) -> Figures:
 
 def tracking(subject: Subject, seed: int, index: int) -> Figures:
     """Walk with one twist of the declared envelope: error of the mean velocity over the last seconds, per axis."""
-    episode = subject.episode(seed, index)
-    try:
+    with closing(subject.episode(seed, index)) as episode:
         twist = command(
             episode.running.envelope, subject.draw("legs/tracking", seed, index).rng("twist"), index
         )
@@ -107,16 +101,13 @@ def tracking(subject: Subject, seed: int, index: int) -> Figures:
             figures |= dict(zip(("error_vx", "error_vy", "error_wz"), error.tolist(), strict=True))
             figures["error_speed"] = float(np.hypot(error[0], error[1]))
         return figures
-    finally:
-        episode.close()
 
 
 def endurance(subject: Subject, seed: int, index: int) -> Figures:
     """Walk at random for a minute, arms moving, shoved with up to 30 N s every few seconds."""
     draw = subject.draw("legs/endurance", seed, index)
     rng, shoves = draw.rng("twists"), draw.rng("shoves")
-    episode = subject.episode(seed, index)
-    try:
+    with closing(subject.episode(seed, index)) as episode:
         envelope = episode.running.envelope
         script = [(0.0, Twist())]
         while script[-1][0] < MINUTE:
@@ -135,8 +126,6 @@ def endurance(subject: Subject, seed: int, index: int) -> Figures:
                 episode.push(shove(DIRECTIONS[shoves.integers(8)], shoves.uniform(0.0, MAX_SHOVE)))
                 count += 1
         return {"seconds": episode.t - start, "pushes": float(count)} | _lost(episode)
-    finally:
-        episode.close()
 
 
 def slope(subject: Subject, seed: int, index: int) -> Figures:
@@ -157,8 +146,7 @@ def stopping(subject: Subject, seed: int, index: int) -> Figures:
     goal = PlanarPose(
         distance * math.cos(bearing), distance * math.sin(bearing), rng.uniform(-GOAL_TURN, GOAL_TURN)
     )
-    episode = subject.episode(seed, index)
-    try:
+    with closing(subject.episode(seed, index)) as episode:
         episode.locate(
             SimulatedOdometry(episode.running.bus, episode.robot, "estimator", draw.rng("odometry"))
         )
@@ -183,8 +171,6 @@ def stopping(subject: Subject, seed: int, index: int) -> Figures:
             "error_yaw": left.yaw,
             "seconds": result.timings.get("walk", GOAL_TIMEOUT),
         }
-    finally:
-        episode.close()
 
 
 def plans(subject: Subject, seed: int, index: int) -> Figures:
@@ -196,8 +182,7 @@ def plans(subject: Subject, seed: int, index: int) -> Figures:
     samples = SAMPLES[index % len(SAMPLES)]
     stack = legs_stack("mpc", subject.profile, robot=subject.robot)
     stack = replace(stack, lower_body=Choice("mpc", {"planner": {"samples": samples}}))
-    episode = Episode(stack, episode_seed(seed, index))
-    try:
+    with closing(Episode(stack, episode_seed(seed, index))) as episode:
         with (
             stopwatch(MPC, "plan", time.perf_counter) as wall,
             stopwatch(MPC, "plan", time.process_time) as cpu,
@@ -209,8 +194,6 @@ def plans(subject: Subject, seed: int, index: int) -> Figures:
             "plans_per_second": 1.0 / float(np.median(wall)),
             "cpu_per_plan": float(np.median(cpu)),
         } | _lost(episode)
-    finally:
-        episode.close()
 
 
 def command(envelope: Envelope, rng: np.random.Generator, index: int) -> Twist:
@@ -226,16 +209,13 @@ def _random(envelope: Envelope, rng: np.random.Generator, still: bool) -> Twist:
 
 
 def _rough(subject: Subject, seed: int, index: int, world: str) -> Figures:
-    episode = subject.episode(seed, index, world=world)
-    try:
+    with closing(subject.episode(seed, index, world=world)) as episode:
         episode.stand(SETTLE)
         episode.start(Exercise(twist=lambda t: ROUGH))
         episode.run(ROUGH_TIME)
         path = episode.recorder.trace().base
         climbed, moved = path[-1, 2] - path[0, 2], np.hypot(*(path[-1] - path[0])[:2])
         return {"distance": float(moved), "climbed": float(climbed)} | _lost(episode)
-    finally:
-        episode.close()
 
 
 def _standing(episode: Episode, start: float) -> Figures:

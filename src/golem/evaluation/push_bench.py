@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
@@ -116,29 +117,24 @@ class Level:
         standing = self.phase == "standing"
         exercise = Exercise(ArmMotion(draw.rng("arms")))
         try:
-            episode = self.subject.episode(self.seed, index)
+            with closing(self.subject.episode(self.seed, index)) as episode:
+                episode.start(exercise)
+                episode.stand(settle)
+                if not standing:
+                    exercise.twist = lambda t: WALK
+                    episode.run(settle)
+                    air = [self.phase != "left_swing", self.phase != "right_swing"]
+                    episode.run(2.0, until=lambda: episode.recorder.contact.tolist() == air)
+                    if not episode.over and episode.recorder.contact.tolist() != air:
+                        return "no step"
+                    episode.run(late)
+                push = (shove if self.kind == "shove" else rod)(self.direction, self.level)
+                episode.push(push)
+                episode.run(push.duration)
+                episode.run(PATIENCE, until=lambda: standing and episode.recorder.quiet >= QUIET)
+                return None if episode.loss is None else episode.loss.stage
         except ModuleFault:
             return FAULT
-        try:
-            episode.start(exercise)
-            episode.stand(settle)
-            if not standing:
-                exercise.twist = lambda t: WALK
-                episode.run(settle)
-                air = [self.phase != "left_swing", self.phase != "right_swing"]
-                episode.run(2.0, until=lambda: episode.recorder.contact.tolist() == air)
-                if not episode.over and episode.recorder.contact.tolist() != air:
-                    return "no step"
-                episode.run(late)
-            push = (shove if self.kind == "shove" else rod)(self.direction, self.level)
-            episode.push(push)
-            episode.run(push.duration)
-            episode.run(PATIENCE, until=lambda: standing and episode.recorder.quiet >= QUIET)
-            return None if episode.loss is None else episode.loss.stage
-        except ModuleFault:
-            return FAULT
-        finally:
-            episode.close()
 
 
 def allowed(n: int) -> int:

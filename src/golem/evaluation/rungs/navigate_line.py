@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -62,8 +63,7 @@ class NavigateLine:
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
         stack = legs_stack(spec.method, spec.profile, spec.overrides)
-        episode = Episode(stack, episode_seed(spec.seed, spec.index))
-        try:
+        with closing(Episode(stack, episode_seed(spec.seed, spec.index))) as episode:
             if episode.running.envelope.vx[1] <= 0.0:
                 why = "It does not walk: the greatest forward speed in its envelope is zero."
                 return TrialOutcome(False, NO_WALKER, f"lower_body: {spec.method}", why)
@@ -86,8 +86,6 @@ class NavigateLine:
             outcome = judge(episode, spec.method)
             shown = not outcome.success or spec.index == 0
             return replace(outcome, picture=strip.picture() if shown else None)
-        finally:
-            episode.close()
 
 
 def judge(episode: Episode, method: str) -> TrialOutcome:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -60,8 +61,7 @@ class PushRung:
         """Run one trial; see `Rung`."""
         stack = legs_stack(spec.method, spec.profile, spec.overrides)
         push, settle = draw(spec.rng("push"))
-        episode = Episode(stack, episode_seed(spec.seed, spec.index))
-        try:
+        with closing(Episode(stack, episode_seed(spec.seed, spec.index))) as episode:
             episode.start(Exercise(ArmMotion(spec.rng("arms"))))
             strip = Strip(episode.robot, push.bearing)
             episode.stand(settle)
@@ -78,8 +78,6 @@ class PushRung:
             outcome = judge(trace, start, push, episode.loss, spec.method)
             shown = not outcome.success or spec.index == 0
             return replace(outcome, picture=strip.picture() if shown else None)
-        finally:
-            episode.close()
 
 
 def draw(rng: np.random.Generator) -> tuple[Push, float]:
