@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from tests.middleware.ros.conftest import domain_id
 
 from golem.middleware import public, topics
 from golem.middleware.bus import Bus
@@ -70,7 +71,7 @@ def test_time_waits_for_a_late_image_and_once_for_one_that_does_not_come(
     stack = Stack(profile="ideal")
     robot = build_robot(stack, 0)
     assert isinstance(robot, Recallable)
-    darkroom = Darkroom(stack, 0, robot, DdsConfig(domain=20 + os.getpid() % 181))
+    darkroom = Darkroom(stack, 0, robot, DdsConfig(domain=domain_id()))
     (process,) = multiprocessing.active_children()
     assert process.pid is not None
 
