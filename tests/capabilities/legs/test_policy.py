@@ -59,7 +59,7 @@ def test_targets_are_posture_and_scaled_action_and_swing(tmp_path: Path) -> None
     action = np.full(12, 0.1)
     scale = np.tile([1, 1, 1, 2, 1, 1], 2)
     q0 = np.tile([0, -0.4, 0, 0.8, -0.4, 0], 2)
-    swing = swing_offset(np.array([0.3, 0.8]), 0.6, 0.3)
+    swing = swing_offset(np.array([0.3, 0.8]), 0.7, 0.6, 0.3, np.full(12, 0.02))
     np.testing.assert_allclose(command.q, q0 + scale * action + swing, rtol=1e-6)
     np.testing.assert_array_equal(command.tau, np.zeros(12))
     np.testing.assert_array_equal(command.kp, 100.0)

@@ -59,6 +59,7 @@ class Policy:
         self._q0 = description.q0()[LEGS]
         self._scale = description.action_scale()
         self._kp, self._kd = description.gains()
+        self._lag = self._kd / np.maximum(self._kp, 1e-6)
         self._action: Array = np.zeros(JOINTS)
 
     def reset(self, state: LowState) -> None:
@@ -84,6 +85,8 @@ class Policy:
             raise BadAction(f"The network's action is not finite{cause}.")
         clip = self.description.action.clip
         self._action = np.clip(action, -clip, clip)
-        swing = swing_offset(motion.phase, self.gait.stance, self.description.action.swing)
+        swing = swing_offset(
+            motion.phase, self.gait.period, self.gait.stance, self.description.action.swing, self._lag
+        )
         q = self._q0 + self._scale * self._action + swing
         return LegCommand(q, self._kp.copy(), self._kd.copy(), np.zeros(JOINTS))
