@@ -15,7 +15,7 @@ from golem.capabilities.legs.swing import swing_offset
 from golem.hardware.safety.base import SafetyLimits
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.training.legs.disturbances import Difficulty, Pushes, UpperBodyMotion
-from golem.training.legs.model import FEET_APART, STANCE, STEP
+from golem.training.legs.model import FEET_APART, KD, KP, STANCE, STEP
 from golem.training.legs.rewards import Rewards, Weights
 from golem.training.legs.world import Rows, World, WorldConfig
 from golem.types import LEGS, Array
@@ -199,8 +199,9 @@ class LegsEnv:
             self.upper.steer(steered, speeds, self.difficulty, dt)
         self._pushes.step(self.difficulty.push, heading_frame(self.world.truth.R), self.walking, dt)
         action = np.clip(action, -10.0, 10.0)
-        stance = config.gait.stance
-        target = STANCE + config.action_scale * action + swing_offset(self.gait.phases, stance, config.swing)
+        gait = config.gait
+        swing = swing_offset(self.gait.phases, gait.period, gait.stance, config.swing, KD / KP)
+        target = STANCE + config.action_scale * action + swing
         target = np.clip(target, self._limits.lower[LEGS], self._limits.upper[LEGS])
         self.world.step(
             target, self.upper.target, self._pushes.force, self._pushes.on_torso, round(dt / STEP)

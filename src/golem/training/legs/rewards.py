@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.capabilities.legs.gait import Gait, GaitConfig
+from golem.capabilities.legs.swing import rise
 from golem.hardware.safety.base import SafetyLimits
 from golem.training.legs.model import STANCE, STAND_HEIGHT
 from golem.training.legs.world import Rows, Truth
@@ -20,6 +21,8 @@ _YAW_ROLL = np.array([0, 2, 6, 8])
 _ANKLES = np.array([4, 5, 10, 11])
 CLEARANCE = 0.08
 """Height of the sole in the middle of its swing [m]."""
+LOW = 0.02
+"""Height of a sole that is about to land, or has just lifted off [m]."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +33,8 @@ class Weights:
         linear, angular: mean velocity as commanded, exp(-error^2 / 0.03).
         linear_now, angular_now: present velocity as commanded, exp(-error^2 / 0.25).
         alive: not fallen.
-        contact: feet on the ground when their phase says so, and off it when not. With 0.4, and 0.4 of `slip`, the
-            robot dragged the trailing foot, with 100 to 200 N on it, when it walked sideways.
+        contact: feet on the ground in their stance, and off it in the middle two thirds of their swing. With 0.4, and
+            0.4 of `slip`, the robot dragged the trailing foot, with 100 to 200 N on it, when it walked sideways.
         swing_height: error of the height of a swinging sole [m^2].
         flat: tilt of the soles to the ground, 1 - cos. A foot that lands on an edge slaps down faster than the gate
             allows, and one that rolls over its heel under load misleads the odometry: when that was not punished, the
@@ -46,6 +49,7 @@ class Weights:
         fast: how much faster a joint is than 70 % of what stops the robot [rad/s].
         hips: yaw and roll of the hips squared [rad^2].
         slip: velocity of loaded soles squared.
+        landing: velocity of free soles less than `LOW` above the ground squared: who comes down fast slides and slaps.
         feet: misplacement of the feet beyond 4 cm while both are on the ground [m].
         impact: foot force above 800 N [N].
         stand_posture: deviation from the stance squared, standing.
@@ -64,7 +68,7 @@ class Weights:
     alive: float = 0.5
     contact: float = 1.0
     swing_height: float = -60.0
-    flat: float = -30.0
+    flat: float = -50.0
     upright: float = -3.0
     height: float = -40.0
     bounce: float = -1.0
@@ -78,6 +82,7 @@ class Weights:
     fast: float = -2.0
     hips: float = -2.0
     slip: float = -1.5
+    landing: float = -2.0
     feet: float = -4.0
     impact: float = -0.002
     stand_posture: float = -2.0
@@ -131,7 +136,8 @@ class Rewards:
         stance = ~stepping[:, None] | (phase < gait.config.stance)
         loaded = truth.force > 5.0
         swing = np.clip((phase - gait.config.stance) / (1.0 - gait.config.stance), 0.0, 1.0)
-        high = CLEARANCE * np.sin(np.pi * swing) - truth.clearance
+        lifted = rise(swing)
+        high = CLEARANCE * lifted - truth.clearance
         legs, speed = truth.q[:, LEGS], truth.dq[:, LEGS]
         torque = np.square(truth.torque[:, LEGS])
         level = truth.height - truth.clearance.min(axis=1)
@@ -140,14 +146,14 @@ class Rewards:
         rest = still * ~stepping
         lean = np.square(truth.R[:, 2, :2]).sum(axis=1)
         off = np.square(capture).sum(axis=1)
-        slip = (np.square(truth.sole_velocity).sum(axis=2) * loaded).sum(axis=1)
+        moving = np.square(truth.sole_velocity).sum(axis=2)
         terms: dict[str, Array] = {
             "linear": np.exp(-(mean[:, 0] + mean[:, 1]) / 0.03),
             "angular": np.exp(-mean[:, 2] / 0.03),
             "linear_now": np.exp(-(error[:, 0] + error[:, 1]) / 0.25),
             "angular_now": np.exp(-error[:, 2] / 0.25),
             "alive": np.ones(len(twist)),
-            "contact": (loaded == stance).mean(axis=1),
+            "contact": np.where(stance, loaded, ~loaded | (lifted < 0.25)).mean(axis=1),
             "swing_height": (np.square(high) * ~stance).sum(axis=1),
             "flat": (1.0 - truth.sole_up).sum(axis=1),
             "upright": lean,
@@ -162,7 +168,8 @@ class Rewards:
             "limits": beyond.sum(axis=1),
             "fast": np.maximum(np.abs(speed) - 0.7 * self._limits.velocity[LEGS], 0.0).sum(axis=1),
             "hips": np.square(legs[:, _YAW_ROLL]).sum(axis=1),
-            "slip": slip,
+            "slip": (moving * loaded).sum(axis=1),
+            "landing": (moving * (~loaded & (truth.clearance < LOW))).sum(axis=1),
             "feet": np.maximum(misplaced - 0.04, 0.0) * stance.all(axis=1),
             "impact": np.maximum(truth.force - 800.0, 0.0).sum(axis=1),
             "stand_posture": np.square(legs - STANCE).sum(axis=1) * rest,

@@ -33,7 +33,7 @@ class TrainConfig:
     Attributes:
         out: folder of checkpoint and curve; a run whose folder holds a checkpoint goes on from it.
         seed: of weights, episodes and noise.
-        steps: actions of all robots together, e.g. 30e6.
+        steps: actions of all robots together, e.g. 38e6.
         robots: how many are simulated at once.
         threads: of the physics and of the networks.
         start: checkpoint of another run whose networks this one begins with.
@@ -49,7 +49,7 @@ class TrainConfig:
 
     out: Path = Path("runs/legs/seed0")
     seed: int = 0
-    steps: float = 30e6
+    steps: float = 38e6
     robots: int = 512
     threads: int = 2
     adversary: Adversary = "learned"
@@ -57,7 +57,7 @@ class TrainConfig:
     start: Path | None = None
     push_ramp: tuple[float, float] = (1e6, 8e6)
     motion_ramp: tuple[float, float] = (3e6, 12e6)
-    noise_ramp: tuple[float, float] = (16e6, 24e6)
+    noise_ramp: tuple[float, float] = (26e6, 33e6)
     noise: tuple[float, float] = (0.45, 0.2)
     env: EnvConfig = field(default_factory=EnvConfig)
     ppo: PpoConfig = field(default_factory=PpoConfig)
