@@ -7,6 +7,7 @@ from pathlib import Path
 import tyro
 
 from golem.training.legs.curve import draw_curves
+from golem.training.legs.env import Task
 from golem.training.legs.train import CHECKPOINT, Adversary, TrainConfig
 from golem.training.legs.train import train as run_training
 
@@ -16,6 +17,7 @@ RUNS = Path("runs/legs")
 def run(
     out: Path = RUNS / "seed0",
     seed: int = 0,
+    task: Task = "walk",
     steps: float = TrainConfig.steps,
     adversary: Adversary = "learned",
     robots: int = 512,
@@ -27,13 +29,14 @@ def run(
     Args:
         out: folder of checkpoint and curve.
         seed: of weights, episodes and noise.
+        task: what is learned: to walk as told, or to stand against pushes.
         steps: actions of all robots together, those of `start` included.
         adversary: what moves the upper body: none, motions (a curriculum), or learned (motions, then a policy as well).
         robots: how many are simulated at once.
         threads: of physics and networks.
         start: checkpoint of another run to go on from, under this command's options.
     """
-    config = TrainConfig(out, seed, steps, robots, threads, adversary, start=start)
+    config = TrainConfig(out, seed, task, steps, robots, threads, adversary, start=start)
     print(run_training(config))
 
 

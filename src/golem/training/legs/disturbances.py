@@ -21,9 +21,6 @@ GENTLE = 0.3
 """Fastest motion of the upper body in a calm episode [rad/s]."""
 ACROSS = 0.4
 """Share of the pushes straight to a side: there the legs are in each other's way, and that takes the most practice."""
-WALKING = 0.6
-"""What walking robots feel of a push: the whole of it is more than they can take on one leg, and teaches them to
-keep both on the ground."""
 TOP_SPEED = 2.5
 """Speed of a target at full difficulty [rad/s]; the safety gate lets 3 pass."""
 
@@ -132,14 +129,13 @@ class Pushes:
         self._t[where] = 0.0
         self._draw(where, difficulty)
 
-    def step(self, difficulty: float, facing: Array, walking: NDArray[np.bool_], dt: float) -> None:
+    def step(self, difficulty: float, facing: Array, dt: float) -> None:
         """Advance the time, and draw anew where a push is over.
 
         Args:
             difficulty: share of the largest impulse.
             facing: (n, 2, 2) heading frame of each robot in the world, from `heading_frame`: a push has a direction
                 relative to the robot.
-            walking: (n,) which robots are pushed less.
             dt: time since the previous step [s].
         """
         self._t += dt
@@ -148,7 +144,7 @@ class Pushes:
             self._draw(over, difficulty)
         share = (self._t - self._start) / self._duration
         profile = np.where(self._slow, np.sin(np.pi * np.clip(share, 0.0, 1.0)), 1.0)
-        profile = profile * ((share >= 0.0) & (share <= 1.0)) * np.where(walking, WALKING, 1.0)
+        profile = profile * ((share >= 0.0) & (share <= 1.0))
         self.force[:, :2] = np.einsum("nij,nj->ni", facing, self._peak) * profile[:, None]
 
     def _draw(self, where: NDArray[np.intp], difficulty: float) -> None:

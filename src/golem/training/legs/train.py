@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from golem.errors import ConfigError, OutputError
 from golem.training.legs.disturbances import NUM_UPPER
-from golem.training.legs.env import PERIOD, EnvConfig, LegsEnv
+from golem.training.legs.env import PERIOD, TASKS, LegsEnv, Task
 from golem.training.legs.mirror import Mirror, leg_mirror, upper_mirror
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
 from golem.training.legs.world import Rows
@@ -33,6 +33,7 @@ class TrainConfig:
     Attributes:
         out: folder of checkpoint and curve; a run whose folder holds a checkpoint goes on from it.
         seed: of weights, episodes and noise.
+        task: what is learned.
         steps: actions of all robots together, e.g. 38e6.
         robots: how many are simulated at once.
         threads: of the physics and of the networks.
@@ -43,12 +44,14 @@ class TrainConfig:
         push_ramp, motion_ramp: steps before which pushes, and motions and payloads of the upper body, are light, and
             after which they have their full range. They grow whether or not the robot survives: tied to survival, as
             ALMI has it, the pushes went up and down below half, and beside full pushes the motions never grew.
-        noise_ramp, noise: steps between which the bound of the legs' exploration noise falls, and the bound before and
-            after. How to stand to the millimetre cannot be learned while the joints tremble by 0.1 rad.
+        noise_ramp, noise: steps before the end at which the bound of the legs' exploration noise begins to fall, and has
+            fallen, and the bound before and after. How to stand to the millimetre cannot be learned while the joints
+            tremble by 0.1 rad.
     """
 
     out: Path = Path("runs/legs/seed0")
     seed: int = 0
+    task: Task = "walk"
     steps: float = 38e6
     robots: int = 512
     threads: int = 2
@@ -57,9 +60,8 @@ class TrainConfig:
     start: Path | None = None
     push_ramp: tuple[float, float] = (1e6, 8e6)
     motion_ramp: tuple[float, float] = (3e6, 12e6)
-    noise_ramp: tuple[float, float] = (26e6, 33e6)
+    noise_ramp: tuple[float, float] = (5e6, 1.5e6)
     noise: tuple[float, float] = (0.45, 0.2)
-    env: EnvConfig = field(default_factory=EnvConfig)
     ppo: PpoConfig = field(default_factory=PpoConfig)
 
 
@@ -100,7 +102,7 @@ class _Run:
         self.steps = 0
         self.updates = 0
         self._cpu = 0.0
-        self.env = LegsEnv(config.robots, config.env, config.seed, config.threads)
+        self.env = LegsEnv(config.robots, TASKS[config.task], config.seed, config.threads)
         self._harden()
         seen = Mirror(self.env.layout.components)
         obs, known = self.env.observe()
@@ -122,8 +124,9 @@ class _Run:
         began, config, env = time.process_time(), self.config, self.env
         learned = config.adversary == "learned" and self.steps >= config.learned_from
         steered: Rows = self._steered if learned else self._steered[:0]
-        if self.steps >= config.noise_ramp[0]:
-            self.legs.bound_noise(float(np.interp(self.steps, config.noise_ramp, config.noise)))
+        begins, ends = config.noise_ramp
+        if (left := config.steps - self.steps) <= begins:
+            self.legs.bound_noise(float(np.interp(left, (ends, begins), config.noise[::-1])))
         meter = _Meter()
         for _ in range(config.ppo.steps):
             action = self.legs.act(self._obs, self._known)
