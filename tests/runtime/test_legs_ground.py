@@ -11,8 +11,6 @@ from typing import Any
 import pytest
 from tests.runtime.test_legs import Drive
 
-from golem.capabilities.legs.almi import NAME
-from golem.capabilities.legs.description import SHIPPED
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
@@ -30,9 +28,6 @@ class Dying({name}):
             raise RuntimeError("gone")
         return super().step(state, base, motion, dt)
 """
-trained = pytest.mark.skipif(
-    not (SHIPPED / f"{NAME}.yaml").is_file(), reason="needs the trained legs, which this installation lacks"
-)
 
 
 @contextmanager
@@ -73,7 +68,6 @@ def test_legs_that_die_while_they_stand(tmp_path: Path) -> None:
         assert_it_stands_on(running, robot, "wbc")
 
 
-@trained
 @pytest.mark.slow
 def test_legs_that_die_in_the_middle_of_a_step(tmp_path: Path) -> None:
     text = DYING.format(module="almi", name="Almi", end=4.13)

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.description import SHIPPED
 from golem.capabilities.legs.hold import STANCES, Hold
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
@@ -113,7 +112,6 @@ def test_calls_are_answered_later_on_the_bus() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not (SHIPPED / "almi.onnx").is_file(), reason="the weights are not trained yet")
 def test_a_robot_on_the_ground_is_brought_up_and_walks_by_remote_calls() -> None:
     stack = replace(load_stack("stand", profile="bench"), lower_body=Choice("vendor"))
     options = {**stack.robot.options, "world": "open"}

@@ -24,13 +24,16 @@ RECORDER = "tests.capabilities.legs.recorder:Recorder"
 class Robot:
     """A base layer over both controllers, on a robot whose state is given."""
 
-    def __init__(self, walk: dict[str, object] | None = None, stand: dict[str, object] | None = None) -> None:
+    def __init__(
+        self,
+        walk: dict[str, object] | None = None,
+        stand: dict[str, object] | None = None,
+        trim: float = 0.0,  # the plant stands still
+    ) -> None:
         walker = Part(RECORDER, {"target": 1.0} | (walk or {}))
         stander = Part(RECORDER, {"target": 0.0} | (stand or {}))
         self.legs = Handover(HandoverConfig(walker, stander))
-        self.layer = Locomotion(
-            self.legs, LocomotionConfig(trim=TrimConfig(gain=0.0))
-        )  # the plant stands still
+        self.layer = Locomotion(self.legs, LocomotionConfig(trim=TrimConfig(gain=trim)))
         self.state, self.base = crouching(), still()
         self.layer.reset(self.state)
         self.targets: list[float] = []
@@ -128,6 +131,19 @@ def test_it_does_not_change_hands_in_motion_or_on_one_leg(moved: BaseEstimate) -
     robot.base = still()
     robot.run(0.2, Twist())
     assert not robot.legs.walking
+
+
+def test_a_push_is_taken_by_the_one_that_stands_steps_and_all() -> None:
+    robot = Robot(stand={"gait": GaitConfig(capture_stop=0.01)}, trim=0.8)
+    robot.run(0.5)
+    robot.base = replace(still(), velocity=np.array([0.8, 0.0, 0.0]))
+    robot.run(0.3)
+    # Healthy again, but still stepping, and the base layer corrects what the push did to the place.
+    robot.base = replace(still(), velocity=np.array([0.15, 0.0, 0.0]))
+    robot.run(0.5)
+    assert robot.stand.motions[-1].stepping
+    assert not robot.legs.walking
+    assert {m.twist for m in robot.stand.motions} == {Twist()}
 
 
 def test_a_clock_that_never_stops_is_left_when_both_feet_are_down() -> None:

@@ -116,7 +116,7 @@ def test_one_robots_signals_are_in_base_link() -> None:
     q[JOINT_INDEX["torso_joint"]], dq[JOINT_INDEX["torso_joint"]] = turn, 2.0
     # The torso turns with the base and, by its joint, about their common z.
     gyro = rotation_rpy(0, 0, turn).T @ (rate + [0, 0, 2.0])
-    motion = Motion(Twist(0.1, 0.2, 0.3), np.array([0.25, 0.75]), True)
+    motion = Motion(Twist(0.1, 0.2, 0.3), np.array([0.25, 0.75]), True, True)
     s = measure(low_state(q, dq, gyro), BaseEstimate(0.0, T, R @ velocity), motion, np.arange(12.0))
     np.testing.assert_allclose(s.velocity, velocity)
     np.testing.assert_allclose(s.gyro, rate)

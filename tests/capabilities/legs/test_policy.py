@@ -7,9 +7,8 @@ import pytest
 from tests.capabilities.legs.floor_plant import STEP, FloorPlant
 from tests.capabilities.legs.test_network import write_onnx
 
-from golem.capabilities.legs.almi import Almi, AlmiConfig
+from golem.capabilities.legs.almi import STAND, WALK, Almi, AlmiConfig
 from golem.capabilities.legs.base import STANDING, LowerBody, Motion
-from golem.capabilities.legs.description import SHIPPED
 from golem.capabilities.legs.locomotion import Locomotion
 from golem.capabilities.legs.policy import BadAction, Policy, PolicyConfig
 from golem.capabilities.legs.swing import swing_offset
@@ -46,7 +45,7 @@ def policy(folder: Path) -> Policy:
 
 
 def walking(vx: float, phase: tuple[float, float] = (0.3, 0.8)) -> Motion:
-    return Motion(Twist(vx), np.array(phase), True)
+    return Motion(Twist(vx), np.array(phase), True, True)
 
 
 def test_targets_are_posture_and_scaled_action_and_swing(tmp_path: Path) -> None:
@@ -104,15 +103,20 @@ def test_almi_without_weights_says_so(tmp_path: Path, monkeypatch: pytest.Monkey
         Almi()
 
 
-@pytest.mark.skipif(not (SHIPPED / "almi.onnx").is_file(), reason="the weights are not trained yet")
-def test_almi_is_the_shipped_policy() -> None:
-    assert isinstance(Almi(), LowerBody)
-    np.testing.assert_array_equal(
-        Almi().step(state(), BASE, STANDING, 0.02).q,
-        Policy(PolicyConfig("almi")).step(state(), BASE, STANDING, 0.02).q,
-    )
+def test_almi_stands_with_one_shipped_policy_and_walks_with_the_other() -> None:
+    legs = Almi()
+    assert isinstance(legs, LowerBody)
+    legs.reset(state())
+    for motion, name in ((STANDING, STAND), (walking(0.3), WALK)):
+        for _ in range(30):  # the other one takes over after a while
+            q = legs.step(state(), BASE, motion, 0.02).q
+        alone = Policy(PolicyConfig(name))
+        alone.reset(state())
+        for _ in range(30):
+            expected = alone.step(state(), BASE, motion, 0.02).q
+        np.testing.assert_allclose(q, expected, atol=1e-3)
     with pytest.raises(ConfigError, match="no network"):
-        Almi(AlmiConfig("absent.onnx"))
+        Almi(AlmiConfig(stand="absent.onnx"))
 
 
 def peer(name: str, network: str) -> Policy:

@@ -63,7 +63,7 @@ class Session:
         self.legs.reset(state())
 
     def run(self, seconds: float, twist: Twist | None = None) -> LegCommand:
-        motion = STANDING if twist is None else Motion(twist, np.zeros(2), False)
+        motion = STANDING if twist is None else Motion(twist, np.zeros(2), False, True)
         command = None
         for _ in range(round(seconds / DT)):
             command = self.legs.step(state(), BASE, motion, DT)

@@ -1,15 +1,18 @@
-"""The shipped leg policy, trained against an adversary that moves the upper body (the game of ALMI)."""
+"""The shipped legs: two networks, each trained against an adversary that moves the upper body (the game of ALMI).
+
+One walks, the other stands: a network for both was worse at both (docs/legs.md, "How `almi` is trained").
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from golem.capabilities.legs.description import SHIPPED
-from golem.capabilities.legs.policy import Policy, PolicyConfig
+from golem.capabilities.legs.handover import Handover, HandoverConfig, Part
 from golem.errors import ConfigError
 
-NAME = "almi"
-"""Its description and network in `SHIPPED`; `golem train legs` writes them."""
+WALK, STAND = "almi_walk", "almi_stand"
+"""Their descriptions and networks in `SHIPPED`; `golem train legs` writes them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,21 +20,26 @@ class AlmiConfig:
     """Options of `Almi`.
 
     Attributes:
-        network: another network for the same description, such as a checkpoint of a training run.
+        walk, stand: other networks for the same descriptions, such as checkpoints of training runs.
     """
 
-    network: str | None = None
+    walk: str | None = None
+    stand: str | None = None
 
 
-class Almi(Policy):
-    """Stands, walks and takes pushes with the shipped network; see `Policy`."""
+class Almi(Handover):
+    """Walks as told with one shipped network, stands and takes pushes with the other; see `Handover`, `Policy`."""
 
     def __init__(self, config: AlmiConfig | None = None) -> None:
-        """Load the shipped description and its network.
+        """Load the shipped descriptions and their networks.
 
         Raises:
-            ConfigError: this installation lacks them, or the network given instead does not fit.
+            ConfigError: this installation lacks them, or a network given instead does not fit.
         """
-        if not (SHIPPED / f"{NAME}.yaml").is_file():
-            raise ConfigError(f"This installation has no trained legs ({SHIPPED / NAME}.yaml is absent).")
-        super().__init__(PolicyConfig(NAME, (config or AlmiConfig()).network))
+        config = config or AlmiConfig()
+        for name in (WALK, STAND):
+            if not (SHIPPED / f"{name}.yaml").is_file():
+                raise ConfigError(f"This installation has no trained legs ({SHIPPED / name}.yaml is absent).")
+        walk = Part("policy", {"file": WALK, "network": config.walk})
+        stand = Part("policy", {"file": STAND, "network": config.stand})
+        super().__init__(HandoverConfig(walk, stand))

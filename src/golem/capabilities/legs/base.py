@@ -55,14 +55,17 @@ class Motion:
             `trim.TrimConfig.most`); exactly zero means stand.
         phase: (2,) gait phase of the left and the right leg, 0 to 1, a leg's stance first (see `gait.Gait`).
         stepping: whether the gait clock runs; while it does not, both feet belong on the ground.
+        commanded: whether the robot shall move; if not, `twist` corrects what the last steps of a stop, or those after
+            a push, do to its place.
     """
 
     twist: Twist
     phase: Array
     stepping: bool
+    commanded: bool
 
 
-STANDING = Motion(Twist(), np.array([0.0, 0.5]), False)
+STANDING = Motion(Twist(), np.array([0.0, 0.5]), False, False)
 """Stand still."""
 
 

@@ -8,7 +8,7 @@ them once it says something.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -114,7 +114,7 @@ class Handover:
             self._blend.begin(self._last)
         else:
             if not self.walking:
-                motion = Motion(ZERO, motion.phase, motion.stepping)
+                motion = replace(motion, twist=ZERO, commanded=False)
             command = self._active.step(state, base, motion, dt)
         self._last = self._blend.step(command, dt)
         return self._last
@@ -151,10 +151,8 @@ class Handover:
         A twist is for the walking one. Without a twist it goes on until the clock has stopped; if its clock never does,
         until both feet are down.
         """
-        if not self.walking:
-            return motion.twist != ZERO
-        if motion.twist != ZERO:
-            return False
+        if not self.walking or motion.commanded:
+            return motion.commanded and not self.walking
         if not motion.stepping:
             return True
         return self.gait.start == "always" and bool((motion.phase < self.gait.stance).all())

@@ -120,7 +120,7 @@ class Locomotion:
             self._clock(state, base, self._since_gate)
             self._until_gate = max(self._until_gate + 1.0 / self.config.gate_rate, 0.0)
             self._since_gate = 0.0
-        motion = Motion(self._trimmed, self.gait.phases, bool(self.gait.stepping))
+        motion = Motion(self._trimmed, self.gait.phases, bool(self.gait.stepping), self.applied != ZERO)
         return self._blend.step(self._paced.step(state, base, motion, dt), dt)
 
     def _forget(self) -> None:

@@ -40,19 +40,16 @@ def run(
     print(run_training(config))
 
 
-def export(
-    checkpoint: Path = RUNS / "seed0" / CHECKPOINT, folder: Path = RUNS / "export", name: str = "almi"
-) -> None:
+def export(checkpoint: Path = RUNS / "seed0" / CHECKPOINT, folder: Path = RUNS / "export") -> None:
     """Write a checkpoint as a network and its description, for `lower_body: {use: policy, file: ...}`.
 
     Args:
         checkpoint: of `run`.
-        folder: where to write NAME.onnx and NAME.yaml.
-        name: of the two files.
+        folder: where to write almi_TASK.onnx and .yaml.
     """
     from golem.training.legs.export import export as write
 
-    print(*write(checkpoint, folder, name), sep="\n")
+    print(*write(checkpoint, folder), sep="\n")
 
 
 def curve(runs: tyro.conf.Positional[tuple[Path, ...]], out: Path = RUNS / "curve.png") -> None:

@@ -18,33 +18,35 @@ from torch import nn
 
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.observation import Layout
-from golem.training.legs.env import LAYOUT, PERIOD, EnvConfig
+from golem.training.legs.env import LAYOUT, PERIOD, TASKS, EnvConfig, Task
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.model import KD, KP, STANCE
 from golem.training.legs.ppo import Actor, PpoConfig
 
 OPSET = 17
 IR_VERSION = 8
-DECLARED = Envelope((-0.4, 0.6), (-0.3, 0.3), (-0.6, 0.6))
+DECLARED = Envelope((-0.4, 0.8), (-0.3, 0.3), (-0.6, 0.6))
 """The twists the shipped controller promises to follow; training commands a little more."""
 
 
-def load_actor(checkpoint: Path) -> Actor:
-    """Return the trained actor of a checkpoint of `train`."""
+def load_actor(checkpoint: Path) -> tuple[Actor, Task]:
+    """Return the trained actor of a checkpoint of `train`, and what it learned."""
     layout = Layout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
     actor = Actor(Mirror(layout.components), leg_mirror(), PpoConfig().hidden)
-    actor.load_state_dict(torch.load(checkpoint, weights_only=True)["legs"]["actor"])
-    return actor.eval()
+    saved = torch.load(checkpoint, weights_only=True)
+    actor.load_state_dict(saved["legs"]["actor"])
+    return actor.eval(), saved["config"]["task"]
 
 
-def export(checkpoint: Path, folder: Path, name: str = "almi") -> tuple[Path, Path]:
-    """Write `folder/name.onnx` and `folder/name.yaml` from a checkpoint; return both paths."""
-    actor = load_actor(checkpoint)
+def export(checkpoint: Path, folder: Path) -> tuple[Path, Path]:
+    """Write `folder/almi_TASK.onnx` and `.yaml` from a checkpoint; return both paths."""
+    actor, task = load_actor(checkpoint)
+    name = f"almi_{task}"
     folder.mkdir(parents=True, exist_ok=True)
     network = folder / f"{name}.onnx"
     onnx.save(_graph(actor), str(network))
     description = folder / f"{name}.yaml"
-    description.write_text(_description(network.name, EnvConfig()), encoding="utf-8")
+    description.write_text(_description(network.name, TASKS[task]), encoding="utf-8")
     return network, description
 
 
@@ -110,5 +112,5 @@ def _description(network: str, config: EnvConfig) -> str:
         "action": {"scale": config.action_scale, "clip": 10.0, "swing": config.swing},
         "observation": terms,
     }
-    head = "# The shipped leg policy; written by `golem train legs export`, see docs/legs.md.\n"
+    head = "# A shipped leg policy; written by `golem train legs export`, see docs/legs.md.\n"
     return head + yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=110)

@@ -44,9 +44,9 @@ class TrainConfig:
         push_ramp, motion_ramp: steps before which pushes, and motions and payloads of the upper body, are light, and
             after which they have their full range. They grow whether or not the robot survives: tied to survival, as
             ALMI has it, the pushes went up and down below half, and beside full pushes the motions never grew.
-        noise_ramp, noise: steps before the end at which the bound of the legs' exploration noise begins to fall, and has
-            fallen, and the bound before and after. How to stand to the millimetre cannot be learned while the joints
-            tremble by 0.1 rad.
+        noise_ramp, noise: steps before the end at which the bound of the legs' exploration noise begins to fall, and
+            has fallen, and the bound before and after. How to stand to the millimetre cannot be learned while the
+            joints tremble by 0.1 rad.
     """
 
     out: Path = Path("runs/legs/seed0")
