@@ -48,6 +48,7 @@ class Weights:
         limits: how far joints are beyond 90 % of their range [rad].
         fast: how much faster a joint is than 70 % of what stops the robot [rad/s].
         hips: yaw and roll of the hips squared [rad^2].
+        turned: yaw of the feet relative to the pelvis squared [rad^2]: it turns when the robot stops.
         slip: velocity of loaded soles squared.
         landing: velocity of free soles less than `LOW` above the ground squared: who comes down fast slides and slaps.
         feet: misplacement of the feet beyond 4 cm while both are on the ground [m].
@@ -69,7 +70,7 @@ class Weights:
     contact: float = 1.0
     swing_height: float = -60.0
     flat: float = -50.0
-    upright: float = -3.0
+    upright: float = -20.0
     height: float = -40.0
     bounce: float = -1.0
     rock: float = -0.15
@@ -81,6 +82,7 @@ class Weights:
     limits: float = -5.0
     fast: float = -2.0
     hips: float = -2.0
+    turned: float = -20.0
     slip: float = -1.5
     landing: float = -2.0
     feet: float = -4.0
@@ -145,6 +147,7 @@ class Rewards:
         still = (np.abs(twist).max(axis=1) < 1e-6).astype(np.float64)
         rest = still * ~stepping
         lean = np.square(truth.R[:, 2, :2]).sum(axis=1)
+        turned = 0.5 * (legs[:, 0] + legs[:, 6])
         off = np.square(capture).sum(axis=1)
         moving = np.square(truth.sole_velocity).sum(axis=2)
         terms: dict[str, Array] = {
@@ -168,6 +171,7 @@ class Rewards:
             "limits": beyond.sum(axis=1),
             "fast": np.maximum(np.abs(speed) - 0.7 * self._limits.velocity[LEGS], 0.0).sum(axis=1),
             "hips": np.square(legs[:, _YAW_ROLL]).sum(axis=1),
+            "turned": np.square(turned),
             "slip": (moving * loaded).sum(axis=1),
             "landing": (moving * (~loaded & (truth.clearance < LOW))).sum(axis=1),
             "feet": np.maximum(misplaced - 0.04, 0.0) * stance.all(axis=1),
@@ -175,7 +179,7 @@ class Rewards:
             "stand_posture": np.square(legs - STANCE).sum(axis=1) * rest,
             "stand_still": (np.square(truth.velocity[:, :2]).sum(axis=1) + np.square(now[:, 2])) * rest,
             "stand_upright": lean * rest,
-            "stand_square": np.exp(-np.square(0.5 * (legs[:, 0] + legs[:, 6]) / 0.02)) * rest,
+            "stand_square": np.exp(-np.square(turned / 0.02)) * rest,
             "stand_center": np.exp(-off / 0.03**2) * rest,
             "stand_exact": np.exp(-off / 0.012**2) * rest,
             "stand_step": still * stepping,
