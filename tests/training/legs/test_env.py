@@ -82,3 +82,16 @@ def test_slope_turns_gravity_and_roughness_lifts_soles() -> None:
     assert 0.0 < moved.max() <= 0.021
     changed = np.unique(np.nonzero(moved)[1])
     assert set(changed) <= set(world.ids.soles)
+
+
+def test_commands_come_late_by_each_robots_delay(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = LegsEnv(4, EnvConfig(), 0, 1).world
+    world._delay[:], world._offset[:] = np.arange(4), 0.0
+    seen: list[np.ndarray] = []
+    monkeypatch.setattr(world, "_judge", lambda: seen.append(world._ctrl[:, 0].copy()))
+    targets = np.array([0.01, 0.02, 0.03])
+    for target in targets:
+        world.step(np.full((4, 12), target), np.zeros((4, 15)), np.zeros((4, 3)), np.zeros(4, dtype=bool), 2)
+    told = np.repeat(np.append(STANCE[0], targets), [4, 2, 2, 2])  # what was meant at each physics step
+    for delay in range(4):
+        np.testing.assert_allclose([row[delay] for row in seen], told[4 - delay : 10 - delay])

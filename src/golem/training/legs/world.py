@@ -35,7 +35,8 @@ class WorldConfig:
         torso_mass: added to the torso [kg].
         payload: largest mass in each hand [kg].
         strength: factor on gains, and (up to 1) on the torque limits of the motors.
-        delay: largest delay of a command, in physics steps of 10 ms.
+        delay: largest delay of a command, in physics steps of 10 ms, up to two periods of the policy. More than the 20 ms
+            of the robot: trained with those, legs that stood most precisely swayed by 6 mm at 2 Hz in the twin.
         slope: largest slope [rad].
         roughness: largest height of the ground under a corner of a sole [m].
         leg_offset, arm_offset: encoder zeros, standard deviation [rad]; as in the twin's field profile.
@@ -48,7 +49,7 @@ class WorldConfig:
     torso_mass: tuple[float, float] = (-2.0, 4.0)
     payload: float = 3.0
     strength: tuple[float, float] = (0.88, 1.1)
-    delay: int = 2
+    delay: int = 3
     slope: float = 0.1
     roughness: float = 0.02
     leg_offset: float = 0.01
@@ -148,7 +149,8 @@ class World:
         self._believed_tilt: Array = np.tile(np.eye(3), (n, 1, 1))
         self._offset: Array = np.zeros((n, NUM_JOINTS))
         self._delay: NDArray[np.int64] = np.zeros(n, dtype=np.int64)
-        self._previous: Array = np.tile(STANCE, (n, 1))
+        # The leg targets of the last two periods, the newest first.
+        self._previous: Array = np.tile(STANCE, (2, n, 1))
         self._rough: Array = np.zeros(n)
         self._force_scale: Array = np.ones((n, 2))
         self.payload: Array = np.zeros((n, 2))
@@ -177,7 +179,7 @@ class World:
         self._qpos[where, 7 : 7 + NUM_JOINTS] = q
         self._qvel[where] = 0.0
         self._qvel[where, :2] = rng.normal(0.0, 0.1, (m, 2))
-        self._previous[where] = STANCE
+        self._previous[:, where] = STANCE
         self._batch.forward(where)
         mask = np.zeros(self.n, dtype=bool)
         mask[where] = True
@@ -195,12 +197,13 @@ class World:
         ctrl[:, LEGS.stop : NUM_JOINTS] = upper - self._offset[:, LEGS.stop :]
         self.stopped[:] = False
         for k in range(substeps):
-            late = (self._delay > k)[:, None]
-            ctrl[:, LEGS] = np.where(late, self._previous, legs) - self._offset[:, LEGS]
+            late = (self._delay - k)[:, None]
+            before = np.where(late > substeps, self._previous[1], self._previous[0])
+            ctrl[:, LEGS] = np.where(late > 0, before, legs) - self._offset[:, LEGS]
             self._batch.step(nstep=1, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
             self._estimate()
             self._judge()
-        self._previous = legs.copy()
+        self._previous = np.stack([legs, self._previous[0]])
         self.read()
 
     def _estimate(self) -> None:
