@@ -48,6 +48,7 @@ class EnvConfig:
         standing: share of the commands that are zero.
         corners: share of the others in which each axis is at an end of its range or zero. A uniform draw hardly ever
             asks for everything at once, and there the robot falls.
+        creeping: share of the others that are slow, as a robot is told that arrives.
         accelerate: how fast a command may change [m/s^2, m/s^2, rad/s^2]; the base layer limits it likewise.
         hold: shortest and longest time a command lasts [s].
         episode: length of an episode [s].
@@ -56,8 +57,8 @@ class EnvConfig:
         calm: share of the episodes without pushes and with slow arms: who is always disturbed learns neither to walk as
             told nor to stand quietly.
         impulse: largest push at full difficulty [N s].
-        fall: what a fall costs beside the rewards it forgoes, which are worth as much: without, the less noise there was
-            the better the robot stood and the more often it fell.
+        fall: what a fall costs beside the rewards it forgoes, which are worth as much: without, the less noise there
+            was the better the robot stood and the more often it fell.
         gait: clock and gate.
         world: randomisation.
         weights: of the rewards.
@@ -66,6 +67,7 @@ class EnvConfig:
     envelope: Envelope = field(default_factory=lambda: Envelope((-0.45, 0.85), (-0.35, 0.35), (-0.65, 0.65)))
     standing: float = 0.2
     corners: float = 0.35
+    creeping: float = 0.15
     accelerate: tuple[float, float, float] = (1.0, 1.0, 2.0)
     hold: tuple[float, float] = (2.0, 7.0)
     episode: float = 20.0
@@ -276,6 +278,8 @@ class LegsEnv:
             twist[:, axis] = np.where((keep < 0) | (keep == axis), twist[:, axis], 0.0)
         ends = np.stack([low, np.zeros(3), high])[rng.integers(0, 3, (m, 3)), np.arange(3)]
         twist = np.where(rng.random((m, 1)) < self.config.corners, ends, twist)
-        still = (rng.random(m) < self.config.standing) | (np.linalg.norm(twist, axis=1) < 0.1)
+        slow = rng.random((m, 1)) < self.config.creeping
+        twist = np.where(slow, twist * rng.uniform(0.05, 0.3, (m, 1)), twist)
+        still = (rng.random(m) < self.config.standing) | (np.linalg.norm(twist, axis=1) < 0.02)
         self._goal[where] = np.where(still[:, None], 0.0, twist)
         self._left[where] = rng.uniform(*self.config.hold, m)

@@ -21,6 +21,8 @@ _YAW_ROLL = np.array([0, 2, 6, 8])
 _ANKLES = np.array([4, 5, 10, 11])
 CLEARANCE = 0.08
 """Height of the sole in the middle of its swing [m]."""
+_PENDULUM = float(np.sqrt(STAND_HEIGHT / 9.81))
+"""Time constant of the robot as an inverted pendulum [s]: velocity times this is how far the capture point is ahead."""
 LOW = 0.02
 """Height of a sole that is about to land, or has just lifted off [m]."""
 
@@ -53,6 +55,8 @@ class Weights:
         landing: velocity of free soles less than `LOW` above the ground squared: who comes down fast slides and slaps.
         feet: misplacement of the feet beyond 4 cm while both are on the ground [m].
         impact: foot force above 800 N [N].
+        center: mean capture point, less the way to it at the commanded velocity, over the middle of the feet,
+            exp(-error^2 / 0.04^2), stepping: who marks time on the heels lands 5 cm ahead where it stops.
         stand_posture: deviation from the stance squared, standing.
         stand_still: base velocity squared, standing.
         stand_upright: as `upright`, standing: without it the trunk leans to bring its weight over the soles.
@@ -87,6 +91,7 @@ class Weights:
     landing: float = -2.0
     feet: float = -4.0
     impact: float = -0.002
+    center: float = 0.5
     stand_posture: float = -2.0
     stand_still: float = -2.0
     stand_upright: float = -40.0
@@ -106,11 +111,13 @@ class Rewards:
         self._weights = weights
         self._share = gait.period / 2.0
         self._mean: Array = np.zeros((n, 3))
+        self._ahead: Array = np.zeros((n, 2))
         self._speed: Array = np.zeros((n, 12))
 
     def reset(self, where: Rows) -> None:
         """Put the robots `where` at rest."""
         self._mean[where] = 0.0
+        self._ahead[where] = 0.0
         self._speed[where] = 0.0
 
     def tracked_error(self, twist: Array) -> Array:
@@ -131,7 +138,9 @@ class Rewards:
         """Return the reward (n,) of one period and the mean of each term."""
         w = self._weights
         now = truth.heading_velocity()
-        self._mean += (now - self._mean) * (dt / (self._share + dt))
+        share = dt / (self._share + dt)
+        self._mean += (now - self._mean) * share
+        self._ahead += (capture - twist[:, :2] * _PENDULUM - self._ahead) * share
         mean = np.square(self._mean - twist)
         error = np.square(now - twist)
         phase, stepping = gait.phases, gait.stepping
@@ -176,6 +185,7 @@ class Rewards:
             "landing": (moving * (~loaded & (truth.clearance < LOW))).sum(axis=1),
             "feet": np.maximum(misplaced - 0.04, 0.0) * stance.all(axis=1),
             "impact": np.maximum(truth.force - 800.0, 0.0).sum(axis=1),
+            "center": np.exp(-np.square(self._ahead).sum(axis=1) / 0.04**2) * stepping,
             "stand_posture": np.square(legs - STANCE).sum(axis=1) * rest,
             "stand_still": (np.square(truth.velocity[:, :2]).sum(axis=1) + np.square(now[:, 2])) * rest,
             "stand_upright": lean * rest,

@@ -35,8 +35,8 @@ class WorldConfig:
         torso_mass: added to the torso [kg].
         payload: largest mass in each hand [kg].
         strength: factor on gains, and (up to 1) on the torque limits of the motors.
-        delay: largest delay of a command, in physics steps of 10 ms, up to two periods of the policy. More than the 20 ms
-            of the robot: trained with those, legs that stood most precisely swayed by 6 mm at 2 Hz in the twin.
+        delay: largest delay of a command, in physics steps of 10 ms, up to two periods of the policy. More than the
+            20 ms of the robot: trained with those, legs that stood most precisely swayed by 6 mm at 2 Hz in the twin.
         slope: largest slope [rad].
         roughness: largest height of the ground under a corner of a sole [m].
         leg_offset, arm_offset: encoder zeros, standard deviation [rad]; as in the twin's field profile.
