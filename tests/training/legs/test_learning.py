@@ -177,13 +177,13 @@ def test_pushes_have_the_impulse_they_were_drawn_with_at_most() -> None:
     assert 40.0 < largest.max() < 52.0
 
 
-def test_who_learns_to_stand_is_never_told_to_walk() -> None:
-    for task, told in (("stand", False), ("walk", True)):
-        env = LegsEnv(20, TASKS[task], 0, 1)
-        walked = False
-        for _ in range(400):
-            step = env.step(np.zeros((20, 12)), np.zeros(0, dtype=np.intp), np.zeros((0, 15)))
-            walked |= bool(env.walking.any())
-            assert ((step.reward < 0.0) == step.ended).all()  # a fall costs more than any reward
-            env.restart(np.flatnonzero(step.ended | step.truncated))
-        assert walked == told
+@pytest.mark.parametrize(("task", "told"), [("stand", False), ("walk", True)])
+def test_who_learns_to_stand_is_never_told_to_walk(task: Task, told: bool) -> None:
+    env = LegsEnv(20, TASKS[task], 0, 1)
+    walked = False
+    for _ in range(400):
+        step = env.step(np.zeros((20, 12)), np.zeros(0, dtype=np.intp), np.zeros((0, 15)))
+        walked |= bool(env.walking.any())
+        assert ((step.reward < 0.0) == step.ended).all()  # a fall costs more than any reward
+        env.restart(np.flatnonzero(step.ended | step.truncated))
+    assert walked == told
