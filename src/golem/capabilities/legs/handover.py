@@ -151,8 +151,10 @@ class Handover:
         A twist is for the walking one. Without a twist it goes on until the clock has stopped; if its clock never does,
         until both feet are down.
         """
-        if not self.walking or motion.commanded:
-            return motion.commanded and not self.walking
+        if motion.commanded:
+            return not self.walking
+        if not self.walking:
+            return False
         if not motion.stepping:
             return True
         return self.gait.start == "always" and bool((motion.phase < self.gait.stance).all())

@@ -10,6 +10,11 @@ LIFT = np.array([0.0, -1.0, 0.0, 2.0, -1.0, 0.0])
 """Shares of hip yaw, hip pitch, hip roll, knee, ankle pitch, ankle roll: they lift the foot and leave it level."""
 
 
+def swing_share(phase: Array, stance: float) -> Array:
+    """Return how much of its swing a leg at `phase` (0 to 1) has done; 0 in stance, which comes first."""
+    return np.maximum(phase - stance, 0.0) / (1.0 - stance)
+
+
 def rise(swing: Array) -> Array:
     """Return sin^2 of a swing that runs from 0 to 1: 1 in its middle, at rest at both ends."""
     return np.square(np.sin(np.pi * swing))
@@ -29,7 +34,7 @@ def swing_offset(phase: Array, period: float, stance: float, amplitude: float, l
         amplitude: peak of the hip's and the ankle's share; the knee bends by twice as much [rad].
         lag: (12,) how far each joint follows behind its target, kd / kp [s].
     """
-    swing = np.maximum(phase - stance, 0.0) / (1.0 - stance)
+    swing = swing_share(phase, stance)
     speed = np.pi / ((1.0 - stance) * period) * np.sin(2.0 * np.pi * swing)
     lead = speed[..., None] * lag.reshape(2, 6)
     return (amplitude * (rise(swing)[..., None] + lead) * LIFT).reshape(*phase.shape[:-1], 12)

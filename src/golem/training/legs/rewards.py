@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from golem.capabilities.legs.balance import GRAVITY
 from golem.capabilities.legs.gait import Gait, GaitConfig
-from golem.capabilities.legs.swing import rise
+from golem.capabilities.legs.swing import rise, swing_share
 from golem.hardware.safety.base import SafetyLimits
 from golem.training.legs.model import STANCE, STAND_HEIGHT
 from golem.training.legs.world import Rows, Truth
@@ -21,7 +22,7 @@ _YAW_ROLL = np.array([0, 2, 6, 8])
 _ANKLES = np.array([4, 5, 10, 11])
 CLEARANCE = 0.08
 """Height of the sole in the middle of its swing [m]."""
-_PENDULUM = float(np.sqrt(STAND_HEIGHT / 9.81))
+_PENDULUM = float(np.sqrt(STAND_HEIGHT / GRAVITY))
 """Time constant of the robot as an inverted pendulum [s]: velocity times this is how far the capture point is ahead."""
 LOW = 0.02
 """Height of a sole that is about to land, or has just lifted off [m]."""
@@ -146,8 +147,7 @@ class Rewards:
         phase, stepping = gait.phases, gait.stepping
         stance = ~stepping[:, None] | (phase < gait.config.stance)
         loaded = truth.force > 5.0
-        swing = np.clip((phase - gait.config.stance) / (1.0 - gait.config.stance), 0.0, 1.0)
-        lifted = rise(swing)
+        lifted = rise(swing_share(phase, gait.config.stance))
         high = CLEARANCE * lifted - truth.clearance
         legs, speed = truth.q[:, LEGS], truth.dq[:, LEGS]
         torque = np.square(truth.torque[:, LEGS])
