@@ -18,9 +18,12 @@ DEAD_BAND = 0.1
 class Walker:
     """A walking base: velocity follows the twist with a lag; a stop takes the rest of a step, and ends with a slip."""
 
-    def __init__(self, seed: int = 0, noise: float = 0.0, slip: float = 0.0, gain: float = 1.0) -> None:
+    def __init__(
+        self, seed: int = 0, noise: float = 0.0, slip: float = 0.0, gain: float = 1.0, coast: float = 0.0
+    ) -> None:
         self._rng = np.random.default_rng(seed)
-        self._noise, self._slip, self._gain = noise, slip, gain
+        self._noise, self._slip, self._gain, self._coast = noise, slip, gain, coast
+        self.stops = 0
         self.pose = PlanarPose(0.0, 0.0, 0.0)
         self.velocity = np.zeros(3)
         self.stepping = False
@@ -42,7 +45,8 @@ class Walker:
             self._left = 0.35
         if self.stepping and self._left <= 0.0:
             values = self._slip * self._rng.normal(size=3) * (0.01, 0.01, math.radians(0.5))
-            self.pose = self.pose @ PlanarPose(*values.tolist())
+            self.pose = self.pose @ PlanarPose(*values.tolist()) @ PlanarPose(self._coast, 0.0, 0.0)
+            self.stops += 1
         self.stepping = self._left > 0.0
         self.velocity = (self.velocity + DT / 0.2 * (self._gain * values - self.velocity)) * self.stepping
         self.pose = self.pose @ PlanarPose(*(DT * self.velocity).tolist())
@@ -123,6 +127,29 @@ def test_a_goal_near_by_is_reached_on_a_straight_line_without_turning_away() -> 
         assert abs(walker.pose.x - walker.pose.y) < 0.05
         assert abs(walker.pose.yaw) < 0.05
     assert error(walker, goal)[0] < 0.04
+
+
+def test_how_far_a_stop_moves_the_robot_is_learned_once_or_told() -> None:
+    walker = Walker(coast=0.05)
+    learner = GoTo()
+    goals = [PlanarPose(1.0, 0.2, 0.1), PlanarPose(2.0, 0.0, 0.0), PlanarPose(3.0, -0.2, 0.2)]
+    stops = []
+    for goal in goals:
+        go(learner, walker, goal)
+        assert error(walker, goal)[0] < GoToConfig().accept + 0.005
+        stops.append(walker.stops)
+    assert stops == [2, 3, 4]
+
+    told = Walker(coast=0.05)
+    go(GoTo(GoToConfig(coast=(0.05, 0.0, 0.0))), told, goals[0])
+    assert told.stops == 1
+
+
+def test_a_robot_that_stands_at_the_goal_does_not_stir() -> None:
+    walker = Walker(coast=0.05)
+    go(GoTo(GoToConfig(coast=(0.05, 0.0, 0.0))), walker, PlanarPose(0.0, 0.0, 0.0))
+    assert all(t == Twist() for t in walker.twists)
+    assert walker.stops == 0
 
 
 def test_far_away_it_faces_the_goal() -> None:

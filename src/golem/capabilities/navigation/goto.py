@@ -1,8 +1,8 @@
 """Goes straight to a pose, in all directions, and stands there: no map, no obstacles.
 
 A robot that walks follows twists as small as they come, so it approaches the goal ever more slowly and marks time there
-until it is sure to be right. Told to stand it takes another step or two, which may move it again: the loop stays
-closed until it stands; if that brought it too far off it starts over, and aims off by as much.
+until it is sure to be right. Told to stand it takes another step or two, and other legs may take over, which moves it
+again: it aims off by as much as the last stop moved it, and starts over if it ends too far off none the less.
 """
 
 from __future__ import annotations
@@ -39,6 +39,8 @@ class GoToConfig:
             starts over [s].
         settle: time without a step before that, in which other legs take over, the body comes to rest and old poses
             arrive [s]: judged 0.3 s after the last step, the robot moved 30 mm more.
+        coast: how far the first stop is expected to move the robot ahead, to its left [m] and round [rad]; every stop
+            measures it anew.
     """
 
     speed: tuple[float, float, float] = (0.6, 0.3, 0.6)
@@ -55,6 +57,7 @@ class GoToConfig:
     widen: float = 1.2
     rest: float = 1.0
     settle: float = 1.0
+    coast: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class GoTo:
@@ -64,6 +67,7 @@ class GoTo:
         """Begin without a goal: the place of the first pose."""
         self.config = config or GoToConfig()
         self._goal: PlanarPose | None = None
+        self._coast = PlanarPose(*self.config.coast)
         self._forget()
 
     def start(self, goal: PlanarPose) -> None:
@@ -79,19 +83,20 @@ class GoTo:
         self._filter(pose, dt)
         self._rested = 0.0 if stepping else self._rested + dt
         here = self._stood(pose, dt) or self._at()
-        # A robot that walks is where it would stand if it were told to now.
-        left = (here @ self._coast if self._walking else here).to(self._goal)
+        # A robot that steps is where it would stand if it were told to now.
+        left = (here @ self._coast if stepping else here).to(self._goal)
         distance, turn = math.hypot(left.x, left.y), abs(left.yaw)
         if self._walking:
             near = distance < self._slack * config.close and turn < self._slack * config.aligned
             self._near = self._near + dt if near else 0.0
             self._walking = self._near < config.dwell
-            self._told = here
+            self._told = here if stepping else None
         elif self._rested >= config.settle + config.rest:
+            if self._told is not None:
+                self._coast, self._told = self._told.to(here), None
             off = distance > self._slack * config.accept or turn > self._slack * config.straight
             if off:
                 self._walking, self._near = True, 0.0
-                self._coast = self._told.to(here)
                 self._slack *= config.widen
         if self._walking:
             return Course(self._towards(left, config.creep if stepping else config.pulse), False, left)
@@ -102,7 +107,7 @@ class GoTo:
         self._velocity: Array = np.zeros(3)
         self._rested = 0.0
         self._sum: Array = np.zeros(3)
-        self._told = self._coast = PlanarPose(0.0, 0.0, 0.0)
+        self._told: PlanarPose | None = None
         self._slack = 1.0
         self._near = 0.0
         self._walking = True
