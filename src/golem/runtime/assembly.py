@@ -67,7 +67,7 @@ class Running:
 
     @property
     def navigator(self) -> Navigator:
-        """The stack's navigator, new and guarded."""
+        """The stack's navigator, guarded."""
         return self._stack.navigator
 
     @property

@@ -174,6 +174,8 @@ class StackSide:
         make = self._workshop.make
         self.context = Context(bus, Kinematics(), nodes.SkillNode.period)
         self._skills = nodes.SkillNode(self.context)
+        # One for all goals: it may learn how these legs stop.
+        self.navigator: Navigator = GuardedNavigator(*make("navigator"))
         localizer, guard = make("localizer")
         lower_body = make("lower_body", onboard=BusOnboard(bus))
         reserve = make("lower_body", stack.legs_in_reserve, onboard=BusOnboard(bus))
@@ -200,11 +202,6 @@ class StackSide:
     def method(self) -> GraspMethod:
         """The stack's grasp method, new and guarded."""
         return GuardedMethod(*self._workshop.make("grasp_method"))
-
-    @property
-    def navigator(self) -> Navigator:
-        """The stack's navigator, new and guarded."""
-        return GuardedNavigator(*self._workshop.make("navigator"))
 
     @property
     def safety(self) -> GateStatus | None:

@@ -20,7 +20,7 @@ class AlmiConfig:
     """Options of `Almi`.
 
     Attributes:
-        walk, stand: other networks for the same descriptions, such as checkpoints of training runs.
+        walk, stand: other networks for the same descriptions, as `golem train legs export` writes them.
     """
 
     walk: str | None = None

@@ -159,7 +159,7 @@ class World:
         self._filter = RandomWalk(RandomWalkConfig(), (n,))
         self._contact = Contact(ContactConfig(), (n,))
         self._limits = SafetyLimits.from_profile()
-        # The gate's rule in physics steps: what persists for 20 ms.
+        # The gate's rule in physics steps.
         self._patience = round(self._limits.leg_samples * SERVO_PERIOD / STEP)
         self._bad: NDArray[np.int64] = np.zeros((n, 2), dtype=np.int64)
         self.stopped: NDArray[np.bool_] = np.zeros(n, dtype=bool)
