@@ -99,6 +99,13 @@ def test_a_broken_controller_is_lost_by_its_fault(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(leg_tests, "MINUTE", 1.0)
     figures = LegTrial("quiet", Subject(f"{METHODS}:Broken", "ideal"), 0, 0).run()
     assert figures["lost"] == 1.0 and figures["lost_in_fault"] == 1.0
+    assert figures["never_negative"] == 0.0 and "base_range" not in figures, (
+        "who is lost does not flatter the mean"
+    )
+
+
+def test_who_does_not_walk_tracks_nothing_rather_than_the_zero_twist() -> None:
+    assert LegTrial("tracking", SUBJECT, 0, 0).run() == {"lost": 0.0, "does_not_walk": 1.0}
 
 
 def test_wrong_options_are_named(tmp_path: Path) -> None:

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from golem.capabilities.legs.description import SHIPPED
 from golem.evaluation import provenance
+from golem.stack import Choice, Stack
 
 
 @pytest.fixture
@@ -72,6 +74,22 @@ def test_the_code_digest_follows_content_and_names_but_no_caches(package: Path) 
     second = code()
     (package / "__init__.py").rename(package / "other.py")
     assert len({first, second, code()}) == 3
+
+
+def test_a_users_policy_is_its_description_and_its_network(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text((SHIPPED / "almi_stand.yaml").read_text())
+    network = tmp_path / "almi_stand.onnx"
+    network.write_bytes(b"one")
+    policy = {"use": "policy", "options": {"file": str(mine)}}
+    for legs in (
+        Choice("policy", {"file": str(mine)}),
+        Choice("handover", {"walk": policy, "stand": policy}),
+    ):
+        before = provenance.user_files(Stack(lower_body=legs))
+        network.write_bytes(network.read_bytes() + b"more")
+        after = provenance.user_files(Stack(lower_body=legs))
+        assert before.keys() == after.keys() and before != after
 
 
 def test_a_digest_does_not_depend_on_the_order_of_keys() -> None:

@@ -108,8 +108,9 @@ class BalanceTrace:
 
     @property
     def base_range(self) -> float:
-        """Largest horizontal extent of the base's path, along x or y [m]."""
-        return float(np.ptp(self.base[:, :2], axis=0).max())
+        """Largest horizontal distance between two places of the base [m]."""
+        corners = convex_hull(self.base[:, :2])
+        return float(np.linalg.norm(corners[:, None] - corners, axis=2).max())
 
     @property
     def sway(self) -> float:

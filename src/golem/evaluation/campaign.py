@@ -65,7 +65,8 @@ def run_campaign(
     """
     if processes < 1:
         raise ConfigError(f"-j is {processes}; it must be 1 or more.")
-    run = {"code": code_digest(), "versions": versions()}
+    # The commit of the beginning: somebody may commit while this runs.
+    run, made = {"code": code_digest(), "versions": versions()}, commit()
     with RunFolder(out) as folder:
         path = folder.path / "jobs.jsonl"
         held = _held(path, run)
@@ -90,7 +91,7 @@ def run_campaign(
                 for job, result in workers.finished():
                     if _REFUSED in result:
                         raise GolemError(result[_REFUSED])
-                    line = {"job": _named(job), "result": result, "commit": commit(), **run}
+                    line = {"job": _named(job), "result": result, "commit": made, **run}
                     append_line(path, json.dumps(line, separators=(",", ":"), allow_nan=False) + "\n")
                     take(job, result)
             except KeyboardInterrupt:

@@ -41,6 +41,8 @@ def run_compare(config: CompareConfig) -> list[dict[str, Any]]:
             raise ConfigError(
                 f"The runs have different {name}s ({one} and {other}); trials are paired by seed, index and profile."
             )
+    if a[0].code != b[0].code:
+        print(f"The runs are of different code, commits {a[0].commit} and {b[0].commit}.")
     methods = [m for m in dict.fromkeys(r.method for r in a) if m in {r.method for r in b}]
     if not methods:
         raise ConfigError("The runs have no method in common.")

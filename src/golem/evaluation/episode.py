@@ -25,6 +25,8 @@ STACK = "stand"
 """The shipped stack whose robot stands on its own feet."""
 READY = 10.0
 """Time in which a robot has to carry its weight, so that its band is let go [s]: the vendor's start-up takes some."""
+LATENCY = 0.02
+"""Delay of motor commands on top of the profile's with which lower bodies are compared [s]."""
 RUNS_FILES = ("policy", "vendor")
 """Lower bodies that run the files of a policy: the adapter, and the vendor's service on board."""
 
@@ -59,7 +61,12 @@ def legs_stack(
         profile: realism profile.
         overrides: slot -> implementation that replaces the stack's own.
         robot: options of the twin that differ from the stack's own; without any, an open floor.
+
+    Raises:
+        ConfigError: `overrides` names a robot, which the test itself brings.
     """
+    if "robot" in (overrides or {}):
+        raise ConfigError("The test of a lower body brings its own robot; leave out --use robot=...")
     stack = with_legs(load_stack(STACK, profile=profile), method)
     options = {**stack.robot.options, "world": "open", **(robot or {})}
     stack = replace(stack, robot=replace(stack.robot, options=options))

@@ -153,7 +153,8 @@ def _follow(use: str, walk: Walk, states: Sequence[LowState]) -> _Track:
     squares = ((velocity - walk.velocity) ** 2).sum(axis=1)
     # The way since the first judged sample, each in the heading frame it had then.
     way, true = (_way(poses, first, last) for poses in (T, walk.T))
-    steps = np.linalg.norm(np.diff(walk.T[first : last + 1 : 50, :2, 3], axis=0), axis=1)
+    # Sampled once a second: the sway of walking is no way.
+    steps = np.linalg.norm(np.diff(walk.T[first : last + 1 : round(1.0 / TICK), :2, 3], axis=0), axis=1)
     return _Track(
         standing=squares[walk.judged & ~walk.stepping],
         walking=squares[walk.judged & walk.stepping],

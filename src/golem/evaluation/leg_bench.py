@@ -15,7 +15,8 @@ from tyro.conf import arg
 
 from golem.errors import ConfigError, ModuleFault, unknown_name
 from golem.evaluation.campaign import Done, Result, robot_options, run_campaign, write_files
-from golem.evaluation.leg_tests import LOST, TESTS
+from golem.evaluation.episode import LATENCY
+from golem.evaluation.leg_tests import LOST, NEVER_STOOD, TESTS, arms, lost_in, quiet
 from golem.evaluation.provenance import commit
 from golem.evaluation.subject import Subject
 from golem.robots.sensors.profiles import load_profile
@@ -42,7 +43,7 @@ class LegBenchConfig:
     """Trials per test and method."""
     profile: str = "bench"
     """Realism of sensors and actuators: ideal, bench or field."""
-    latency: float = 0.02
+    latency: float = LATENCY
     """Delay of motor commands on top of the profile's [s]."""
     robot: tuple[str, ...] = ()
     """Further options of the twin, e.g. feet=box cone=elliptic mjcf=../h1_2.xml."""
@@ -76,7 +77,8 @@ class LegTrial:
         try:
             return dict(TESTS[self.test](self.subject, self.seed, self.index))
         except ModuleFault as fault:
-            return {"lost": 1.0, f"{LOST}{FAULT}": 1.0, "fault": str(fault)}
+            stood = NEVER_STOOD if TESTS[self.test] in (arms, quiet) else {}
+            return {**stood, **lost_in(FAULT), "fault": str(fault)}
 
 
 def run_leg_bench(config: LegBenchConfig) -> list[dict[str, Any]]:

@@ -1,8 +1,8 @@
 """What `golem bench legs` tests: standing, working, walking, stopping; one function per test, one robot per trial.
 
 A test takes subject, seed and index of the trial, and returns its figures in SI units. Trial `i` of every subject
-meets the same draws. A robot that is lost (fell, was stopped, or its controller failed) adds the figure `lost` = 1 and
-the stage in `LOST`; figures that were not reached are left out.
+meets the same draws. A robot that is lost (fell, was stopped, or its controller failed) has the figures of `lost_in`
+alone: what it did until then would flatter it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from golem.capabilities.legs.base import Envelope
-from golem.capabilities.legs.mpc.controller import MPC
+from golem.capabilities.legs.mpc.controller import MPC, MPCConfig
 from golem.capabilities.navigation.base import PlanarPose
 from golem.evaluation.bench import stopwatch
 from golem.evaluation.episode import Episode, episode_seed, legs_stack
@@ -48,6 +48,8 @@ ROUGH_TIME = 15.0
 """Time it is commanded [s]: the ramp begins a metre ahead."""
 MAX_SHOVE = 30.0
 """Largest push of the endurance test [N s]."""
+PATIENCE = 4.0
+"""Time after its last push that has to be survived, too [s]."""
 GOAL_DISTANCE = (1.8, 2.2)
 """Distance of the goals of the test of stopping [m]."""
 GOAL_TURN = 0.6
@@ -60,6 +62,8 @@ PLANNED = 10.0
 """Length of the test of the planner's rate [s]."""
 SAMPLES = (8, 12, 16, 24, 32)
 """Samples per plan of the test of the planner's rate."""
+NEVER_STOOD: Figures = {"never_negative": 0.0}
+"""What a robot that is lost adds to the share of those that kept their balance."""
 
 
 def quiet(subject: Subject, seed: int, index: int) -> Figures:
@@ -81,15 +85,16 @@ def _minute(episode: Episode, settle: float) -> Figures:
     episode.stand(settle)
     start = episode.t
     episode.run(MINUTE)
-    return _standing(episode, start) | _lost(episode)
+    return NEVER_STOOD | _lost(episode) if episode.over else _standing(episode, start) | _lost(episode)
 
 
 def tracking(subject: Subject, seed: int, index: int) -> Figures:
     """Walk with one twist of the declared envelope: error of the mean velocity over the last seconds, per axis."""
     with closing(subject.episode(seed, index)) as episode:
-        twist = command(
-            episode.running.envelope, subject.draw("legs/tracking", seed, index).rng("twist"), index
-        )
+        envelope = episode.running.envelope
+        if not any(limit for axis in (envelope.vx, envelope.vy, envelope.wz) for limit in axis):
+            return {"lost": 0.0, "does_not_walk": 1.0}
+        twist = command(envelope, subject.draw("legs/tracking", seed, index).rng("twist"), index)
         asked = np.array([twist.vx, twist.vy, twist.wz])
         episode.stand(SETTLE)
         episode.start(Exercise(twist=lambda t: twist))
@@ -125,7 +130,9 @@ def endurance(subject: Subject, seed: int, index: int) -> Figures:
             if episode.t < start + MINUTE - 1e-6 and not episode.over:
                 episode.push(shove(DIRECTIONS[shoves.integers(8)], shoves.uniform(0.0, MAX_SHOVE)))
                 count += 1
-        return {"seconds": episode.t - start, "pushes": float(count)} | _lost(episode)
+        seconds = episode.t - start
+        episode.run(PATIENCE)
+        return {"seconds": seconds, "pushes": float(count)} | _lost(episode)
 
 
 def slope(subject: Subject, seed: int, index: int) -> Figures:
@@ -189,11 +196,21 @@ def plans(subject: Subject, seed: int, index: int) -> Figures:
         ):
             episode.stand(SETTLE)
             episode.run(PLANNED)
+        if not wall:
+            return _lost(episode)
+        rate = 1.0 / float(np.median(wall))
+        stands = rate >= MPCConfig().plan_rate and not episode.over
         return {
-            "samples": float(samples),
-            "plans_per_second": 1.0 / float(np.median(wall)),
-            "cpu_per_plan": float(np.median(cpu)),
+            f"plans_per_second_{samples}": rate,
+            f"cpu_per_plan_{samples}": float(np.median(cpu)),
+            f"stands_{samples}": float(not episode.over),
+            f"stands_in_real_time_{samples}": float(stands),
         } | _lost(episode)
+
+
+def lost_in(stage: str) -> Figures:
+    """Return the figures of a robot that was lost in `stage`."""
+    return {"lost": 1.0, f"{LOST}{stage}": 1.0}
 
 
 def command(envelope: Envelope, rng: np.random.Generator, index: int) -> Twist:
@@ -211,17 +228,18 @@ def _random(envelope: Envelope, rng: np.random.Generator, still: bool) -> Twist:
 def _rough(subject: Subject, seed: int, index: int, world: str) -> Figures:
     with closing(subject.episode(seed, index, world=world)) as episode:
         episode.stand(SETTLE)
+        start = episode.t
         episode.start(Exercise(twist=lambda t: ROUGH))
         episode.run(ROUGH_TIME)
-        path = episode.recorder.trace().base
+        if episode.over:
+            return _lost(episode)
+        path = episode.recorder.trace().window(start).base
         climbed, moved = path[-1, 2] - path[0, 2], np.hypot(*(path[-1] - path[0])[:2])
         return {"distance": float(moved), "climbed": float(climbed)} | _lost(episode)
 
 
 def _standing(episode: Episode, start: float) -> Figures:
     stood = episode.recorder.trace().window(start)
-    if not len(stood.t):
-        return {}
     return {
         "base_range": stood.base_range,
         "sway": stood.sway,
@@ -234,8 +252,7 @@ def _standing(episode: Episode, start: float) -> Figures:
 
 
 def _lost(episode: Episode) -> Figures:
-    loss = episode.loss
-    return {"lost": 0.0} if loss is None else {"lost": 1.0, f"{LOST}{loss.stage}": 1.0}
+    return {"lost": 0.0} if episode.loss is None else lost_in(episode.loss.stage)
 
 
 TESTS: dict[str, Callable[[Subject, int, int], Figures]] = {

@@ -8,17 +8,20 @@ import json
 import platform
 import subprocess
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import golem
 from golem import registry
+from golem.capabilities.legs.description import load_description
+from golem.errors import ConfigError
 from golem.robots.sensors.profiles import load_profile
 from golem.stack import Stack
 
-PACKAGES = ("golem-humanoid", "numpy", "scipy", "mujoco", "pin", "daqp", "onnxruntime")
+PACKAGES = ("golem-humanoid", "numpy", "scipy", "mujoco", "pin", "daqp", "onnxruntime", "torch")
 """Distributions whose version may change a trial's outcome."""
 
 
@@ -45,10 +48,24 @@ def user_files(stack: Stack) -> dict[str, str]:
     }
     for slot, choice in chosen.items():
         named = {"use": choice.use.rpartition(":")[0], **choice.options}
-        for name, value in named.items():
-            if isinstance(value, str) and (path := Path(value).expanduser()).is_file():
-                found[f"{slot}/{name}"] = hashlib.sha256(path.read_bytes()).hexdigest()
+        for name, path in _named(named).items():
+            found[f"{slot}/{name}"] = hashlib.sha256(path.read_bytes()).hexdigest()
     return found
+
+
+def _named(options: Mapping[str, Any]) -> dict[str, Path]:
+    """Return the files that options name, whatever their depth, and the network beside a policy's description."""
+    found: dict[str, Path] = {}
+    for name, value in options.items():
+        if isinstance(value, Mapping):
+            within = _named(cast(Mapping[str, Any], value))
+            found |= {f"{name}/{inner}": path for inner, path in within.items()}
+        elif isinstance(value, str):
+            found[name] = Path(value).expanduser()
+            if found[name].suffix in (".yaml", ".yml"):
+                with suppress(ConfigError):  # another kind of file, or absent: said elsewhere
+                    found.setdefault("network", load_description(value)[1])
+    return {name: path for name, path in found.items() if path.is_file()}
 
 
 def versions() -> dict[str, str]:

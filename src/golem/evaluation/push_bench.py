@@ -14,6 +14,7 @@ from tyro.conf import arg
 
 from golem.errors import ConfigError, ModuleFault, unknown_name
 from golem.evaluation.campaign import Done, Job, Result, robot_options, run_campaign, write_files
+from golem.evaluation.episode import LATENCY, Episode
 from golem.evaluation.exercise import ArmMotion, Exercise
 from golem.evaluation.provenance import commit
 from golem.evaluation.pushes import DIRECTIONS, rod, shove
@@ -33,6 +34,10 @@ WALK = Twist(vx=0.3)
 """Twist of the trials in which the robot walks."""
 SWING = 0.15
 """The push meets a swinging foot up to so long after it was lifted [s]."""
+STEP = 2.0
+"""Time in which a robot that walks lifts each foot [s]."""
+TRIES = 5
+"""Swings of that foot that may end before the push: a sole chatters, or a step is short."""
 PATIENCE = 4.0
 """Time after the push that has to be survived [s]."""
 QUIET = 0.5
@@ -64,7 +69,7 @@ class PushBenchConfig:
     """Highest level."""
     profile: str = "bench"
     """Realism of sensors and actuators: ideal, bench or field."""
-    latency: float = 0.02
+    latency: float = LATENCY
     """Delay of motor commands on top of the profile's [s]."""
     robot: tuple[str, ...] = ()
     """Further options of the twin, e.g. feet=box cone=elliptic mjcf=../h1_2.xml."""
@@ -123,18 +128,31 @@ class Level:
                 if not standing:
                     exercise.twist = lambda t: WALK
                     episode.run(settle)
-                    air = [self.phase != "left_swing", self.phase != "right_swing"]
-                    episode.run(2.0, until=lambda: episode.recorder.contact.tolist() == air)
-                    if not episode.over and episode.recorder.contact.tolist() != air:
+                    if not self._swing(episode, late):
                         return "no step"
-                    episode.run(late)
                 push = (shove if self.kind == "shove" else rod)(self.direction, self.level)
                 episode.push(push)
                 episode.run(push.duration)
+                episode.recorder.quiet = 0.0
                 episode.run(PATIENCE, until=lambda: standing and episode.recorder.quiet >= QUIET)
                 return None if episode.loss is None else episode.loss.stage
         except ModuleFault:
             return FAULT
+
+    def _swing(self, episode: Episode, late: float) -> bool:
+        """Walk until the foot of the phase was lifted `late` [s] ago and is still in the air; False if it never is."""
+        air = [self.phase != "left_swing", self.phase != "right_swing"]
+
+        def swings() -> bool:
+            return episode.recorder.contact.tolist() == air
+
+        for _ in range(TRIES):
+            episode.run(STEP, until=lambda: not swings())
+            episode.run(STEP, until=swings)
+            episode.run(late)
+            if episode.over or swings():
+                return True
+        return False
 
 
 def allowed(n: int) -> int:

@@ -110,7 +110,7 @@ class LowerBodyNode:
             # A copy: the one that was raised holds every frame it passed.
             self._fault = ModuleFault(fault.slot, fault.use, fault.reason)
             self._failed_at = t
-            self._legs = self._fallback
+            self._legs, self._overruns = self._fallback, 0
             try:
                 self._legs.guard.call(self._locomotion.hand_over, self._legs.controller, state, self._last)
                 command = self._control(state, base, None)

@@ -9,8 +9,9 @@ import pytest
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.oracle import GraspTruth
-from golem.evaluation.rungs.pick import PAD_REACH, STRAIGHT, Tether, blame
+from golem.evaluation.rungs.pick import PAD_REACH, STRAIGHT, Stand, Tether, blame
 
+LIMP = f"{Path(__file__).parents[1] / 'leg_methods.py'}:Limp"
 BAD_MODULES = """
 import numpy as np
 from golem.capabilities.arms.base import ArmCommand
@@ -49,6 +50,11 @@ def test_a_perfect_robot_puts_the_screw_in_the_tray(method: str, rung: Tether) -
     assert 1.0 < outcome.timings["detect_to_grasp"] < 15.0
     assert outcome.series["grasp_miss"] < PAD_REACH
     assert outcome.picture is not None and outcome.picture.startswith(b"\x89PNG")
+
+
+def test_a_robot_whose_legs_carry_nothing_does_not_pick_in_its_band() -> None:
+    outcome = Stand().run(TrialSpec("stand", "visual_servo", "ideal", 0, 0, {"lower_body": LIMP}), None)
+    assert (outcome.success, outcome.stage, outcome.module) == (False, "settle", f"lower_body: {LIMP}")
 
 
 def test_a_trial_depends_on_its_spec_alone(rung: Tether) -> None:

@@ -13,7 +13,8 @@ from golem.evaluation.episode import Loss
 from golem.evaluation.pushes import DIRECTIONS, ROD_TIME, rod
 from golem.evaluation.rungs.push import LEAST_PEAK, PEAK, PushRung, draw, judge
 
-STIFF = f"{Path(__file__).parents[1] / 'leg_methods.py'}:Stiff"
+METHODS = Path(__file__).parents[1] / "leg_methods.py"
+STIFF = f"{METHODS}:Stiff"
 
 
 def spec(method: str = STIFF, index: int = 0) -> TrialSpec:
@@ -72,5 +73,6 @@ def test_what_was_lost_names_stage_and_lower_body(margin: float, loss: Loss | No
 
 
 def test_a_robot_that_fell_before_the_push_is_not_blamed_on_it() -> None:
-    outcome = judge(trace(0.1), 9.0, rod("left", 22.0), Loss("fall", "The robot fell at 1.0 s."), "mine")
+    outcome = PushRung().run(TrialSpec("push", f"{METHODS}:Limp", "ideal", 0, 0), None)
+    assert not outcome.success and outcome.module == f"lower_body: {METHODS}:Limp"
     assert outcome.stage == "settle" and outcome.series == {} and "not pushed yet" in outcome.detail

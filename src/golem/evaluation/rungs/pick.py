@@ -17,7 +17,7 @@ from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
-from golem.evaluation.episode import episode_seed
+from golem.evaluation.episode import READY, episode_seed
 from golem.evaluation.oracle import GraspTruth, Oracle
 from golem.evaluation.provenance import stack_facts
 from golem.middleware import topics
@@ -33,8 +33,8 @@ from golem.stack import Stack, load_stack
 
 STANDING = "stand"
 """Name of the rung, and of the stack, whose robot balances."""
-STARTED = 1.5
-"""Time after which no band holds a robot that balances [s]."""
+RELEASED = 1.0
+"""Time between a robot that balances carrying its weight and its errand [s]."""
 SETTLE = 0.5
 """Robot time a dropped screw gets to come to rest [s]."""
 ABORTED = ("safety", FAULT, "timeout")
@@ -81,6 +81,11 @@ class PickRung:
         running, robot = build(stack, episode_seed(spec.seed, spec.index))
         oracle = Oracle(robot)
         try:
+            if self.balances:
+                running.executor.run(READY, lambda: not robot.banded)
+                if robot.banded:
+                    return _never_stood(stack)
+                running.executor.run(running.executor.t + RELEASED)
             watch = _Watch(running, oracle, BalanceRecorder(robot) if self.balances else None)
             result = running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=watch)
             running.executor.run(running.executor.t + SETTLE)
@@ -159,9 +164,14 @@ def _judge(stack: Stack, result: SkillResult, oracle: Oracle, watch: _Watch) -> 
     return TrialOutcome(False, stage, module, detail, result.timings, series, picture)
 
 
-def balance(trace: BalanceTrace) -> dict[str, float]:
-    """Return how a robot stood that worked; from `STARTED` on, since until then a band held it."""
-    stood = trace.window(STARTED)
+def _never_stood(stack: Stack) -> TrialOutcome:
+    """Return the outcome of a robot whose band could not let go."""
+    detail = f"The robot did not carry its weight within {READY:g} s."
+    return TrialOutcome(False, "settle", f"lower_body: {stack.lower_body.use}", detail)
+
+
+def balance(stood: BalanceTrace) -> dict[str, float]:
+    """Return how a robot stood that worked."""
     if not len(stood.t):
         return {}
     return {

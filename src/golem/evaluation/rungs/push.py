@@ -13,7 +13,7 @@ import numpy as np
 from golem import registry
 from golem.evaluation.balance import TRACE, BalanceTrace
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
-from golem.evaluation.episode import Episode, Loss, episode_seed, legs_stack
+from golem.evaluation.episode import LATENCY, Episode, Loss, episode_seed, legs_stack
 from golem.evaluation.exercise import ArmMotion, Exercise
 from golem.evaluation.provenance import stack_facts
 from golem.evaluation.pushes import DIRECTIONS, Push, rod
@@ -26,6 +26,8 @@ LEAST_PEAK = 5.0
 """Peak below which a draw is raised to it [N]."""
 SETTLE = (2.0, 3.0)
 """Range of the time between standing and the push [s]; the arms are then in motion."""
+PLANT = {"latency": LATENCY}
+"""The twin's options beside the profile's: what the leg benches test, too."""
 MOMENTS = (0.5, 0.5, 0.4, 0.6)
 """Times between the moments of the strip of pictures, from the begin of the push on [s]."""
 PATIENCE = 5.0
@@ -51,7 +53,7 @@ class PushRung:
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
         return {
-            **stack_facts(legs_stack(method, profile, overrides)),
+            **stack_facts(legs_stack(method, profile, overrides, PLANT)),
             "peak": PEAK,
             "settle": SETTLE,
             "patience": PATIENCE,
@@ -59,12 +61,14 @@ class PushRung:
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
-        stack = legs_stack(spec.method, spec.profile, spec.overrides)
+        stack = legs_stack(spec.method, spec.profile, spec.overrides, PLANT)
         push, settle = draw(spec.rng("push"))
         with closing(Episode(stack, episode_seed(spec.seed, spec.index))) as episode:
             episode.start(Exercise(ArmMotion(spec.rng("arms"))))
             strip = Strip(episode.robot, push.bearing)
             episode.stand(settle)
+            if episode.loss is not None:
+                return never_pushed(episode.loss, spec.method)
             start = episode.t
             episode.push(push)
             for seconds in MOMENTS:
@@ -80,6 +84,11 @@ class PushRung:
             return replace(outcome, picture=strip.picture() if shown else None)
 
 
+def never_pushed(loss: Loss, method: str) -> TrialOutcome:
+    """Return the outcome of a robot that was lost before its push."""
+    return TrialOutcome(False, "settle", f"lower_body: {method}", f"{loss.detail} It was not pushed yet.")
+
+
 def draw(rng: np.random.Generator) -> tuple[Push, float]:
     """Return the push of one trial, and the time before it [s]."""
     direction = DIRECTIONS[rng.integers(len(DIRECTIONS))]
@@ -90,8 +99,6 @@ def draw(rng: np.random.Generator) -> tuple[Push, float]:
 def measures(trace: BalanceTrace, start: float) -> dict[str, float]:
     """Return the paper's measures of a push that began at `start` [s], SI units."""
     after = trace.window(start)
-    if not len(after.t):
-        return {}
     return {
         "peak_force": float(np.linalg.norm(after.force, axis=1).max()),
         "peak_lean": float(np.abs(after.rpy[:, 1]).max()),
@@ -112,11 +119,8 @@ def judge(trace: BalanceTrace, start: float, push: Push, loss: Loss | None, meth
     if loss is None and series["margin_final"] <= 0.0:
         loss = Loss("balance", f"The CoM margin ends at {1e3 * series['margin_final']:.0f} mm.")
     if loss is not None:
-        module = f"lower_body: {method}"
-        if not series:
-            return TrialOutcome(False, "settle", module, f"{loss.detail} It was not pushed yet.")
         detail = f"{loss.detail} It was {pushed} at {start:.1f} s."
-        return TrialOutcome(False, loss.stage, module, detail, series=series)
+        return TrialOutcome(False, loss.stage, f"lower_body: {method}", detail, series=series)
     recovery = trace.recovery_time(start)
     # A robot that never lost its balance has none to recover.
     timings = {"recovery": recovery} if recovery > 0.0 else {}
