@@ -170,6 +170,11 @@ class Ppo:
         """Let the standard deviation of no action exceed `most`."""
         self.actor.log_std.clamp_(max=float(np.log(most)))
 
+    @torch.no_grad()
+    def set_noise(self, deviation: float) -> None:
+        """Explore every action with this standard deviation."""
+        self.actor.log_std.fill_(float(np.log(deviation)))
+
     def state(self) -> dict[str, Any]:
         """Return everything that a checkpoint needs."""
         return {

@@ -37,7 +37,7 @@ class TrainConfig:
         steps: actions of all robots together, e.g. 38e6.
         robots: how many are simulated at once.
         threads: of the physics and of the networks.
-        start: checkpoint of another run whose networks this one begins with.
+        start: checkpoint of another run whose networks and steps this one begins with, and with the noise of `noise`.
         adversary: what moves the upper body: `none` (it rests in random postures), `motions` (the curriculum), or
             `learned` (motions, and a policy that moves half of the robots once `learned_from` steps are done).
         learned_from: steps after which the learned adversary begins.
@@ -195,10 +195,11 @@ class _Run:
         self._obs, self._known = self.env.observe()
 
     def begin_with(self, path: Path) -> None:
-        """Take over networks and steps of another run's checkpoint; the configuration is this run's own."""
+        """Take over networks and steps of another run's checkpoint; configuration and noise are this run's own."""
         saved = torch.load(path, weights_only=True)
         self.legs.load(saved["legs"])
         self.upper.load(saved["upper"])
+        self.legs.set_noise(self.config.noise[0])
         self.steps = saved["steps"]
         self._harden()
 
