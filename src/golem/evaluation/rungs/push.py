@@ -98,7 +98,7 @@ def draw(rng: np.random.Generator) -> tuple[Push, float]:
 
 def measures(trace: BalanceTrace, start: float) -> dict[str, float]:
     """Return the paper's measures of a push that began at `start` [s], SI units."""
-    after = trace.window(start)
+    after = trace.window(min(start, float(trace.t[-1])))  # a stop may come before the next sample
     return {
         "peak_force": float(np.linalg.norm(after.force, axis=1).max()),
         "peak_lean": float(np.abs(after.rpy[:, 1]).max()),
