@@ -119,7 +119,7 @@ def test_the_noise_is_bounded_late_in_a_run(tmp_path: Path) -> None:
     assert std[1:] == pytest.approx([0.7, 0.4] + [0.1] * 7, rel=0.05)
 
     # Who begins with these networks explores again.
-    ramp = {"noise_ramp": (1.0, 0.0), "noise": (0.7, 0.1)}
+    ramp: dict[str, Any] = {"noise_ramp": (1.0, 0.0), "noise": (0.7, 0.1)}
     train(small(tmp_path / "again", updates=12, start=tmp_path / CHECKPOINT, **ramp))
     with (tmp_path / "again" / CURVE).open() as file:
         assert [float(row["std"]) for row in csv.DictReader(file)] == pytest.approx([0.7] * 2, rel=0.05)
