@@ -94,6 +94,10 @@ class Loss:
     detail: str
 
 
+HANGS = Loss("settle", f"The robot did not carry its weight within {READY:g} s.")
+"""A robot whose band could not let go."""
+
+
 class Episode:
     """A robot that pursues a skill while it is pushed and recorded.
 
@@ -161,7 +165,7 @@ class Episode:
         if self._fault is not None:
             return Loss(FAULT, self._fault)
         if self._hangs:
-            return Loss("settle", f"The robot did not carry its weight within {READY:g} s.")
+            return HANGS
         if self.recorder.fallen:
             return Loss("fall", f"The robot fell at {self.t:.1f} s.")
         safety = self.running.safety

@@ -16,7 +16,7 @@ from tyro.conf import arg
 from golem.errors import ConfigError, ModuleFault, unknown_name
 from golem.evaluation.campaign import Done, Result, robot_options, run_campaign, write_files
 from golem.evaluation.episode import LATENCY
-from golem.evaluation.leg_tests import LOST, NEVER_STOOD, TESTS, arms, lost_in, quiet
+from golem.evaluation.leg_tests import LOST, STANDING, TESTS, lost_in
 from golem.evaluation.provenance import commit
 from golem.evaluation.subject import Subject
 from golem.robots.sensors.profiles import load_profile
@@ -75,10 +75,10 @@ class LegTrial:
     def run(self) -> Result:
         """Return the figures; a module that breaks its contract loses the robot."""
         try:
-            return dict(TESTS[self.test](self.subject, self.seed, self.index))
+            found: Result = dict(TESTS[self.test](self.subject, self.seed, self.index))
         except ModuleFault as fault:
-            stood = NEVER_STOOD if TESTS[self.test] in (arms, quiet) else {}
-            return {**stood, **lost_in(FAULT), "fault": str(fault)}
+            found = {**lost_in(FAULT), "fault": str(fault)}
+        return {"never_negative": 0.0, **found} if found["lost"] and self.test in STANDING else found
 
 
 def run_leg_bench(config: LegBenchConfig) -> list[dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 A test takes subject, seed and index of the trial, and returns its figures in SI units. Trial `i` of every subject
 meets the same draws. A robot that is lost (fell, was stopped, or its controller failed) has the figures of `lost_in`
-alone: what it did until then would flatter it.
+and none of how well it did until then: they would flatter it.
 """
 
 from __future__ import annotations
@@ -62,8 +62,6 @@ PLANNED = 10.0
 """Length of the test of the planner's rate [s]."""
 SAMPLES = (8, 12, 16, 24, 32)
 """Samples per plan of the test of the planner's rate."""
-NEVER_STOOD: Figures = {"never_negative": 0.0}
-"""What a robot that is lost adds to the share of those that kept their balance."""
 
 
 def quiet(subject: Subject, seed: int, index: int) -> Figures:
@@ -85,7 +83,7 @@ def _minute(episode: Episode, settle: float) -> Figures:
     episode.stand(settle)
     start = episode.t
     episode.run(MINUTE)
-    return NEVER_STOOD | _lost(episode) if episode.over else _standing(episode, start) | _lost(episode)
+    return _lost(episode) if episode.over else _standing(episode, start) | _lost(episode)
 
 
 def tracking(subject: Subject, seed: int, index: int) -> Figures:
@@ -255,6 +253,8 @@ def _lost(episode: Episode) -> Figures:
     return {"lost": 0.0} if episode.loss is None else lost_in(episode.loss.stage)
 
 
+STANDING = (quiet.__name__, arms.__name__)
+"""Tests in which a robot that is lost counts among those that did not keep their balance."""
 TESTS: dict[str, Callable[[Subject, int, int], Figures]] = {
     test.__name__: test for test in (quiet, arms, tracking, endurance, slope, rubble, stopping, plans)
 }

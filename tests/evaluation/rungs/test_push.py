@@ -73,6 +73,6 @@ def test_what_was_lost_names_stage_and_lower_body(margin: float, loss: Loss | No
 
 
 def test_a_robot_that_fell_before_the_push_is_not_blamed_on_it() -> None:
-    outcome = PushRung().run(TrialSpec("push", f"{METHODS}:Limp", "ideal", 0, 0), None)
+    outcome = PushRung().run(spec(f"{METHODS}:Limp"), None)
     assert not outcome.success and outcome.module == f"lower_body: {METHODS}:Limp"
     assert outcome.stage == "settle" and outcome.series == {} and "not pushed yet" in outcome.detail

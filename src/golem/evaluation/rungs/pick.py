@@ -17,7 +17,7 @@ from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
-from golem.evaluation.episode import READY, episode_seed
+from golem.evaluation.episode import HANGS, READY, episode_seed
 from golem.evaluation.oracle import GraspTruth, Oracle
 from golem.evaluation.provenance import stack_facts
 from golem.middleware import topics
@@ -84,7 +84,9 @@ class PickRung:
             if self.balances:
                 running.executor.run(READY, lambda: not robot.banded)
                 if robot.banded:
-                    return _never_stood(stack)
+                    return TrialOutcome(
+                        False, HANGS.stage, f"lower_body: {stack.lower_body.use}", HANGS.detail
+                    )
                 running.executor.run(running.executor.t + RELEASED)
             watch = _Watch(running, oracle, BalanceRecorder(robot) if self.balances else None)
             result = running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=watch)
@@ -162,12 +164,6 @@ def _judge(stack: Stack, result: SkillResult, oracle: Oracle, watch: _Watch) -> 
     )
     picture = watch.picture or oracle.picture()
     return TrialOutcome(False, stage, module, detail, result.timings, series, picture)
-
-
-def _never_stood(stack: Stack) -> TrialOutcome:
-    """Return the outcome of a robot whose band could not let go."""
-    detail = f"The robot did not carry its weight within {READY:g} s."
-    return TrialOutcome(False, "settle", f"lower_body: {stack.lower_body.use}", detail)
 
 
 def balance(stood: BalanceTrace) -> dict[str, float]:
