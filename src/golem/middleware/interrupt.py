@@ -1,4 +1,4 @@
-"""Ctrl-C as an event, for processes that have to complete something first."""
+"""Ctrl-C, and a terminal that is closed, as an event, for processes that have to complete something first."""
 
 from __future__ import annotations
 
@@ -7,17 +7,23 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
 
 @contextmanager
 def interrupted() -> Iterator[threading.Event]:
-    """Yield an event that Ctrl-C or SIGTERM sets; to be entered in the main thread. Afterwards they are as before."""
+    """Yield an event that Ctrl-C, SIGTERM or SIGHUP sets; to be entered in the main thread.
+
+    Afterwards the three are as before. One that is ignored stays so, as SIGHUP is by nohup.
+    """
     stop = threading.Event()
 
     def interrupt(*_: object) -> None:
         # By another thread: the handler may run while this one holds the event's lock.
         threading.Thread(target=stop.set).start()
 
-    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    heeded = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, interrupt) for number in heeded}
     try:
         yield stop
     finally:

@@ -147,8 +147,8 @@ TOPICS: tuple[Topic, ...] = (
           "What the motors are told, with checksum; from the safety gate and nobody else. The drives go limp "
           "0.1 s after the last one. reserve[0] as in /safety/lowcmd_in: a simulated robot waits for answers."),
     Topic("/clock", "rosgraph_msgs/msg/Clock", "robot", (), NEWEST, 500, "",
-          "Robot time; simulated robots only."),
-    Topic("/joint_states", "sensor_msgs/msg/JointState", "robot", (), SENSOR, 100, "",
+          "Robot time."),
+    Topic("/joint_states", "sensor_msgs/msg/JointState", "robot", (), DEFAULT, 100, "",
           "The 27 joints in motor order, then the joints of the fingers."),
     Topic("/tf", "tf2_msgs/msg/TFMessage", "robot", (), DEFAULT, 50, "",
           "Every moving link in its parent."),
@@ -189,7 +189,8 @@ TOPICS: tuple[Topic, ...] = (
     Topic("/odom", "nav_msgs/msg/Odometry", "stack", (), DEFAULT, 50, "odom",
           "Pose of base_link in odom and its velocity in base_link."),
     Topic("/cmd_vel", "geometry_msgs/msg/Twist", "user", ("stack",), DEFAULT, None, BASE_FRAME,
-          "Velocity for the legs [m/s], [rad/s]; to be repeated at least every 0.5 s, or the robot stands."),
+          "Velocity for the legs [m/s], [rad/s]; to be repeated at least every 0.5 s, or the robot stands. Ignored "
+          "while a skill runs."),
     Topic("/legs/status", "golem_interfaces/msg/LegStatus", "stack", (), DEFAULT, 50, BASE_FRAME,
           "What the lower body was told, what it does, and why not more."),
     Topic("/onboard/lowcmd", "unitree_hg/msg/LowCmd", "robot", ("stack",), LOW, 500, "",

@@ -92,8 +92,13 @@ class _Entry:
 class Executor:
     """Drives nodes in the given order on one clock."""
 
-    def __init__(self, bus: Bus, nodes: Sequence[Node]) -> None:
+    def __init__(self, bus: Bus, nodes: Sequence[Node], start: float = 0.0) -> None:
         """Schedule `nodes`, which exchange messages over `bus`.
+
+        Args:
+            bus: where they meet.
+            nodes: in the order of their turns.
+            start: a time that is to be a tick [s]; a clock from outside need not start at a multiple of one.
 
         Raises:
             ConfigError: a node is faster than the clock.
@@ -101,15 +106,17 @@ class Executor:
         self._bus = bus
         self._schedule = [_Entry(node) for node in nodes]
         self._tick = 0
+        # Whole microseconds, so that it is exactly zero for a clock that ticks as this one does.
+        self._offset = round(start - TICK * round(start / TICK), 6)
 
     @property
     def t(self) -> float:
         """Present time [s]."""
-        return self._tick * TICK
+        return self._offset + self._tick * TICK
 
     def step(self) -> None:
         """Advance by one tick: deliver what is due, then step every node whose period has come."""
-        t = self._tick * TICK
+        t = self.t
         self._bus.deliver(t)
         for entry in self._schedule:
             if self._tick >= entry.due:
@@ -119,7 +126,7 @@ class Executor:
 
     def advance(self, t: float, most: int) -> None:
         """Follow a clock from outside up to time `t` [s]; ticks further back than the last `most` are left out."""
-        target = round(t / TICK)
+        target = round((t - self._offset) / TICK)
         if target - self._tick >= most:
             self._tick = target - most + 1
             for entry in self._schedule:

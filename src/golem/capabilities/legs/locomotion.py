@@ -17,14 +17,12 @@ from golem.capabilities.legs.blend import Blend
 from golem.capabilities.legs.gait import Gait
 from golem.capabilities.legs.pacing import Paced
 from golem.capabilities.legs.trim import Trim, TrimConfig
-from golem.robots.model.imu import base_rate
+from golem.robots.model.imu import sensed_base_rate
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.leg_kinematics import SOLE_CENTER
-from golem.robots.model.table import JOINT_NAMES
 from golem.types import NUM_JOINTS, SIDES, Array, BaseEstimate, LowState, Twist
 
 ZERO = Twist()
-_WAIST = JOINT_NAMES.index("torso_joint")
 _ANKLES = tuple(f"{side}_ankle_roll_link" for side in SIDES)
 
 
@@ -180,7 +178,7 @@ class Locomotion:
         R = base.T_odom_base[:3, :3]
         soles = self._soles(state.q)
         com = R @ self._kinematics.com()
-        rate = R @ base_rate(state.imu.gyro, state.q[_WAIST], state.dq[_WAIST])
+        rate = R @ sensed_base_rate(state)
         velocity = base.velocity + np.cross(rate, com)
         capture, misplaced = balance_errors(R, com, velocity, soles @ R.T, self._stance)
         self.gait.config = self.controller.gait

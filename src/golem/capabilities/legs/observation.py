@@ -10,11 +10,10 @@ import numpy as np
 from golem.capabilities.legs.base import Motion
 from golem.errors import ConfigError, unknown_name
 from golem.options import vector
-from golem.robots.model.imu import base_rate
-from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
+from golem.robots.model.imu import sensed_base_rate
+from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, SIDES, UPPER, Array, BaseEstimate, LowState
 
-_WAIST = JOINT_INDEX["torso_joint"]
 _AXES = ("x", "y", "z")
 
 TERMS: dict[str, tuple[str, ...]] = {
@@ -158,7 +157,7 @@ def measure(state: LowState, base: BaseEstimate, motion: Motion, action: Array) 
     return Signals(
         q=state.q,
         dq=state.dq,
-        gyro=base_rate(state.imu.gyro, state.q[_WAIST], state.dq[_WAIST]),
+        gyro=sensed_base_rate(state),
         gravity=-R[2],
         velocity=base.velocity @ R,
         twist=np.array((motion.twist.vx, motion.twist.vy, motion.twist.wz)),

@@ -31,7 +31,7 @@ from golem.capabilities.legs.wbc_qp import (
     Weights,
 )
 from golem.errors import ConfigError, GolemError, unknown_name
-from golem.robots.model.imu import base_rate
+from golem.robots.model.imu import sensed_base_rate
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
@@ -196,7 +196,7 @@ class Wbc:
         """
         c, d = self.config, self._dynamics
         q, dq = state.q[LEGS], state.dq[LEGS]
-        rate = base_rate(state.imu.gyro, state.q[_TORSO], state.dq[_TORSO])
+        rate = sensed_base_rate(state)
         if not math.isfinite(sum(float(x.sum()) for x in (state.q, state.dq, rate, base.velocity))):
             raise StanceError("Wbc was given a joint, a rate or a base velocity that is not finite.")
         R = base.T_odom_base[:3, :3]

@@ -57,6 +57,7 @@ class Reason(StrEnum):
     BASE_STALE = "base_estimate_stale"
     WRITERS = "two_writers"
     STATE_DAMAGED = "state_damaged"
+    MOTOR = "motor_error"
     COMMAND_DAMAGED = "command_damaged"
     COMMAND_MISSING = "command_never_seen"
     COMMAND_STALE = "command_stale"

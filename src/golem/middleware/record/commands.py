@@ -21,6 +21,7 @@ from golem.middleware.record.reader import Bag, repair
 from golem.middleware.record.recorder import Recorder
 from golem.middleware.record.writer import BagConfig, BagWriter, Compression
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
+from golem.middleware.sole import refuse_second_robot
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ def run_replay(config: ReplayConfig) -> int:
 
     Raises:
         BagError: there is no bag, or it is damaged.
-        ConfigError: an option is wrong, or the bag would be played to the real robot.
+        ConfigError: an option is wrong, or the bag would be played to the real robot, or beside another one.
         DdsError: the domain cannot be joined.
     """
     if config.dds.robot:
@@ -114,6 +115,8 @@ def run_replay(config: ReplayConfig) -> int:
             flush=True,
         )
     with closing(connect(config.dds, PARTICIPANT_USER_DATA)) as participant, interrupted() as stop:
+        if "/lowstate" in (play.topics or bag.topics):
+            refuse_second_robot(participant, config.dds)
         with closing(Player(bag, participant, play)) as player:
             print(f"Playing {config.bag} on {config.dds}. Ctrl-C ends it.", flush=True)
             written = player.run(stop)

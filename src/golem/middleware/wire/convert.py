@@ -57,10 +57,12 @@ def decode_low_state(payload: Payload) -> LowState:
     """Return the state in a `LowState_`. Its time is the robot's tick, which starts again after 49.7 days.
 
     Raises:
-        WireError: encapsulation, length or checksum is wrong, a value is not finite, or the quaternion is none.
+        WireError: encapsulation, length or checksum is wrong, the ankles are not in pitch and roll, a value is not
+            finite, or the quaternion is none.
     """
     _check(payload, hg.LOW_STATE, hg.STATE_CHECKSUM)
-    _, _, _, tick, *numbers = hg.STATE_NUMBERS.unpack(payload)
+    _, mode_pr, _, tick, *numbers = hg.STATE_NUMBERS.unpack(payload)
+    _check_ankles(mode_pr, "state")
     quat, gyro, acc, motors = numbers[:4], numbers[4:7], numbers[7:10], numbers[14:]
     _check_imu(quat, gyro, acc, hg.LOW_STATE)
     _check_motors(motors, _MEASURED, hg.LOW_STATE)
@@ -75,6 +77,19 @@ def mode_machine(payload: Payload) -> int:
         WireError: encapsulation or length is wrong.
     """
     return int(hg.LOW_STATE.read(payload)["mode_machine"])
+
+
+def motor_errors(payload: Payload) -> dict[int, int]:
+    """Return the error word of every motor in a `LowState_` that has one, by index.
+
+    The vendor's low-level examples report a `motorstate` other than zero as an error with that code; what the codes
+    mean is not published.
+
+    Raises:
+        WireError: encapsulation or length is wrong.
+    """
+    words = hg.LOW_STATE.read(payload)["motor"]["motorstate"][:NUM_JOINTS]
+    return {int(i): int(words[i]) for i in np.flatnonzero(words)}
 
 
 def encode_low_command(command: LowCommand, mode_machine: int, answers: float = 0.0) -> bytes:
@@ -112,10 +127,7 @@ def decode_low_command(payload: Payload, t: float, mode_machine: int = MODE_MACH
     """
     _check(payload, hg.LOW_CMD, hg.COMMAND_CHECKSUM)
     _, mode_pr, machine, *motors, _ = hg.COMMAND_NUMBERS.unpack(payload)
-    if mode_pr != hg.PR:
-        raise WireError(
-            f"The command has mode_pr {mode_pr}; only {hg.PR} (ankle pitch and roll) is supported."
-        )
+    _check_ankles(mode_pr, "command")
     if machine != mode_machine:
         raise WireError(
             f"The command has mode_machine {machine}, this robot reports {mode_machine}: copy it from the LowState."
@@ -135,6 +147,13 @@ def answered(payload: Payload) -> float:
         WireError: encapsulation or length is wrong.
     """
     return int(hg.LOW_CMD.read(payload)["reserve"][0]) / _TICKS
+
+
+def _check_ankles(mode_pr: int, what: str) -> None:
+    if mode_pr != hg.PR:
+        raise WireError(
+            f"The {what} has mode_pr {mode_pr}; only {hg.PR} (ankle pitch and roll) is supported."
+        )
 
 
 def rpy(quat: Array) -> tuple[float, float, float]:

@@ -6,7 +6,10 @@ import math
 
 import numpy as np
 
-from golem.types import Array
+from golem.robots.model.table import JOINT_INDEX
+from golem.types import Array, LowState
+
+WAIST = JOINT_INDEX["torso_joint"]
 
 
 def base_rate(gyro: Array, waist: Array, waist_rate: Array) -> Array:
@@ -20,6 +23,11 @@ def base_rate(gyro: Array, waist: Array, waist_rate: Array) -> Array:
     c, s = np.cos(waist), np.sin(waist)
     x, y, z = gyro[..., 0], gyro[..., 1], gyro[..., 2]
     return np.stack([c * x - s * y, s * x + c * y, z - waist_rate], axis=-1)
+
+
+def sensed_base_rate(state: LowState) -> Array:
+    """Return the (3,) angular rate of base_link in base_link as `state` measures it [rad/s]."""
+    return base_rate(state.imu.gyro, state.q[WAIST], state.dq[WAIST])
 
 
 def torso_motion(quat: Array, rate: Array, waist: float, waist_rate: float) -> tuple[Array, Array]:

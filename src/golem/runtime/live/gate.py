@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from golem.hardware.estop.base import EstopFrame
@@ -17,7 +17,7 @@ from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import Fault, GateState, GateStatus, Reason, Request, SafetyLimits
 from golem.middleware import topics
 from golem.middleware.bus import Bus, News
-from golem.middleware.dds.base import Participant, Sample
+from golem.middleware.dds.base import Participant, Qos, Sample
 from golem.middleware.ros.base import Node
 from golem.middleware.ros.convert import diagnostic, diagnostics, header, to_base_estimate
 from golem.middleware.ros.msgs import golem_interfaces
@@ -26,6 +26,7 @@ from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response
 from golem.middleware.ros.waitset import WaitSet
 from golem.middleware.wire import convert
 from golem.middleware.wire.layout import WireError
+from golem.robots.model.table import JOINT_NAMES
 from golem.runtime.executor import in_order
 from golem.runtime.live import pace
 from golem.runtime.live.clock import RobotClock
@@ -36,6 +37,8 @@ from golem.types import BaseEstimate, LowCommand, LowState
 
 REMEMBERED = 256
 """States whose time of arrival is remembered: half a second."""
+PERSISTENT = 25
+"""States in a row with a motor's error that are a fault [own: as many as stop the legs for a speed]."""
 LOOK = 0.05
 """Time between two looks for other writers of the motors' command [s]."""
 REPORT = 0.05
@@ -51,6 +54,7 @@ class Arrivals:
         commands: what the process waits on.
         mode_machine: machine type that the robot reports; None before its first state.
         answered: robot time of the state that the newest command answers [s]; 0 where its sender does not say.
+        sole: what reads each of the topics that one process alone may write.
     """
 
     def __init__(self, bus: Bus, surface: Surface, clock: Callable[[], float]) -> None:
@@ -61,8 +65,12 @@ class Arrivals:
         self.commands, self._states = WaitSet(), WaitSet()
         self.mode_machine: int | None = None
         self.answered = 0.0
-        surface.receive("/lowstate", self._states, self._state)
-        surface.receive("/safety/lowcmd_in", self.commands, self._command)
+        self._faulty = 0
+        # Of each there is one: commands of two stacks would take turns, and states of two robots.
+        self.sole = {
+            "/lowstate": surface.receive("/lowstate", self._states, self._state),
+            "/safety/lowcmd_in": surface.receive("/safety/lowcmd_in", self.commands, self._command),
+        }
 
     def poll(self) -> None:
         """Take what has come; states first, since commands answer them."""
@@ -84,6 +92,11 @@ class Arrivals:
             if len(self._arrived) > REMEMBERED:
                 self._arrived.popitem(last=False)
             self._bus.publish(topics.LOW_STATE, replace(state, t=now), now)
+        errors = convert.motor_errors(sample.payload)
+        self._faulty = self._faulty + 1 if errors else 0
+        if self._faulty >= PERSISTENT:
+            said = ", ".join(f"{JOINT_NAMES[i]} reports error {code:#x}" for i, code in errors.items())
+            self._bus.publish(topics.TRANSPORT_FAULT, Fault(Reason.MOTOR, said), now)
 
     def _command(self, sample: Sample) -> None:
         now = self._clock()
@@ -143,13 +156,14 @@ class LiveGate:
         self._arrivals = Arrivals(self.bus, surface, clock)
         self.commands = self._arrivals.commands
         self._out = surface.writer("/lowcmd")
-        self._all_commands = surface.reader("/lowcmd")
+        # Best effort, as the robot's own reader may be: a reliable one does not see writers that are.
+        self._all_commands = surface.reader("/lowcmd", Qos(reliable=False, depth=1))
         self._estop = estop
         self._side = SafetySide(self.bus, limits, estop)
         self._nodes = in_order(self._side.nodes)
         self._estops = News(self.bus, topics.ESTOP, EstopFrame)
         self._base_stamp = -math.inf
-        self._others: list[str] = []
+        self._crowded = ""
         self._looks, self._reports, self._diagnoses = Every(LOOK), Every(REPORT), Every(DIAGNOSE)
         self._steps = 0
         self.status = GateStatus(clock(), GateState.INIT)
@@ -169,8 +183,7 @@ class LiveGate:
         self._node.poll()
         now = self._clock()
         if self._looks.due(now):
-            own = self._out.guid
-            self._others = [self._who(g) for g in self._all_commands.writers().values() if g != own]
+            self._crowded = self._crowd()
         self._judge()
         if self._diagnoses.due(now):
             self._diagnose(now)
@@ -184,11 +197,8 @@ class LiveGate:
     def _judge(self) -> None:
         """Run the gate once, and publish what follows."""
         now, before = self._clock(), self.status
-        if self._others:
-            names = ", ".join(self._others)
-            self.bus.publish(
-                topics.TRANSPORT_FAULT, Fault(Reason.WRITERS, f"/lowcmd is also written by {names}"), now
-            )
+        if self._crowded:
+            self.bus.publish(topics.TRANSPORT_FAULT, Fault(Reason.WRITERS, self._crowded), now)
         for node in self._nodes:
             node.step(now)
         self._steps += 1
@@ -196,7 +206,8 @@ class LiveGate:
         command = self.bus.latest(topics.LOW_CMD, LowCommand)
         assert status is not None and command is not None
         self.status = status
-        if self._arrivals.mode_machine is not None:
+        # A gate that is shut from the start leaves the motors to whoever has them.
+        if self._arrivals.mode_machine is not None and status.state is not GateState.INIT:
             waited_for = self._patient and status.state is GateState.ACTIVE
             answers = self._arrivals.answered if waited_for else 0.0
             self._out.write(convert.encode_low_command(command, self._arrivals.mode_machine, answers))
@@ -206,6 +217,20 @@ class LiveGate:
             self._surface.publish("/estop", message)
         if (status.state, status.reason) != (before.state, before.reason) or self._reports.due(now):
             self._surface.publish("/safety/status", status_message(status))
+
+    def _crowd(self) -> str:
+        """Return who else writes what one process alone may write; empty if nobody does."""
+        others = [g for g in self._all_commands.writers().values() if g != self._out.guid]
+        if others:
+            return f"/lowcmd is also written by {self._names(others)}"
+        for topic, inbox in self._arrivals.sole.items():
+            writers = list(inbox.writers().values())
+            if len(writers) > 1:
+                return f"{topic} is written by {len(writers)}: {self._names(writers)}"
+        return ""
+
+    def _names(self, writers: Iterable[bytes]) -> str:
+        return ", ".join(map(self._who, writers))
 
     def _ask(self, request: Request, *wanted: GateState) -> Trigger_Response:
         """Pass on what an operator asks for; the answer says what came of it."""

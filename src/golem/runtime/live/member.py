@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
+from queue import SimpleQueue
 
-from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
@@ -14,8 +15,6 @@ from golem.middleware.ros.future import RosError
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import DdsNode
 
-DISCOVERY = 0.3
-"""Time that whoever is on the domain already gets to be seen [s]."""
 SEARCH = 5.0
 """How long is looked for whoever offers something [s]."""
 ANSWER = 30.0
@@ -33,16 +32,6 @@ def member(name: str, dds: DdsConfig) -> Iterator[tuple[CycloneParticipant, DdsN
     with closing(connect(dds, f"{PARTICIPANT_USER_DATA}golem={name};")) as participant:
         with closing(DdsNode(participant, name)) as node:
             yield participant, node
-
-
-def owner(participant: CycloneParticipant, guid: bytes) -> str:
-    """Return who has the endpoint with `guid` (16 bytes), for a person."""
-    for found in discovery.members(participant):
-        if found.guid[:12] == guid[:12]:
-            name = found.user_data.partition("golem=")[2].partition(";")[0]
-            process = found.process or guid.hex()
-            return f"golem {name}, {process}" if name else process
-    return guid.hex()
 
 
 def until(node: Node, condition: Callable[[], bool], timeout: float) -> bool:
@@ -68,3 +57,27 @@ def find(node: Node, name: str, client: Client | ActionClient, remedy: str) -> N
 def say(text: str) -> None:
     """Print a line at once, also into a pipe."""
     print(text, flush=True)
+
+
+class Teller:
+    """Says lines on a thread of its own: a terminal that is held up, or gone, does not hold up who has them said."""
+
+    def __init__(self) -> None:
+        """Start the thread."""
+        self._lines: SimpleQueue[str | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._tell, name="teller", daemon=True)
+        self._thread.start()
+
+    def __call__(self, text: str) -> None:
+        """Have a line said."""
+        self._lines.put(text)
+
+    def close(self) -> None:
+        """Say what is left, unless that takes a second."""
+        self._lines.put(None)
+        self._thread.join(1.0)
+
+    def _tell(self) -> None:
+        while (text := self._lines.get()) is not None:
+            with suppress(OSError):
+                say(text)

@@ -89,11 +89,12 @@ class RequestOut:
 
     def __init__(self, bus: Bus, surface: Surface, mode_machine: Callable[[], int]) -> None:
         """Send what is on `bus`; `mode_machine()` is the machine type that the robot reports."""
-        self._writer, self._mode_machine = surface.writer("/safety/lowcmd_in"), mode_machine
+        self._bus, self._mode_machine = bus, mode_machine
+        self._writer = surface.writer("/safety/lowcmd_in")
         self._commands = News(bus, topics.LOW_CMD_REQUEST, LowCommand)
 
     def step(self, t: float) -> None:
         """Send a new command, with the time of the state it answers."""
-        command = self._commands.read()
-        if command is not None:
-            self._writer.write(encode_low_command(command, self._mode_machine(), answers=t))
+        command, state = self._commands.read(), self._bus.latest(topics.LOW_STATE, LowState)
+        if command is not None and state is not None:
+            self._writer.write(encode_low_command(command, self._mode_machine(), answers=state.t))

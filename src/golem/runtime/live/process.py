@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
@@ -14,15 +15,15 @@ from tyro.conf import OmitArgPrefixes, Positional
 from golem.errors import ConfigError
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import GateState, GateStatus, SafetyLimits
-from golem.middleware.dds import discovery
 from golem.middleware.dds.domain import ROBOT_DOMAIN, DdsConfig
 from golem.middleware.interrupt import interrupted
+from golem.middleware.sole import owner, refuse_second_robot
 from golem.robots.base import Recallable
 from golem.runtime.assembly import build_robot
 from golem.runtime.executor import TICK
 from golem.runtime.live.darkroom import Darkroom
 from golem.runtime.live.gate import LiveGate
-from golem.runtime.live.member import DISCOVERY, member, owner, say
+from golem.runtime.live.member import Teller, member, say
 from golem.runtime.live.stack import LiveStack
 from golem.runtime.live.twin import Twin
 from golem.runtime.live.verdict import told
@@ -104,13 +105,7 @@ def run_twin(config: TwinConfig) -> None:
         )
     stack = twin_stack(config)
     with interrupted() as stop, member("twin", config.dds) as (participant, node):
-        time.sleep(DISCOVERY)
-        others = [e for e in discovery.writers(participant) if e.topic == "rt/lowstate"]
-        if others:
-            raise ConfigError(
-                f"There is a robot on {config.dds} already: {owner(participant, others[0].guid)}; "
-                "end it, or choose another domain."
-            )
+        refuse_second_robot(participant, config.dds)
         with closing(build_robot(stack, config.seed)) as robot, ExitStack() as closing_time:
             darkroom = None
             if isinstance(robot, Recallable):
@@ -135,21 +130,28 @@ def run_safety(config: SafetyConfig) -> None:
     limits = SafetyLimits.from_profile(config.limits)
     patient = not (config.strict or config.dds.robot)
     estop = None if config.dds.robot else VirtualEstop()
-    with interrupted() as stop, member("safety", config.dds) as (participant, node):
+    with (
+        interrupted() as stop,
+        closing(Teller()) as tell,
+        member("safety", config.dds) as (participant, node),
+    ):
         who = partial(owner, participant)
         gate = LiveGate(participant, node, limits, estop, who=who, patient=patient)
-        say(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
+        tell(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
         if estop is None:
-            say("No driver of an emergency stop is here: the gate stays shut.")
+            tell("No driver of an emergency stop is here: the gate stays shut.")
         said = gate.status
         settle()
-        while not stop.is_set():
-            gate.commands.wait(TICK)
-            gate.step()
-            said = report(said, gate.status)
-        while not gate.stop():
-            gate.commands.wait(TICK)
-        report(said, gate.status)
+        try:
+            while not stop.is_set():
+                gate.commands.wait(TICK)
+                gate.step()
+                said = report(said, gate.status, tell)
+        finally:
+            # Whatever ended the loop: the last command on the wire must not be a stiff one.
+            while not gate.stop():
+                gate.commands.wait(TICK)
+        report(said, gate.status, tell)
 
 
 def run_up(config: UpConfig) -> None:
@@ -182,11 +184,11 @@ def run_up(config: UpConfig) -> None:
             if live.restarts != restarts:
                 restarts = live.restarts
                 say("The robot was started anew, and so was the stack.")
-            said = report(said, live.side.safety or said)
+            said = report(said, live.side.safety or said, say)
 
 
-def report(before: GateStatus, now: GateStatus) -> GateStatus:
-    """Say what the gate is now if it changed; return it."""
+def report(before: GateStatus, now: GateStatus, tell: Callable[[str], None]) -> GateStatus:
+    """Tell what the gate is now if it changed; return it."""
     if (now.state, now.reason) != (before.state, before.reason):
-        say(f"Safety gate: {told(now)}")
+        tell(f"Safety gate: {told(now)}")
     return now

@@ -124,6 +124,10 @@ class Skills:
             self._give_up(anew)
         self._stack = stack
 
+    def busy(self) -> bool:
+        """Return whether a goal is pursued."""
+        return self._pursuit is not None
+
     def begin(self, offer: Offer, goal: ServerGoal) -> None:
         """Pursue a goal, or say in its result why not."""
         goal.execute()

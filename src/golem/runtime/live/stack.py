@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from golem.errors import ConfigError
 from golem.middleware import public, topics
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant, Sample
@@ -27,7 +28,7 @@ from golem.runtime.live.clock import RobotClock
 from golem.runtime.live.motors import RequestOut
 from golem.runtime.live.onboard import AnswersIn, CallsOut, Identities, LegsIn
 from golem.runtime.live.pace import CATCH_UP
-from golem.runtime.live.robot_out import FramesOut, JointsOut, describe
+from golem.runtime.live.robot_out import ClockOut, FramesOut, JointsOut, describe
 from golem.runtime.live.skills import Skills
 from golem.runtime.live.stack_in import CameraIn, GateIn, RemoteBand, listen
 from golem.runtime.live.surface import Poll, Surface
@@ -35,7 +36,7 @@ from golem.runtime.sides import StackSide
 from golem.stack import Stack
 from golem.types import SIDES, Array
 
-SHOWN = ("/joint_states", "/tf", "/tf_static", "/robot_description")
+SHOWN = ("/clock", "/joint_states", "/tf", "/tf_static", "/robot_description")
 """What of the robot's surface follows from its state, and is not the vendor's to publish."""
 
 
@@ -71,7 +72,15 @@ class LiveStack:
                 robot's does.
             beside: where the localizer runs; see `LocalizerNode`.
             clock: this process's own [s].
+
+        Raises:
+            ConfigError: the legs of a real robot would be its own controller's, which commands the motors itself.
         """
+        if real and stack.legs_on_board is not None:
+            raise ConfigError(
+                "With lower_body 'vendor' the real robot moves its legs itself, and nobody else may command its motors "
+                "meanwhile: run it on a twin, or choose another lower_body."
+            )
         self._stack, self._node, self._real = stack, node, real
         self._bus = Bus()
         self._robot = RobotClock()
@@ -91,7 +100,7 @@ class LiveStack:
         self._onboard = surface.reader("/onboard/lowcmd")
         self._skills = Skills(surface)
         surface.serve({k: v for s in SIDES for k, v in out.hand_services(self._bus, s, self._now).items()})
-        listen(self._bus, surface, self._calibration, self._now)
+        listen(self._bus, surface, self._calibration, self._now, self._skills.busy)
         self._drivers = Surface("robot", participant, node, only=SHOWN) if real else None
         if self._drivers is not None:
             describe(self._drivers, {})
@@ -118,12 +127,12 @@ class LiveStack:
             return
         if anew or self._executor is None:
             self.restarts += anew
-            self._executor = self._build()
+            self._executor = self._build(state.t)
         self._bus.publish(topics.LOW_STATE, state, state.t)
         self._executor.advance(state.t, CATCH_UP)
 
-    def _build(self) -> Executor:
-        """Build every module anew, for a robot whose time begins anew."""
+    def _build(self, t: float) -> Executor:
+        """Build every module anew, for a robot whose time begins anew at `t` [s]."""
         bus, surface = self._bus, self._surface
         bus.clear()
         for camera in self._cameras:
@@ -153,6 +162,7 @@ class LiveStack:
             *((Phase.SEND, out.HandStatusOut(bus, surface, hand)) for hand in SIDES),
         ]
         if self._drivers is not None:
+            placed.append((Phase.SEND, ClockOut(self._drivers)))
             placed.append((Phase.SEND, JointsOut(bus, self._drivers)))
             placed.append((Phase.SEND, FramesOut(bus, self._drivers)))
-        return Executor(bus, in_order(placed))
+        return Executor(bus, in_order(placed), t)

@@ -18,12 +18,16 @@ from golem.middleware.ros.msgs.tf2_msgs import TFMessage
 from golem.middleware.topics import Exposure
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.pairing import Pairing
-from golem.runtime.cameras import looked_for
+from golem.runtime.cameras import OPTICAL_FRAMES, looked_for
 from golem.runtime.executor import TICK
+from golem.runtime.live.member import say
 from golem.runtime.live.pace import SILENCE
 from golem.runtime.live.surface import Surface
 from golem.runtime.live.verdict import to_status
 from golem.types import SIDES, Array, CameraInfo, Side
+
+AHEAD = 0.05
+"""How far ahead of the robot's time an image may be stamped [s] [own]: more, and its clock is another."""
 
 
 class CameraIn:
@@ -33,6 +37,7 @@ class CameraIn:
 
     def __init__(self, bus: Bus, surface: Surface, camera: str) -> None:
         """Bring the exposures of `camera` to `bus`."""
+        self._t, self._warned = 0.0, False
         self._bus, self._surface, self._camera = bus, surface, camera
         self._wanted = looked_for(bus, camera)
         self._open: list[Subscription] = []
@@ -41,6 +46,7 @@ class CameraIn:
 
     def step(self, t: float) -> None:
         """Come or go, as skills want."""
+        self._t = t
         if bool(self._open) == self._wanted():
             return
         if self._open:
@@ -69,7 +75,18 @@ class CameraIn:
         info, rgb, metres = self._info, images.to_rgb(color), images.to_depth(depth)
         if info is not None and rgb.shape[:2] == metres.shape == (info.height, info.width):
             t = convert.seconds(color.header.stamp)
+            if t > self._t + AHEAD:
+                self._warn(t)
+                return
             self._bus.publish(topics.exposures(self._camera), Exposure(t, info, rgb, metres), t)
+
+    def _warn(self, t: float) -> None:
+        if not self._warned:
+            self._warned = True
+            say(
+                f"Images of the {self._camera} camera are ignored: they are stamped {t:.3f} s, the robot's time is "
+                f"{self._t:.3f} s. Start the camera's driver with use_sim_time: /clock is the robot's."
+            )
 
 
 class GateIn:
@@ -134,7 +151,13 @@ class RemoteBand:
         self.banded = False
 
 
-def listen(bus: Bus, surface: Surface, calibration: dict[str, Array], now: Callable[[], float]) -> None:
+def listen(
+    bus: Bus,
+    surface: Surface,
+    calibration: dict[str, Array],
+    now: Callable[[], float],
+    busy: Callable[[], bool],
+) -> None:
     """Bring hands and velocities to the bus, and keep the calibration of the cameras up to date.
 
     Args:
@@ -142,16 +165,20 @@ def listen(bus: Bus, surface: Surface, calibration: dict[str, Array], now: Calla
         surface: where they come from.
         calibration: by camera; see `Robot.calibration`.
         now: robot time [s].
+        busy: whether a skill has the robot: velocities from elsewhere are then ignored.
     """
     cameras = {public.optical_frame(camera): camera for camera in public.CAMERAS}
 
     def take_frames(message: TFMessage) -> None:
         for link in message.transforms:
-            if link.child_frame_id in cameras:
-                calibration[cameras[link.child_frame_id]] = convert.transform_matrix(link.transform)
+            camera = cameras.get(link.child_frame_id)
+            # The drivers of the cameras publish frames of the same names, in other parents.
+            if camera is not None and link.header.frame_id == OPTICAL_FRAMES[camera]:
+                calibration[camera] = convert.transform_matrix(link.transform)
 
     def take_twist(message: Twist) -> None:
-        bus.publish(topics.TWIST, convert.to_twist(message), now())
+        if not busy():
+            bus.publish(topics.TWIST, convert.to_twist(message), now())
 
     def take_hand(side: Side) -> Callable[[golem_interfaces.HandState], None]:
         topic = topics.hand_state(side)

@@ -15,10 +15,11 @@ from golem.middleware.ros.msgs import golem_interfaces
 from golem.middleware.ros.msgs.std_srvs import Trigger_Response
 from golem.middleware.topics import HandGoal, LegStatus, Sightings
 from golem.robots.model import magpie
+from golem.robots.model.imu import sensed_base_rate
 from golem.runtime.executor import TICK
 from golem.runtime.live.surface import Surface
 from golem.runtime.nodes import moving
-from golem.types import BaseEstimate, HandCommand, Side
+from golem.types import BaseEstimate, HandCommand, LowState, Side
 
 SHUT = "The safety gate is shut, see /safety/status."
 
@@ -51,10 +52,12 @@ class OdometryOut:
     def step(self, t: float) -> None:
         """Send the present estimate."""
         estimate = self._bus.latest(topics.BASE, BaseEstimate)
-        if estimate is None:
+        state = self._bus.latest(topics.LOW_STATE, LowState)
+        if estimate is None or state is None:
             return
         if self._surface.heard("/odom"):
-            self._surface.publish("/odom", convert.odometry(estimate))
+            message = convert.odometry(estimate, sensed_base_rate(state))
+            self._surface.publish("/odom", message)
         if self._surface.heard("/tf"):
             pose = estimate.T_odom_base[np.newaxis]
             self._surface.publish("/tf", convert.transforms(estimate.t, [("odom", public.BASE_FRAME)], pose))

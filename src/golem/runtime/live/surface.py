@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import Any
 
 from golem.middleware import public
-from golem.middleware.dds.base import Participant, Reader, Sample, Writer
+from golem.middleware.dds.base import Participant, Qos, Reader, Sample, Writer
 from golem.middleware.public import Role
 from golem.middleware.ros import names
 from golem.middleware.ros.base import ActionHandler, ActionServer, Node, Publisher, Subscription
@@ -71,10 +71,10 @@ class Surface:
 
         return self.node.subscription(row.name, row.type, take, row.qos)
 
-    def reader(self, topic: str) -> Reader:
-        """Return a reader of one of the vendor's topics."""
+    def reader(self, topic: str, qos: Qos | None = None) -> Reader:
+        """Return a reader of one of the vendor's topics, with another `qos` than the table's if one is given."""
         row = self._read(topic)
-        return self._participant.reader(names.topic(row.name), dds_name(row.type), row.qos)
+        return self._participant.reader(names.topic(row.name), dds_name(row.type), qos or row.qos)
 
     def receive(self, topic: str, waitset: WaitSet, handle: Callable[[Sample], None]) -> Inbox:
         """Give the samples of one of the vendor's topics to `handle`, when `waitset` is polled."""

@@ -14,7 +14,8 @@ from golem.middleware.dds.discovery import Endpoint
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.ros import names
-from golem.runtime.live.member import DISCOVERY, member, owner, say
+from golem.middleware.sole import DISCOVERY, owner
+from golem.runtime.live.member import member, say
 
 EAR = Qos(reliable=False, depth=None)
 """Matches every writer, and misses nothing that arrives."""

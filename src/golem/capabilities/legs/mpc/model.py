@@ -15,7 +15,7 @@ from mujoco.rollout import Rollout
 
 from golem.capabilities.legs.balance import GRAVITY, heading_frame
 from golem.hardware.safety.base import SafetyLimits
-from golem.robots.model.imu import base_rate
+from golem.robots.model.imu import sensed_base_rate
 from golem.robots.model.leg_kinematics import SOLE_CENTER, leg_poses
 from golem.robots.model.mjcf import robot_spec
 from golem.robots.model.spatial import quat_of
@@ -147,7 +147,7 @@ class PlanningModel:
         qpos[3:7] = quat_of(R)
         qpos[self._qpos] = state.q[LEGS]
         qvel[:3] = heading.T @ base.velocity
-        qvel[3:6] = base_rate(state.imu.gyro, state.q[UPPER.start], state.dq[UPPER.start])
+        qvel[3:6] = sensed_base_rate(state)
         qvel[self._qvel] = state.dq[LEGS]
 
     def rollout(self, targets: Array) -> Trajectories:
