@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -112,6 +114,8 @@ def test_odometry_gives_its_velocity_in_the_child_frame() -> None:
     linear = message.twist.twist.linear
     assert (linear.x, linear.y) == pytest.approx((2.0, 0.0), abs=1e-12)
     assert message.twist.twist.angular.z == 0.7
+    for covariance in (message.pose.covariance, message.twist.covariance):
+        assert len(covariance) == 36 and (np.diag(np.reshape(covariance, (6, 6))) > 0.0).all()
 
 
 def test_diagnostics_say_what_is_wrong() -> None:
@@ -149,6 +153,9 @@ def test_hands_survive() -> None:
     )
     command = HandCommand(2.0, 0.01, 16.0)
     assert convert.to_hand_command(convert.hand_command(command, "right")) == command
+    for change in ({"gap": np.nan}, {"force": np.inf}):
+        with pytest.raises(CodecError, match="told a gap"):
+            convert.to_hand_command(convert.hand_command(replace(command, **change), "right"))
 
 
 def test_legs_say_why_they_stand() -> None:

@@ -170,6 +170,7 @@ def inertial(field: str, value: Any) -> Callable[[Any], None]:
         ("state", inertial("quaternion", np.nan), "no unit quaternion"),
         ("state", inertial("gyroscope", np.nan), "not finite"),
         ("state", inertial("accelerometer", np.inf), "not finite"),
+        ("state", whole("mode_pr", 1), "mode_pr 1"),
         ("command", motor("kp", np.inf), "kp of motor 26"),
         ("command", whole("mode_pr", 1), "mode_pr 1"),
         ("command", whole("mode_machine", 5), "copy it from the LowState"),

@@ -26,6 +26,7 @@ from golem.middleware.ros.node import DdsNode
 from golem.middleware.topics import HandGoal
 from golem.runtime.executor import TICK
 from golem.skills.base import SkillResult
+from golem.types import Twist
 
 
 @dataclass
@@ -96,6 +97,20 @@ def test_a_second_goal_is_refused_with_the_reason_and_the_first_goes_on(client: 
     status, result = client.outcome(client.send("/skill/stand", stand(0.1)))
     assert status is GoalStatus.ABORTED and "Another skill is running" in result.reason
     assert client.outcome(first)[0] is GoalStatus.SUCCEEDED
+
+
+def test_velocities_from_elsewhere_wait_while_a_skill_has_the_robot(client: Client) -> None:
+    live, row = client.live, public.topic("/cmd_vel")
+    assert live.up is not None and live.up.side is not None
+    velocity = client.node.publisher(row.name, row.type, row.qos)
+    goal = client.send("/skill/stand", stand(0.2))
+    velocity.publish(convert.twist(Twist(0.3)))
+    live.run(0.02)
+    assert live.up.side.bus.latest(topics.TWIST, Twist) == Twist()  # the skill's
+    assert client.outcome(goal)[0] is GoalStatus.SUCCEEDED
+    velocity.publish(convert.twist(Twist(0.3)))
+    live.run(0.02)
+    assert live.up.side.bus.latest(topics.TWIST, Twist) == Twist(0.3)
 
 
 def test_a_cancelled_skill_ends_as_cancelled_and_makes_room(client: Client) -> None:

@@ -1,0 +1,148 @@
+"""A domain is shared: what others are there, what they say, and whose the motors are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.runtime.live.conftest import Live
+from tests.runtime.live.test_live import VENDOR
+
+from golem.errors import ConfigError
+from golem.hardware.safety.base import GateState
+from golem.middleware import public, topics
+from golem.middleware.bus import Bus
+from golem.middleware.dds.base import Qos
+from golem.middleware.ros import convert, images
+from golem.middleware.topics import LookRequest
+from golem.middleware.wire import hg
+from golem.middleware.wire.convert import answered, encode_low_state
+from golem.robots.sensors.cameras import CAMERAS
+from golem.runtime.cameras import OPTICAL_FRAMES
+from golem.runtime.executor import Executor
+from golem.runtime.live.motors import RequestOut
+from golem.runtime.live.surface import Surface
+from golem.stack import Choice
+from golem.types import NUM_JOINTS, Imu, LowCommand, LowState
+
+STILL = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
+
+
+def at_rest(t: float) -> LowState:
+    zeros = np.zeros(NUM_JOINTS)
+    return LowState(t, zeros, zeros, zeros, STILL)
+
+
+def test_a_gate_that_is_shut_leaves_the_motors_to_whoever_has_them(live: Live) -> None:
+    participant, _ = live.member("listener")
+    motors = participant.reader("rt/lowcmd", hg.LOW_CMD.type_name, Qos(reliable=False, depth=1000))
+    other, _ = live.member("on_board")
+    other.writer("rt/lowcmd", hg.LOW_CMD.type_name, VENDOR)
+    live.run(0.1)
+    assert (live.state, live.reason) == (GateState.INIT, "two_writers") and not motors.take(1000)
+    other.close()
+    live.run(0.1)
+    assert live.state is GateState.ARMED and motors.take(1000)
+
+
+def test_a_best_effort_writer_is_another_writer(live: Live) -> None:
+    live.activate()
+    intruder, _ = live.member("intruder")
+    intruder.writer("rt/lowcmd", hg.LOW_CMD.type_name, Qos(reliable=False, depth=1))
+    live.run(0.1)
+    assert (live.state, live.reason) == (GateState.STOP1, "two_writers")
+
+
+@pytest.mark.parametrize(("topic", "kind"), [("/safety/lowcmd_in", hg.LOW_CMD), ("/lowstate", hg.LOW_STATE)])
+def test_a_second_stack_and_a_second_robot_stop_the_first(live: Live, topic: str, kind: hg.Layout) -> None:
+    live.activate()
+    second, _ = live.member("second")
+    writer = second.writer(f"rt{topic}", kind.type_name, public.topic(topic).qos)
+    live.run(0.1)
+    assert (live.state, live.reason) == (GateState.STOP1, "two_writers")
+    assert live.gate is not None
+    assert (
+        f"{topic} is written by 2" in live.gate.status.detail and writer.guid.hex() in live.gate.status.detail
+    )
+
+
+def test_a_motor_that_reports_an_error_is_named_once_it_persists(live: Live) -> None:
+    live.activate()
+    live.leave("twin")
+    robot, _ = live.member("robot")
+    writer = robot.writer("rt/lowstate", hg.LOW_STATE.type_name, public.topic("/lowstate").qos)
+    seen = []
+    for k in range(40):
+        payload = bytearray(encode_low_state(at_rest(100.0 + 0.002 * k)))
+        hg.LOW_STATE.read(payload)["motor"]["motorstate"][9] = 0x20
+        hg.STATE_CHECKSUM.seal(payload)
+        writer.write(bytes(payload))
+        live.run(0.002)
+        seen.append(live.reason)
+    assert live.gate is not None
+    assert "motor_error" in seen and seen.index("motor_error") >= 20
+    assert "right_knee_joint reports error 0x20" in live.gate.status.detail
+
+
+@pytest.mark.parametrize("first", [5.000, 5.001])
+def test_a_stack_ticks_once_for_each_state_and_answers_that_one(live: Live, first: float) -> None:
+    participant, node = live.member("answering")
+    reader = live.member("gate")[0].reader("rt/safety/lowcmd_in", hg.LOW_CMD.type_name, Qos(depth=100))
+    bus = Bus()
+    executor = Executor(bus, [RequestOut(bus, Surface("stack", participant, node), lambda: 0)], first)
+    got = []
+    for k in range(50):
+        t = first + 0.002 * k
+        bus.publish(topics.LOW_STATE, at_rest(t), t)
+        zeros = np.zeros(NUM_JOINTS)
+        bus.publish(topics.LOW_CMD_REQUEST, LowCommand(t, zeros, zeros, zeros, zeros, zeros), t)
+        executor.advance(t, 5)
+        got.append([answered(sample.payload) for sample in reader.take(100) if sample.alive])
+    assert got == [[pytest.approx(first + 0.002 * k)] for k in range(50)]
+
+
+@pytest.mark.parametrize("parent", ["camera_link", OPTICAL_FRAMES["head"]])
+def test_only_the_robots_own_frames_calibrate_a_camera(live: Live, parent: str) -> None:
+    live.run(0.02)
+    driver, node = live.member("driver")
+    row = public.topic("/tf_static")
+    shifted = np.eye(4)
+    shifted[0, 3] = 0.5
+    publisher = node.publisher(row.name, row.type, row.qos)
+    publisher.publish(convert.transforms(0.0, [(parent, public.optical_frame("head"))], shifted[np.newaxis]))
+    live.run(0.02)
+    assert live.up is not None
+    moved = live.up._calibration["head"][0, 3]  # pyright: ignore[reportPrivateUsage]
+    assert (abs(moved - 0.5) < 1e-9) == (parent == OPTICAL_FRAMES["head"])
+
+
+def test_images_of_another_clock_are_refused_with_a_remedy(
+    live: Live, capsys: pytest.CaptureFixture[str]
+) -> None:
+    live.run(0.02)
+    assert live.up is not None and live.up.side is not None
+    bus = live.up.side.bus
+    bus.publish(topics.look("head"), LookRequest(("screw",)), 0.02)
+    live.run(0.02)
+    _, node = live.member("driver")
+    send: dict[str, Callable[..., None]] = {}
+    for what in (public.CAMERA_INFO, public.COLOR, public.DEPTH):
+        row = public.topic(public.image("head", what))
+        send[what] = node.publisher(row.name, row.type, row.qos).publish
+    info, frame = CAMERAS["head"], public.optical_frame("head")
+    for t in (1.7e9, 0.03):
+        send[public.CAMERA_INFO](images.camera_info(t, info, frame))
+        send[public.COLOR](images.color_image(t, np.zeros((info.height, info.width, 3), np.uint8), frame))
+        send[public.DEPTH](images.depth_image(t, np.ones((info.height, info.width), np.float32), frame))
+        live.run(0.02)
+        newest = bus.latest(topics.exposures("head"), topics.Exposure)
+        assert (newest is None) == (t > 1.0)
+    assert capsys.readouterr().out.count("use_sim_time") == 1
+
+
+def test_the_real_robots_own_leg_controller_is_not_commanded_against(live: Live) -> None:
+    live.stack = replace(live.stack, lower_body=Choice("vendor"))
+    with pytest.raises(ConfigError, match="moves its legs itself"):
+        live.start_up(real=True)
