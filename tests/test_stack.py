@@ -127,7 +127,7 @@ def test_a_file_is_read(tmp_path: Path) -> None:
 
 
 CHANGED: dict[str, Any] = {
-    slot: Choice(getattr(Stack(), slot).use, {"option": 1}) for slot in registry.slots()
+    slot: Choice(Stack().choice(slot).use, {"option": 1}) for slot in registry.slots()
 } | {"fallback": Choice("hold"), "onboard": Choice("hold"), "profile": "field", "limits": "paper"}
 
 
@@ -141,6 +141,14 @@ def test_a_robot_on_its_feet_falls_back_on_legs_that_balance() -> None:
     assert parse_stack("robot: {use: mujoco, support: ground}", "x").legs_in_reserve == Choice("almi")
     chosen = parse_stack("fallback: {use: hold, stance: crouch}", "x")
     assert chosen.legs_in_reserve == Choice("hold", {"stance": "crouch"})
+
+
+def test_a_robot_on_its_feet_is_not_taken_to_hang() -> None:
+    assert Stack().choice("estimator") == Choice("tether")
+    ground = "robot: {use: mujoco, support: ground}"
+    assert parse_stack(ground, "x").choice("estimator") == Choice("random_walk_kf")
+    with pytest.raises(ConfigError, match="'tether' takes the base to stay.*random_walk_kf, invariant_ekf"):
+        parse_stack(f"{ground}\nestimator: tether", "x")
 
 
 def test_the_digest_does_not_depend_on_the_order_of_options() -> None:

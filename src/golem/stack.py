@@ -39,15 +39,15 @@ class Stack:
     """A whole stack: one choice per slot, the realism profile and the torque limits.
 
     Attributes:
-        fallback: the lower body that takes the legs when `lower_body` fails. None: `almi` where the robot's option
-            `support` is `ground`, else `hold`.
+        estimator: None: `random_walk_kf` where the robot's option `support` is `ground`, else `tether`.
+        fallback: the lower body that takes the legs when `lower_body` fails. None: `almi` on the ground, else `hold`.
         onboard: the lower body that the twin's on-board controller runs for `vendor`. None: `almi`.
         profile: realism profile of a simulated robot: ideal, bench or field.
         limits: torque limit profile the safety gate enforces: urdf or paper.
     """
 
     robot: Choice = Choice("mujoco")
-    estimator: Choice = Choice("tether")
+    estimator: Choice | None = None
     servo: Choice = Choice("pd_gravity")
     hand: Choice = Choice("magpie")
     lower_body: Choice = Choice("hold")
@@ -60,8 +60,22 @@ class Stack:
     profile: str = "bench"
     limits: str = "urdf"
 
+    def __post_init__(self) -> None:
+        """Check what would otherwise fall over without a word.
+
+        Raises:
+            ConfigError: the robot is on its feet, and the estimator takes it to hang in the hoist.
+        """
+        if self.on_ground and self.choice("estimator").use == "tether":
+            raise ConfigError(
+                "The estimator 'tether' takes the base to stay where it is; a robot with 'support: ground' needs "
+                "random_walk_kf, invariant_ekf or one of yours."
+            )
+
     def choice(self, slot: str) -> Choice:
         """Return what sits in `slot`."""
+        if slot == "estimator" and self.estimator is None:
+            return Choice("random_walk_kf" if self.on_ground else "tether")
         return getattr(self, slot)
 
     @property

@@ -42,11 +42,21 @@ class Failing(Hold):
         if self.how == "raises": raise RuntimeError("gone")
         if self.how == "sleeps": time.sleep(1.1 / self.rate)
         if self.how == "lags": self.latency = 0.5
+        if self.how == "unsure": self.latency = float("nan")
         return {{"nothing": None, "nan": LegCommand(q * np.nan, kp, kd), "shape": LegCommand(np.zeros(27), kp, kd),
                 "torque": LegCommand(q, kp, kd, np.full(12, np.inf))}}.get(self.how, good)
 
 class Chosen(Failing):
     how = "{how}"
+
+class Unmeasured(Failing):
+    how = "unmeasured"
+    @property
+    def latency(self):
+        return 0.01 / (self.ticks <= 20) if hasattr(self, "ticks") else 0.01
+    @latency.setter
+    def latency(self, value):
+        pass
 
 class Doomed(Failing):
     how = "raises"
@@ -108,12 +118,14 @@ FAULTS = {
     "shape": "q has shape (27,)",
     "torque": "tau contains NaN or infinity",
     "lags": "its latency is 0.5 s, legs need at most 0.1 s",
+    "unsure": "latency is nan",
+    "unmeasured": "ZeroDivisionError",
 }
 
 
 @pytest.mark.parametrize("how", FAULTS)
 def test_failed_legs_go_to_the_fallback_and_the_skill_ends_with_their_name(how: str, tmp_path: Path) -> None:
-    use = f"{write(tmp_path, how)}:Chosen"
+    use = f"{write(tmp_path, how)}:{'Unmeasured' if how == 'unmeasured' else 'Chosen'}"
     with hanging(lower_body=Choice(use), fallback=Choice("hold", {"stance": "crouch"})) as running:
         result = running.execute(Drive(), None, timeout=5.0)
         assert (result.success, result.stage, result.slot) == (False, "fault", "lower_body")
@@ -143,6 +155,13 @@ def test_legs_that_take_longer_than_their_period_lose_them_where_the_wall_clock_
     with hanging(lower_body=Choice(use), fallback=slow) as running:
         # One late call of the fallback, its first, is no fault of its own.
         result = running.execute(Drive(), None, timeout=0.7, realtime=True)
+        assert (result.stage, result.slot) == ("fault", "lower_body")
+        assert "longer than its period 5 times in a row" in result.reason
+
+
+def test_legs_that_are_late_are_noticed_in_the_ticks_of_a_faster_fallback(tmp_path: Path) -> None:
+    with hanging(lower_body=Choice(f"{write(tmp_path, 'sleeps')}:Chosen"), fallback=Choice("wbc")) as running:
+        result = running.execute(Drive(), None, timeout=0.9, realtime=True)
         assert (result.stage, result.slot) == ("fault", "lower_body")
         assert "longer than its period 5 times in a row" in result.reason
 

@@ -39,6 +39,7 @@ class Ground:
     start: PlanarPose = field(default_factory=lambda: PlanarPose(0.0, 0.0, 0.0))
     reports: bool = True
     stuck: bool = False
+    reason: str = ""
     offset: float | None = None
 
     def __post_init__(self) -> None:
@@ -78,7 +79,10 @@ class Ground:
             T[0, 3] += self.offset
         self.bus.publish(topics.BASE, BaseEstimate(t, T), t)
         moving = twist != Twist()
-        status = LegStatus(t, twist, twist, False, "", moving, np.array([0.0, 0.5]), "almi")
+        applied = Twist() if self.reason else twist
+        status = LegStatus(
+            t, twist, applied, False, self.reason, moving, moving, np.array([0.0, 0.5]), "almi"
+        )
         if self.reports:
             self.bus.publish(topics.LEG_STATUS, status, t)
         self.context.refresh(t)
@@ -122,6 +126,13 @@ def test_a_robot_that_does_not_get_there_gives_up_and_stands() -> None:
     assert (result.success, result.stage, result.slot) == (False, "walk", "navigator")
     assert "Not at the goal after 2 s: 1.00 m and 0 deg are left." in result.reason
     assert ground.twist == Twist()
+
+
+def test_legs_that_do_not_move_are_named_with_their_reason() -> None:
+    ground = Ground(stuck=True, reason="the commanded twist is outside the envelope")
+    result = outcome(ground.run(Walk(GoTo()).run(ground.context, WalkGoal(1.0, 0.0, timeout=2.0))))
+    assert (result.success, result.stage, result.slot) == (False, "walk", "lower_body")
+    assert "The legs do not move: the commanded twist is outside the envelope." in result.reason
 
 
 def test_legs_that_do_not_report_are_named() -> None:

@@ -53,7 +53,7 @@ class Walk:
         velocity: (n, 3) its true velocity in odom [m/s].
         forces: (n, 2) true vertical force on each foot [N].
         judged: (n,) whether the band is gone, the filters have had a second, and the robot does not fall within one.
-        stepping: (n,) whether the gait clock ran.
+        stepping: (n,) whether the robot walked or stepped.
         lost: how the robot was lost, empty if it was not.
     """
 
@@ -103,7 +103,7 @@ def record(subject: Subject, spec: TrialSpec, pushed: bool) -> Walk:
         states.append(state)
         for column, value in zip((poses, velocities, forces), now, strict=True):
             column.append(value)
-        stepping.append(legs is not None and legs.stepping)
+        stepping.append(legs is not None and (legs.stepping or legs.moving))
         free.append(not episode.robot.banded)
         now = look()
         return False

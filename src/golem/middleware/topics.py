@@ -143,6 +143,8 @@ class LegStatus:
         clamped: whether `commanded` lies outside the controller's envelope.
         reason: why `applied` is not on its way to `commanded`; empty where it is.
         stepping: whether the gait clock runs.
+        moving: whether the robot changes its place: a twist is applied, or it steps though its controller's clock could
+            rest. A controller without a clock moves without stepping, one that marks time steps without moving.
         phase: (2,) gait phase of the left and the right leg, 0 to 1.
         controller: the implementation in charge, as the stack names it.
         fault: how the stack's own controller failed, once the fallback is in charge; else None.
@@ -154,6 +156,7 @@ class LegStatus:
     clamped: bool
     reason: str
     stepping: bool
+    moving: bool
     phase: Array
     controller: str
     fault: str | None = None

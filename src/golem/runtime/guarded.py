@@ -66,9 +66,9 @@ class GuardedNavigator:
         """Give the navigator its goal; see `Navigator`."""
         self._guard.call(self._navigator.start, goal)
 
-    def step(self, pose: PlanarPose, stepping: bool, dt: float) -> Course:
+    def step(self, pose: PlanarPose, moving: bool, dt: float) -> Course:
         """Return the navigator's course; see `Navigator`."""
-        course = self._guard.call(self._navigator.step, pose, stepping, dt)
+        course = self._guard.call(self._navigator.step, pose, moving, dt)
         self._guard.kind("the course", course, Course)
         self._guard.kind("twist", course.twist, Twist)
         for name in ("vx", "vy", "wz"):

@@ -45,9 +45,10 @@ class Legs:
         """Return the latency at this moment [s]; a controller may measure its own.
 
         Raises:
-            ModuleFault: it is no latency.
+            ModuleFault: it is none.
         """
-        return self.guard.number("latency", self.controller.latency, least=0.0)
+        latency = self.guard.call(lambda: self.controller.latency)
+        return self.guard.number("latency", latency, least=0.0)
 
     def check(self, command: object) -> LegCommand:
         """Return the `command` that the controller returned.
@@ -103,7 +104,7 @@ class LowerBodyNode:
             return
         twist = self._twists.read()
         try:
-            command = self._control(state, base, twist)
+            command, latency = self._control(state, base, twist)
         except ModuleFault as fault:
             if self._fault is not None:
                 raise self._both(fault) from fault
@@ -113,29 +114,31 @@ class LowerBodyNode:
             self._legs, self._overruns = self._fallback, 0
             try:
                 self._legs.guard.call(self._locomotion.hand_over, self._legs.controller, state, self._last)
-                command = self._control(state, base, None)
+                command, latency = self._control(state, base, None)
             except ModuleFault as second:
                 raise self._both(second) from second
         self._last = command
-        self._bus.publish(topics.LEG_COMMAND, command, t, self._legs.check_latency())
+        self._bus.publish(topics.LEG_COMMAND, command, t, latency)
         self._report(t)
 
-    def _control(self, state: LowState, base: BaseEstimate, twist: Twist | None) -> LegCommand:
-        """Run the controller in charge for one tick; a fault of it is raised."""
+    def _control(self, state: LowState, base: BaseEstimate, twist: Twist | None) -> tuple[LegCommand, float]:
+        """Run the controller in charge for one tick; return its command and latency. A fault of it is raised."""
         guard = self._legs.guard
-        started = time.perf_counter()
+        started, runs = time.perf_counter(), self._locomotion.runs
         if not moving(self._bus):
             guard.call(self._locomotion.reset, state)
             twist = None
         command = guard.call(self._locomotion.step, state, base, twist, self.period)
-        late = self.realtime and time.perf_counter() - started > 1.0 / self._legs.rate
-        self._overruns = self._overruns + 1 if late else 0
+        if self._locomotion.runs != runs:
+            # Only where it ran: in between, on the ticks of a faster fallback, its last command stands.
+            late = self.realtime and time.perf_counter() - started > 1.0 / self._legs.rate
+            self._overruns = self._overruns + 1 if late else 0
         if self._overruns >= OVERRUNS:
             raise guard.fault(f"it took longer than its period {OVERRUNS} times in a row")
         latency = self._legs.check_latency()
         if latency > MAX_LATENCY:
             raise guard.fault(f"its latency is {latency:g} s, legs need at most {MAX_LATENCY:g} s")
-        return self._legs.check(command)
+        return self._legs.check(command), latency
 
     def _both(self, second: ModuleFault) -> ModuleFault:
         """Return the fault of the stack's own controller, with that of the fallback added."""
@@ -153,6 +156,7 @@ class LowerBodyNode:
             locomotion.clamped,
             locomotion.reason,
             bool(locomotion.gait.stepping),
+            locomotion.moving,
             locomotion.gait.phases,
             self._legs.guard.use,
             None if self._fault is None else str(self._fault),

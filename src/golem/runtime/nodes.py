@@ -108,6 +108,9 @@ class EstimatorNode:
         if np.abs(T[:3, :3] @ T[:3, :3].T - IDENTITY).max() > 1e-3:
             raise self._guard.fault("T_odom_base is not a rigid transform")
         self._guard.array("velocity", estimate.velocity, 3)
+        self._guard.array("contact", estimate.contact, 2)
+        self._guard.number("height", estimate.height)
+        self._guard.number("t", estimate.t)
         self._bus.publish(topics.BASE, estimate, t)
 
 

@@ -64,7 +64,7 @@ class Walk:
         said = -math.inf
         while True:
             pose = PlanarPose.of(context.legs.pose)
-            course = self._navigator.step(pose, context.legs.status.stepping, context.period)
+            course = self._navigator.step(pose, context.legs.status.moving, context.period)
             left = course.left
             distance, turn = math.hypot(left.x, left.y), math.degrees(left.yaw)
             if course.arrived:
@@ -72,11 +72,13 @@ class Walk:
                 context.say("done", text, left=[left.x, left.y, left.yaw])
                 return SkillResult(True, "done", None, text, {"walk": context.t - start})
             if context.t - start >= goal.timeout:
-                raise StageFailed(
-                    "walk",
-                    "navigator",
-                    f"Not at the goal after {goal.timeout:g} s: {distance:.2f} m and {turn:.0f} deg are left.",
+                status = context.legs.status
+                text = (
+                    f"Not at the goal after {goal.timeout:g} s: {distance:.2f} m and {turn:.0f} deg are left."
                 )
+                if status.applied == ZERO and status.reason:
+                    raise StageFailed("walk", "lower_body", f"{text} The legs do not move: {status.reason}.")
+                raise StageFailed("walk", "navigator", text)
             if context.t - said >= 1.0:
                 said = context.t
                 context.say("walk", f"{distance:.2f} m to go.", left=[left.x, left.y, left.yaw])

@@ -31,13 +31,17 @@ class Recorder:
         self.steps: list[float] = []
         self.resets = 0
 
+    @property
+    def started(self) -> bool:
+        return len(self.steps) > self.silent
+
     def reset(self, state: LowState) -> None:
         self.resets += 1
 
     def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
         self.motions.append(motion)
         self.steps.append(dt)
-        stiffness = self.stiffness if len(self.steps) > self.silent else 0.0
+        stiffness = self.stiffness if self.started else 0.0
         return LegCommand(np.full(12, self.target), np.full(12, stiffness), np.full(12, 2.0), np.zeros(12))
 
 

@@ -182,7 +182,7 @@ def test_each_runs_at_its_own_rate() -> None:
     np.testing.assert_allclose(robot.walk.steps[1:], 0.02)
 
 
-def test_a_controller_that_has_yet_to_start_gets_the_legs_when_it_speaks() -> None:
+def test_a_controller_that_has_yet_to_start_gets_the_legs_once_it_has() -> None:
     robot = Robot(walk={"silent": 30})
     robot.run(0.5)
     robot.run(30 * DT, Twist(0.5))
@@ -192,6 +192,20 @@ def test_a_controller_that_has_yet_to_start_gets_the_legs_when_it_speaks() -> No
     assert robot.legs.walking
     robot.run(0.4, Twist(0.5))
     assert robot.targets[-1] == 1.0
+
+
+def test_a_controller_that_has_started_waits_for_a_robot_that_is_calm() -> None:
+    robot = Robot(walk={"silent": 30})
+    robot.run(0.5)
+    robot.run(20 * DT, Twist(0.5))
+    calm, robot.state = robot.state, rotating(robot.state)
+    robot.run(20 * DT, Twist(0.5))
+    assert robot.walk.started and not robot.legs.walking
+    robot.state = calm
+    robot.run(4 * DT, Twist(0.5))
+    assert not robot.legs.walking
+    robot.run(DT, Twist(0.5))
+    assert robot.legs.walking
 
 
 def test_a_controller_that_starts_too_slowly_is_left_alone_again() -> None:

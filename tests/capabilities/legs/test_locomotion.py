@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
 from golem.capabilities.legs.trim import TrimConfig
+from golem.errors import ConfigError
 from golem.types import Array, Twist
 
 DT = 0.02
@@ -232,3 +234,36 @@ def test_a_robot_that_lags_is_asked_for_more_within_bounds_and_for_nothing_when_
     assert driver.applied == ZERO
     driver.run(0.6, Twist(0.5, 0.0, 0.0))
     assert driver.applied.vx < 0.5 + most  # begun anew
+
+
+@pytest.mark.parametrize("start", ["never", "command", "recovery", "always"])
+def test_moving_is_what_the_robot_does_whatever_its_clock(start: Any) -> None:
+    driver = Driver(Recorder(gait=GaitConfig(start=start)))
+    driver.run(0.2)
+    assert not driver.layer.moving
+    driver.run(0.5, Twist(0.5))
+    assert driver.layer.moving
+    driver.run(3.0, Twist())
+    assert not driver.layer.moving
+    assert bool(driver.layer.gait.stepping) == (start == "always")
+
+
+@pytest.mark.parametrize("changes", [{"vx": (0.2, 0.8)}, {"wz": (-math.inf, 1.0)}, {"vy": (0.1, -0.1)}])
+def test_an_envelope_without_zero_is_refused(changes: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError, match=f"envelope.{next(iter(changes))} is a range around zero"):
+        Envelope(**changes)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"period": 0.0},
+        {"stance": 0.5},
+        {"capture_start": (-0.1, 0.15)},
+        {"capture_stop": 0.0},
+        {"feet_start": -1.0},
+    ],
+)
+def test_a_clock_that_cannot_be_meant_is_refused(changes: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError, match=r"The gait\."):
+        GaitConfig(**changes)

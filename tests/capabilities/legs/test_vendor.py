@@ -117,6 +117,18 @@ def test_twists_are_passed_on_refreshed_and_run_out_when_the_client_dies() -> No
     assert session.now == Twist()
 
 
+def test_a_twist_that_is_corrected_at_every_tick_is_sent_at_the_pace_of_its_refreshing() -> None:
+    session = Session(Link())
+    session.run(0.5)
+    session.link.asked.clear()
+    for k in range(500):
+        session.run(DT, Twist(0.3 + 1e-3 * (k % 7)))
+    seconds = 500 * DT
+    assert seconds / 0.1 - 2 <= len(session.link.asked) <= seconds / 0.1 + 2
+    session.run(0.02, Twist())  # a stop does not wait
+    assert session.now == Twist()
+
+
 def test_one_call_at_a_time_however_slow_the_answers() -> None:
     link = Link(delay=100)
     session = Session(link)

@@ -107,3 +107,14 @@ def test_a_mirrored_measurement_gives_the_mirrored_estimate() -> None:
         v = one.step(measured, weight, DT)
         m = other.step(measured[::-1] * mirror, weight[::-1], DT)
         np.testing.assert_allclose(v * mirror, m, atol=1e-12)
+
+
+def test_a_reset_forgets_what_is_no_number() -> None:
+    filter = RandomWalk(RandomWalkConfig(), (3,))
+    filter.step(np.full((3, 2, 3), np.nan), np.ones((3, 2)), 0.002)
+    assert np.isnan(filter.velocity).all()
+    filter.reset(np.array([True, False, True]))
+    assert np.isfinite(filter.velocity).all(axis=1).tolist() == [True, False, True]
+    assert np.isfinite(filter.variance).tolist() == [True, False, True]
+    filter.reset()
+    assert not filter.velocity.any() and np.isfinite(filter.variance).all()

@@ -159,7 +159,9 @@ def test_hands_survive() -> None:
 
 
 def test_legs_say_why_they_stand() -> None:
-    status = LegStatus(1.0, Twist(5.0), Twist(1.0), True, "too fast", True, np.array([0.0, 0.5]), "almi")
+    status = LegStatus(
+        1.0, Twist(5.0), Twist(1.0), True, "too fast", True, True, np.array([0.0, 0.5]), "almi"
+    )
     message = convert.leg_status(status)
     assert (message.commanded.linear.x, message.applied.linear.x, message.fault) == (5.0, 1.0, "")
     assert message.phase.tolist() == [0.0, 0.5] and message.clamped and message.stepping

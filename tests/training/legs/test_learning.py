@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from golem.capabilities.legs.network import load_network
 from golem.capabilities.legs.observation import Layout
 from golem.errors import ConfigError
 from golem.robots.model.leg_kinematics import leg_poses
+from golem.training.legs.checkpoint import CHECKPOINT, CURVE, read_curve
 from golem.training.legs.curve import draw_curves
 from golem.training.legs.disturbances import ACROSS, GENTLE, Difficulty, Pushes, UpperBodyMotion
 from golem.training.legs.env import LAYOUT, TASKS, LegsEnv, Task
@@ -23,14 +25,16 @@ from golem.training.legs.export import export, load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.model import STANCE
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
-from golem.training.legs.train import CHECKPOINT, CURVE, Adversary, TrainConfig, train
+from golem.training.legs.train import Adversary, TrainConfig, train
 
 
 def small(out: Path, seed: int = 0, updates: int = 2, **changes: object) -> TrainConfig:
     return TrainConfig(out=out, seed=seed, robots=8, steps=8 * 24 * updates, threads=1, **changes)  # type: ignore[arg-type]
 
 
-def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(tmp_path: Path) -> None:
+def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name, seed in (("a", 0), ("b", 0), ("c", 1)):
         train(small(tmp_path / name, seed, updates=10, learned_from=0.0))
     a, b, c = (load_actor(tmp_path / name / CHECKPOINT)[0].net[0].weight for name in "abc")
@@ -42,8 +46,49 @@ def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(tmp_pat
     assert torch.load(tmp_path / "a" / CHECKPOINT, weights_only=True)["updates"] == 11
     with pytest.raises(ConfigError, match="another configuration"):
         train(small(tmp_path / "a", seed=5, updates=12))
+    with monkeypatch.context() as changed, pytest.raises(ConfigError, match="other rewards"):
+        changed.setitem(TASKS, "walk", replace(TASKS["walk"], fall=7.0))
+        train(small(tmp_path / "a", updates=12, learned_from=0.0))
     draw_curves([tmp_path / name for name in "abc"], tmp_path / "curve.png")
     assert (tmp_path / "curve.png").stat().st_size > 1000
+
+
+def test_rows_of_the_curve_that_are_learned_again_are_left_out(tmp_path: Path) -> None:
+    train(small(tmp_path, updates=20))
+    with (tmp_path / CURVE).open("a") as file:  # it was killed between a curve and a checkpoint
+        file.write((tmp_path / CURVE).read_text().splitlines()[-1].replace("3840", "5760", 1) + "\n")
+    train(small(tmp_path, updates=30))
+    assert read_curve(tmp_path)["steps"].tolist() == pytest.approx([192 * k for k in range(1, 31)], rel=1e-4)
+
+
+def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(tmp_path: Path) -> None:
+    first = train(small(tmp_path / "first"))
+    weights = [
+        load_actor(train(small(tmp_path / f"{seed}", seed, updates=3, start=first)))[0].net[0].weight
+        for seed in (1, 2)
+    ]
+    assert not torch.equal(*weights)
+    with pytest.raises(ConfigError, match=r"has 384 steps already; --steps, which counts them, is 384\."):
+        train(small(tmp_path / "none", start=first))
+
+
+def test_files_that_are_no_checkpoint_or_curve_are_named(tmp_path: Path) -> None:
+    (tmp_path / "notes.pt").write_text("hello")
+    torch.save({"model": 1}, tmp_path / "other.pt")
+    for name, words in (
+        ("nope.pt", "No such file"),
+        ("notes.pt", "is no checkpoint"),
+        ("other.pt", "older one"),
+    ):
+        with pytest.raises(ConfigError, match=words):
+            export(tmp_path / name, tmp_path)
+        with pytest.raises(ConfigError, match=words):
+            train(small(tmp_path / "run", start=tmp_path / name))
+    with pytest.raises(ConfigError, match="name folders of runs"):
+        draw_curves([tmp_path / "nope"], tmp_path / "curve.png")
+    (tmp_path / CURVE).write_text("steps\n")
+    with pytest.raises(ConfigError, match="is no learning curve"):
+        draw_curves([tmp_path], tmp_path / "curve.png")
 
 
 @pytest.mark.parametrize("task", TASKS)

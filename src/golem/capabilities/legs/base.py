@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from golem.capabilities.legs.gait import GaitConfig
+from golem.errors import ConfigError
 from golem.types import Array, BaseEstimate, LowState, Twist
 
 
@@ -36,6 +38,17 @@ class Envelope:
     vx: tuple[float, float] = (0.0, 0.0)
     vy: tuple[float, float] = (0.0, 0.0)
     wz: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Check the ranges.
+
+        Raises:
+            ConfigError: zero is outside of one, or a bound is not finite.
+        """
+        for axis in ("vx", "vy", "wz"):
+            low, high = getattr(self, axis)
+            if not (-inf < low <= 0.0 <= high < inf):
+                raise ConfigError(f"The envelope.{axis} is a range around zero, not {low:g} to {high:g}.")
 
     def clamp(self, twist: Twist) -> Twist:
         """Return the nearest twist inside, each component by itself."""
@@ -102,3 +115,14 @@ class LowerBody(Protocol):
             dt: time since the previous tick [s], positive.
         """
         ...
+
+
+@runtime_checkable
+class Starting(Protocol):
+    """A lower body that has to start before it can carry the robot, as the vendor's does.
+
+    Attributes:
+        started: whether it can; asked after every step.
+    """
+
+    started: bool

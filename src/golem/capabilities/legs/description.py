@@ -143,11 +143,11 @@ def load_description(file: str | Path, network: str | Path | None = None) -> tup
         raise ConfigError(f"{file}: a policy description is a mapping such as 'network: policy.onnx'.")
     check_values(str(file), data)
     options = cast(Mapping[str, object], data)
-    description: Description = fill(f"key of {file}", Description, options)
     try:
+        description: Description = fill(f"key of {file}", Description, options)
         _check(description)
     except ConfigError as error:
-        raise ConfigError(f"{file}: {error}") from error
+        raise ConfigError(str(error) if str(file) in str(error) else f"{file}: {error}") from error
     return description, Path(network).expanduser() if network else path.parent / description.network
 
 
@@ -159,14 +159,8 @@ def _check(d: Description) -> None:
     for what, value, fine, wanted in (
         ("rate", d.rate, 1.0 <= d.rate < inf, "a number of ticks per second, at least 1"),
         ("latency", d.latency, 0.0 <= d.latency < inf, "a time in seconds, not negative"),
-        ("gait.period", d.gait.period, 0.0 < d.gait.period < inf, "a time in seconds, positive"),
-        ("gait.stance", d.gait.stance, 0.5 < d.gait.stance < 1.0, "a share of the period, between 0.5 and 1"),
         ("action.clip", d.action.clip, d.action.clip > 0.0, "a positive number"),
         ("action.swing", d.action.swing, abs(d.action.swing) < inf, "an angle in radians"),
     ):
         if not fine:
             raise ConfigError(f"The {what} is {wanted}, not {value:g}.")
-    for axis in ("vx", "vy", "wz"):
-        low, high = getattr(d.envelope, axis)
-        if not (-inf < low <= 0.0 <= high < inf):
-            raise ConfigError(f"The envelope.{axis} is a range around zero, not {low:g} to {high:g}.")

@@ -12,11 +12,13 @@ stops at a double support at which the twist is zero and both errors are small a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.errors import ConfigError
 from golem.types import Array
 
 Bools = NDArray[np.bool_]
@@ -44,6 +46,21 @@ class GaitConfig:
     capture_stop: float = 0.07
     feet_start: float = 0.12
     feet_stop: float = 0.05
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ConfigError: one of them cannot be meant.
+        """
+        lengths = (*self.capture_start, self.capture_stop, self.feet_start, self.feet_stop)
+        for what, value, fine, wanted in (
+            ("period", self.period, 0.0 < self.period < inf, "a time in seconds, positive"),
+            ("stance", self.stance, 0.5 < self.stance < 1.0, "a share of the period, between 0.5 and 1"),
+            ("capture and gait.feet", min(lengths), min(lengths) > 0.0, "a length in metres, positive"),
+        ):
+            if not fine:
+                raise ConfigError(f"The gait.{what} is {wanted}, not {value:g}.")
 
 
 class Gait:

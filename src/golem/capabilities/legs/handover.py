@@ -2,7 +2,7 @@
 
 The legs change hands while the robot stays in place and is healthy, and the targets are blended over a short time,
 because each controller has its own posture and gains. A controller that has to start first, such as the vendor's, gets
-them once it says something.
+them once it has started.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from golem import registry
-from golem.capabilities.legs.base import Envelope, LegCommand, Motion
+from golem.capabilities.legs.base import Envelope, LegCommand, Motion, Starting
 from golem.capabilities.legs.blend import Blend
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.pacing import Paced
@@ -105,11 +105,11 @@ class Handover:
         self._healthy = self._healthy + dt if self._is_healthy(state, base) else 0.0
         if not self._other_wanted(motion):
             self._coming = None
-        elif self._coming is None and self._healthy > self.config.calm - 0.5 * dt:
+        elif self._coming is None and self._is_calm(dt):
             self._coming = self._stand if self.walking else self._walk
             self._coming.reset(state)
         command = None if self._coming is None else self._coming.step(state, base, motion, dt)
-        if self._coming is not None and command is not None and _speaks(command):
+        if self._coming is not None and command is not None and self._may_take_over(self._coming, dt):
             self._take_over(self._coming)
             self._blend.begin(self._last)
         else:
@@ -129,6 +129,15 @@ class Handover:
         self._healthy = 0.0
         self._last: LegCommand | None = None
         self._blend.reset()
+
+    def _is_calm(self, dt: float) -> bool:
+        """Return whether the robot has been healthy for long enough."""
+        return self._healthy > self.config.calm - 0.5 * dt
+
+    def _may_take_over(self, coming: Paced, dt: float) -> bool:
+        """Return whether the legs may change hands now: one that took long to start may find the robot in a step."""
+        controller = coming.controller
+        return self._is_calm(dt) and (not isinstance(controller, Starting) or controller.started)
 
     def _is_healthy(self, state: LowState, base: BaseEstimate) -> bool:
         """Return whether the measured robot is calm, upright, in place, and not on one leg."""
@@ -158,8 +167,3 @@ class Handover:
         if not motion.stepping:
             return True
         return self.gait.start == "always" and bool((motion.phase < self.gait.stance).all())
-
-
-def _speaks(command: LegCommand) -> bool:
-    """Return whether a controller moves the legs: one that has yet to start only damps them."""
-    return bool(command.kp.any()) or (command.tau is not None and bool(command.tau.any()))

@@ -81,6 +81,17 @@ class Locomotion:
         """The controller in charge."""
         return self._paced.controller
 
+    @property
+    def runs(self) -> int:
+        """How often the controller in charge was run."""
+        return self._paced.runs
+
+    @property
+    def moving(self) -> bool:
+        """Whether the robot changes its place; see `LegStatus`."""
+        resting = self.gait.config.start == "always" or not self.gait.stepping
+        return self.applied != ZERO or not resting
+
     def reset(self, state: LowState) -> None:
         """Stand, from the measured `state` on; a twist from before is void."""
         self._forget()
@@ -181,7 +192,10 @@ class Locomotion:
         rate = R @ sensed_base_rate(state)
         velocity = base.velocity + np.cross(rate, com)
         capture, misplaced = balance_errors(R, com, velocity, soles @ R.T, self._stance)
-        self.gait.config = self.controller.gait
+        if self.gait.config != self.controller.gait:
+            # Another controller has the legs, as in a hand-over: what was learned about the last one is void.
+            self._trim.reset()
+            self.gait.config = self.controller.gait
         self.gait.step(np.asarray(self.applied != ZERO), capture, misplaced, dt)
         if self.applied == ZERO and not self.gait.stepping:
             self._trim.reset()

@@ -11,11 +11,13 @@ class Paced:
 
     Attributes:
         controller: the controller.
+        runs: how often it was run.
     """
 
     def __init__(self, controller: LowerBody) -> None:
         """Run `controller`, whose first tick is the first of the loop."""
         self.controller = controller
+        self.runs = 0
         self._command: LegCommand | None = None
         self._elapsed = 0.0
         self._due = 0.0
@@ -35,6 +37,7 @@ class Paced:
         # A microsecond of slack: periods and ticks are binary fractions.
         if self._command is None or self._due < 1e-6:
             self._command = self.controller.step(state, base, motion, self._elapsed)
+            self.runs += 1
             self._due += 1.0 / self.controller.rate
             self._elapsed = 0.0
         return self._command

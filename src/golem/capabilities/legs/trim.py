@@ -21,13 +21,14 @@ class TrimConfig:
     Attributes:
         gain: correction per velocity error and time [1/s]; 0 corrects nothing.
         most: bound of the correction of vx, vy [m/s] and wz [rad/s]; by so much the twist may leave the envelope.
+            Turning falls short most, where it is asked for beside full speed ahead and to a side.
         heed: bound of each error that is integrated: a push is not the controller's doing.
         smoothing: time constant of the filter on command and measurement [s]: a period of the gait, whose sway shall
             not reach the twist.
     """
 
     gain: float = 0.8
-    most: tuple[float, float, float] = (0.15, 0.15, 0.15)
+    most: tuple[float, float, float] = (0.15, 0.15, 0.25)
     heed: tuple[float, float, float] = (0.15, 0.15, 0.15)
     smoothing: float = 0.7
 

@@ -156,7 +156,8 @@ class Vendor:
         while True:
             sent, sent_at = self._twist, self._t
             yield from self._call(api.set_velocity, self._velocity(sent))
-            while self._twist == sent and self._t < sent_at + self.config.refresh:
+            # The base layer corrects the twist at every tick; starts and stops alone are not to wait.
+            while (self._twist == Twist()) == (sent == Twist()) and self._t < sent_at + self.config.refresh:
                 yield
 
     def _velocity(self, twist: Twist) -> str:

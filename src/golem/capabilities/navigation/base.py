@@ -61,16 +61,16 @@ class Navigator(Protocol):
     """Brings the base to a goal pose."""
 
     def start(self, goal: PlanarPose) -> None:
-        """Pursue `goal`, in odom, from the next tick on; whatever was remembered is forgotten."""
+        """Pursue `goal`, in odom, from the next tick on; of earlier ones counts what they taught about legs."""
         ...
 
-    def step(self, pose: PlanarPose, stepping: bool, dt: float) -> Course:
+    def step(self, pose: PlanarPose, moving: bool, dt: float) -> Course:
         """Advance by one tick.
 
         Args:
             pose: where base_link is in odom, as well as the robot knows.
-            stepping: whether the lower body steps, commanded or for its balance: only while it does not, the robot
-                stays where it is.
+            moving: whether the lower body moves the base, commanded or for its balance: only while it does not, the
+                robot stays where it is.
             dt: time since the previous tick [s], positive.
         """
         ...

@@ -75,22 +75,22 @@ class GoTo:
         self._goal = goal
         self._forget()
 
-    def step(self, pose: PlanarPose, stepping: bool, dt: float) -> Course:
+    def step(self, pose: PlanarPose, moving: bool, dt: float) -> Course:
         """Return the twist of this tick; see `Navigator`."""
         if self._goal is None:
             self._goal = pose
         config = self.config
         self._filter(pose, dt)
-        self._rested = 0.0 if stepping else self._rested + dt
+        self._rested = 0.0 if moving else self._rested + dt
         here = self._stood(pose, dt) or self._at()
-        # A robot that steps is where it would stand if it were told to now.
-        left = (here @ self._coast if stepping else here).to(self._goal)
+        # A robot that moves is where it would stand if it were told to now.
+        left = (here @ self._coast if moving else here).to(self._goal)
         distance, turn = math.hypot(left.x, left.y), abs(left.yaw)
         if self._walking:
             near = distance < self._slack * config.close and turn < self._slack * config.aligned
             self._near = self._near + dt if near else 0.0
             self._walking = self._near < config.dwell
-            self._told = here if stepping else None
+            self._told = here if moving else None
         elif self._rested >= config.settle + config.rest:
             if self._told is not None:
                 self._coast, self._told = self._told.to(here), None
@@ -99,7 +99,7 @@ class GoTo:
                 self._walking, self._near = True, 0.0
                 self._slack *= config.widen
         if self._walking:
-            return Course(self._towards(left, config.creep if stepping else config.pulse), False, left)
+            return Course(self._towards(left, config.creep if moving else config.pulse), False, left)
         return Course(ZERO, self._rested >= config.settle + config.rest, left)
 
     def _forget(self) -> None:

@@ -113,7 +113,7 @@ def judge(episode: Episode, method: str) -> TrialOutcome:
         module = f"navigator: {episode.running.stack.navigator.use}" if result.slot == "navigator" else module
     if loss is None and radial > TOLERANCE:
         loss = Loss("goal", f"It stands {radial:.2f} m beside the goal and believes to be there.")
-        module = f"estimator: {episode.running.stack.estimator.use}"
+        module = f"estimator: {episode.running.stack.choice('estimator').use}"
     if loss is not None:
         return TrialOutcome(False, loss.stage, module, loss.detail, series=series)
     detail = f"stands {1e3 * radial:.0f} mm from the goal"

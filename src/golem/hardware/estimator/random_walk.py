@@ -106,10 +106,10 @@ class RandomWalk:
 
     def reset(self, where: NDArray[np.bool_] | None = None) -> None:
         """Put the robots `where` (*shape,) back to rest; None is all."""
-        keep = 0.0 if where is None else 1.0 - where
-        self.velocity = self.velocity * np.asarray(keep)[..., None]
-        self.variance = self.variance * keep + self.config.start**2 * (1.0 - np.asarray(keep))
-        self.unmeasured = self.unmeasured * keep
+        chosen = np.ones_like(self.variance, dtype=bool) if where is None else where
+        self.velocity = np.where(chosen[..., None], 0.0, self.velocity)
+        self.variance = np.where(chosen, self.config.start**2, self.variance)
+        self.unmeasured = np.where(chosen, 0.0, self.unmeasured)
 
     def step(self, measured: Array, weight: Array, dt: float) -> Array:
         """Advance by `dt` [s] with `measured` (*shape, 2, 3) and `weight` (*shape, 2); return `velocity`."""

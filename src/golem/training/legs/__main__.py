@@ -6,9 +6,10 @@ from pathlib import Path
 
 import tyro
 
+from golem.training.legs.checkpoint import CHECKPOINT
 from golem.training.legs.curve import draw_curves
 from golem.training.legs.env import Task
-from golem.training.legs.train import CHECKPOINT, Adversary, TrainConfig
+from golem.training.legs.train import Adversary, TrainConfig
 from golem.training.legs.train import train as run_training
 
 RUNS = Path("runs/legs")

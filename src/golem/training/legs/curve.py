@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from golem.training.legs.train import CURVE
+from golem.training.legs.checkpoint import read_curve
 
 PANELS = (
     ("falls", "falls per robot second", 1.0),
@@ -31,7 +30,7 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         runs: folders of training runs.
         out: the PNG file.
     """
-    curves = {run.name: _read(run / CURVE) for run in runs}
+    curves = {run.name: read_curve(run) for run in runs}
     last = max(float(curve["steps"][-1]) for curve in curves.values())
     image = Image.new("RGB", (SIZE[0] * len(PANELS), SIZE[1] + 20 * len(curves)), "white")
     pen, font = ImageDraw.Draw(image), ImageFont.load_default(12)
@@ -61,9 +60,3 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         pen.line([(left, y + 6), (left + 24, y + 6)], fill=colour, width=3)
         pen.text((left + 32, y), name, fill="black", font=font)
     image.save(out)
-
-
-def _read(path: Path) -> dict[str, np.ndarray]:
-    with path.open() as file:
-        rows = list(csv.DictReader(file))
-    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}

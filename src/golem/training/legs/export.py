@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import onnx
-import torch
 import yaml
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
@@ -18,6 +17,7 @@ from torch import nn
 
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.observation import Layout
+from golem.training.legs.checkpoint import read_checkpoint
 from golem.training.legs.env import LAYOUT, PERIOD, TASKS, EnvConfig, Task
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.model import KD, KP, STANCE
@@ -33,13 +33,17 @@ def load_actor(checkpoint: Path) -> tuple[Actor, Task]:
     """Return the trained actor of a checkpoint of `train`, and what it learned."""
     layout = Layout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
     actor = Actor(Mirror(layout.components), leg_mirror(), PpoConfig().hidden)
-    saved = torch.load(checkpoint, weights_only=True)
+    saved = read_checkpoint(checkpoint)
     actor.load_state_dict(saved["legs"]["actor"])
     return actor.eval(), saved["config"]["task"]
 
 
 def export(checkpoint: Path, folder: Path) -> tuple[Path, Path]:
-    """Write `folder/almi_TASK.onnx` and `.yaml` from a checkpoint; return both paths."""
+    """Write `folder/almi_TASK.onnx` and `.yaml` from a checkpoint; return both paths.
+
+    Raises:
+        ConfigError: it is no checkpoint.
+    """
     actor, task = load_actor(checkpoint)
     name = f"almi_{task}"
     folder.mkdir(parents=True, exist_ok=True)

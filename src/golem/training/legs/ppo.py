@@ -186,10 +186,14 @@ class Ppo:
 
     def load(self, state: dict[str, Any]) -> None:
         """Go on from a checkpoint's `state`."""
-        self.actor.load_state_dict(state["actor"])
-        self.critic.load_state_dict(state["critic"])
+        self.take_networks(state)
         self._optimiser.load_state_dict(state["optimiser"])
         self._generator.set_state(state["generator"])
+
+    def take_networks(self, state: dict[str, Any]) -> None:
+        """Take over the networks of a checkpoint's `state`, and nothing else."""
+        self.actor.load_state_dict(state["actor"])
+        self.critic.load_state_dict(state["critic"])
 
     def _evaluate(self, observation: Tensor, known: Tensor) -> Tensor:
         return self.critic(torch.cat([observation, known], dim=-1)).squeeze(-1)

@@ -14,15 +14,14 @@ import torch
 from numpy.typing import NDArray
 
 from golem.errors import ConfigError, OutputError
+from golem.training.legs.checkpoint import CHECKPOINT, CURVE, cut_curve, read_checkpoint
 from golem.training.legs.disturbances import NUM_UPPER
-from golem.training.legs.env import PERIOD, TASKS, LegsEnv, Task
+from golem.training.legs.env import PERIOD, TASKS, EnvConfig, LegsEnv, Task
 from golem.training.legs.mirror import Mirror, leg_mirror, upper_mirror
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
 from golem.training.legs.world import Rows
 from golem.types import Array
 
-CHECKPOINT = "checkpoint.pt"
-CURVE = "curve.csv"
 Adversary = Literal["none", "motions", "learned"]
 
 
@@ -170,6 +169,7 @@ class _Run:
                 "cpu": self._cpu,
                 "survival": self._survival,
                 "config": _plain(self.config),
+                "env": _plain(TASKS[self.config.task]),
             },
             part,
         )
@@ -179,13 +179,18 @@ class _Run:
         """Go on from a checkpoint, with new episodes.
 
         Raises:
-            ConfigError: it was made with another seed, network or task.
+            ConfigError: it was made with another seed, network, task or reward.
         """
-        saved = torch.load(path, weights_only=True)
+        saved = read_checkpoint(path)
         free = ("out", "steps", "threads")
         mine = {k: v for k, v in _plain(self.config).items() if k not in free}
         if mine != {k: v for k, v in saved["config"].items() if k not in free}:
             raise ConfigError(f"{path} was made with another configuration; choose another --out.")
+        if saved.get("env") != _plain(TASKS[self.config.task]):
+            raise ConfigError(
+                f"{path} was made with other rewards or another world; choose another --out, or the code of then."
+            )
+        cut_curve(self.config.out / CURVE, saved["steps"])
         self.legs.load(saved["legs"])
         self.upper.load(saved["upper"])
         self.steps, self.updates, self._cpu = saved["steps"], saved["updates"], saved["cpu"]
@@ -195,12 +200,20 @@ class _Run:
         self._obs, self._known = self.env.observe()
 
     def begin_with(self, path: Path) -> None:
-        """Take over networks and steps of another run's checkpoint; configuration and noise are this run's own."""
-        saved = torch.load(path, weights_only=True)
-        self.legs.load(saved["legs"])
-        self.upper.load(saved["upper"])
-        self.legs.set_noise(self.config.noise[0])
+        """Take over networks and steps of another run's checkpoint; configuration, draws and noise are this run's own.
+
+        Raises:
+            ConfigError: it has as many steps as this run is to have.
+        """
+        saved = read_checkpoint(path)
         self.steps = saved["steps"]
+        if self.steps >= self.config.steps:
+            raise ConfigError(
+                f"{path} has {self.steps:.4g} steps already; --steps, which counts them, is {self.config.steps:.4g}."
+            )
+        self.legs.take_networks(saved["legs"])
+        self.upper.take_networks(saved["upper"])
+        self.legs.set_noise(self.config.noise[0])
         self._harden()
 
     def _harden(self) -> None:
@@ -287,7 +300,7 @@ class _Meter:
         }
 
 
-def _plain(config: TrainConfig) -> dict[str, Any]:
+def _plain(config: TrainConfig | EnvConfig) -> dict[str, Any]:
     """Return `config` as data that any later version can read."""
 
     def plain(value: Any) -> Any:
