@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.capabilities.navigation.base import Course, PlanarPose
+from golem.capabilities.navigation.base import Course
 from golem.errors import ModuleFault
 from golem.runtime.guard import Guard
 from golem.runtime.guarded import GuardedMethod, GuardedNavigator
 from golem.skills.grasping.base import Grasp, OpenLoop, ServoStatus, ServoStep
-from golem.types import Array, Detection, LocalizedObject, Twist
+from golem.types import Array, Detection, LocalizedObject, PlanarPose, Twist
 
 TARGET = LocalizedObject(
     Detection("screw", 0.9, np.zeros(4), np.zeros(2)), 0.0, np.zeros(3), np.zeros((0, 3))

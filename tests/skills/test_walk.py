@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.capabilities.navigation.base import PlanarPose
 from golem.capabilities.navigation.goto import GoTo
 from golem.middleware import topics
 from golem.middleware.bus import Bus
@@ -20,7 +19,7 @@ from golem.skills.base import Feedback, SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
 from golem.skills.walk import Stand, StandGoal, Walk, WalkGoal
-from golem.types import Array, BaseEstimate, Twist
+from golem.types import Array, BaseEstimate, PlanarPose, Twist
 
 PERIOD = 0.01
 
@@ -81,7 +80,16 @@ class Ground:
         moving = twist != Twist()
         applied = Twist() if self.reason else twist
         status = LegStatus(
-            t, twist, applied, False, self.reason, moving, moving, np.array([0.0, 0.5]), "almi"
+            t,
+            twist,
+            applied,
+            False,
+            self.reason,
+            moving,
+            moving,
+            PlanarPose(0.0, 0.0, 0.0),
+            np.array([0.0, 0.5]),
+            "almi",
         )
         if self.reports:
             self.bus.publish(topics.LEG_STATUS, status, t)

@@ -18,17 +18,15 @@ import numpy as np
 
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.mpc.controller import MPC, MPCConfig
-from golem.capabilities.navigation.base import PlanarPose
 from golem.evaluation.bench import stopwatch
 from golem.evaluation.episode import Episode, episode_seed, legs_stack
 from golem.evaluation.exercise import WIDE_AREA, ArmMotion, Exercise
 from golem.evaluation.odometry import SimulatedOdometry
 from golem.evaluation.pushes import DIRECTIONS, shove
 from golem.evaluation.subject import Subject
-from golem.middleware import topics
 from golem.skills.walk import Walk, WalkGoal
 from golem.stack import Choice
-from golem.types import BaseEstimate, Twist
+from golem.types import PlanarPose, Twist
 
 Figures = dict[str, float]
 LOST = "lost_in_"
@@ -145,10 +143,7 @@ def rubble(subject: Subject, seed: int, index: int) -> Figures:
 
 
 def stopping(subject: Subject, seed: int, index: int) -> Figures:
-    """Walk to a pose 2 m away and stand there, by the base estimator with 1 cm and 1 deg of noise: the true error.
-
-    Away from where the robot stands when it is told: what its odometry lost in the band is no error of walking.
-    """
+    """Walk to a pose 2 m away and stand there, by the base estimator with 1 cm and 1 deg of noise: the true error."""
     draw = subject.draw("legs/stopping", seed, index)
     rng = draw.rng("goal")
     bearing, distance = rng.uniform(-math.pi, math.pi), rng.uniform(*GOAL_DISTANCE)
@@ -162,19 +157,16 @@ def stopping(subject: Subject, seed: int, index: int) -> Figures:
         episode.stand(SETTLE)
         if episode.over:
             return _lost(episode)
-        truth, estimate = episode.robot.truth, episode.running.bus.latest(topics.BASE, BaseEstimate)
-        assert estimate is not None
-        asked = PlanarPose.of(estimate.T_odom_base) @ goal
-        goal = PlanarPose.of(truth.base().T_world_base) @ goal
         episode.start(
-            Walk(episode.running.navigator), WalkGoal(asked.x, asked.y, asked.yaw, "odom", GOAL_TIMEOUT)
+            Walk(episode.running.navigator), WalkGoal(goal.x, goal.y, goal.yaw, "odom", GOAL_TIMEOUT)
         )
         episode.run(GOAL_TIMEOUT + 1.0, until=lambda: episode.result is not None)
         episode.run(AFTER)
-        result, figures = episode.result, _lost(episode)
+        truth, result = episode.robot.truth, episode.result
+        figures = _lost(episode)
         if episode.over or result is None:
             return figures
-        left = goal.to(PlanarPose.of(truth.base().T_world_base))
+        left = goal.to(PlanarPose.of(np.linalg.inv(truth.T_world_odom) @ truth.base().T_world_base))
         return figures | {
             "arrived": float(result.success),
             "error": math.hypot(left.x, left.y),

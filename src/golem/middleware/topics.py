@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.types import Array, CameraInfo, LocalizedObject, Side, Twist
+from golem.types import Array, CameraInfo, LocalizedObject, PlanarPose, Side, Twist
 
 LOW_STATE = "lowstate"
 """`LowState` at 500 Hz, from the robot."""
@@ -145,6 +145,7 @@ class LegStatus:
         stepping: whether the gait clock runs.
         moving: whether the robot changes its place: a twist is applied, or it steps though its controller's clock could
             rest. A controller without a clock moves without stepping, one that marks time steps without moving.
+        rest: where base_link would come to rest if the robot were told to stand now, as seen from base_link.
         phase: (2,) gait phase of the left and the right leg, 0 to 1.
         controller: the implementation in charge, as the stack names it.
         fault: how the stack's own controller failed, once the fallback is in charge; else None.
@@ -157,6 +158,7 @@ class LegStatus:
     reason: str
     stepping: bool
     moving: bool
+    rest: PlanarPose
     phase: Array
     controller: str
     fault: str | None = None

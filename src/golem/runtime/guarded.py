@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from golem.capabilities.arms.base import check_pose
-from golem.capabilities.navigation.base import Course, Navigator, PlanarPose
+from golem.capabilities.navigation.base import Course, Navigator
 from golem.runtime.guard import Guard
 from golem.skills.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus, ServoStep
-from golem.types import Array, LocalizedObject, Twist
+from golem.types import Array, LocalizedObject, PlanarPose, Twist
 
 
 class GuardedMethod:

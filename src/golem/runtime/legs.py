@@ -157,6 +157,7 @@ class LowerBodyNode:
             locomotion.reason,
             bool(locomotion.gait.stepping),
             locomotion.moving,
+            locomotion.rest,
             locomotion.gait.phases,
             self._legs.guard.use,
             None if self._fault is None else str(self._fault),

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from golem.capabilities.navigation.base import Navigator, PlanarPose
+from golem.capabilities.navigation.base import Navigator
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
-from golem.types import Twist
+from golem.types import PlanarPose, Twist
 
 ZERO = Twist()
 
@@ -63,8 +63,9 @@ class Walk:
         self._navigator.start(target)
         said = -math.inf
         while True:
-            pose = PlanarPose.of(context.legs.pose)
-            course = self._navigator.step(pose, context.legs.status.moving, context.period)
+            status = context.legs.status
+            pose = PlanarPose.of(context.legs.pose) @ status.rest
+            course = self._navigator.step(pose, status.moving, context.period)
             left = course.left
             distance, turn = math.hypot(left.x, left.y), math.degrees(left.yaw)
             if course.arrived:
@@ -72,7 +73,6 @@ class Walk:
                 context.say("done", text, left=[left.x, left.y, left.yaw])
                 return SkillResult(True, "done", None, text, {"walk": context.t - start})
             if context.t - start >= goal.timeout:
-                status = context.legs.status
                 text = (
                     f"Not at the goal after {goal.timeout:g} s: {distance:.2f} m and {turn:.0f} deg are left."
                 )

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from golem.capabilities.navigation.base import PlanarPose, wrap
+from golem.types import PlanarPose, wrap
 
 poses = st.builds(PlanarPose, *(st.floats(-5.0, 5.0) for _ in range(3)))
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from golem.capabilities.navigation.base import Course, Navigator, PlanarPose
+from golem.capabilities.navigation.base import Course, Navigator
 from golem.capabilities.navigation.goto import GoTo, GoToConfig
-from golem.types import Twist
+from golem.types import PlanarPose, Twist
 
 DT = 0.01
 DEAD_BAND = 0.1

@@ -13,7 +13,16 @@ from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.diagnostic_msgs import DiagnosticStatus
 from golem.middleware.ros.msgs.geometry_msgs import Point, Pose, Quaternion
 from golem.middleware.topics import LegStatus, Sightings
-from golem.types import BaseEstimate, Detection, HandCommand, HandState, Imu, LocalizedObject, Twist
+from golem.types import (
+    BaseEstimate,
+    Detection,
+    HandCommand,
+    HandState,
+    Imu,
+    LocalizedObject,
+    PlanarPose,
+    Twist,
+)
 
 
 def T(rpy: tuple[float, float, float], xyz: tuple[float, float, float]) -> np.ndarray:
@@ -160,7 +169,16 @@ def test_hands_survive() -> None:
 
 def test_legs_say_why_they_stand() -> None:
     status = LegStatus(
-        1.0, Twist(5.0), Twist(1.0), True, "too fast", True, True, np.array([0.0, 0.5]), "almi"
+        1.0,
+        Twist(5.0),
+        Twist(1.0),
+        True,
+        "too fast",
+        True,
+        True,
+        PlanarPose(0.0, 0.0, 0.0),
+        np.array([0.0, 0.5]),
+        "almi",
     )
     message = convert.leg_status(status)
     assert (message.commanded.linear.x, message.applied.linear.x, message.fault) == (5.0, 1.0, "")

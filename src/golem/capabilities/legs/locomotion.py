@@ -16,11 +16,12 @@ from golem.capabilities.legs.base import LegCommand, LowerBody, Motion
 from golem.capabilities.legs.blend import Blend
 from golem.capabilities.legs.gait import Gait
 from golem.capabilities.legs.pacing import Paced
+from golem.capabilities.legs.rest import Rest
 from golem.capabilities.legs.trim import Trim, TrimConfig
 from golem.robots.model.imu import sensed_base_rate
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.leg_kinematics import SOLE_CENTER
-from golem.types import NUM_JOINTS, SIDES, Array, BaseEstimate, LowState, Twist
+from golem.types import NUM_JOINTS, SIDES, Array, BaseEstimate, LowState, PlanarPose, Twist
 
 ZERO = Twist()
 _ANKLES = tuple(f"{side}_ankle_roll_link" for side in SIDES)
@@ -70,8 +71,9 @@ class Locomotion:
         self._paced = Paced(controller)
         self._blend = Blend(self.config.blend)
         self._trim = Trim(self.config.trim)
+        self._rest = Rest()
         self._kinematics = Kinematics()
-        left, right = self._soles(np.zeros(NUM_JOINTS))
+        left, right = self._feet(np.zeros(NUM_JOINTS))[:, :3, 3]
         # With both hips straight and level the distance of the feet does not depend on how far the knees are bent.
         self._stance: Array = (left - right)[:2]
         self._forget()
@@ -92,9 +94,15 @@ class Locomotion:
         resting = self.gait.config.start == "always" or not self.gait.stepping
         return self.applied != ZERO or not resting
 
+    @property
+    def rest(self) -> PlanarPose:
+        """Where the robot would come to rest; see `LegStatus`."""
+        return self._rest.pose
+
     def reset(self, state: LowState) -> None:
         """Stand, from the measured `state` on; a twist from before is void."""
         self._forget()
+        self._rest.reset()
         self.gait.reset()
         self._blend.reset()
         self._paced.reset(state)
@@ -187,7 +195,8 @@ class Locomotion:
     def _clock(self, state: LowState, base: BaseEstimate, dt: float) -> None:
         """Advance the gait clock by `dt` [s] from how well the measured robot stands."""
         R = base.T_odom_base[:3, :3]
-        soles = self._soles(state.q)
+        feet = self._feet(state.q)
+        soles = feet[:, :3, 3]
         com = R @ self._kinematics.com()
         rate = R @ sensed_base_rate(state)
         velocity = base.velocity + np.cross(rate, com)
@@ -197,6 +206,7 @@ class Locomotion:
             self._trim.reset()
             self.gait.config = self.controller.gait
         self.gait.step(np.asarray(self.applied != ZERO), capture, misplaced, dt)
+        self._rest.step(base.T_odom_base, feet, base.contact, self.moving, dt)
         if self.applied == ZERO and not self.gait.stepping:
             self._trim.reset()
             self._trimmed = ZERO
@@ -205,13 +215,14 @@ class Locomotion:
             wanted = np.array(_values(self.applied))
             self._trimmed = Twist(*self._trim.step(wanted, R, base.velocity, rate, dt).tolist())
 
-    def _soles(self, q: Array) -> Array:
-        """Return the (2, 3) centres of the soles in base_link at the joints `q` (27,) [m]."""
+    def _feet(self, q: Array) -> Array:
+        """Return the (2, 4, 4) poses of the soles' centres in base_link at the joints `q` (27,)."""
         self._kinematics.update(q)
-        return np.array([(self._kinematics.pose(ankle) @ _SOLE)[:3] for ankle in _ANKLES])
+        return np.array([self._kinematics.pose(ankle) @ _SOLE for ankle in _ANKLES])
 
 
-_SOLE: Array = np.append(SOLE_CENTER, 1.0)
+_SOLE: Array = np.eye(4)
+_SOLE[:3, 3] = SOLE_CENTER
 
 
 def _values(twist: Twist) -> tuple[float, float, float]:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.navigation.base import Course, PlanarPose, wrap
-from golem.types import Array, Twist
+from golem.capabilities.navigation.base import Course
+from golem.types import Array, PlanarPose, Twist, wrap
 
 ZERO = Twist()
 

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from golem import registry
-from golem.capabilities.navigation.base import PlanarPose
 from golem.evaluation.balance import TRACE
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.episode import Episode, Loss, episode_seed, legs_stack
@@ -23,6 +22,7 @@ from golem.middleware import topics
 from golem.middleware.topics import Odometry
 from golem.robots.sensors.profiles import PROFILES
 from golem.skills.walk import Walk, WalkGoal
+from golem.types import PlanarPose
 
 DISTANCE = 6.0
 """Length of the line [m], from the paper."""
