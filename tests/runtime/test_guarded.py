@@ -73,7 +73,7 @@ class Lost:
         if goal.x < 0.0:
             raise ValueError("behind me")
 
-    def step(self, pose: PlanarPose, stepping: bool, dt: float) -> Course:
+    def step(self, pose: PlanarPose, moving: bool, dt: float) -> Course:
         return self._course  # pyright: ignore
 
 
