@@ -84,10 +84,12 @@ class EnvConfig:
 Task = Literal["walk", "stand"]
 TASKS: dict[Task, EnvConfig] = {
     "walk": EnvConfig(),
-    "stand": EnvConfig(standing=1.0, calm=0.3, impulse=100.0),
+    "stand": EnvConfig(standing=1.0, calm=0.3, impulse=100.0, weights=Weights(feet=-4.0, toes=0.0)),
 }
 """A network for each. One for both learned neither well: shoves of 90 N s teach a robot that walks to shuffle, and one
-that is praised for standing to the millimetre, or has learned to walk, is slow to step."""
+that is praised for standing to the millimetre, or has learned to walk, is slow to step. Who only stands steps after a
+push, to wherever that is good: with the walker's price on where the feet are, the robot swayed by 10 mm at 20 ms of
+delay, 8 M steps after it had stood within 2."""
 
 
 @dataclass
