@@ -172,6 +172,10 @@ def test_a_bag_is_played_onto_a_domain(robot: CycloneParticipant, domain: int, t
         [i * 0.002 for i in range(200)]
     )
     assert len(_all(clock)) == 40
+    writer(robot, STATE)
+    with golem("replay", str(tmp_path / "bag"), "--domain", str(domain)) as player:
+        out = player.communicate(timeout=30)[0]
+        assert player.returncode == 2 and "There is a robot on" in out
 
 
 def _all(reader: Reader) -> list[Sample]:
