@@ -1,4 +1,4 @@
-"""A robot on its own feet whose leg controller dies: it stays on its feet."""
+"""A robot on its own feet whose leg controller dies, or whose legs change hands: it stays on its feet."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.runtime.test_legs import Drive
 
+from golem.capabilities.navigation.goto import GoTo
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
 from golem.runtime.assembly import Running, build
-from golem.skills.walk import Stand, StandGoal
+from golem.skills.walk import Stand, StandGoal, Walk, WalkGoal
 from golem.stack import Choice, load_stack
 from golem.types import Twist
 
@@ -31,13 +33,12 @@ class Dying({name}):
 
 
 @contextmanager
-def standing(path: Path, text: str, fallback: str) -> Iterator[tuple[Running, Any]]:
-    """A stack on open ground whose legs are the class `Dying` of `text`."""
-    path.write_text(text)
+def on_open_ground(legs: Choice, fallback: str) -> Iterator[tuple[Running, Any]]:
+    """A stack on open ground with certain legs."""
     stack = replace(
         load_stack("stand", profile="ideal"),
         robot=Choice("mujoco", {"support": "ground", "world": "open"}),
-        lower_body=Choice(f"{path}:Dying"),
+        lower_body=legs,
         fallback=Choice(fallback),
     )
     running, robot = build(stack, seed=0)
@@ -45,6 +46,14 @@ def standing(path: Path, text: str, fallback: str) -> Iterator[tuple[Running, An
         yield running, robot
     finally:
         robot.close()
+
+
+@contextmanager
+def standing(path: Path, text: str, fallback: str) -> Iterator[tuple[Running, Any]]:
+    """The same with legs that are the class `Dying` of `text`."""
+    path.write_text(text)
+    with on_open_ground(Choice(f"{path}:Dying"), fallback) as both:
+        yield both
 
 
 def assert_it_stands_on(running: Running, robot: Any, fallback: str) -> None:
@@ -77,3 +86,31 @@ def test_legs_that_die_in_the_middle_of_a_step(tmp_path: Path) -> None:
         assert (result.stage, result.slot) == ("fault", "lower_body")
         assert robot.data.qpos[0] > 0.2
         assert_it_stands_on(running, robot, "almi")
+
+
+@pytest.mark.slow
+def test_it_walks_with_the_robots_own_controller_and_stands_with_another() -> None:
+    """The vendor's has to be brought up first, which takes a second and a half; the robot stands meanwhile."""
+    parts = {
+        "walk": {"use": "vendor"},
+        "stand": {"use": "policy", "options": {"file": "almi_stand"}},
+    }
+    with on_open_ground(Choice("handover", parts), "almi") as (running, robot):
+        assert running.execute(Stand(), StandGoal(2.5), timeout=5.0).success
+        assert running.execute(Drive(Twist(0.3), seconds=4.0), None, timeout=6.0).success
+        assert robot.data.qpos[0] > 0.5
+        assert running.execute(Stand(), StandGoal(3.0), timeout=5.0).success
+        stood = robot.data.qpos[:2].copy()
+        assert running.execute(Stand(), StandGoal(2.0), timeout=5.0).success
+        assert np.hypot(*(robot.data.qpos[:2] - stood)) < 0.05
+        assert_it_stands_on(running, robot, "handover")
+
+
+@pytest.mark.slow
+def test_a_pose_is_reached_with_legs_that_have_no_gait_clock_of_ours() -> None:
+    with on_open_ground(Choice("vendor"), "almi") as (running, robot):
+        assert running.execute(Stand(), StandGoal(3.0), timeout=5.0).success
+        start = robot.data.qpos[:2].copy()
+        result = running.execute(Walk(GoTo()), WalkGoal(1.0, 0.0, frame="base", timeout=30.0), timeout=35.0)
+        assert result.success, result.reason
+        assert np.hypot(*(robot.data.qpos[:2] - start)) == pytest.approx(1.0, abs=0.1)
