@@ -53,7 +53,6 @@ class WbcConfig:
 
     Attributes:
         stance: posture to stand in, a name in `hold.STANCES`.
-        com_ahead: where the centre of mass belongs, ahead of the middle of the soles [m].
         height_speed: how fast the pelvis moves from where it is to the stance's height [m/s].
         com_gain, com_damping: spring [1/s^2] and damper [1/s] of the centre of mass along x, y and z. The vertical ones
             are stiffer: what the hands carry is not in the model and pulls straight down.
@@ -78,7 +77,6 @@ class WbcConfig:
     """
 
     stance: str = "crouch"
-    com_ahead: float = 0.0
     height_speed: float = 0.1
     com_gain: tuple[float, float, float] = (40.0, 40.0, 100.0)
     com_damping: tuple[float, float, float] = (12.0, 12.0, 20.0)
@@ -258,9 +256,7 @@ class Wbc:
         c, s = (ahead / np.linalg.norm(ahead)).tolist()
         level = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         # The pelvis' height stands in for the CoM's, so that raising an arm bends no knee.
-        goal = middle + self.config.com_ahead * level[:, 0]
-        goal[2] += self._height + d.com[2]
-        return level, goal
+        return level, middle + np.array([0.0, 0.0, self._height + d.com[2]])
 
     def _creep(self, level: Array) -> Array:
         """Return the (12,) way back of both soles to their places relative to each other, in their own axes."""

@@ -42,7 +42,6 @@ class Ids:
 
     Attributes:
         base, torso: bodies.
-        feet: (2,) bodies of the left and right foot.
         hands: (2,) bodies of the hands.
         soles: (8,) geoms of the foot spheres, left foot first.
         touch: (2,) addresses of the normal forces in the sensor data.
@@ -51,7 +50,6 @@ class Ids:
 
     base: int
     torso: int
-    feet: NDArray[np.intp]
     hands: NDArray[np.intp]
     soles: NDArray[np.intp]
     touch: NDArray[np.intp]
@@ -97,7 +95,6 @@ def build_model() -> tuple[mujoco.MjModel, Ids]:
     return model, Ids(
         base=model.body(BASE_LINK).id,
         torso=model.body("torso_link").id,
-        feet=np.array(feet),
         hands=np.array([model.body(magpie.hand_name(side)).id for side in SIDES]),
         soles=np.array(soles),
         touch=np.array([model.sensor(f"{side}_touch").adr[0] for side in SIDES]),

@@ -31,7 +31,6 @@ class PlannerConfig:
         gain: share of the way to that average that CEM moves a plan which is among the elite itself, so that a robot
             that stands well is not shaken by the sampling; a plan that is not goes all the way.
         noise: standard deviation of hip yaw, pitch, roll, knee, ankle pitch, roll that sampling starts from [rad].
-        growth: ratio of the noise of the last knot to that of the first.
         narrowest: CEM fits the noise to the elite, but not below this share of `noise`.
         wide: share of the samples that keep the full `noise` nevertheless: they find the way out after a push.
         seed: of the planner's own random numbers.
@@ -43,7 +42,6 @@ class PlannerConfig:
     elite: float = 0.17
     gain: float = 0.3
     noise: tuple[float, ...] = (0.015, 0.09, 0.06, 0.11, 0.3, 0.11)
-    growth: float = 1.0
     narrowest: float = 0.1
     wide: float = 0.25
     seed: int = 0
@@ -77,8 +75,7 @@ class Planner:
         self._config = config
         self._lower, self._upper = lower, upper
         self._times: Array = np.linspace(0.0, horizon, config.knots)
-        growth = np.linspace(1.0, config.growth, config.knots)
-        self._noise: Array = growth[:, None] * np.tile(config.noise, 2)
+        self._noise: Array = np.tile(config.noise, (config.knots, 2))
         self.reset(np.zeros_like(lower))
 
     def reset(self, targets: Array) -> None:
