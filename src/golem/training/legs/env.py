@@ -88,8 +88,7 @@ TASKS: dict[Task, EnvConfig] = {
 }
 """A network for each. One for both learned neither well: shoves of 90 N s teach a robot that walks to shuffle, and one
 that is praised for standing to the millimetre, or has learned to walk, is slow to step. Who only stands steps after a
-push, to wherever that is good: with the walker's price on where the feet are, the robot swayed by 10 mm at 20 ms of
-delay, 8 M steps after it had stood within 2."""
+push, to wherever that is good: it pays less for where its feet are."""
 
 
 @dataclass
