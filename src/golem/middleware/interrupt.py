@@ -7,14 +7,12 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
 
 @contextmanager
 def interrupted() -> Iterator[threading.Event]:
     """Yield an event that Ctrl-C, SIGTERM or SIGHUP sets; to be entered in the main thread.
 
-    Afterwards the three are as before. One that is ignored stays so, as SIGHUP is by nohup.
+    Afterwards the three are as before. A SIGHUP that is ignored stays so: that is what nohup is for.
     """
     stop = threading.Event()
 
@@ -22,7 +20,9 @@ def interrupted() -> Iterator[threading.Event]:
         # By another thread: the handler may run while this one holds the event's lock.
         threading.Thread(target=stop.set).start()
 
-    heeded = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+    heeded = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        heeded.append(signal.SIGHUP)
     before = {number: signal.signal(number, interrupt) for number in heeded}
     try:
         yield stop
