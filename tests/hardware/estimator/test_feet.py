@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.hardware.estimator.attitude import TORSO, Attitude
+from golem.hardware.estimator.attitude import Attitude
 from golem.hardware.estimator.feet import Feet, FeetConfig
-from golem.robots.model.imu import base_rate
+from golem.robots.model.imu import TORSO, base_rate
 from golem.types import LowState
 
 DT = 0.002

@@ -34,10 +34,9 @@ from golem.errors import ConfigError, GolemError, unknown_name
 from golem.robots.model.imu import sensed_base_rate
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.limits import load_limits
-from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
+from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
-_TORSO = JOINT_INDEX["torso_joint"]
 _G = 9.81
 _SLIP = np.array([0.003, 0.003, 0.02])
 """How far the feet may be from their places relative to each other, x, y [m] and yaw [rad]; further on these move."""

@@ -6,11 +6,8 @@ import math
 
 import numpy as np
 
-from golem.robots.model.table import JOINT_INDEX
+from golem.robots.model.imu import TORSO
 from golem.types import Array, LowState
-
-TORSO = JOINT_INDEX["torso_joint"]
-"""Motor index of the waist: the only joint between base_link and the IMU, about their common z."""
 
 
 class Attitude:

@@ -7,13 +7,12 @@ import math
 import numpy as np
 import pinocchio as pin
 
+from golem.robots.model.imu import TORSO
 from golem.robots.model.pinocchio_model import build
-from golem.robots.model.table import JOINT_NAMES
 from golem.types import Array
 
 STANDARD_GRAVITY = 9.81
 """[m/s^2], as in the twin."""
-_TORSO = JOINT_NAMES.index("torso_joint")
 
 
 class Gravity:
@@ -41,7 +40,7 @@ class Gravity:
         # Down in the torso: minus the third row of its rotation matrix.
         down_x = -2.0 * (x * z - w * y) * scale
         down_y = -2.0 * (y * z + w * x) * scale
-        yaw = float(q[_TORSO])
+        yaw = float(q[TORSO])
         c, s = math.cos(yaw), math.sin(yaw)
         field = self._field
         field[0] = c * down_x - s * down_y

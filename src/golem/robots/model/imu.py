@@ -9,7 +9,8 @@ import numpy as np
 from golem.robots.model.table import JOINT_INDEX
 from golem.types import Array, LowState
 
-WAIST = JOINT_INDEX["torso_joint"]
+TORSO = JOINT_INDEX["torso_joint"]
+"""Motor index of the waist: the only joint between base_link and the IMU, about their common z."""
 
 
 def base_rate(gyro: Array, waist: Array, waist_rate: Array) -> Array:
@@ -27,7 +28,7 @@ def base_rate(gyro: Array, waist: Array, waist_rate: Array) -> Array:
 
 def sensed_base_rate(state: LowState) -> Array:
     """Return the (3,) angular rate of base_link in base_link as `state` measures it [rad/s]."""
-    return base_rate(state.imu.gyro, state.q[WAIST], state.dq[WAIST])
+    return base_rate(state.imu.gyro, state.q[TORSO], state.dq[TORSO])
 
 
 def torso_motion(quat: Array, rate: Array, waist: float, waist_rate: float) -> tuple[Array, Array]:
