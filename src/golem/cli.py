@@ -144,7 +144,7 @@ def _twin(words: list[str]) -> int:
 
 
 def _safety(words: list[str]) -> int:
-    """Guard the robot on a domain; `safety activate|stop|reset|press|release|status` asks the one that does."""
+    """Guard the robot on a domain; `safety activate|stop|reset|press|release|status|take` asks the one that does."""
     from golem.runtime.live import operator
 
     if words and words[0] in operator.REQUESTS:

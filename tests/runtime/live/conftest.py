@@ -54,11 +54,13 @@ class Live:
         # In this one process nobody could answer while the twin waits.
         self.twin = Twin(self.stack, self.robot, *self.member("twin"), patience=0.0)
 
-    def start_gate(self, patient: bool = False) -> None:
+    def start_gate(self, patient: bool = False, real: bool = False) -> None:
         """Put a new gate on the domain."""
         limits = SafetyLimits.from_profile(self.stack.limits)
         estop = VirtualEstop()
-        self.gate = LiveGate(*self.member("safety"), limits, estop, clock=lambda: self.clock, patient=patient)
+        self.gate = LiveGate(
+            *self.member("safety"), limits, estop, clock=lambda: self.clock, patient=patient, real=real
+        )
 
     def start_up(self, real: bool = False) -> None:
         """Put a new stack on the domain."""

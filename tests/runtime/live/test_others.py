@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.middleware.wire.rpc import reach
 from tests.runtime.live.conftest import Live
 from tests.runtime.live.test_live import VENDOR
 
@@ -17,11 +18,15 @@ from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Qos
 from golem.middleware.ros import convert, images
 from golem.middleware.topics import LookRequest
+from golem.middleware.unitree_api import Request, encode
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import answered, encode_low_state
+from golem.middleware.wire.rpc import RpcServer
+from golem.robots.onboard import motion_switcher
 from golem.robots.sensors.cameras import CAMERAS
 from golem.runtime.cameras import OPTICAL_FRAMES
 from golem.runtime.executor import Executor
+from golem.runtime.live import authority
 from golem.runtime.live.motors import RequestOut
 from golem.runtime.live.surface import Surface
 from golem.stack import Choice
@@ -146,3 +151,50 @@ def test_the_real_robots_own_leg_controller_is_not_commanded_against(live: Live)
     live.stack = replace(live.stack, lower_body=Choice("vendor"))
     with pytest.raises(ConfigError, match="moves its legs itself"):
         live.start_up(real=True)
+
+
+def test_a_real_robots_motors_are_not_touched_before_its_own_controller_lets_go_of_them(live: Live) -> None:
+    live.leave("safety")
+    live.start_gate(real=True)
+    assert live.gate is not None
+    participant, node = live.member("listener")
+    motors = participant.reader("rt/lowcmd", hg.LOW_CMD.type_name, Qos(reliable=False, depth=1000))
+    live.run(0.2)
+    assert (live.state, live.reason) == (GateState.INIT, "motors_held") and not motors.take(1000)
+    assert "'ai'" in live.gate.status.detail and "golem safety take" in live.gate.status.detail
+    assert not live.ask("activate")[0]
+
+    switcher = reach(participant, motion_switcher.SERVICE)
+    switcher.send(Request(1, motion_switcher.RELEASE_MODE))
+    live.run(1.0)
+    assert live.state is GateState.ARMED and motors.take(1000)
+    live.activate()
+
+    switcher.send(Request(2, motion_switcher.SELECT_MODE, encode({"name": motion_switcher.MODE})))
+    live.run(1.0)
+    assert (live.state, live.reason) == (GateState.STOP1, "motors_held")
+    motors.take(1000)
+    live.run(0.1)
+    assert not motors.take(1000)  # not even to damp them
+    live.leave_quietly(node)
+
+
+def test_a_motion_switcher_that_falls_silent_keeps_the_gate_shut_but_stops_nobody(
+    live: Live, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    live.leave("safety")
+    live.start_gate(real=True)
+    participant, _ = live.member("operator")
+    reach(participant, motion_switcher.SERVICE).send(Request(1, motion_switcher.RELEASE_MODE))
+    live.run(1.0)
+    live.activate()
+    monkeypatch.setattr(RpcServer, "reply", lambda server, response: None)
+    live.run(2.5 * authority.SILENCE)
+    assert live.state is GateState.ACTIVE
+    assert live.ask("stop")[0]
+    assert not live.ask("reset")[0]
+    live.leave("safety")
+    live.start_gate(real=True)
+    live.run(0.5)
+    assert (live.state, live.reason) == (GateState.INIT, "motors_held")
+    assert live.gate is not None and "does not say" in live.gate.status.detail

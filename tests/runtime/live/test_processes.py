@@ -145,3 +145,10 @@ def test_what_is_not_there_is_said_with_a_remedy() -> None:
     assert skill.returncode == 2 and "start a stack with: golem up STACK" in skill.stderr
     restart = golem("restart", "up")
     assert restart.returncode == 2 and "only what 'golem launch' started" in restart.stderr
+
+
+def test_an_operator_takes_the_motors_from_the_robots_own_controller(launched: Launched) -> None:
+    first, second = golem("safety", "take"), golem("safety", "take")
+    assert first.returncode == second.returncode == 0, first.stdout + first.stderr
+    assert "'ai' has the motors and lets go" in first.stdout
+    assert second.stdout.splitlines() == ["None of the robot's own controllers has the motors."]

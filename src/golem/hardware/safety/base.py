@@ -56,6 +56,7 @@ class Reason(StrEnum):
     TILT = "tilt"
     BASE_STALE = "base_estimate_stale"
     WRITERS = "two_writers"
+    HELD = "motors_held"
     STATE_DAMAGED = "state_damaged"
     MOTOR = "motor_error"
     COMMAND_DAMAGED = "command_damaged"

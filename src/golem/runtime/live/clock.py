@@ -34,3 +34,18 @@ class RobotClock:
             return False
         self.t, self._writer = t, writer
         return True
+
+
+class Every:
+    """Tells when something is due again."""
+
+    def __init__(self, period: float) -> None:
+        """Be due every `period` [s], the first time at once."""
+        self._period, self._last = period, -math.inf
+
+    def due(self, now: float) -> bool:
+        """Return whether it is due at `now` [s]."""
+        if now - self._last < self._period:
+            return False
+        self._last = now
+        return True

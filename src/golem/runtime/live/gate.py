@@ -29,7 +29,8 @@ from golem.middleware.wire.layout import WireError
 from golem.robots.model.table import JOINT_NAMES
 from golem.runtime.executor import in_order
 from golem.runtime.live import pace
-from golem.runtime.live.clock import RobotClock
+from golem.runtime.live.authority import Authority
+from golem.runtime.live.clock import Every, RobotClock
 from golem.runtime.live.surface import Surface
 from golem.runtime.live.verdict import status_message, told
 from golem.runtime.sides import SafetySide
@@ -134,6 +135,7 @@ class LiveGate:
         clock: Callable[[], float] = time.monotonic,
         who: Callable[[bytes], str] = bytes.hex,
         patient: bool = False,
+        real: bool = False,
     ) -> None:
         """Guard the robot on the domain.
 
@@ -146,6 +148,7 @@ class LiveGate:
             clock: monotonic [s].
             who: names the owner of an endpoint by its guid.
             patient: whether the robot's time may stand still for a stack that is behind; see `live.pace`.
+            real: whether the robot has controllers of its own that must have let go of the motors first.
         """
         if patient:
             limits = pace.patient(limits)
@@ -158,6 +161,7 @@ class LiveGate:
         self._out = surface.writer("/lowcmd")
         # Best effort, as the robot's own reader may be: a reliable one does not see writers that are.
         self._all_commands = surface.reader("/lowcmd", Qos(reliable=False, depth=1))
+        self._authority = Authority.on(surface, clock) if real else None
         self._estop = estop
         self._side = SafetySide(self.bus, limits, estop)
         self._nodes = in_order(self._side.nodes)
@@ -184,6 +188,8 @@ class LiveGate:
         now = self._clock()
         if self._looks.due(now):
             self._crowded = self._crowd()
+        if self._authority is not None:
+            self._authority.poll()
         self._judge()
         if self._diagnoses.due(now):
             self._diagnose(now)
@@ -197,8 +203,11 @@ class LiveGate:
     def _judge(self) -> None:
         """Run the gate once, and publish what follows."""
         now, before = self._clock(), self.status
-        if self._crowded:
-            self.bus.publish(topics.TRANSPORT_FAULT, Fault(Reason.WRITERS, self._crowded), now)
+        moving = before.state is GateState.ACTIVE
+        held = self._authority.doubt(moving) if self._authority else ""
+        for reason, detail in ((Reason.WRITERS, self._crowded), (Reason.HELD, held)):
+            if detail:
+                self.bus.publish(topics.TRANSPORT_FAULT, Fault(reason, detail), now)
         for node in self._nodes:
             node.step(now)
         self._steps += 1
@@ -206,8 +215,8 @@ class LiveGate:
         command = self.bus.latest(topics.LOW_CMD, LowCommand)
         assert status is not None and command is not None
         self.status = status
-        # A gate that is shut from the start leaves the motors to whoever has them.
-        if self._arrivals.mode_machine is not None and status.state is not GateState.INIT:
+        # Motors that the robot's own controllers have, or that a gate shut from the start never had, are left to them.
+        if self._arrivals.mode_machine is not None and status.state is not GateState.INIT and not held:
             waited_for = self._patient and status.state is GateState.ACTIVE
             answers = self._arrivals.answered if waited_for else 0.0
             self._out.write(convert.encode_low_command(command, self._arrivals.mode_machine, answers))
@@ -271,18 +280,3 @@ class LiveGate:
             level = DiagnosticStatus.WARN
         entry = diagnostic(level, "safety gate", told(self.status), values)
         self._surface.publish("/diagnostics", diagnostics(now, [entry]))
-
-
-class Every:
-    """Tells when something is due again."""
-
-    def __init__(self, period: float) -> None:
-        """Be due every `period` [s], the first time at once."""
-        self._period, self._last = period, -math.inf
-
-    def due(self, now: float) -> bool:
-        """Return whether it is due at `now` [s]."""
-        if now - self._last < self._period:
-            return False
-        self._last = now
-        return True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -9,11 +10,14 @@ from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.hardware.safety.base import GateState
 from golem.middleware import public
+from golem.middleware.dds.base import Participant
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros.base import Node
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, Trigger_Request
+from golem.runtime.live.authority import CALLS, Authority
 from golem.runtime.live.member import ANSWER, SEARCH, find, member, say, until
+from golem.runtime.live.surface import Surface
 from golem.runtime.live.verdict import to_status, told
 
 REQUESTS: dict[str, tuple[str, Any]] = {
@@ -23,8 +27,9 @@ REQUESTS: dict[str, tuple[str, Any]] = {
     "press": ("/estop/press", SetBool_Request(True)),
     "release": ("/estop/press", SetBool_Request(False)),
     "status": ("", None),
+    "take": ("", None),
 }
-"""What can be asked of the safety process: service and request."""
+"""What an operator can ask for: service of the safety process, and request; nothing where it is no service."""
 
 
 @dataclass(frozen=True)
@@ -50,9 +55,11 @@ def run_request(what: str, config: RequestConfig) -> bool:
         RosError: there is none, or it does not answer.
     """
     service, request = REQUESTS[what]
-    with member("operator", config.dds) as (_, node):
-        if not service:
+    with member("operator", config.dds) as (participant, node):
+        if what == "status":
             return _status(node, config.dds)
+        if what == "take":
+            return take(participant, node, config.dds)
         kind = next(row.type for row in public.SERVICES if row.name == service)
         response = ask(node, service, kind, request, f"start it with: golem safety, on {config.dds}")
         say(response.message)
@@ -101,3 +108,32 @@ def _status(node: Node, dds: DdsConfig) -> bool:
     status = to_status(message, 0.0)
     say(told(status))
     return status.state is GateState.ACTIVE
+
+
+def take(participant: Participant, node: Node, dds: DdsConfig) -> bool:
+    """Have the robot's own controller let go of the motors, which makes the robot limp; return whether it did.
+
+    Raises:
+        RosError: nobody answers for the robot.
+    """
+    authority = Authority.on(Surface("safety", participant, node, only=(CALLS,)), node.now)
+
+    def answered(wanted: Callable[[], bool], timeout: float) -> bool:
+        def ask() -> bool:
+            authority.poll()
+            return wanted()
+
+        return until(node, ask, timeout)
+
+    if not answered(lambda: authority.known, SEARCH):
+        raise RosError(
+            f"No robot on {dds} says which of its own controllers has the motors; is it switched on?"
+        )
+    if not authority.free:
+        say(f"'{authority.owner}' has the motors and lets go of them: the robot goes limp.")
+        authority.release()
+        if not answered(lambda: authority.free, SEARCH):
+            say(f"'{authority.owner}' still has them: switch the robot to its debug mode by remote control.")
+            return False
+    say("None of the robot's own controllers has the motors.")
+    return True

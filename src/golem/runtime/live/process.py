@@ -136,7 +136,7 @@ def run_safety(config: SafetyConfig) -> None:
         member("safety", config.dds) as (participant, node),
     ):
         who = partial(owner, participant)
-        gate = LiveGate(participant, node, limits, estop, who=who, patient=patient)
+        gate = LiveGate(participant, node, limits, estop, who=who, patient=patient, real=config.dds.robot)
         tell(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
         if estop is None:
             tell("No driver of an emergency stop is here: the gate stays shut.")
