@@ -129,6 +129,21 @@ def vector(what: str, value: object, size: int, *shorter: int) -> Array:
     return np.resize(np.array(numbers, dtype=np.float64), size)
 
 
+def require(where: str, *rows: tuple[str, float, bool, str]) -> None:
+    """Check numbers, each given with its name, whether it is fine, and what is wanted, e.g. "a positive number".
+
+    Args:
+        where: what goes before the names, e.g. "gait.".
+        rows: name, value, whether it is fine, what is wanted.
+
+    Raises:
+        ConfigError: one is not; about the first.
+    """
+    for what, value, fine, wanted in rows:
+        if not fine:
+            raise ConfigError(f"The {where}{what} is {wanted}, not {value:g}.")
+
+
 def dataclass_in(hint: Any) -> type[Any] | None:
     """Return the dataclass that a type hint is, or has among its alternatives."""
     if typing.get_origin(hint) in (tuple, list):

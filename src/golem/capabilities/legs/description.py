@@ -14,7 +14,7 @@ from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.observation import Layout, Term
 from golem.errors import ConfigError
-from golem.options import check_values, fill, read_yaml, vector
+from golem.options import check_values, fill, read_yaml, require, vector
 from golem.types import LEGS, NUM_JOINTS, Array
 
 JOINTS = LEGS.stop - LEGS.start
@@ -156,11 +156,10 @@ def _check(d: Description) -> None:
     d.gains()
     d.action_scale()
     d.layout()
-    for what, value, fine, wanted in (
+    require(
+        "",
         ("rate", d.rate, 1.0 <= d.rate < inf, "a number of ticks per second, at least 1"),
         ("latency", d.latency, 0.0 <= d.latency < inf, "a time in seconds, not negative"),
         ("action.clip", d.action.clip, d.action.clip > 0.0, "a positive number"),
         ("action.swing", d.action.swing, abs(d.action.swing) < inf, "an angle in radians"),
-    ):
-        if not fine:
-            raise ConfigError(f"The {what} is {wanted}, not {value:g}.")
+    )

@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.errors import ConfigError
+from golem.options import require
 from golem.types import Array
 
 Bools = NDArray[np.bool_]
@@ -54,13 +54,12 @@ class GaitConfig:
             ConfigError: one of them cannot be meant.
         """
         lengths = (*self.capture_start, self.capture_stop, self.feet_start, self.feet_stop)
-        for what, value, fine, wanted in (
+        require(
+            "gait.",
             ("period", self.period, 0.0 < self.period < inf, "a time in seconds, positive"),
             ("stance", self.stance, 0.5 < self.stance < 1.0, "a share of the period, between 0.5 and 1"),
             ("capture and gait.feet", min(lengths), min(lengths) > 0.0, "a length in metres, positive"),
-        ):
-            if not fine:
-                raise ConfigError(f"The gait.{what} is {wanted}, not {value:g}.")
+        )
 
 
 class Gait:

@@ -19,6 +19,7 @@ from golem.capabilities.legs.base import Envelope, LegCommand, Motion
 from golem.capabilities.legs.gait import GaitConfig
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.middleware.unitree_api import LOCO_APIS, OK, Request, Response, decode_int, encode
+from golem.options import require
 from golem.types import LEGS, Array, BaseEstimate, LowState, Twist
 
 DAMPING: Array = np.full(LEGS.stop, 5.0)
@@ -93,10 +94,9 @@ class Vendor:
             raise ConfigError(
                 "lower_body: vendor needs the robot's own computer, which only a stack connects to."
             )
-        for name in ("timeout", "stand_up", "refresh", "duration"):
-            value = getattr(c, name)
-            if not 0.0 < value < math.inf:
-                raise ConfigError(f"vendor's {name} is a positive time in seconds, not {value:g}.")
+        times = {name: getattr(c, name) for name in ("timeout", "stand_up", "refresh", "duration")}
+        rows = ((n, t, 0.0 < t < math.inf, "a positive time in seconds") for n, t in times.items())
+        require("vendor's ", *rows)
         if c.refresh >= c.duration:
             raise ConfigError(
                 f"vendor's refresh ({c.refresh:g} s) must be shorter than its duration ({c.duration:g} s), "

@@ -48,10 +48,15 @@ def tilt(quat: Array) -> float:
     return math.acos(max(-1.0, min(1.0, 1.0 - 2.0 * (x * x + y * y) / (w * w + x * x + y * y + z * z))))
 
 
+def at_rest(q: Array, dq: Array, deceleration: Array) -> Array:
+    """Return where joints at `q` [rad] with `dq` [rad/s] come to rest if braked: dq^2 / (2 a) further on [rad]."""
+    return q + dq * np.abs(dq) / (deceleration + deceleration)
+
+
 def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[Counters, Fault | None]:
     """Compare one new sample with the limits.
 
-    A joint brakes in the distance dq^2 / (2 a): where it would come to rest must lie inside the range as well.
+    Where a joint would come to rest must lie inside the range as well.
 
     Args:
         state: a sample that `whole` accepts.
@@ -64,7 +69,7 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
     q, dq = state.q, state.dq
     speed = np.abs(dq)
     load = np.abs(state.tau)
-    rest = q + dq * speed / (limits.deceleration + limits.deceleration)
+    rest = at_rest(q, dq, limits.deceleration)
     angle = tilt(state.imu.quat)
     count = np.count_nonzero
     quick = speed > limits.velocity

@@ -18,6 +18,7 @@ from golem.capabilities.legs.balance import GRAVITY, heading_frame
 from golem.hardware.estimator.contact import Contact, ContactConfig
 from golem.hardware.estimator.random_walk import RandomWalk, RandomWalkConfig
 from golem.hardware.safety.base import SafetyLimits
+from golem.hardware.safety.monitor import at_rest
 from golem.training.legs.model import STANCE, STAND_HEIGHT, STEP, build_model
 from golem.types import LEGS, NUM_JOINTS, Array
 
@@ -221,7 +222,7 @@ class World:
         """Apply the safety gate's limits of leg speed and braking distance to the present physics step."""
         limits = self._limits
         q, dq = self._qpos[:, 7 : 7 + LEGS.stop], self._qvel[:, 6 : 6 + LEGS.stop]
-        rest = q + dq * np.abs(dq) / (2.0 * limits.deceleration[LEGS])
+        rest = at_rest(q, dq, limits.deceleration[LEGS])
         fast = np.any(np.abs(dq) > limits.velocity[LEGS], axis=1)
         beyond = np.any((rest > limits.state_upper[LEGS]) | (rest < limits.state_lower[LEGS]), axis=1)
         now = np.stack([fast, beyond], axis=1)
