@@ -161,6 +161,9 @@ def test_another_choice_comes_without_the_options_of_the_old_one() -> None:
     stack = Stack(hand=Choice("magpie", {"settle": 1.0}), profile="field")
     changed = stack.with_choice("hand", "mine.py:Hand")
     assert changed.hand == Choice("mine.py:Hand")
+    assert stack.with_choice("hand", "{use: magpie, settle: 2.0}").hand == Choice("magpie", {"settle": 2.0})
+    with pytest.raises(ConfigError, match="use: NAME"):
+        stack.with_choice("hand", "{settle: 2.0}")
     assert changed.profile == "field"
 
 

@@ -117,6 +117,9 @@ def _bench(words: list[str]) -> int:
 def _train(words: list[str]) -> int:
     """Train a module from scratch: detector or legs."""
     what = words[0] if words else ""
+    if what in ("-h", "--help"):
+        print(f"usage: golem train {{{','.join(TRAINERS)}}} [options]")
+        return 0
     if what not in TRAINERS:
         raise unknown_name("thing to train", what, TRAINERS)
     _prepare_graphics()
@@ -147,6 +150,8 @@ def _safety(words: list[str]) -> int:
     """Guard the robot on a domain; `safety activate|stop|reset|press|release|status|take` asks the one that does."""
     from golem.runtime.live import operator
 
+    if words[:1] == ["take"]:
+        return 0 if operator.run_take(_parse(operator.TakeConfig, "safety take", words[1:])) else FAILED
     if words and words[0] in operator.REQUESTS:
         config = _parse(operator.RequestConfig, f"safety {words[0]}", words[1:])
         return 0 if operator.run_request(words[0], config) else FAILED

@@ -95,14 +95,19 @@ class Stack:
         return self.robot.options.get("support") == "ground"
 
     def with_choice(self, slot: str, use: str) -> Stack:
-        """Return a copy with another implementation in `slot` (and no options for it).
+        """Return a copy with another implementation in `slot`.
+
+        Args:
+            slot: where.
+            use: its name, without options, or `{use: NAME, option: value, ...}` as a stack file has it.
 
         Raises:
-            ConfigError: there is no such slot.
+            ConfigError: there is no such slot, or `use` is neither.
         """
         if slot not in registry.slots():
             raise unknown_name("slot", slot, registry.slots())
-        return replace(self, **{slot: Choice(use)})
+        value = read_yaml(use, f"'{use}'") if use.startswith("{") else use
+        return replace(self, **{slot: _choice(f"'{use}'", slot, slot, value)})
 
     def digest(self) -> str:
         """Return 12 hex digits that change whenever anything in the stack changes."""

@@ -222,6 +222,13 @@ class PlanarPose:
         """Return where the (4, 4) pose `T` stands and heads."""
         return cls(float(T[0, 3]), float(T[1, 3]), math.atan2(T[1, 0], T[0, 0]))
 
+    def matrix(self) -> Array:
+        """Return it as a (4, 4) pose at height 0."""
+        T = np.eye(4)
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        T[:2, :2], T[:2, 3] = ((c, -s), (s, c)), (self.x, self.y)
+        return T
+
     def __matmul__(self, other: PlanarPose) -> PlanarPose:
         """Return the pose `other`, given in the frame of this one, in the frame in which this one is given."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)

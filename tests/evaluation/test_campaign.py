@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +14,7 @@ import pytest
 from golem.errors import ConfigError, GolemError, OutputError
 from golem.evaluation import campaign
 from golem.evaluation.campaign import Job, Result, robot_options, run_campaign
+from golem.evaluation.provenance import Unchanged
 
 
 @dataclass(frozen=True)
@@ -69,4 +72,49 @@ def test_what_a_user_can_cause_comes_back_as_a_sentence(tmp_path: Path, log: Pat
 def test_a_file_that_holds_no_jobs_is_refused(tmp_path: Path, log: Path) -> None:
     (tmp_path / "jobs.jsonl").write_text(json.dumps({"something": "else"}) + "\n")
     with pytest.raises(OutputError, match="Line 1"):
+        run_campaign(tmp_path, [Count(1, str(log))], 1)
+
+
+def test_options_of_the_robot_are_words_and_numbers() -> None:
+    with pytest.raises(ConfigError, match="a value is a word"):
+        robot_options(["payload=2024-01-01"])
+    with pytest.raises(ConfigError, match="--latency"):
+        robot_options(["latency=0"])
+
+
+@dataclass(frozen=True)
+class Die:
+    """Takes its process with it."""
+
+    number: int
+
+    def run(self) -> Result:
+        if self.number:
+            time.sleep(0.2)
+            os._exit(9)
+        return {}
+
+
+def test_a_worker_that_dies_is_a_sentence_wherever_it_is_noticed(tmp_path: Path) -> None:
+    def then(job: Job, result: Result) -> Iterable[Job]:
+        time.sleep(1.0)  # the other worker dies meanwhile
+        return [Die(0)]
+
+    with pytest.raises(GolemError, match="A worker process died"):
+        run_campaign(tmp_path / "run", [Die(0), Die(1)], 2, then)
+
+
+def test_results_of_code_that_changed_meanwhile_are_not_kept(
+    tmp_path: Path, log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stamps = iter([(1, 1), (1, 2)])
+    monkeypatch.setattr(Unchanged, "_now", staticmethod(lambda: next(stamps)))
+    with pytest.raises(OutputError, match="changed while this ran"):
+        run_campaign(tmp_path / "run", [Count(1, str(log))], 1)
+    assert not (tmp_path / "run" / "jobs.jsonl").exists()
+
+
+def test_a_file_of_results_that_cannot_be_read_is_a_sentence(tmp_path: Path, log: Path) -> None:
+    (tmp_path / "jobs.jsonl").mkdir()
+    with pytest.raises(OutputError, match="Cannot write to"):
         run_campaign(tmp_path, [Count(1, str(log))], 1)

@@ -58,3 +58,18 @@ def test_runs_that_cannot_be_paired_are_refused(
     run_ladder(poor)
     with pytest.raises(ConfigError, match="no method in common"):
         run_compare(CompareConfig(first.out, poor.out))
+
+
+def test_whatever_else_differs_is_said(
+    runs: tuple[LadderConfig, LadderConfig], capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = runs
+    path = second.out / "trials.jsonl"
+    records = [
+        replace(r, overrides={"servo": "mine"}, versions={**r.versions, "numpy": "1"})
+        for r in read_records(path)
+    ]
+    path.write_text("".join(r.line() for r in records))
+    run_compare(CompareConfig(first.out, second.out))
+    said = capsys.readouterr().out
+    assert "different --use: none and servo=mine" in said and "different versions of numpy" in said

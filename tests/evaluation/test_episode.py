@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from golem.errors import ConfigError
 from golem.evaluation import episode as episodes
 from golem.evaluation.episode import Episode, legs_stack, with_legs
 from golem.evaluation.exercise import WIDE_AREA, ArmMotion, Exercise
@@ -33,6 +34,12 @@ def test_a_method_is_a_lower_body_or_the_files_of_a_policy() -> None:
     assert with_legs(stack, "policy:mine.yaml").lower_body == Choice("policy", {"file": "mine.yaml"})
     vendor = with_legs(stack, "vendor:almi_open:net.pt")
     assert (vendor.lower_body, vendor.onboard) == (Choice("vendor"), Choice("policy", files))
+    assert with_legs(stack, "{use: almi, walk: net.onnx}").lower_body == Choice("almi", {"walk": "net.onnx"})
+
+
+def test_what_is_compared_is_not_replaced_as_well() -> None:
+    with pytest.raises(ConfigError, match="leave out --use lower_body"):
+        legs_stack("almi", "ideal", {"lower_body": "hold"})
 
 
 def test_a_robot_that_never_carries_its_weight_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -98,5 +98,5 @@ def test_the_estimators_meet_their_target_on_a_short_walk(monkeypatch: pytest.Mo
     nominal = {row.estimator: row for row in rows if row.condition == "nominal"}
     for row in nominal.values():
         assert row.distance > 0.5
-        assert row.walking is not None and row.standing is not None
+        assert row.walking is not None and row.standing is not None and row.drift is not None
         assert row.walking < 0.05 and row.standing < 0.02 and row.drift < 0.05

@@ -15,7 +15,7 @@ from golem.evaluation import leg_tests
 from golem.evaluation.campaign import Done
 from golem.evaluation.leg_bench import LegBenchConfig, LegTrial, run_leg_bench, summarise
 from golem.evaluation.odometry import LATENCY, PERIOD, POSITION_NOISE, YAW_NOISE, SimulatedOdometry
-from golem.evaluation.subject import Subject
+from golem.evaluation.subject import Subject, labels
 from golem.middleware import topics
 from golem.middleware.bus import Bus
 from golem.middleware.topics import Odometry
@@ -112,3 +112,34 @@ def test_wrong_options_are_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="test 'dance'"):
         run_leg_bench(LegBenchConfig(test=("dance",), out=tmp_path / "run"))
     assert list(islice(tmp_path.iterdir(), 1)) == []
+
+
+def test_few_trials_see_every_end_of_the_envelope() -> None:
+    rng = np.random.default_rng(0)
+    first = [leg_tests.command(ENVELOPE, rng, i) for i in range(6)]
+    assert {(t.vx, t.vy, t.wz) for t in first} == {
+        (-0.4, 0.0, 0.0), (0.8, 0.0, 0.0), (0.0, -0.3, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, -0.6), (0.0, 0.0, 0.6)
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("test", ["endurance", "slope", "rubble", "stopping"])
+def test_who_does_not_walk_neither_endures_nor_climbs(test: str) -> None:
+    assert LegTrial(test, SUBJECT, 0, 0).run() == {"lost": 0.0, "does_not_walk": 1.0}
+
+
+def test_who_was_lost_did_not_arrive(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(leg_tests.TESTS, "stopping", lambda *_: leg_tests.lost_in("fall"))
+    assert LegTrial("stopping", SUBJECT, 0, 0).run()["arrived"] == 0.0
+
+
+def test_the_rate_of_the_planner_is_timed_alone(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="alone"):
+        run_leg_bench(LegBenchConfig(test=("plans",), j=2, out=tmp_path / "run"))
+    with pytest.raises(ConfigError, match="twice"):
+        run_leg_bench(LegBenchConfig(test=("quiet", "quiet"), out=tmp_path / "run"))
+
+
+def test_labels_are_short_where_that_tells_them_apart() -> None:
+    options = "{use: almi, walk: a/x.onnx}"
+    assert labels(["a/x.py:L", "almi", options]) == {"a/x.py:L": "x.py:L", "almi": "almi", options: options}
+    assert labels(["a/x.py:L", "b/x.py:L"]) == {"a/x.py:L": "a/x.py:L", "b/x.py:L": "b/x.py:L"}

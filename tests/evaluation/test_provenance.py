@@ -95,3 +95,17 @@ def test_a_users_policy_is_its_description_and_its_network(tmp_path: Path) -> No
 def test_a_digest_does_not_depend_on_the_order_of_keys() -> None:
     assert provenance.digest({"a": 1, "b": [2]}) == provenance.digest({"b": [2], "a": 1})
     assert provenance.digest({"a": 1}) != provenance.digest({"a": 1.5})
+
+
+def test_a_module_named_by_its_package_is_a_users_file_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "my_package").mkdir()
+    (tmp_path / "my_package" / "__init__.py").touch()
+    file = tmp_path / "my_package" / "legs.py"
+    file.write_text("one = 1\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    stack = Stack(lower_body=Choice("my_package.legs:Mine"))
+    before = provenance.user_files(stack)
+    file.write_text("one = 2\n")
+    assert before.keys() == {"lower_body/use"} and provenance.user_files(stack) != before

@@ -11,6 +11,7 @@ import pytest
 from golem.errors import ConfigError
 from golem.evaluation.campaign import Done
 from golem.evaluation.push_bench import (
+    DOES_NOT_WALK,
     Level,
     PushBenchConfig,
     allowed,
@@ -32,7 +33,7 @@ def search(strength: float, first: float, last: float = 100.0) -> list[float]:
     while todo:
         level = todo.pop()
         tried.append(level.level)
-        todo += following(level, level.level <= strength, first, 10.0, last)
+        todo += following(level, level.level <= strength, True, first, 10.0, last)
     return tried
 
 
@@ -65,8 +66,8 @@ def test_the_table_says_what_was_survived_and_what_was_not_found() -> None:
         Done(replace(LEVEL, level=10.0), result(True)),
         Done(replace(LEVEL, level=20.0), result(False, 3, fall=2)),
         Done(replace(left, level=10.0), result(True)),
-        Done(replace(left, phase="left_swing"), result(False, 2, **{"no step": 2})),
-        Done(replace(LEVEL, phase="left_swing"), result(False, 2, **{"no step": 2})),
+        Done(replace(left, phase="left_swing"), result(False, 2, **{DOES_NOT_WALK: 2})),
+        Done(replace(LEVEL, phase="left_swing"), result(False, 2, **{DOES_NOT_WALK: 2})),
     ]
     found = cells(done)
     front = next(c for c in found if c["direction"] == "front" and c["phase"] == "standing")
@@ -98,3 +99,22 @@ def test_wrong_options_are_named(tmp_path: Path) -> None:
         run_push_bench(PushBenchConfig(direction=("north",), out=tmp_path / "run"))
     with pytest.raises(ConfigError, match="--step"):
         run_push_bench(PushBenchConfig(step=0.0, out=tmp_path / "run"))
+
+
+def test_who_only_stands_is_not_asked_to_walk_again() -> None:
+    walking = replace(LEVEL, phase="left_swing", level=5.0, n=1)
+    assert walking.run()["losses"] == {DOES_NOT_WALK: 1}
+    assert following(walking, False, False, 5.0, 1.0, 10.0) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"seed": -1}, "--seed"),
+        ({"first": 50.0, "last": 20.0}, "--last"),
+        ({"direction": ("left", "left")}, "--direction"),
+    ],
+)
+def test_options_that_cannot_be_meant_are_refused(change: dict[str, Any], word: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=word):
+        run_push_bench(replace(PushBenchConfig(out=tmp_path / "run"), **change))

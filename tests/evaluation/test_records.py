@@ -9,7 +9,7 @@ import pytest
 
 from golem.errors import OutputError
 from golem.evaluation.base import TrialOutcome, TrialSpec
-from golem.evaluation.records import Provenance, RunFolder, TrialRecord, read_records
+from golem.evaluation.records import Provenance, RunFolder, TrialRecord, read_records, trial_name
 from golem.evaluation.trials import Finished
 
 PROVENANCE = Provenance({"a": "c0ffee", "b": "beef"}, "code", "commit", {"numpy": "2"})
@@ -135,3 +135,11 @@ def test_an_unwritable_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="Cannot write to --out"):
         RunFolder(tmp_path / "file" / "run")
+
+
+def test_methods_have_files_of_their_own() -> None:
+    names = {
+        trial_name(TrialSpec("tether", method, "field", 0, 7)) for method in ("legs/v1.py:M", "legs_v1.py:M")
+    }
+    assert len(names) == 2 and all(name.endswith("-00007") and "/" not in name for name in names)
+    assert trial_name(TrialSpec("tether", "centroid", "field", 0, 7)) == "centroid-00007"

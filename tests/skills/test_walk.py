@@ -40,6 +40,7 @@ class Ground:
     stuck: bool = False
     reason: str = ""
     offset: float | None = None
+    silent: float = math.inf
 
     def __post_init__(self) -> None:
         self.bus = Bus()
@@ -73,7 +74,7 @@ class Ground:
         if not self.stuck:
             self.pose = self.pose @ PlanarPose(twist.vx * PERIOD, twist.vy * PERIOD, twist.wz * PERIOD)
         T = pose(self.pose.x, self.pose.y, self.pose.yaw)
-        if self.offset is not None:
+        if self.offset is not None and t < self.silent:
             self.bus.publish(topics.ODOMETRY, Odometry(t, T.copy()), t)
             T[0, 3] += self.offset
         self.bus.publish(topics.BASE, BaseEstimate(t, T), t)
@@ -165,3 +166,11 @@ def test_it_stands_for_as_long_as_it_is_told() -> None:
     run = ground.run(Stand().run(ground.context, StandGoal(1.5)), seconds=1.6)
     assert outcome(run).success
     assert ground.twist == Twist()
+
+
+def test_an_odometry_that_falls_silent_stops_the_robot() -> None:
+    ground = Ground(offset=0.5, silent=1.0)
+    result = outcome(ground.run(Walk(GoTo()).run(ground.context, WalkGoal(3.0, 0.0))))
+    assert (result.success, result.stage, result.slot) == (False, "walk", "odometry")
+    assert "silent for 0.5 s" in result.reason and ground.twist == Twist()
+    assert ground.pose.x < 1.0

@@ -139,7 +139,10 @@ class BalanceTrace:
             f.name: a if (a := getattr(self, f.name)).dtype == bool else a.astype(np.float32)
             for f in fields(self)
         }
-        np.savez_compressed(path, allow_pickle=False, **arrays)
+        part = path.with_suffix(".part")
+        with part.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+        part.replace(path)
 
     @classmethod
     def load(cls, path: Path) -> BalanceTrace:

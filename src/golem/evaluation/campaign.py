@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-import yaml
 from tqdm import tqdm
 
 from golem.errors import ConfigError, GolemError, OutputError
 from golem.evaluation.pool import Workers
-from golem.evaluation.provenance import code_digest, commit, digest, versions
+from golem.evaluation.provenance import Unchanged, code_digest, commit, digest, versions
 from golem.evaluation.records import RunFolder, append_line, whole_lines
+from golem.options import check_values, read_yaml
 
 Result = dict[str, Any]
 """What a job found: JSON-like."""
@@ -66,10 +67,12 @@ def run_campaign(
     if processes < 1:
         raise ConfigError(f"-j is {processes}; it must be 1 or more.")
     # The commit of the beginning: somebody may commit while this runs.
+    code = Unchanged()
     run, made = {"code": code_digest(), "versions": versions()}, commit()
     with RunFolder(out) as folder:
         path = folder.path / "jobs.jsonl"
-        held = _held(path, run)
+        with _written(out):
+            held = _held(path, run)
         found: dict[str, Done] = {}
         workers: Workers[Job, Result] = Workers(processes)
         with workers, tqdm(unit="job", disable=None) as progress:
@@ -86,20 +89,20 @@ def run_campaign(
                 progress.update()
                 ask(then(job, result))
 
-            ask(jobs)
             try:
+                ask(jobs)
                 for job, result in workers.finished():
                     if _REFUSED in result:
                         raise GolemError(result[_REFUSED])
+                    code.check(out)
                     line = {"job": _named(job), "result": result, "commit": made, **run}
-                    append_line(path, json.dumps(line, separators=(",", ":"), allow_nan=False) + "\n")
+                    with _written(out):
+                        append_line(path, json.dumps(line, separators=(",", ":"), allow_nan=False) + "\n")
                     take(job, result)
             except KeyboardInterrupt:
                 raise CampaignInterrupted(
                     f"Stopped with {len(found)} jobs kept in {out}; give the same command again to continue."
                 ) from None
-            except OSError as error:
-                raise OutputError(f"Cannot write to {out}: {error.strerror}.") from error
     return [found[key] for key in sorted(found)]
 
 
@@ -123,15 +126,22 @@ def robot_options(words: Iterable[str]) -> dict[str, Any]:
     options: dict[str, Any] = {}
     for word in words:
         name, equals, value = word.partition("=")
-        try:
-            if not (name and equals):
-                raise ValueError
-            options[name] = yaml.safe_load(value)
-        except (yaml.YAMLError, ValueError):
-            raise ConfigError(
-                f"--robot '{word}' must read option=value, e.g. feet=box or payload=[1,1]."
-            ) from None
+        if not (name and equals):
+            raise ConfigError(f"--robot '{word}' must read option=value, e.g. feet=box or payload=[1,1].")
+        if name == "latency":
+            raise ConfigError("The latency has an option of its own, --latency.")
+        options[name] = read_yaml(value, f"--robot {name}")
+        check_values(f"--robot {name}", options[name])
     return options
+
+
+@contextmanager
+def _written(out: Path) -> Generator[None, None, None]:
+    """Say in one sentence that `out` cannot be read or written."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(f"Cannot write to {out}: {error.strerror}.") from error
 
 
 _REFUSED = "refused"

@@ -41,8 +41,8 @@ def run_compare(config: CompareConfig) -> list[dict[str, Any]]:
             raise ConfigError(
                 f"The runs have different {name}s ({one} and {other}); trials are paired by seed, index and profile."
             )
-    if a[0].code != b[0].code:
-        print(f"The runs are of different code, commits {a[0].commit} and {b[0].commit}.")
+    for difference in _differences(a[0], b[0]):
+        print(difference)
     methods = [m for m in dict.fromkeys(r.method for r in a) if m in {r.method for r in b}]
     if not methods:
         raise ConfigError("The runs have no method in common.")
@@ -80,6 +80,21 @@ def _read(folder: Path) -> list[TrialRecord]:
     if not records:
         raise ConfigError(f"{folder} holds no trials; give the --out folder of a finished golem ladder.")
     return records
+
+
+def _differences(a: TrialRecord, b: TrialRecord) -> list[str]:
+    """Return what else differs between two runs, so that nobody takes it for the rung's or the method's doing."""
+    found: list[str] = []
+    if a.code != b.code:
+        found.append(f"The runs are of different code, commits {a.commit} and {b.commit}.")
+    if a.overrides != b.overrides:
+        sides = (" ".join(f"{k}={v}" for k, v in r.overrides.items()) or "none" for r in (a, b))
+        found.append(f"The runs have different --use: {' and '.join(sides)}.")
+    for name in sorted(a.versions.keys() | b.versions.keys()):
+        one, other = (r.versions.get(name, "none") for r in (a, b))
+        if one != other:
+            found.append(f"The runs have different versions of {name}: {one} and {other}.")
+    return found
 
 
 def _paired(

@@ -14,13 +14,15 @@ from golem.hardware.safety.base import GateState
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.assembly import build
+from golem.runtime.assembly import Running, build
 from golem.skills.base import Skill, SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import FAULT, SkillRun
 from golem.stack import Choice, Stack, load_stack
 from golem.types import Array
 
+SLOT = "lower_body"
+"""What methods that walk and stand are."""
 STACK = "stand"
 """The shipped stack whose robot stands on its own feet."""
 READY = 10.0
@@ -36,12 +38,13 @@ def with_legs(stack: Stack, method: str) -> Stack:
 
     Args:
         stack: any stack.
-        method: a registered name, a user's `file.py:Class` or `package.module:Class`, or the files of a policy as
-            `policy:DESCRIPTION` or `policy:DESCRIPTION:NETWORK`; `vendor:DESCRIPTION:NETWORK` runs them on board.
+        method: a registered name, a user's `file.py:Class` or `package.module:Class`, either with options as
+            `{use: NAME, option: value}`, or the files of a policy as `policy:DESCRIPTION` or
+            `policy:DESCRIPTION:NETWORK`; `vendor:DESCRIPTION:NETWORK` runs them on board.
     """
     name, *files = method.split(":")
     if name not in RUNS_FILES or not files:
-        return replace(stack, lower_body=Choice(method))
+        return stack.with_choice(SLOT, method)
     policy = Choice("policy", dict(zip(("file", "network"), files, strict=False)))
     if name == "vendor":
         return replace(stack, lower_body=Choice(name), onboard=policy)
@@ -63,10 +66,11 @@ def legs_stack(
         robot: options of the twin that differ from the stack's own; without any, an open floor.
 
     Raises:
-        ConfigError: `overrides` names a robot, which the test itself brings.
+        ConfigError: `overrides` names the robot or the lower body, which the test itself brings.
     """
-    if "robot" in (overrides or {}):
-        raise ConfigError("The test of a lower body brings its own robot; leave out --use robot=...")
+    for slot in ("robot", SLOT):
+        if slot in (overrides or {}):
+            raise ConfigError(f"The test of a lower body brings its own {slot}; leave out --use {slot}=...")
     stack = with_legs(load_stack(STACK, profile=profile), method)
     options = {**stack.robot.options, "world": "open", **(robot or {})}
     stack = replace(stack, robot=replace(stack.robot, options=options))
@@ -96,6 +100,24 @@ class Loss:
 
 HANGS = Loss("settle", f"The robot did not carry its weight within {READY:g} s.")
 """A robot whose band could not let go."""
+
+
+def lost(running: Running, recorder: BalanceRecorder | None) -> Loss | None:
+    """Return how the robot of a stack was lost; None while it was not.
+
+    Args:
+        running: the stack.
+        recorder: what has watched it since it carried its weight; None for a robot that hangs.
+    """
+    t, safety = running.executor.t, running.safety
+    legs = running.bus.latest(topics.LEG_STATUS, LegStatus)
+    if legs is not None and legs.fault is not None:
+        return Loss(FAULT, legs.fault)
+    if recorder is not None and recorder.fallen:
+        return Loss("fall", f"The robot fell at {t:.1f} s.")
+    if safety is not None and safety.state in (GateState.STOP1, GateState.STOP0):
+        return Loss("safety", f"Safety stop at {t:.1f} s: {safety.reason}. {safety.detail}")
+    return None
 
 
 class Episode:
@@ -149,34 +171,14 @@ class Episode:
         return self._pusher.force
 
     @property
-    def stopped(self) -> bool:
-        """Whether the safety gate has stopped the robot."""
-        safety = self.running.safety
-        return safety is not None and safety.state in (GateState.STOP1, GateState.STOP0)
-
-    @property
     def over(self) -> bool:
         """Whether the robot fell, was stopped, or lost its leg controller."""
-        return self.recorder.fallen or self.stopped or self._hangs or self._fault is not None
+        return self.loss is not None
 
     @property
     def loss(self) -> Loss | None:
         """How the robot was lost; None while it was not."""
-        if self._fault is not None:
-            return Loss(FAULT, self._fault)
-        if self._hangs:
-            return HANGS
-        if self.recorder.fallen:
-            return Loss("fall", f"The robot fell at {self.t:.1f} s.")
-        safety = self.running.safety
-        if self.stopped and safety is not None:
-            return Loss("safety", f"Safety stop at {self.t:.1f} s: {safety.reason}. {safety.detail}")
-        return None
-
-    @property
-    def _fault(self) -> str | None:
-        legs = self.running.bus.latest(topics.LEG_STATUS, LegStatus)
-        return None if legs is None else legs.fault
+        return HANGS if self._hangs else lost(self.running, self.recorder)
 
     def stand(self, seconds: float) -> None:
         """Let the robot take over its weight, then let `seconds` pass; one that never does so is lost."""

@@ -25,6 +25,8 @@ from golem.types import Array, LowState
 
 ESTIMATORS = ("random_walk_kf", "invariant_ekf")
 """Estimators of a robot on its feet."""
+LEAST_WAY = 1.0
+"""Way from which on an error at its end is a drift [m]."""
 PUSHED = "pushed"
 """The condition with shoves and unspoilt sensors."""
 
@@ -58,7 +60,8 @@ class EstimationRow:
     Attributes:
         estimator, condition: what was judged.
         standing, walking: root mean square of the velocity's error vector [m/s]; None where it never did.
-        drift: horizontal error at the end over the distance walked, mean over the walks.
+        drift: horizontal error at the end over the distance walked, mean over the walks of at least `LEAST_WAY`; None
+            without any.
         yaw: root mean square of the error of the heading's change at the end [rad].
         gap: longest time without a believed foot after the start [s].
         tick, tick_p99: CPU time of one tick, median and 99 % quantile [us].
@@ -69,7 +72,7 @@ class EstimationRow:
     condition: str
     standing: float | None
     walking: float | None
-    drift: float
+    drift: float | None
     yaw: float
     gap: float
     tick: float
@@ -168,7 +171,12 @@ def _follow(use: str, walk: Walk, states: Sequence[LowState]) -> _Track:
 
 def _impatient(use: str) -> dict[str, object]:
     """Return the options under which an estimator calls itself stale at once, where it has that option."""
-    return {"stale_after": 0.0} if use in ESTIMATORS else {}
+    options: dict[str, object] = {"stale_after": 0.0}
+    try:
+        registry.create("estimator", use, options)
+    except ConfigError:
+        return {}
+    return options
 
 
 def _way(T: Array, first: int, last: int) -> Array:
@@ -190,13 +198,14 @@ def _row(use: str, condition: str, tracks: Sequence[_Track]) -> EstimationRow:
         squares = np.concatenate(parts)
         return math.sqrt(squares.mean()) if len(squares) else None
 
+    drifts = [track.error / track.distance for track in tracks if track.distance >= LEAST_WAY]
     ticks = np.concatenate([track.ticks for track in tracks]) * 1e6
     return EstimationRow(
         estimator=use,
         condition=condition,
         standing=rms([track.standing for track in tracks]),
         walking=rms([track.walking for track in tracks]),
-        drift=float(np.mean([track.error / track.distance for track in tracks])),
+        drift=float(np.mean(drifts)) if drifts else None,
         yaw=math.sqrt(np.mean([track.yaw**2 for track in tracks])),
         gap=max(track.gap for track in tracks),
         tick=float(np.median(ticks)),
@@ -211,7 +220,7 @@ def _table(rows: Sequence[EstimationRow], title: str) -> Table:
     for row in rows:
         figures = (
             *("-" if rms is None else f"{rms:.4f}" for rms in (row.standing, row.walking)),
-            f"{row.drift:.4f}",
+            "-" if row.drift is None else f"{row.drift:.4f}",
             f"{math.degrees(row.yaw):.2f}",
             f"{1e3 * row.gap:.0f}",
             f"{row.tick:.0f}",

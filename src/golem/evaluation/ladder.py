@@ -15,7 +15,7 @@ from tyro.conf import arg
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.evaluation.base import TrialSpec, make_rung, rung_target
 from golem.evaluation.pool import Workers
-from golem.evaluation.provenance import code_digest, commit, digest, versions
+from golem.evaluation.provenance import Unchanged, code_digest, commit, digest, versions
 from golem.evaluation.records import Provenance, RunFolder, TrialRecord, artefacts
 from golem.evaluation.report import render
 from golem.evaluation.summary import Summary, summarise
@@ -33,7 +33,8 @@ class LadderConfig:
     rung: str = "tether"
     """Rung of the ladder."""
     method: tuple[str, ...] = ("centroid", "visual_servo")
-    """Methods to compare."""
+    """Methods to compare: names, file.py:Class, or with options "{use: NAME, option: value}"; legs also as
+    policy:DESCRIPTION:NETWORK."""
     n: Annotated[int, arg(aliases=("-n",))] = 30
     """Trials per method."""
     profile: str = "field"
@@ -45,7 +46,8 @@ class LadderConfig:
     j: Annotated[int, arg(aliases=("-j",))] = 1
     """Processes that run trials at the same time; the records do not depend on it."""
     use: tuple[str, ...] = ()
-    """Replace modules of the stack: slot=implementation, e.g. upper_body=my_ik.py:MyIk."""
+    """Replace other modules of the stack: slot=implementation, e.g. upper_body=my_ik.py:MyIk, or with options
+    "localizer={use: onnx, least_score: 0.7}"."""
     json: bool = False
     """Print the summary as a last line of JSON."""
 
@@ -89,6 +91,7 @@ def run_ladder(config: LadderConfig) -> LadderResult:
         golem.errors.GolemError: a rung or a worker process cannot go on; finished trials are kept.
         LadderInterrupted: Ctrl-C.
     """
+    code = Unchanged()
     overrides = _overrides(config.use)
     target, provenance = _check(config, overrides)
     wanted = [
@@ -105,6 +108,7 @@ def run_ladder(config: LadderConfig) -> LadderResult:
         with progress, contextlib.closing(_finished(target, todo, config.j, folder.path)) as finished:
             try:
                 for spec, result in finished:
+                    code.check(config.out)
                     record = provenance.record(spec, result.outcome)
                     folder.append(record, result)
                     records.append(record)

@@ -16,9 +16,9 @@ from tyro.conf import arg
 from golem.errors import ConfigError, ModuleFault, unknown_name
 from golem.evaluation.campaign import Done, Result, robot_options, run_campaign, write_files
 from golem.evaluation.episode import LATENCY
-from golem.evaluation.leg_tests import LOST, STANDING, TESTS, lost_in
+from golem.evaluation.leg_tests import LOST, MISSED, TESTS, lost_in, plans
 from golem.evaluation.provenance import commit
-from golem.evaluation.subject import Subject
+from golem.evaluation.subject import Subject, labels
 from golem.robots.sensors.profiles import load_profile
 from golem.skills.runner import FAULT
 
@@ -38,7 +38,7 @@ class LegBenchConfig:
     test: tuple[str, ...] = ("quiet", "tracking", "stopping")
     """Tests to run."""
     method: tuple[str, ...] = ("almi",)
-    """Lower bodies: registered names, file.py:Class, or policy:DESCRIPTION:NETWORK."""
+    """Lower bodies: names, file.py:Class, policy:DESCRIPTION:NETWORK, or with options "{use: NAME, option: value}"."""
     n: Annotated[int, arg(aliases=("-n",))] = 10
     """Trials per test and method."""
     profile: str = "bench"
@@ -78,7 +78,7 @@ class LegTrial:
             found: Result = dict(TESTS[self.test](self.subject, self.seed, self.index))
         except ModuleFault as fault:
             found = {**lost_in(FAULT), "fault": str(fault)}
-        return {"never_negative": 0.0, **found} if found["lost"] and self.test in STANDING else found
+        return {**MISSED.get(self.test, {}), **found} if found["lost"] else found
 
 
 def run_leg_bench(config: LegBenchConfig) -> list[dict[str, Any]]:
@@ -95,8 +95,13 @@ def run_leg_bench(config: LegBenchConfig) -> list[dict[str, Any]]:
     for name in config.test:
         if name not in TESTS:
             raise unknown_name("test", name, TESTS)
-    if config.n < 1 or not config.test or not config.method:
-        raise ConfigError("Give at least one --test, one --method and -n 1.")
+    if config.n < 1 or not config.test or not config.method or config.seed < 0:
+        raise ConfigError("Give at least one --test, one --method, -n 1 and --seed 0.")
+    for option, names in (("test", config.test), ("method", config.method)):
+        if len(set(names)) < len(names):
+            raise ConfigError(f"--{option} names one of them twice.")
+    if plans.__name__ in config.test and (config.j, config.test, len(config.method)) != (1, ("plans",), 1):
+        raise ConfigError("The test plans times the machine: give it alone, with one --method and -j 1.")
     robot = {"latency": config.latency, **robot_options(config.robot)}
     subjects = [Subject.of(method, config.profile, robot) for method in config.method]
     trials = [
@@ -111,8 +116,9 @@ def run_leg_bench(config: LegBenchConfig) -> list[dict[str, Any]]:
     options = {name: str(v) if isinstance(v, Path) else v for name, v in asdict(config).items()}
     results = {"config": options, "commit": commit(), "results": found}
     write_files(config.out, {"results.json": json.dumps(results, indent=1) + "\n"})
+    names = labels(config.method)
     for row in found:
-        Console().print(table(row))
+        Console().print(table(row, names[row["method"]]))
     if config.json:
         print(json.dumps(results))
     return found
@@ -157,21 +163,21 @@ def _statistics(values: Sequence[float]) -> dict[str, float]:
         "mean": float(array.mean()),
         "rms": float(np.sqrt((array * array).mean())),
         "median": float(np.median(array)),
-        "p95": float(np.quantile(np.abs(array), 0.95)),
+        "p95_size": float(np.quantile(np.abs(array), 0.95)),
         "least": float(array.min()),
         "most": float(array.max()),
     }
 
 
-def table(row: Mapping[str, Any]) -> Table:
-    """Return the figures of one test and method for a terminal; p95 is that of the magnitudes."""
+def table(row: Mapping[str, Any], name: str) -> Table:
+    """Return the figures of one test and the method called `name` for a terminal."""
     stages = ", ".join(f"{stage} {count}" for stage, count in row["lost_in"].items())
-    title = f"{row['test']}, {Path(row['method']).name}: {row['lost']} of {row['n']} lost"
+    title = f"{row['test']}, {name}: {row['lost']} of {row['n']} lost"
     title += f" ({stages})" if stages else ""
     if "lost_per_hour" in row:
         title += f", {row['lost_per_hour']:.2f} per robot hour in {row['robot_hours']:.2f} h"
-    columns = ("n", "mean", "rms", "median", "p95", "least", "most")
-    out = Table("figure", *columns, title=title)
+    columns = ("n", "mean", "rms", "median", "p95_size", "least", "most")
+    out = Table("figure", *(c.replace("_", " of ") for c in columns), title=title)
     for name, statistics in row["figures"].items():
         out.add_row(name.replace("_", " "), *(f"{statistics[c]:.3g}" for c in columns))
     return out

@@ -31,6 +31,8 @@ from golem.types import PlanarPose, Twist
 Figures = dict[str, float]
 LOST = "lost_in_"
 """Prefix of the figure that counts a stage in which robots were lost."""
+DOES_NOT_WALK: Figures = {"lost": 0.0, "does_not_walk": 1.0}
+"""Figures of a lower body that was not tested, because it only stands."""
 SETTLE = 3.0
 """Time between a robot carrying its weight and the test [s]: what the release of its band set off has died away."""
 CALM = 10.0
@@ -89,8 +91,8 @@ def tracking(subject: Subject, seed: int, index: int) -> Figures:
     """Walk with one twist of the declared envelope: error of the mean velocity over the last seconds, per axis."""
     with closing(subject.episode(seed, index)) as episode:
         envelope = episode.running.envelope
-        if not any(limit for axis in (envelope.vx, envelope.vy, envelope.wz) for limit in axis):
-            return {"lost": 0.0, "does_not_walk": 1.0}
+        if not can_walk(envelope):
+            return DOES_NOT_WALK
         twist = command(envelope, subject.draw("legs/tracking", seed, index).rng("twist"), index)
         asked = np.array([twist.vx, twist.vy, twist.wz])
         episode.stand(SETTLE)
@@ -111,6 +113,8 @@ def endurance(subject: Subject, seed: int, index: int) -> Figures:
     rng, shoves = draw.rng("twists"), draw.rng("shoves")
     with closing(subject.episode(seed, index)) as episode:
         envelope = episode.running.envelope
+        if not can_walk(envelope):
+            return DOES_NOT_WALK
         script = [(0.0, Twist())]
         while script[-1][0] < MINUTE:
             still = rng.random() < 0.2
@@ -151,6 +155,8 @@ def stopping(subject: Subject, seed: int, index: int) -> Figures:
         distance * math.cos(bearing), distance * math.sin(bearing), rng.uniform(-GOAL_TURN, GOAL_TURN)
     )
     with closing(subject.episode(seed, index)) as episode:
+        if not can_walk(episode.running.envelope):
+            return DOES_NOT_WALK
         episode.locate(
             SimulatedOdometry(episode.running.bus, episode.robot, "estimator", draw.rng("odometry"))
         )
@@ -214,7 +220,13 @@ def command(envelope: Envelope, rng: np.random.Generator, index: int) -> Twist:
     """Return twist `index` of the test of tracking: the 26 ends, edges and corners of the envelope, then draws."""
     axes = [(low, 0.0, high) for low, high in (envelope.vx, envelope.vy, envelope.wz)]
     corners = [c for c in dict.fromkeys(itertools.product(*axes)) if any(c)]
+    corners.sort(key=np.count_nonzero)  # first along one axis: who asks for few trials shall see each
     return Twist(*corners[index]) if index < len(corners) else _random(envelope, rng, still=False)
+
+
+def can_walk(envelope: Envelope) -> bool:
+    """Return whether a lower body follows any twist at all."""
+    return any(limit for axis in (envelope.vx, envelope.vy, envelope.wz) for limit in axis)
 
 
 def _random(envelope: Envelope, rng: np.random.Generator, still: bool) -> Twist:
@@ -224,6 +236,8 @@ def _random(envelope: Envelope, rng: np.random.Generator, still: bool) -> Twist:
 
 def _rough(subject: Subject, seed: int, index: int, world: str) -> Figures:
     with closing(subject.episode(seed, index, world=world)) as episode:
+        if not can_walk(episode.running.envelope):
+            return DOES_NOT_WALK
         episode.stand(SETTLE)
         start = episode.t
         episode.start(Exercise(twist=lambda t: ROUGH))
@@ -252,8 +266,11 @@ def _lost(episode: Episode) -> Figures:
     return {"lost": 0.0} if episode.loss is None else lost_in(episode.loss.stage)
 
 
-STANDING = (quiet.__name__, arms.__name__)
-"""Tests in which a robot that is lost counts among those that did not keep their balance."""
+MISSED: dict[str, Figures] = {
+    **dict.fromkeys((quiet.__name__, arms.__name__), {"never_negative": 0.0}),
+    stopping.__name__: {"arrived": 0.0},
+}
+"""Figures by which a robot that is lost counts among those that did not do what a test asks for."""
 TESTS: dict[str, Callable[[Subject, int, int], Figures]] = {
     test.__name__: test for test in (quiet, arms, tracking, endurance, slope, rubble, stopping, plans)
 }

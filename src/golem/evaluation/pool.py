@@ -50,8 +50,12 @@ class Workers(Generic[K, R]):
         self._stack.close()
 
     def submit(self, key: K, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> None:
-        """Add one piece of work, called `key`."""
-        with _ctrl_c_held():
+        """Add one piece of work, called `key`.
+
+        Raises:
+            GolemError: a process died.
+        """
+        with _ctrl_c_held(), _named_death():
             self._pending[self._pool.submit(function, *args, **kwargs)] = key
 
     def finished(self) -> Generator[tuple[K, R], None, None]:
@@ -60,15 +64,22 @@ class Workers(Generic[K, R]):
         Raises:
             GolemError: a process died.
         """
-        try:
-            while self._pending:
-                for future in wait(self._pending, return_when=FIRST_COMPLETED).done:
-                    yield self._pending.pop(future), future.result()
-        except BrokenProcessPool:
-            raise GolemError(
-                "A worker process died (out of memory, or a crash in native code); finished trials are kept: "
-                "give the same command again to continue."
-            ) from None
+        while self._pending:
+            for future in wait(self._pending, return_when=FIRST_COMPLETED).done:
+                with _named_death():
+                    result = future.result()
+                yield self._pending.pop(future), result
+
+
+@contextlib.contextmanager
+def _named_death() -> Generator[None, None, None]:
+    try:
+        yield
+    except BrokenProcessPool:
+        raise GolemError(
+            "A worker process died (out of memory, or a crash in native code); finished trials are kept: "
+            "give the same command again to continue."
+        ) from None
 
 
 @contextlib.contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import importlib.util
 import json
 import platform
 import subprocess
@@ -17,7 +18,7 @@ from typing import Any, cast
 import golem
 from golem import registry
 from golem.capabilities.legs.description import load_description
-from golem.errors import ConfigError
+from golem.errors import ConfigError, OutputError
 from golem.robots.sensors.profiles import load_profile
 from golem.stack import Stack
 
@@ -47,10 +48,21 @@ def user_files(stack: Stack) -> dict[str, str]:
         name: choice for name, choice in (("fallback", stack.fallback), ("onboard", stack.onboard)) if choice
     }
     for slot, choice in chosen.items():
-        named = {"use": choice.use.rpartition(":")[0], **choice.options}
+        named = {"use": _source(choice.use.rpartition(":")[0]), **choice.options}
         for name, path in _named(named).items():
             found[f"{slot}/{name}"] = hashlib.sha256(path.read_bytes()).hexdigest()
     return found
+
+
+def _source(module: str) -> str:
+    """Return the file of a user's `package.module`; what is a path already, or nothing that can be found, as it is."""
+    if not module or "/" in module or module.endswith(".py"):
+        return module
+    try:
+        spec = importlib.util.find_spec(module)
+    except (ImportError, ValueError):
+        return module
+    return module if spec is None or spec.origin is None else spec.origin
 
 
 def _named(options: Mapping[str, Any]) -> dict[str, Path]:
@@ -89,6 +101,30 @@ def code_digest() -> str:
             total.update(path.relative_to(root).as_posix().encode() + b"\0")
             total.update(hashlib.sha256(path.read_bytes()).digest())
     return total.hexdigest()[:16]
+
+
+class Unchanged:
+    """Sees whether the package's code changes under what runs it: workers import, and load networks, late."""
+
+    def __init__(self) -> None:
+        """Begin with the code as it is."""
+        self._stamp = self._now()
+
+    def check(self, out: Path) -> None:
+        """Refuse to add another result to `out` once the code has changed.
+
+        Raises:
+            OutputError: it has.
+        """
+        if self._now() != self._stamp:
+            raise OutputError(
+                f"The code of golem changed while this ran; {out} holds results of the old one, choose another --out."
+            )
+
+    @staticmethod
+    def _now() -> tuple[int, int]:
+        files = [p.stat() for p in _package().rglob("*") if p.is_file() and "__pycache__" not in p.parts]
+        return len(files), max(f.st_mtime_ns for f in files)
 
 
 @functools.cache

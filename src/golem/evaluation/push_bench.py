@@ -16,13 +16,16 @@ from golem.errors import ConfigError, ModuleFault, unknown_name
 from golem.evaluation.campaign import Done, Job, Result, robot_options, run_campaign, write_files
 from golem.evaluation.episode import LATENCY, Episode
 from golem.evaluation.exercise import ArmMotion, Exercise
+from golem.evaluation.leg_tests import can_walk
 from golem.evaluation.provenance import commit
 from golem.evaluation.pushes import DIRECTIONS, rod, shove
-from golem.evaluation.subject import Subject
+from golem.evaluation.subject import Subject, labels
 from golem.robots.sensors.profiles import load_profile
 from golem.skills.runner import FAULT
 from golem.types import Twist
 
+DOES_NOT_WALK = "does not walk"
+"""Loss of a lower body that only stands, in a phase of walking."""
 Kind = Literal["shove", "rod"]
 Phase = Literal["standing", "left_swing", "right_swing"]
 
@@ -52,7 +55,7 @@ class PushBenchConfig:
     """
 
     method: tuple[str, ...] = ("almi",)
-    """Lower bodies: registered names, file.py:Class, or policy:DESCRIPTION:NETWORK."""
+    """Lower bodies: names, file.py:Class, policy:DESCRIPTION:NETWORK, or with options "{use: NAME, option: value}"."""
     kind: Kind = "shove"
     """shove: constant force on the torso for 0.2 s, levels in N s. rod: half a sine of 1 s at the pelvis, in N."""
     phase: tuple[Phase, ...] = ("standing", "left_swing", "right_swing")
@@ -126,6 +129,8 @@ class Level:
                 episode.start(exercise)
                 episode.stand(settle)
                 if not standing:
+                    if not can_walk(episode.running.envelope):
+                        return DOES_NOT_WALK
                     exercise.twist = lambda t: WALK
                     episode.run(settle)
                     if not self._swing(episode, late):
@@ -182,7 +187,8 @@ def run_push_bench(config: PushBenchConfig) -> list[dict[str, Any]]:
 
     def then(job: Job, result: Result) -> Iterable[Job]:
         assert isinstance(job, Level)
-        return following(job, result["passed"], config.first, config.step, config.last)
+        walked = DOES_NOT_WALK not in result["losses"]
+        return following(job, result["passed"], walked, config.first, config.step, config.last)
 
     done = run_campaign(config.out, jobs, config.j, then)
     found = cells(done)
@@ -195,14 +201,17 @@ def run_push_bench(config: PushBenchConfig) -> list[dict[str, Any]]:
     return found
 
 
-def following(job: Level, passed: bool, first: float, step: float, last: float) -> list[Level]:
-    """Return the level to try after `job`: up from the first as long as they pass, down if the first fails."""
+def following(job: Level, passed: bool, walked: bool, first: float, step: float, last: float) -> list[Level]:
+    """Return the level to try after `job`: up from the first as long as they pass, down if the first fails.
+
+    A robot that never `walked` is not asked again.
+    """
     if job.level < first:
         level = None if passed else job.level - step
     elif passed:
         level = job.level + step
     else:
-        level = first - step if job.level == first else None
+        level = first - step if job.level == first and walked else None
     if level is None or level < 1e-9 or level > last + 1e-9:
         return []
     return [Level(job.subject, job.kind, job.phase, job.direction, level, job.n, job.seed)]
@@ -250,12 +259,13 @@ def table(found: Sequence[dict[str, Any]], config: PushBenchConfig) -> str:
     ]
     by_key = {(c["method"], c["phase"], c["direction"]): c for c in found}
     rows: list[str] = []
+    names = labels(config.method)
     for method in config.method:
         for phase in config.phase:
             chosen = [by_key[method, phase, direction] for direction in config.direction]
             shown = [_cell(c) for c in chosen]
             least = min(c["survived"] for c in chosen)
-            rows.append(f"| {Path(method).name} | {phase} | {' | '.join(shown)} | {least:g} |")
+            rows.append(f"| {names[method]} | {phase} | {' | '.join(shown)} | {least:g} |")
     notes = [
         "",
         f"A level is lost with {allowed(config.n) + 1} of {config.n} trials, and ends there; `>=`: the highest level "
@@ -266,8 +276,8 @@ def table(found: Sequence[dict[str, Any]], config: PushBenchConfig) -> str:
 
 
 def _cell(cell: dict[str, Any]) -> str:
-    if "no step" in cell["losses"] and not cell["survived"]:
-        return "does not walk"
+    if DOES_NOT_WALK in cell["losses"]:
+        return DOES_NOT_WALK
     return f"{'' if cell['failed'] is not None else '>= '}{cell['survived']:g}"
 
 
@@ -282,6 +292,11 @@ def _check(config: PushBenchConfig) -> None:
     for option, value in (("-n", config.n), ("--first", config.first), ("--step", config.step)):
         if value <= 0:
             raise ConfigError(f"{option} is {value:g}; it must be more than 0.")
+    if config.seed < 0 or config.last < config.first:
+        raise ConfigError("--seed is 0 or more, and --last at least --first.")
+    for option, names in (("direction", config.direction), ("phase", config.phase)):
+        if len(set(names)) < len(names):
+            raise ConfigError(f"--{option} names one of them twice.")
     if not config.method or len(set(config.method)) < len(config.method):
         raise ConfigError("--method names one lower body or several different ones.")
 

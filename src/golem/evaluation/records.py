@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import hashlib
 import json
 import os
 import re
@@ -126,8 +127,11 @@ class Provenance:
 
 def trial_name(trial: TrialSpec | TrialRecord) -> str:
     """Return the file name, without suffix, of what belongs to one trial."""
-    # A method may be named `folder/file.py:Class`.
-    return f"{re.sub(r'[^A-Za-z0-9_.-]', '_', trial.method)}-{trial.index:05d}"
+    # A method may be named `folder/file.py:Class`, and another `folder_file.py:Class`.
+    plain = re.sub(r"[^A-Za-z0-9_.-]", "_", trial.method)
+    if plain != trial.method:
+        plain = f"{plain[-60:]}-{hashlib.sha256(trial.method.encode()).hexdigest()[:6]}"
+    return f"{plain}-{trial.index:05d}"
 
 
 def artefacts(folder: Path, trial: TrialSpec | TrialRecord) -> Path:

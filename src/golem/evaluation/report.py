@@ -161,7 +161,9 @@ def _map(grouped: Mapping[str, Sequence[TrialRecord]]) -> str:
         '<li><span class="swatch key-lost"></span>failure</li></ul>'
     )
     cells = {method: [(r.success, _says(r)) for r in rows] for method, rows in grouped.items()}
-    return _card("Trial by trial", trial_map(cells) + legend, "One column per seed; hover for what happened.")
+    return _card(
+        "Trial by trial", trial_map(cells) + legend, "One column per trial; hover for what happened."
+    )
 
 
 def _failures(summary: Summary) -> str:

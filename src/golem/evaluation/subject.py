@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.episode import Episode, episode_seed, legs_stack
 from golem.evaluation.provenance import digest, user_files
+
+
+def labels(methods: Sequence[str]) -> dict[str, str]:
+    """Return short names of lower bodies, file names without folders where that tells them apart."""
+    short = {method: method if method.startswith("{") else Path(method).name for method in methods}
+    taken = list(short.values())
+    return {method: name if taken.count(name) == 1 else method for method, name in short.items()}
 
 
 @dataclass(frozen=True, slots=True)

@@ -80,6 +80,10 @@ def run_trial(target: str, spec: TrialSpec, artefacts: Path) -> Finished | Refus
         outcome = TrialOutcome(False, FAULT, f"{fault.slot}: {fault.use}", fault.reason)
     except GolemError as error:
         return Refused(str(error))
+    except OSError as error:
+        return Refused(
+            f"Cannot write what trial {spec.index} keeps to {artefacts}: {error.strerror or error}."
+        )
     except Exception as error:
         return Refused(f"{type(error).__name__}: {error}", traceback.format_exc())
     return Finished(outcome, time.perf_counter() - wall, time.process_time() - cpu)

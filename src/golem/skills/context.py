@@ -16,6 +16,9 @@ from golem.robots.model.kinematics import Kinematics
 from golem.skills.base import Feedback, StageFailed, Tick
 from golem.types import Array, BaseEstimate, LowState, PalmTargets, Side, Twist
 
+SILENT = 0.5
+"""Age of the newest odometry from which on it says nothing about where the robot is [s]."""
+
 
 class Hand:
     """One gripper, as a skill commands and reads it."""
@@ -148,8 +151,15 @@ class Legs:
 
     @property
     def pose(self) -> Array:
-        """(4, 4) pose of base_link in odom by the odometry, or by the base estimate in a stack without one."""
+        """(4, 4) pose of base_link in odom by the odometry, or by the base estimate in a stack without one.
+
+        Raises:
+            StageFailed: the odometry has fallen silent.
+        """
         odometry = self._context.bus.latest(topics.ODOMETRY, Odometry)
+        if odometry is not None and self._context.t - odometry.t > SILENT:
+            age = self._context.t - odometry.t
+            raise StageFailed("walk", "odometry", f"The odometry has been silent for {age:.1f} s.")
         return self._context.T_odom_base if odometry is None else odometry.T_odom_base
 
     def drive(self, twist: Twist) -> None:

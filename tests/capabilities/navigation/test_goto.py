@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from golem.capabilities.navigation.base import Course, Navigator
 from golem.capabilities.navigation.goto import GoTo, GoToConfig
+from golem.errors import ConfigError
 from golem.types import PlanarPose, Twist
 
 DT = 0.01
@@ -198,3 +200,26 @@ def test_a_robot_that_stops_badly_is_not_chased_for_ever() -> None:
     go(GoTo(), Walker(seed=2, noise=1.0, slip=6.0), goal, seconds=40.0)
     with pytest.raises(AssertionError, match="not there after 40 s"):
         go(GoTo(GoToConfig(widen=1.0)), Walker(seed=2, noise=1.0, slip=6.0), goal, seconds=40.0)
+
+
+@pytest.mark.parametrize(
+    "change", [{"smoothing": 0.0}, {"speed": (0.6, 0.0, 0.6)}, {"widen": 0.5}, {"rest": -1.0}]
+)
+def test_numbers_that_cannot_be_meant_are_refused(change: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError, match=f"goto option {next(iter(change))}"):
+        GoToConfig(**change)
+
+
+def test_a_push_during_a_stop_is_not_learned() -> None:
+    navigator, walker = GoTo(), Walker()
+    go(navigator, walker, PlanarPose(0.5, 0.0, 0.0))
+    navigator.start(PlanarPose(1.0, 0.0, 0.0))
+    pushed = False
+    for _ in range(4000):
+        course = navigator.step(walker.measured(), walker.stepping, DT)
+        if course.twist == Twist() and not pushed:
+            walker.pose, pushed = PlanarPose(3.0, 0.0, 0.0), True
+        walker.step(course.twist)
+        if course.arrived:
+            break
+    assert pushed and error(walker, PlanarPose(1.0, 0.0, 0.0))[0] < 0.05

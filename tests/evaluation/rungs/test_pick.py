@@ -8,7 +8,9 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
+from golem.evaluation.episode import Loss
 from golem.evaluation.oracle import GraspTruth
+from golem.evaluation.rungs import pick
 from golem.evaluation.rungs.pick import PAD_REACH, STRAIGHT, Stand, Tether, blame
 
 LIMP = f"{Path(__file__).parents[1] / 'leg_methods.py'}:Limp"
@@ -134,3 +136,17 @@ def test_a_file_in_the_home_folder_may_be_named_by_the_tilde(
     assert rung.config("centroid", "ideal", {"upper_body": "~/mine.py:Arms"})["user_files"].keys() == {
         "upper_body/use"
     }
+
+
+@pytest.mark.parametrize("slot, use", [("grasp_method", "centroid"), ("robot", "mujoco")])
+def test_what_the_rung_brings_is_not_replaced(slot: str, use: str) -> None:
+    with pytest.raises(ConfigError, match=f"--use {slot}"):
+        Stand().config("visual_servo", "field", {slot: use})
+
+
+def test_a_robot_that_falls_after_its_errand_has_lost_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    loss = Loss("fall", "The robot fell at 9.0 s.")
+    monkeypatch.setattr(pick, "lost", lambda running, recorder: loss)
+    outcome = Stand().run(TrialSpec("stand", "visual_servo", "ideal", 0, 0, {"localizer": "onnx"}), None)
+    assert (outcome.success, outcome.stage, outcome.module) == (False, "fall", "lower_body: almi")
+    assert "fell" in outcome.detail and "in the tray" in outcome.detail

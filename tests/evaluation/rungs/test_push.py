@@ -54,7 +54,7 @@ def trace(margin: float) -> BalanceTrace:
 
 
 def test_standing_again_is_a_success_with_the_time_it_took() -> None:
-    outcome = judge(trace(0.1), 2.0, rod("left", 22.0), None, "mine")
+    outcome = judge(trace(0.1), 2.0, rod("left", 22.0), None, True, "mine")
     assert outcome.success
     assert outcome.timings["recovery"] == pytest.approx(0.6, abs=0.02)
     assert outcome.series["margin_min"] == pytest.approx(-0.04)
@@ -62,12 +62,18 @@ def test_standing_again_is_a_success_with_the_time_it_took() -> None:
 
 
 @pytest.mark.parametrize(
-    ("margin", "loss", "stage"),
-    [(-0.02, None, "balance"), (0.1, Loss("fall", "The robot fell."), "fall")],
-    ids=["outside at the end", "fell"],
+    ("margin", "loss", "rests", "stage"),
+    [
+        (-0.02, None, False, "balance"),
+        (0.1, None, False, "unrest"),
+        (0.1, Loss("fall", "The robot fell."), False, "fall"),
+    ],
+    ids=["outside at the end", "still stepping", "fell"],
 )
-def test_what_was_lost_names_stage_and_lower_body(margin: float, loss: Loss | None, stage: str) -> None:
-    outcome = judge(trace(margin), 2.0, rod("left", 22.0), loss, "mine")
+def test_what_was_lost_names_stage_and_lower_body(
+    margin: float, loss: Loss | None, rests: bool, stage: str
+) -> None:
+    outcome = judge(trace(margin), 2.0, rod("left", 22.0), loss, rests, "mine")
     assert not outcome.success and outcome.stage == stage and outcome.module == "lower_body: mine"
     assert "22 N to the left" in outcome.detail
 

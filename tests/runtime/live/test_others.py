@@ -161,7 +161,7 @@ def test_a_real_robots_motors_are_not_touched_before_its_own_controller_lets_go_
     motors = participant.reader("rt/lowcmd", hg.LOW_CMD.type_name, Qos(reliable=False, depth=1000))
     live.run(0.2)
     assert (live.state, live.reason) == (GateState.INIT, "motors_held") and not motors.take(1000)
-    assert "'ai'" in live.gate.status.detail and "golem safety take" in live.gate.status.detail
+    assert "'ai'" in live.gate.status.detail and "golem safety take --hanging" in live.gate.status.detail
     assert not live.ask("activate")[0]
 
     switcher = reach(participant, motion_switcher.SERVICE)

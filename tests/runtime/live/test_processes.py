@@ -148,7 +148,9 @@ def test_what_is_not_there_is_said_with_a_remedy() -> None:
 
 
 def test_an_operator_takes_the_motors_from_the_robots_own_controller(launched: Launched) -> None:
-    first, second = golem("safety", "take"), golem("safety", "take")
+    refused = golem("safety", "take")
+    assert refused.returncode != 0 and "hang it up" in refused.stderr
+    first, second = golem("safety", "take", "--hanging"), golem("safety", "take")
     assert first.returncode == second.returncode == 0, first.stdout + first.stderr
     assert "'ai' has the motors and lets go" in first.stdout
     assert second.stdout.splitlines() == ["None of the robot's own controllers has the motors."]

@@ -13,9 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.capabilities.navigation.base import Course
+from golem.options import require
 from golem.types import Array, PlanarPose, Twist, wrap
 
 ZERO = Twist()
+
+MOST_COAST = (0.3, 0.3, 0.5)
+"""Furthest that a stop may be expected to move the robot ahead, to its left [m] and round [rad] [own]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +63,22 @@ class GoToConfig:
     settle: float = 1.0
     coast: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ConfigError: one of them cannot be meant.
+        """
+        positive = ("gain", "face", "pulse", "creep", "smoothing", "close", "aligned", "accept", "straight")
+        values = {name: getattr(self, name) for name in positive} | {"speed": min(self.speed)}
+        times = {name: getattr(self, name) for name in ("dwell", "rest", "settle")}
+        require(
+            "goto option ",
+            *((n, v, 0.0 < v < math.inf, "a positive number") for n, v in values.items()),
+            *((n, v, 0.0 <= v < math.inf, "a time in seconds, not negative") for n, v in times.items()),
+            ("widen", self.widen, 1.0 <= self.widen < math.inf, "a factor of at least 1"),
+        )
+
 
 class GoTo:
     """Follows the straight line to the goal; see `Navigator`."""
@@ -93,7 +113,8 @@ class GoTo:
             self._told = here if moving else None
         elif self._rested >= config.settle + config.rest:
             if self._told is not None:
-                self._coast, self._told = self._told.to(here), None
+                # A robot that was pushed meanwhile shall not teach the next stop.
+                self._coast, self._told = _within(self._told.to(here), MOST_COAST), None
             off = distance > self._slack * config.accept or turn > self._slack * config.straight
             if off:
                 self._walking, self._near = True, 0.0
@@ -153,3 +174,9 @@ class GoTo:
         size = math.hypot(*line, spin)
         boost = least / size if 0.0 < size < least else 1.0
         return Twist(float(line[0] * boost), float(line[1] * boost), float(spin * boost))
+
+
+def _within(pose: PlanarPose, bounds: tuple[float, float, float]) -> PlanarPose:
+    """Return `pose` with x, y and yaw limited to +- `bounds`."""
+    x, y, yaw = (min(max(v, -b), b) for v, b in zip((pose.x, pose.y, pose.yaw), bounds, strict=True))
+    return PlanarPose(x, y, yaw)

@@ -17,7 +17,7 @@ from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
-from golem.evaluation.episode import HANGS, READY, episode_seed
+from golem.evaluation.episode import HANGS, READY, Loss, episode_seed, lost
 from golem.evaluation.oracle import GraspTruth, Oracle
 from golem.evaluation.provenance import stack_facts
 from golem.middleware import topics
@@ -31,6 +31,8 @@ from golem.skills.pick import TIMEOUT, Pick, PickConfig, PickGoal
 from golem.skills.runner import FAULT
 from golem.stack import Stack, load_stack
 
+SLOT = "grasp_method"
+"""What the methods of these rungs are."""
 STANDING = "stand"
 """Name of the rung, and of the stack, whose robot balances."""
 RELEASED = 1.0
@@ -57,7 +59,7 @@ class PickRung:
 
     def methods(self) -> tuple[str, ...]:
         """Return the registered grasp methods."""
-        return registry.names("grasp_method")
+        return registry.names(SLOT)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
@@ -90,10 +92,10 @@ class PickRung:
                 running.executor.run(running.executor.t + RELEASED)
             watch = _Watch(running, oracle, BalanceRecorder(robot) if self.balances else None)
             result = running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=watch)
-            running.executor.run(running.executor.t + SETTLE)
+            running.executor.run(running.executor.t + SETTLE, watch.look)
             if artefacts is not None and watch.recorder is not None:
                 watch.recorder.trace().save(artefacts / TRACE)
-            return _judge(stack, result, oracle, watch)
+            return _judge(stack, result, oracle, watch, lost(running, watch.recorder))
         finally:
             oracle.close()
             robot.close()
@@ -104,9 +106,16 @@ class PickRung:
         return self.name == STANDING
 
     def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
-        stack = load_stack(self.name, profile=profile).with_choice("grasp_method", method)
+        if SLOT in overrides:
+            raise ConfigError(f"The method is what sits in {SLOT}; leave out --use {SLOT}=...")
+        stack = load_stack(self.name, profile=profile).with_choice(SLOT, method)
         for slot, use in overrides.items():
             stack = stack.with_choice(slot, use)
+        if stack.on_ground != self.balances:
+            raise ConfigError(
+                f"Rung {self.name} has a robot {'on its feet' if self.balances else 'in its hoist'}, and this one is "
+                "not; leave out --use robot=..."
+            )
         return stack
 
 
@@ -132,9 +141,14 @@ class _Watch:
         self.grasp: GraspTruth | None = None
         self.picture: bytes | None = None
 
-    def __call__(self) -> None:
+    def look(self) -> bool:
+        """Look on after the errand; it is never a reason to end."""
         if self.recorder is not None:
             self.recorder(self._running.executor.t)
+        return False
+
+    def __call__(self) -> None:
+        self.look()
         feedback = self._news.read()
         if feedback is None:
             return
@@ -145,12 +159,18 @@ class _Watch:
             self.picture = self._oracle.picture()
 
 
-def _judge(stack: Stack, result: SkillResult, oracle: Oracle, watch: _Watch) -> TrialOutcome:
-    """Say whether a screw is in the tray, and if not, which module lost it."""
+def _judge(
+    stack: Stack, result: SkillResult, oracle: Oracle, watch: _Watch, loss: Loss | None
+) -> TrialOutcome:
+    """Say whether a screw is in the tray and the robot still there, and if not, which module lost it."""
     truth = watch.grasp
     series = {} if truth is None else {f"grasp_{name}": value for name, value in asdict(truth).items()}
     if watch.recorder is not None:
         series |= balance(watch.recorder.trace())
+    if loss is not None and result.stage not in ABORTED:
+        module = f"lower_body: {stack.lower_body.use}" if stack.on_ground else None
+        detail = f"{loss.detail} The errand itself: {result.reason}"
+        return TrialOutcome(False, loss.stage, module, detail, result.timings, series, oracle.picture())
     if oracle.screws_in_tray() and result.stage not in ABORTED:
         return TrialOutcome(True, DONE, None, result.reason, result.timings, series, watch.picture)
     # The skill may believe it succeeded: then the screw was lost between the pull and the tray.
@@ -192,4 +212,4 @@ def blame(stage: str, slot: str | None, truth: GraspTruth | None) -> str | None:
         return "localizer" if truth.aim >= truth.reach else "upper_body"
     if stage == "extract" and truth.tilt > STRAIGHT:
         return "upper_body"
-    return "localizer" if stage == "place" else "grasp_method"
+    return "localizer" if stage == "place" else SLOT

@@ -79,7 +79,8 @@ class PushRung:
             trace = episode.recorder.trace()
             if artefacts is not None:
                 trace.save(artefacts / TRACE)
-            outcome = judge(trace, start, push, episode.loss, spec.method)
+            rests = episode.recorder.quiet >= QUIET
+            outcome = judge(trace, start, push, episode.loss, rests, spec.method)
             shown = not outcome.success or spec.index == 0
             return replace(outcome, picture=strip.picture() if shown else None)
 
@@ -112,12 +113,16 @@ def measures(trace: BalanceTrace, start: float) -> dict[str, float]:
     }
 
 
-def judge(trace: BalanceTrace, start: float, push: Push, loss: Loss | None, method: str) -> TrialOutcome:
+def judge(
+    trace: BalanceTrace, start: float, push: Push, loss: Loss | None, rests: bool, method: str
+) -> TrialOutcome:
     """Say whether the robot stands again after `push`, which began at `start` [s], and if not, how it failed."""
     series = measures(trace, start)
     pushed = f"pushed with {push.peak:.0f} N to the {push.direction.replace('_', ' ')}"
     if loss is None and series["margin_final"] <= 0.0:
         loss = Loss("balance", f"The CoM margin ends at {1e3 * series['margin_final']:.0f} mm.")
+    if loss is None and not rests:
+        loss = Loss("unrest", "It is on its feet, but does not come to rest.")
     if loss is not None:
         detail = f"{loss.detail} It was {pushed} at {start:.1f} s."
         return TrialOutcome(False, loss.stage, f"lower_body: {method}", detail, series=series)

@@ -25,7 +25,7 @@ class GateState(StrEnum):
     """Where the gate is. Only `ACTIVE` lets a command through."""
 
     INIT = "init"
-    """Something that must be there is missing; the motors are limp."""
+    """Something that must be there is missing; the command is limp, and a live gate sends none."""
     ARMED = "armed"
     """State and emergency stop are sound; the motors damp; waits for the request to activate."""
     ACTIVE = "active"

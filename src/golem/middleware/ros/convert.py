@@ -252,6 +252,8 @@ def leg_status(status: LegStatus) -> golem_interfaces.LegStatus:
         bool(status.clamped),
         status.reason,
         bool(status.stepping),
+        bool(status.moving),
+        pose(status.rest.matrix()),
         np.array(status.phase, np.float64),
         status.controller,
         status.fault or "",

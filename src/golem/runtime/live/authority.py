@@ -79,7 +79,7 @@ class Authority:
         if self.owner:
             return (
                 f"the robot's own controller '{self.owner}' has the motors; "
-                "hang the robot up, then: golem safety take"
+                "hang the robot up, then: golem safety take --hanging"
             )
         if moving or self.known:
             return ""

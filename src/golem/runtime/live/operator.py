@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional
 
+from golem.errors import ConfigError
 from golem.hardware.safety.base import GateState
 from golem.middleware import public
 from golem.middleware.dds.base import Participant
@@ -27,15 +28,23 @@ REQUESTS: dict[str, tuple[str, Any]] = {
     "press": ("/estop/press", SetBool_Request(True)),
     "release": ("/estop/press", SetBool_Request(False)),
     "status": ("", None),
-    "take": ("", None),
 }
-"""What an operator can ask for: service of the safety process, and request; nothing where it is no service."""
+"""What can be asked of the safety process: service and request."""
 
 
 @dataclass(frozen=True)
 class RequestConfig:
     """Ask something of the safety process on a domain."""
 
+    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
+
+
+@dataclass(frozen=True)
+class TakeConfig:
+    """Have the robot's own controller let go of the motors, so that the safety gate may have them."""
+
+    hanging: bool = False
+    """The robot hangs in its hoist: without a controller it goes limp at once."""
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
 
 
@@ -55,11 +64,9 @@ def run_request(what: str, config: RequestConfig) -> bool:
         RosError: there is none, or it does not answer.
     """
     service, request = REQUESTS[what]
-    with member("operator", config.dds) as (participant, node):
-        if what == "status":
+    with member("operator", config.dds) as (_, node):
+        if not service:
             return _status(node, config.dds)
-        if what == "take":
-            return take(participant, node, config.dds)
         kind = next(row.type for row in public.SERVICES if row.name == service)
         response = ask(node, service, kind, request, f"start it with: golem safety, on {config.dds}")
         say(response.message)
@@ -110,12 +117,18 @@ def _status(node: Node, dds: DdsConfig) -> bool:
     return status.state is GateState.ACTIVE
 
 
-def take(participant: Participant, node: Node, dds: DdsConfig) -> bool:
-    """Have the robot's own controller let go of the motors, which makes the robot limp; return whether it did.
+def run_take(config: TakeConfig) -> bool:
+    """Have the robot's own controller let go of the motors; return whether none of them has them now.
 
     Raises:
+        ConfigError: nobody said that the robot hangs.
         RosError: nobody answers for the robot.
     """
+    with member("operator", config.dds) as (participant, node):
+        return _take(participant, node, config)
+
+
+def _take(participant: Participant, node: Node, config: TakeConfig) -> bool:
     authority = Authority.on(Surface("safety", participant, node, only=(CALLS,)), node.now)
 
     def answered(wanted: Callable[[], bool], timeout: float) -> bool:
@@ -127,9 +140,14 @@ def take(participant: Participant, node: Node, dds: DdsConfig) -> bool:
 
     if not answered(lambda: authority.known, SEARCH):
         raise RosError(
-            f"No robot on {dds} says which of its own controllers has the motors; is it switched on?"
+            f"No robot on {config.dds} says which of its own controllers has the motors; is it switched on?"
         )
     if not authority.free:
+        if not config.hanging:
+            raise ConfigError(
+                f"'{authority.owner}' has the motors. A robot that stands falls once it lets go of them: hang it up, "
+                "then repeat this with --hanging."
+            )
         say(f"'{authority.owner}' has the motors and lets go of them: the robot goes limp.")
         authority.release()
         if not answered(lambda: authority.free, SEARCH):

@@ -52,11 +52,12 @@ class TwinConfig:
 class SafetyConfig:
     """Guard the robot on a domain: emergency stop and safety gate, and nothing else in this process.
 
-    To ask something of the one that runs: golem safety activate, stop, reset, press, release or status.
+    To ask something of the one that runs: golem safety activate, stop, reset, press, release or status. To have a
+    robot's own controller let go of the motors: golem safety take.
     """
 
     limits: str = "urdf"
-    """Limit profile to enforce: urdf or paper."""
+    """Limit profile to enforce: urdf or paper. The stack file's is not read here: the gate trusts no stack."""
     strict: bool = False
     """Stop a simulated robot as early as the real one for what is late: a busy machine then stops it."""
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)

@@ -94,9 +94,9 @@ TASKS: dict[Task, EnvConfig] = {
 }
 """A network for each. One for both learned neither well: shoves of 90 N s teach a robot that walks to shuffle, and one
 that is praised for standing to the millimetre, or has learned to walk, is slow to step. Who only stands steps after a
-push, to wherever that is good: it pays less for where its feet are. Its delays go further, because legs of high gain sway
-at 2 Hz from some delay on: of four networks trained to 30 ms two moved at 20 mm/s there, left alone, and those two swayed by
-7 mm in the twin at 22 ms."""
+push, to wherever that is good: it pays less for where its feet are. Its delays go further, because legs of high gain
+sway at 2 Hz from some delay on: of four networks trained to 30 ms two moved at 20 mm/s there, left alone, and those two
+swayed by 7 mm in the twin at 22 ms."""
 
 
 @dataclass

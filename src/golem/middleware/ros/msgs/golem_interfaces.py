@@ -301,6 +301,8 @@ class LegStatus(Message):
         clamped: whether commanded lies outside the controller's envelope
         reason: why applied is not on its way to commanded; empty where it is
         stepping: whether the gait clock runs
+        moving: whether the robot changes its place
+        rest: where base_link would come to rest if told to stand now, as seen from base_link
         phase: gait phase of the left and the right leg, 0 to 1
         controller: the implementation in charge, as the stack names it
         fault: how the stack's own controller failed, once the fallback is in charge; else empty
@@ -314,6 +316,8 @@ class LegStatus(Message):
     clamped: bool = False
     reason: str = ""
     stepping: bool = False
+    moving: bool = False
+    rest: Pose = field(default_factory=Pose)
     phase: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2, np.float64))
     controller: str = ""
     fault: str = ""
