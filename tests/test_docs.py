@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from golem import registry
+from golem.evaluation.push_bench import Level
+from golem.evaluation.subject import Subject
 from golem.stack import Stack, load_stack, parse_stack
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -22,10 +24,18 @@ def blocks(page: str, language: str) -> list[str]:
 def test_the_module_of_write_a_module_loads_and_grasps(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module, usage = blocks("write-a-module.md", "python")
+    module, usage, _ = blocks("write-a-module.md", "python")
     (tmp_path / "my_grasp.py").write_text(module)
     monkeypatch.chdir(tmp_path)
     exec(compile(usage, "write-a-module.md", "exec"), {})
+
+
+def test_the_legs_of_write_a_module_stand(tmp_path: Path) -> None:
+    *_, module = blocks("write-a-module.md", "python")
+    file = tmp_path / "my_legs.py"
+    file.write_text(module)
+    level = Level(Subject(f"{file}:Stiff", "ideal"), "shove", "standing", "front", level=5.0, n=1, seed=0)
+    assert level.run()["passed"]
 
 
 def test_the_stack_of_write_a_module_is_valid() -> None:

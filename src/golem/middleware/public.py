@@ -144,8 +144,8 @@ TOPICS: tuple[Topic, ...] = (
           "Motors and torso IMU, with checksum; tick is robot time in ms and the clock of everything above the "
           "robot."),
     Topic("/lowcmd", "unitree_hg/msg/LowCmd", "safety", ("robot", "safety"), LOW, 500, "",
-          "What the motors are told, with checksum; from the safety gate and nobody else. The drives go limp "
-          "0.1 s after the last one. reserve[0] as in /safety/lowcmd_in: a simulated robot waits for answers."),
+          "What the motors are told, with checksum; from the safety gate and nobody else. The twin's drives go "
+          "limp 0.1 s after the last one. reserve[0] as in /safety/lowcmd_in: a simulated robot waits for answers."),
     Topic("/clock", "rosgraph_msgs/msg/Clock", "robot", (), NEWEST, 500, "",
           "Robot time."),
     Topic("/joint_states", "sensor_msgs/msg/JointState", "robot", (), DEFAULT, 100, "",
