@@ -60,7 +60,7 @@ class TrainConfig:
     push_ramp: tuple[float, float] = (1e6, 8e6)
     motion_ramp: tuple[float, float] = (3e6, 12e6)
     noise_ramp: tuple[float, float] = (5e6, 1.5e6)
-    noise: tuple[float, float] = (0.45, 0.2)
+    noise: tuple[float, float] = (0.45, 0.1)
     ppo: PpoConfig = field(default_factory=PpoConfig)
 
 
