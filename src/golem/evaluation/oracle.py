@@ -19,9 +19,10 @@ class GraspTruth:
     """Where hand and screw were when the fingers began to close.
 
     Attributes:
-        aim: distance across the approach axis from where the hand was sent to the nearest screw [m]: perception.
-        reach: distance between where the hand was sent and where it was [m]: the arm and its calibration.
-        miss: distance across the approach axis between hand and nearest screw [m]: what came of both.
+        aim: from where the hand was sent to the nearest screw [m]: perception.
+        reach: from where the hand was sent to where it was [m]: the arm and its calibration.
+        miss: from the hand to the nearest screw [m]: what came of both. All three are across the approach axis of the hand
+            as it was: one that is too high or too low misses nothing.
         depth: height of the screw's head above the fingertips [m], positive when the tips are below it.
         tilt: angle between approach axis and vertical [rad].
     """
@@ -65,19 +66,19 @@ class Oracle:
     def screw_heads(self) -> Array:
         """Return the (n, 3) undersides of the loosened screws' heads in odom [m]."""
         world = np.array([self._robot.data.body(name).xpos for name in self._robot.scene.names.screws])
-        return world + self._T_odom_world[:3, 3]
+        return world @ self._T_odom_world[:3, :3].T + self._T_odom_world[:3, 3]
 
     def grasp(self, side: Side, T_commanded: Array) -> GraspTruth:
         """Compare where the hand is, where it was sent (4, 4, in odom), and where the nearest screw is."""
         T = self.gripper(side)
-        heads = self.screw_heads()
-        offsets = (heads - T[:3, 3]) @ T[:3, :3]
-        nearest = int(np.argmin(np.hypot(offsets[:, 0], offsets[:, 1])))
+        screws = (self.screw_heads() - T[:3, 3]) @ T[:3, :3]
+        screw = screws[np.argmin(np.hypot(screws[:, 0], screws[:, 1]))]
+        sent = (T_commanded[:3, 3] - T[:3, 3]) @ T[:3, :3]
         return GraspTruth(
-            aim=float(np.hypot(*(heads[nearest] - T_commanded[:3, 3])[:2])),
-            reach=float(np.linalg.norm(T[:3, 3] - T_commanded[:3, 3])),
-            miss=float(np.hypot(*offsets[nearest, :2])),
-            depth=-float(offsets[nearest, 2]),
+            aim=float(np.hypot(*(screw - sent)[:2])),
+            reach=float(np.hypot(*sent[:2])),
+            miss=float(np.hypot(*screw[:2])),
+            depth=-float(screw[2]),
             tilt=float(np.arccos(np.clip(-T[2, 2], -1.0, 1.0))),
         )
 

@@ -9,9 +9,11 @@ import pytest
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.episode import Loss
-from golem.evaluation.oracle import GraspTruth
+from golem.evaluation.oracle import GraspTruth, Oracle
 from golem.evaluation.rungs import pick
 from golem.evaluation.rungs.pick import PAD_REACH, STRAIGHT, Stand, Tether, blame
+from golem.runtime.assembly import build
+from golem.stack import load_stack
 
 LIMP = f"{Path(__file__).parents[1] / 'leg_methods.py'}:Limp"
 BAD_MODULES = """
@@ -150,3 +152,21 @@ def test_a_robot_that_falls_after_its_errand_has_lost_it(monkeypatch: pytest.Mon
     outcome = Stand().run(TrialSpec("stand", "visual_servo", "ideal", 0, 0, {"localizer": "onnx"}), None)
     assert (outcome.success, outcome.stage, outcome.module) == (False, "fall", "lower_body: almi")
     assert "fell" in outcome.detail and "in the tray" in outcome.detail
+
+
+def test_aim_reach_and_miss_are_measured_alike() -> None:
+    running, robot = build(load_stack("tether", profile="ideal"), 0)
+    oracle = Oracle(robot)
+    try:
+        T = oracle.gripper("right")
+        high = T.copy()
+        high[:3, 3] -= 0.05 * T[:3, 2]
+        aside = T.copy()
+        aside[:3, 3] += 0.05 * T[:3, 1]
+        exact, above, beside = (oracle.grasp("right", sent) for sent in (T, high, aside))
+    finally:
+        oracle.close()
+        robot.close()
+    assert exact.reach == pytest.approx(0.0, abs=1e-9) and exact.aim == pytest.approx(exact.miss)
+    assert above.reach == pytest.approx(0.0, abs=1e-9) and above.aim == pytest.approx(above.miss)
+    assert beside.reach == pytest.approx(0.05) and abs(beside.aim - beside.miss) <= 0.05 + 1e-9
