@@ -21,8 +21,8 @@ class GraspTruth:
     Attributes:
         aim: from where the hand was sent to the nearest screw [m]: perception.
         reach: from where the hand was sent to where it was [m]: the arm and its calibration.
-        miss: from the hand to the nearest screw [m]: what came of both. All three are across the approach axis of the hand
-            as it was: one that is too high or too low misses nothing.
+        miss: from the hand to the nearest screw [m]: what came of both. All three are across the approach axis of the
+            hand as it was: one that is too high or too low misses nothing.
         depth: height of the screw's head above the fingertips [m], positive when the tips are below it.
         tilt: angle between approach axis and vertical [rad].
     """

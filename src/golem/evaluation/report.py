@@ -120,7 +120,12 @@ def _headline_time(m: MethodSummary, name: str) -> str:
     time = m.times.get(name)
     if time is None:
         return "-"
-    return f"{time.median:.1f} s<small>{time.q1:.1f} to {time.q3:.1f}</small>"
+    return f"{time.median:.1f} s<small>{time.q1:.1f} to {time.q3:.1f}{_of(time.n, m.n)}</small>"
+
+
+def _of(n: int, trials: int) -> str:
+    """Return how many trials a figure is of, where it is not of all."""
+    return "" if n == trials else f", n = {n}"
 
 
 def _comparisons(summary: Summary) -> str:
@@ -230,14 +235,15 @@ def _measures(grouped: Mapping[str, Sequence[TrialRecord]]) -> str:
             cells.append(
                 '<td class="num">-</td>'
                 if s is None
-                else f'<td class="num">{s.median:.3g}<small>{s.q1:.3g} to {s.q3:.3g}</small></td>'
+                else f'<td class="num">{s.median:.3g}'
+                f"<small>{s.q1:.3g} to {s.q3:.3g}{_of(s.n, len(rows))}</small></td>"
             )
         lines.append(f"<tr><td>{escape(measure.label)}</td><td>{measure.unit}</td>{''.join(cells)}</tr>")
     head = "".join(f'<th class="num">{escape(method)}</th>' for method in grouped)
     return _card(
         "What was measured",
         f'<div class="scroll"><table><tr><th>measure</th><th>unit</th>{head}</tr>{"".join(lines)}</table></div>',
-        "Median over the trials, and quartiles; on the simulator's truth.",
+        "Median and quartiles over the trials that got that far, n where not all did; on the simulator's truth.",
     )
 
 
