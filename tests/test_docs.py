@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from golem import registry
-from golem.evaluation.push_bench import Level
+from golem.evaluation.push_bench import Trial
 from golem.evaluation.subject import Subject
 from golem.stack import Stack, load_stack, parse_stack
 
@@ -34,8 +34,8 @@ def test_the_legs_of_write_a_module_stand(tmp_path: Path) -> None:
     *_, module = blocks("write-a-module.md", "python")
     file = tmp_path / "my_legs.py"
     file.write_text(module)
-    level = Level(Subject(f"{file}:Stiff", "ideal"), "shove", "standing", "front", level=5.0, n=1, seed=0)
-    assert level.run()["passed"]
+    trial = Trial(Subject(f"{file}:Stiff", "ideal"), "shove", "standing", ("front",), 5.0, index=0, seed=0)
+    assert trial.run() == {"front": None}
 
 
 def test_the_stack_of_write_a_module_is_valid() -> None:

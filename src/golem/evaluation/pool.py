@@ -5,7 +5,11 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import pickle
 import signal
+import sys
+import traceback
+import warnings
 from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -15,6 +19,8 @@ from typing import Generic, ParamSpec, TypeVar
 from golem.errors import GolemError
 from golem.evaluation.trials import SINGLE_THREAD, start_worker
 
+CAN_COPY = sys.platform == "linux"
+"""Whether a process may go on in a copy of itself: Apple's libraries do not survive it, Windows has none."""
 K = TypeVar("K")
 R = TypeVar("R")
 P = ParamSpec("P")
@@ -105,3 +111,31 @@ def _environment(variables: Mapping[str, str]) -> Generator[None, None, None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
+
+
+def in_a_copy(function: Callable[[], R]) -> R:
+    """Return what `function` returns in a copy of this process: whatever it changes is as before here.
+
+    Raises:
+        GolemError: it raised, or the copy died.
+    """
+    reading, writing = os.pipe()
+    with warnings.catch_warnings():
+        # Of forks beside threads; the only other one of a worker waits for its parent's end.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        copy = os.fork()
+    if copy == 0:
+        try:
+            with os.fdopen(writing, "wb") as pipe:
+                pickle.dump(function(), pipe)
+            os._exit(0)
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            os._exit(1)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as pipe:
+        found = pipe.read()
+    if os.waitpid(copy, 0)[1] != 0:
+        raise GolemError("A copy of a worker process died; give the same command again to continue.")
+    return pickle.loads(found)

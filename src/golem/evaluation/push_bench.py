@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -17,6 +19,7 @@ from golem.evaluation.campaign import Done, Job, Result, robot_options, run_camp
 from golem.evaluation.episode import LATENCY, Episode
 from golem.evaluation.exercise import ArmMotion, Exercise
 from golem.evaluation.leg_tests import can_walk
+from golem.evaluation.pool import CAN_COPY, in_a_copy
 from golem.evaluation.provenance import commit
 from golem.evaluation.pushes import DIRECTIONS, rod, shove
 from golem.evaluation.subject import Subject, labels
@@ -51,7 +54,7 @@ QUIET = 0.5
 class PushBenchConfig:
     """Find the largest push each lower body survives: a shove of 0.2 s against the torso, or the rod at the pelvis.
 
-    Levels ascend until one is not survived in 95 % of its trials; a first level that fails descends instead.
+    Levels ascend until one is not survived in 95 % of its trials; where the first level fails they descend instead.
     """
 
     method: tuple[str, ...] = ("almi",)
@@ -87,62 +90,74 @@ class PushBenchConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
-    """All trials of one cell of the table at one level.
+class Trial:
+    """One robot, pushed in several directions: up to the push they all share one past.
 
     Attributes:
         subject: what is tested.
-        kind, phase, direction: the cell.
+        kind, phase: of the push.
+        directions: where it drives the robot, one after the other, each time from the same moment.
         level: impulse [N s] of a shove, peak force [N] of the rod.
-        n, seed: trials.
+        index, seed: the draws.
     """
 
     subject: Subject
     kind: str
     phase: str
-    direction: str
+    directions: tuple[str, ...]
     level: float
-    n: int
+    index: int
     seed: int
 
     def run(self) -> Result:
-        """Return how many trials were run and survived; ends once enough are lost to fail."""
-        losses: dict[str, int] = {}
-        trials = 0
-        while trials < self.n and sum(losses.values()) <= allowed(self.n):
-            loss = self._trial(trials)
-            trials += 1
-            if loss is not None:
-                losses[loss] = losses.get(loss, 0) + 1
-        lost = sum(losses.values())
-        return {"trials": trials, "lost": lost, "losses": losses, "passed": lost <= allowed(self.n)}
+        """Return the stage in which the robot was lost, by direction; None where it survived."""
+        starts = [self.directions] if CAN_COPY else [(direction,) for direction in self.directions]
+        found: Result = {}
+        for directions in starts:
+            found |= self._from_one_start(directions)
+        return found
 
-    def _trial(self, index: int) -> str | None:
-        """Return the stage in which trial `index` was lost, or None."""
-        draw = self.subject.draw("push-bench", self.seed, index)
+    def _from_one_start(self, directions: Sequence[str]) -> Result:
+        try:
+            with closing(self.subject.episode(self.seed, self.index)) as episode:
+                lost = self._before(episode)
+                if lost is not None:
+                    return dict.fromkeys(directions, lost)
+                if len(directions) == 1:
+                    return {directions[0]: self._after(episode, directions[0])}
+                return {d: in_a_copy(partial(self._after, episode, d)) for d in directions}
+        except ModuleFault:
+            return dict.fromkeys(directions, FAULT)
+
+    def _before(self, episode: Episode) -> str | None:
+        """Bring the robot to the moment of the push; return the stage in which it was lost, or None."""
+        draw = self.subject.draw("push-bench", self.seed, self.index)
         times = draw.rng("times")
         settle, late = times.uniform(*SETTLE), times.uniform(0.0, SWING)
-        standing = self.phase == "standing"
         exercise = Exercise(ArmMotion(draw.rng("arms")))
+        episode.start(exercise)
+        episode.stand(settle)
+        if self.phase != "standing":
+            if not can_walk(episode.running.envelope):
+                return DOES_NOT_WALK
+            exercise.twist = lambda t: WALK
+            episode.run(settle)
+            if not self._swing(episode, late):
+                return "no step"
+        return None if episode.loss is None else episode.loss.stage
+
+    def _after(self, episode: Episode, direction: str) -> str | None:
+        """Push the robot and wait; return the stage in which it was lost, or None."""
+        push = (shove if self.kind == "shove" else rod)(direction, self.level)
         try:
-            with closing(self.subject.episode(self.seed, index)) as episode:
-                episode.start(exercise)
-                episode.stand(settle)
-                if not standing:
-                    if not can_walk(episode.running.envelope):
-                        return DOES_NOT_WALK
-                    exercise.twist = lambda t: WALK
-                    episode.run(settle)
-                    if not self._swing(episode, late):
-                        return "no step"
-                push = (shove if self.kind == "shove" else rod)(self.direction, self.level)
-                episode.push(push)
-                episode.run(push.duration)
-                episode.recorder.quiet = 0.0
-                episode.run(PATIENCE, until=lambda: standing and episode.recorder.quiet >= QUIET)
-                return None if episode.loss is None else episode.loss.stage
+            episode.push(push)
+            episode.run(push.duration)
+            episode.recorder.quiet = 0.0
+            standing = self.phase == "standing"
+            episode.run(PATIENCE, until=lambda: standing and episode.recorder.quiet >= QUIET)
         except ModuleFault:
             return FAULT
+        return None if episode.loss is None else episode.loss.stage
 
     def _swing(self, episode: Episode, late: float) -> bool:
         """Walk until the foot of the phase was lifted `late` [s] ago and is still in the air; False if it never is."""
@@ -165,6 +180,61 @@ def allowed(n: int) -> int:
     return math.floor((1.0 - SURVIVED) * n + 1e-9)
 
 
+class Search:
+    """Gathers the trials of a level until it is complete, and says which are next."""
+
+    def __init__(self, config: PushBenchConfig) -> None:
+        """Search as `config` says."""
+        self._config = config
+        self._found: dict[tuple[str, str, float], list[Result]] = {}
+
+    def first(self, subjects: Sequence[Subject]) -> list[Trial]:
+        """Return the trials to begin with."""
+        c = self._config
+        return [
+            Trial(subject, c.kind, phase, c.direction, c.first, index, c.seed)
+            for phase in c.phase
+            for index in range(c.n)
+            for subject in subjects
+        ]
+
+    def following(self, job: Job, result: Result) -> list[Trial]:
+        """Return the trials that follow from another result: of the levels to which its own leads, if complete."""
+        assert isinstance(job, Trial)
+        found = self._found.setdefault((job.subject.method, job.phase, job.level), [])
+        found.append(result)
+        if len(found) < self._config.n:
+            return []
+        wanted: dict[float, list[str]] = {}
+        for direction in job.directions:
+            level = self.next([r[direction] for r in found], job.level)
+            if level is not None:
+                wanted.setdefault(level, []).append(direction)
+        return [
+            replace(job, directions=tuple(directions), level=level, index=index)
+            for level, directions in wanted.items()
+            for index in range(self._config.n)
+        ]
+
+    def next(self, losses: Sequence[str | None], level: float) -> float | None:
+        """Return the level to try after `level` in one direction: up as long as they pass, down if the first fails.
+
+        Args:
+            losses: how each robot was lost at this level; None where it survived.
+            level: present one.
+        """
+        c = self._config
+        lost = [loss for loss in losses if loss is not None]
+        passed = len(lost) <= allowed(c.n)
+        if level < c.first:
+            following = None if passed else level - c.step
+        elif passed:
+            following = level + c.step
+        else:
+            following = c.first - c.step if level == c.first and DOES_NOT_WALK not in lost else None
+        return following if following is not None and 1e-9 < following <= c.last + 1e-9 else None
+
+
 def run_push_bench(config: PushBenchConfig) -> list[dict[str, Any]]:
     """Search every cell, write and print the table.
 
@@ -178,20 +248,8 @@ def run_push_bench(config: PushBenchConfig) -> list[dict[str, Any]]:
     _check(config)
     robot = {"latency": config.latency, **robot_options(config.robot)}
     subjects = [Subject.of(method, config.profile, robot) for method in config.method]
-    jobs = [
-        Level(subject, config.kind, phase, direction, config.first, config.n, config.seed)
-        for phase in config.phase
-        for direction in config.direction
-        for subject in subjects
-    ]
-
-    def then(job: Job, result: Result) -> Iterable[Job]:
-        assert isinstance(job, Level)
-        walked = DOES_NOT_WALK not in result["losses"]
-        return following(job, result["passed"], walked, config.first, config.step, config.last)
-
-    done = run_campaign(config.out, jobs, config.j, then)
-    found = cells(done)
+    search = Search(config)
+    found = cells(run_campaign(config.out, search.first(subjects), config.j, search.following))
     text = table(found, config)
     results = {"config": _jsonable(config), "commit": commit(), "cells": found}
     write_files(config.out, {"table.md": text, "results.json": json.dumps(results, indent=1) + "\n"})
@@ -201,48 +259,34 @@ def run_push_bench(config: PushBenchConfig) -> list[dict[str, Any]]:
     return found
 
 
-def following(job: Level, passed: bool, walked: bool, first: float, step: float, last: float) -> list[Level]:
-    """Return the level to try after `job`: up from the first as long as they pass, down if the first fails.
-
-    A robot that never `walked` is not asked again.
-    """
-    if job.level < first:
-        level = None if passed else job.level - step
-    elif passed:
-        level = job.level + step
-    else:
-        level = first - step if job.level == first and walked else None
-    if level is None or level < 1e-9 or level > last + 1e-9:
-        return []
-    return [Level(job.subject, job.kind, job.phase, job.direction, level, job.n, job.seed)]
-
-
 def cells(done: Sequence[Done]) -> list[dict[str, Any]]:
-    """Return one entry per cell: the largest level survived, the least that was not, and how that one was lost."""
-    found: dict[tuple[str, str, str], dict[str, Any]] = {}
+    """Return one entry per cell: its levels with trials and losses, the largest survived, the least that was not."""
+    levels: dict[tuple[str, str, str], dict[float, list[str | None]]] = {}
     for item in done:
         job = item.job
-        assert isinstance(job, Level)
-        key = job.subject.method, job.phase, job.direction
-        cell = found.setdefault(
-            key,
+        assert isinstance(job, Trial)
+        for direction in job.directions:
+            cell = levels.setdefault((job.subject.method, job.phase, direction), {})
+            cell.setdefault(job.level, []).append(item.result[direction])
+    found: list[dict[str, Any]] = []
+    for (method, phase, direction), tried in levels.items():
+        lost = {level: Counter(x for x in tried[level] if x is not None) for level in sorted(tried)}
+        passed = [level for level in lost if lost[level].total() <= allowed(len(tried[level]))]
+        failed = [level for level in lost if level not in passed]
+        found.append(
             {
-                "method": job.subject.method,
-                "phase": job.phase,
-                "direction": job.direction,
-                "survived": 0.0,
-                "failed": None,
-                "losses": {},
-                "n": job.n,
-                "trials": 0,
-            },
+                "method": method,
+                "phase": phase,
+                "direction": direction,
+                "survived": max(passed, default=0.0),
+                "failed": min(failed, default=None),
+                "losses": dict(lost[min(failed)]) if failed else {},
+                "levels": [
+                    {"level": level, "n": len(tried[level]), "lost": lost[level].total()} for level in lost
+                ],
+            }
         )
-        cell["trials"] += item.result["trials"]
-        if item.result["passed"]:
-            cell["survived"] = max(cell["survived"], job.level)
-        elif cell["failed"] is None or job.level < cell["failed"]:
-            cell["failed"], cell["losses"] = job.level, item.result["losses"]
-    return list(found.values())
+    return found
 
 
 def table(found: Sequence[dict[str, Any]], config: PushBenchConfig) -> str:
@@ -268,8 +312,7 @@ def table(found: Sequence[dict[str, Any]], config: PushBenchConfig) -> str:
             rows.append(f"| {names[method]} | {phase} | {' | '.join(shown)} | {least:g} |")
     notes = [
         "",
-        f"A level is lost with {allowed(config.n) + 1} of {config.n} trials, and ends there; `>=`: the highest level "
-        "tried was survived.",
+        f"A level is lost with {allowed(config.n) + 1} of {config.n} trials; `>=`: the highest one tried was not lost.",
         "",
     ]
     return "\n".join([*head, *rows, *notes])
