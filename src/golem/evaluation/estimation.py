@@ -119,7 +119,7 @@ def run_estimation(config: EstimationConfig) -> list[EstimationRow]:
     tracks: dict[tuple[str, str], list[_Track]] = {}
     lost = 0
     for index in range(config.n):
-        spec = subject.draw("estimation", config.seed, index)
+        spec = subject.draw(config.seed, index)
         for pushed in (False, True):
             walk = record(subject, spec, pushed)
             if not walk.judged.any():

@@ -74,7 +74,7 @@ def quiet(subject: Subject, seed: int, index: int) -> Figures:
 def arms(subject: Subject, seed: int, index: int) -> Figures:
     """Stand for a minute while both arms sweep their workspace with a kilogram in each hand."""
     with closing(subject.episode(seed, index, payload=PAYLOAD)) as episode:
-        draw = subject.draw("legs/arms", seed, index)
+        draw = subject.draw(seed, index)
         episode.start(Exercise(ArmMotion(draw.rng("arms"), WIDE_AREA)))
         return _minute(episode, SETTLE)
 
@@ -93,7 +93,7 @@ def tracking(subject: Subject, seed: int, index: int) -> Figures:
         envelope = episode.running.envelope
         if not can_walk(envelope):
             return DOES_NOT_WALK
-        twist = command(envelope, subject.draw("legs/tracking", seed, index).rng("twist"), index)
+        twist = command(envelope, subject.draw(seed, index).rng("twist"), index)
         asked = np.array([twist.vx, twist.vy, twist.wz])
         episode.stand(SETTLE)
         episode.start(Exercise(twist=lambda t: twist))
@@ -109,7 +109,7 @@ def tracking(subject: Subject, seed: int, index: int) -> Figures:
 
 def endurance(subject: Subject, seed: int, index: int) -> Figures:
     """Walk at random for a minute, arms moving, shoved with up to 30 N s every few seconds."""
-    draw = subject.draw("legs/endurance", seed, index)
+    draw = subject.draw(seed, index)
     rng, shoves = draw.rng("twists"), draw.rng("shoves")
     with closing(subject.episode(seed, index)) as episode:
         envelope = episode.running.envelope
@@ -148,7 +148,7 @@ def rubble(subject: Subject, seed: int, index: int) -> Figures:
 
 def stopping(subject: Subject, seed: int, index: int) -> Figures:
     """Walk to a pose 2 m away and stand there, by the base estimator with 1 cm and 1 deg of noise: the true error."""
-    draw = subject.draw("legs/stopping", seed, index)
+    draw = subject.draw(seed, index)
     rng = draw.rng("goal")
     bearing, distance = rng.uniform(-math.pi, math.pi), rng.uniform(*GOAL_DISTANCE)
     goal = PlanarPose(

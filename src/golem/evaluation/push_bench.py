@@ -131,7 +131,7 @@ class Trial:
 
     def _before(self, episode: Episode) -> str | None:
         """Bring the robot to the moment of the push; return the stage in which it was lost, or None."""
-        draw = self.subject.draw("push-bench", self.seed, self.index)
+        draw = self.subject.draw(self.seed, self.index)
         times = draw.rng("times")
         settle, late = times.uniform(*SETTLE), times.uniform(0.0, SWING)
         exercise = Exercise(ArmMotion(draw.rng("arms")))

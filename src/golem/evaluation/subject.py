@@ -44,9 +44,9 @@ class Subject:
         """
         return cls(method, profile, dict(robot), digest(user_files(legs_stack(method, profile, robot=robot))))
 
-    def draw(self, test: str, seed: int, index: int) -> TrialSpec:
-        """Return the trial whose noise streams trial `index` of `test` draws from, whatever the method."""
-        return TrialSpec(test, self.method, self.profile, seed, index)
+    def draw(self, seed: int, index: int) -> TrialSpec:
+        """Return the trial whose noise streams trial `index` of every test draws from, whatever the method."""
+        return TrialSpec("legs", self.method, self.profile, seed, index)
 
     def episode(self, seed: int, index: int, **robot: object) -> Episode:
         """Return the robot of trial `index`, with further options of the twin."""

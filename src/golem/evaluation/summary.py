@@ -121,7 +121,7 @@ class Summary:
         for c in self.comparisons:
             lines.append(
                 f"{c.a} against {c.b}: {c.table.only_a} trials won only by the first, {c.table.only_b} only by the "
-                f"second, exact McNemar p = {c.p:.2g}"
+                f"second, exact McNemar p = {c.p:.2g}, Holm-adjusted {c.p_holm:.2g}"
             )
         return "\n".join(lines)
 
