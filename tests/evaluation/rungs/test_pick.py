@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
-from golem.evaluation.episode import Loss
+from golem.evaluation.episode import Loss, episode_seed
 from golem.evaluation.oracle import GraspTruth, Oracle
 from golem.evaluation.rungs import pick
 from golem.evaluation.rungs.pick import PAD_REACH, STRAIGHT, Stand, Tether, blame
+from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.assembly import build
 from golem.stack import load_stack
 
@@ -170,3 +172,26 @@ def test_aim_reach_and_miss_are_measured_alike() -> None:
     assert exact.reach == pytest.approx(0.0, abs=1e-9) and exact.aim == pytest.approx(exact.miss)
     assert above.reach == pytest.approx(0.0, abs=1e-9) and above.aim == pytest.approx(above.miss)
     assert beside.reach == pytest.approx(0.05) and abs(beside.aim - beside.miss) <= 0.05 + 1e-9
+
+
+def test_both_rungs_meet_the_same_screws_and_errors() -> None:
+    found = []
+    for name in ("tether", "stand"):
+        robot = build(load_stack(name, profile="field"), episode_seed(0, 3))[1]
+        assert isinstance(robot, MujocoRobot)
+        heads = [robot.data.body(screw).xpos.copy() for screw in robot.scene.names.screws]
+        model = robot.scene.model
+        screws = [model.body(screw).id for screw in robot.scene.names.screws]
+        friction = model.geom_friction[np.isin(model.geom_bodyid, screws)]
+        tables = [robot.calibration[camera] for camera in sorted(robot.calibration)]
+        # A robot on its feet is lower than one in its hoist, and so is its table.
+        found.append(
+            (
+                heads - np.array([0.0, 0.0, heads[0][2]]),
+                np.array(tables),
+                robot.scene.model.geom_friction.sum(),
+            )
+        )
+        robot.close()
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
