@@ -189,7 +189,7 @@ def test_both_rungs_meet_the_same_screws_and_errors() -> None:
             (
                 heads - np.array([0.0, 0.0, heads[0][2]]),
                 np.array(tables),
-                robot.scene.model.geom_friction.sum(),
+                friction,
             )
         )
         robot.close()
