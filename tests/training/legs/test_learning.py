@@ -19,7 +19,7 @@ from golem.errors import ConfigError
 from golem.robots.model.leg_kinematics import leg_poses
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, read_curve
 from golem.training.legs.curve import draw_curves
-from golem.training.legs.disturbances import ACROSS, GENTLE, Difficulty, Pushes, UpperBodyMotion
+from golem.training.legs.disturbances import ACROSS, BACK, GENTLE, Difficulty, Pushes, UpperBodyMotion
 from golem.training.legs.env import LAYOUT, TASKS, LegsEnv, Task
 from golem.training.legs.export import export, load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror
@@ -201,7 +201,7 @@ def test_a_calm_episode_has_no_push_and_slow_arms() -> None:
     assert fastest[calm].max() < 2.01 * GENTLE < fastest[~calm].min()
 
 
-def test_pushes_come_from_the_sides_of_the_robot_more_often_whichever_way_it_looks() -> None:
+def test_pushes_go_to_the_sides_and_back_more_often_whichever_way_the_robot_looks() -> None:
     pushes = Pushes(2000, 50.0, np.random.default_rng(0))
     facing = np.tile([[0.0, -1.0], [1.0, 0.0]], (2000, 1, 1))  # along the world's y
     pushes.reset(np.arange(2000), 1.0, np.zeros(2000, dtype=bool))
@@ -209,9 +209,11 @@ def test_pushes_come_from_the_sides_of_the_robot_more_often_whichever_way_it_loo
     for _ in range(1600):
         pushes.step(1.0, facing, 0.005)
         force = np.linalg.norm(pushes.force, axis=1)
-        ahead = np.where(force > 1.0, np.abs(pushes.force[:, 1]) / np.maximum(force, 1.0), ahead)
-    # All of those straight across and 0.6 / pi of the others are within 0.3 rad of the robot's y axis.
-    assert abs((ahead < np.sin(0.3)).mean() - (ACROSS + (1.0 - ACROSS) * 0.6 / np.pi)) < 0.05
+        ahead = np.where(force > 1.0, pushes.force[:, 1] / np.maximum(force, 1.0), ahead)
+    # Besides the straight ones, 0.6 / pi of the others are within 0.3 rad of the y axis, and half as many go back.
+    anywhere = 1.0 - ACROSS - BACK
+    assert abs((np.abs(ahead) < np.sin(0.3)).mean() - (ACROSS + anywhere * 0.6 / np.pi)) < 0.05
+    assert abs((ahead < -np.cos(0.3)).mean() - (BACK + anywhere * 0.3 / np.pi)) < 0.05
 
 
 def test_pushes_have_the_impulse_they_were_drawn_with_at_most() -> None:

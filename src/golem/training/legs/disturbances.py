@@ -20,8 +20,8 @@ NUM_UPPER = UPPER.stop - UPPER.start
 GENTLE = 0.3
 """Fastest motion of the upper body in a calm episode [rad/s]."""
 ACROSS, BACK = 0.35, 0.25
-"""Shares of the pushes straight to a side, where the legs are in each other's way, and straight back, where the feet are
-short and the knees bend the wrong way: both take more practice than pushes ahead."""
+"""Shares of the pushes straight to a side, where the legs are in each other's way, and straight back, where the feet
+are short and the knees bend the wrong way: both take more practice than pushes ahead."""
 TOP_SPEED = 2.5
 """Speed of a target at full difficulty [rad/s]; the safety gate lets 3 pass."""
 
