@@ -30,6 +30,9 @@ offer. Names are those of ROS 2. On the wire the topic `/x` is `rt/x`: `/lowstat
   with `base_link`; optical frames have z forward.
 - Units: SI. Quaternions on ROS topics are xyzw, in the vendor's messages wxyz.
 - What is not transient local is sent only while somebody subscribes, so that nothing is rendered or written unasked.
+- Types `golem_interfaces/...` are in `ros/golem_interfaces`, with units and frames in their comments.
+- `SafetyStatus.reason` is a value of `Reason` in `golem.hardware.safety.base`.
+- A goal that cannot be pursued is accepted and aborted at once: `SkillResult.stage` is "refused", `reason` a sentence.
 """
 
 
