@@ -148,7 +148,7 @@ class LiveGate:
             clock: monotonic [s].
             who: names the owner of an endpoint by its guid.
             patient: whether the robot's time may stand still for a stack that is behind; see `live.pace`.
-            real: whether the robot has controllers of its own that must have let go of the motors first.
+            real: whether the robot's own controllers must have let go of the motors first; a twin's move none.
         """
         if patient:
             limits = pace.patient(limits)
@@ -161,7 +161,7 @@ class LiveGate:
         self._out = surface.writer("/lowcmd")
         # Best effort, as the robot's own reader may be: a reliable one does not see writers that are.
         self._all_commands = surface.reader("/lowcmd", Qos(reliable=False, depth=1))
-        self._authority = Authority.on(surface, clock) if real else None
+        self._authority, self._real = Authority.on(surface, clock), real
         self._estop = estop
         self._side = SafetySide(self.bus, limits, estop)
         self._nodes = in_order(self._side.nodes)
@@ -188,8 +188,7 @@ class LiveGate:
         now = self._clock()
         if self._looks.due(now):
             self._crowded = self._crowd()
-        if self._authority is not None:
-            self._authority.poll()
+        self._authority.poll()
         self._judge()
         if self._diagnoses.due(now):
             self._diagnose(now)
@@ -204,7 +203,7 @@ class LiveGate:
         """Run the gate once, and publish what follows."""
         now, before = self._clock(), self.status
         moving = before.state is GateState.ACTIVE
-        held = self._authority.doubt(moving) if self._authority else ""
+        held = self._authority.doubt(moving) if self._real else ""
         for reason, detail in ((Reason.WRITERS, self._crowded), (Reason.HELD, held)):
             if detail:
                 self.bus.publish(topics.TRANSPORT_FAULT, Fault(reason, detail), now)
@@ -275,6 +274,7 @@ class LiveGate:
             values[f"age of {name} [ms]"] = (
                 "never seen" if newest is None else f"{(now - newest.t) * 1e3:.0f}"
             )
+        values["on-board controller"] = self._authority.owner or "none"
         level = DiagnosticStatus.ERROR if self.status.stopped else DiagnosticStatus.OK
         if self.status.state in (GateState.INIT, GateState.ARMED):
             level = DiagnosticStatus.WARN
