@@ -96,10 +96,9 @@ def code_digest() -> str:
     """Return 16 hex digits that identify the files of the package `golem`, committed or not."""
     root = _package()
     total = hashlib.sha256()
-    for path in sorted(root.rglob("*")):
-        if path.is_file() and "__pycache__" not in path.parts:
-            total.update(path.relative_to(root).as_posix().encode() + b"\0")
-            total.update(hashlib.sha256(path.read_bytes()).digest())
+    for path in sorted(_package_files()):
+        total.update(path.relative_to(root).as_posix().encode() + b"\0")
+        total.update(hashlib.sha256(path.read_bytes()).digest())
     return total.hexdigest()[:16]
 
 
@@ -123,7 +122,7 @@ class Unchanged:
 
     @staticmethod
     def _now() -> tuple[int, int]:
-        files = [p.stat() for p in _package().rglob("*") if p.is_file() and "__pycache__" not in p.parts]
+        files = [path.stat() for path in _package_files()]
         return len(files), max(f.st_mtime_ns for f in files)
 
 
@@ -138,6 +137,10 @@ def commit() -> str:
 
 def _package() -> Path:
     return Path(golem.__path__[0])
+
+
+def _package_files() -> list[Path]:
+    return [path for path in _package().rglob("*") if path.is_file() and "__pycache__" not in path.parts]
 
 
 def _git(*arguments: str) -> str | None:
