@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -224,6 +225,31 @@ def test_a_reset_gives_the_legs_to_the_standing_one() -> None:
     robot.run(DT)
     assert not robot.legs.walking
     assert robot.targets[-1] == 0.0
+
+
+def test_who_stands_does_not_step_for_a_twist_while_it_waits_for_the_one_that_walks() -> None:
+    """A robot that marks time is on both feet for too short a time to change hands, and would do so for ever."""
+    robot = Robot(walk={"silent": 30})
+    robot.run(30 * DT, Twist(0.5))
+    assert not any(m.stepping for m in robot.stand.motions)
+    robot.run(0.2, Twist(0.5))
+    assert robot.legs.walking and robot.walk.motions[-1].stepping
+
+
+@pytest.mark.parametrize(("start", "walking"), [("recovery", True), ("always", False)])
+def test_a_step_that_is_found_is_ended_by_the_one_that_walks(start: Any, walking: bool) -> None:
+    robot = Robot(stand={"gait": GaitConfig(start=start)})
+    former = Locomotion(Recorder(), LocomotionConfig(trim=TrimConfig(gain=0.0)))
+    former.reset(robot.state)
+    for _ in range(15):
+        former.step(robot.state, robot.base, Twist(0.5), DT)
+    assert former.gait.stepping
+    former.hand_over(robot.legs, robot.state, None)
+    robot.layer = former
+    robot.run(DT)
+    assert robot.legs.walking == walking
+    robot.run(1.5)
+    assert not robot.legs.walking
 
 
 def test_an_unknown_controller_is_named() -> None:

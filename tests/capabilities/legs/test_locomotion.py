@@ -236,7 +236,7 @@ def test_a_robot_that_lags_is_asked_for_more_within_bounds_and_for_nothing_when_
     assert driver.applied.vx < 0.5 + most  # begun anew
 
 
-@pytest.mark.parametrize("start", ["never", "command", "recovery", "always"])
+@pytest.mark.parametrize("start", ["never", "command", "balance", "recovery", "always"])
 def test_moving_is_what_the_robot_does_whatever_its_clock(start: Any) -> None:
     driver = Driver(Recorder(gait=GaitConfig(start=start)))
     driver.run(0.2)

@@ -3,15 +3,16 @@
 Phases run from 0 to 1 per period, the right leg half a period behind the left. A leg is in stance while its phase is
 below `stance`, so both are in double support for a moment after phase 0 and after phase 0.5.
 
-While the robot stands the clock rests. It starts when a twist is commanded or, with `start: recovery`, when the
-standing robot cannot keep its balance with its feet where they are: the capture point (CoM position plus velocity over
-the pendulum's frequency; Pratt et al., Humanoids 2006) has left the middle of the feet, or the feet are misplaced. It
-stops at a double support at which the twist is zero and both errors are small again, so that nobody stands on one leg.
+While the robot stands the clock rests. It starts when a twist is commanded or, with `start: recovery` or `balance`,
+when the standing robot cannot keep its balance with its feet where they are: the capture point (CoM position plus
+velocity over the pendulum's frequency; Pratt et al., Humanoids 2006) has left the middle of the feet, or the feet are
+misplaced. It stops at a double support at which the twist is zero and both errors are small again, so that nobody
+stands on one leg.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Literal
 
@@ -31,7 +32,8 @@ class GaitConfig:
     Attributes:
         period: time of one step of each foot [s].
         stance: share of the period for which a foot stays on the ground, more than a half.
-        start: when the clock runs: `never`, at a `command` other than zero, also for `recovery`, or `always`.
+        start: when the clock runs: `never`, at a `command` other than zero, where `balance` asks for it, both
+            (`recovery`), or `always`.
         capture_start: half axes, ahead and sideways, of the ellipse about the middle of the feet out of which the
             capture point of a robot that stands must come for it to step [m]: well inside the soles, because a push
             grows by a fifth until the foot is off the ground.
@@ -41,7 +43,7 @@ class GaitConfig:
 
     period: float = 0.7
     stance: float = 0.55
-    start: Literal["never", "command", "recovery", "always"] = "recovery"
+    start: Literal["never", "command", "balance", "recovery", "always"] = "recovery"
     capture_start: tuple[float, float] = (0.10, 0.15)
     capture_stop: float = 0.07
     feet_start: float = 0.12
@@ -60,6 +62,22 @@ class GaitConfig:
             ("stance", self.stance, 0.5 < self.stance < 1.0, "a share of the period, between 0.5 and 1"),
             ("capture and gait.feet", min(lengths), min(lengths) > 0.0, "a length in metres, positive"),
         )
+
+    @property
+    def follows(self) -> bool:
+        """Whether the clock starts at a commanded twist."""
+        return self.start in ("command", "recovery")
+
+    @property
+    def recovers(self) -> bool:
+        """Whether the clock starts where balance asks for a step."""
+        return self.start in ("balance", "recovery")
+
+    def without_commands(self) -> GaitConfig:
+        """Return the same clock for a controller that is to follow no twist."""
+        if not self.follows:
+            return self
+        return replace(self, start="balance" if self.recovers else "never")
 
 
 class Gait:
@@ -102,20 +120,17 @@ class Gait:
         ahead, sideways = config.capture_start
         lost = np.hypot(capture[..., 0] / ahead, capture[..., 1] / sideways) > 1.0
         lost = lost | (misplaced > config.feet_start)
-        if config.start == "always":
-            wanted = np.ones_like(self.stepping)
-        elif config.start == "never":
-            wanted = np.zeros_like(self.stepping)
-        else:
-            wanted = commanded | lost if config.start == "recovery" else commanded
+        commanded = commanded & config.follows
+        lost = lost & config.recovers
+        wanted = np.ones_like(self.stepping) if config.start == "always" else commanded | lost
         # The unloaded foot swings first: the right one, from phase 0, while the body leans to the left. Who falls has
         # no time for the double support before it.
         begins = wanted & ~self.stepping
-        skipped = np.where(lost & ~commanded, config.stance - 0.5, 0.0) if config.start == "recovery" else 0.0
+        skipped = np.where(lost & ~commanded, config.stance - 0.5, 0.0)
         first = np.where(capture[..., 1] >= 0.0, 0.0, 0.5) + skipped
         self.phase = np.where(begins, first, self.phase)
         settled = (error < config.capture_stop) & (misplaced < config.feet_stop)
-        may_stop = ~wanted & (settled if config.start == "recovery" else True)
+        may_stop = ~wanted & (settled | (not config.recovers))
         after = self.phase + dt / config.period
         half = np.floor(2.0 * after) > np.floor(2.0 * self.phase)
         ends = self.stepping & half & may_stop

@@ -2,7 +2,8 @@
 
 The legs change hands while the robot stays in place and is healthy, and the targets are blended over a short time,
 because each controller has its own posture and gains. A controller that has to start first, such as the vendor's, gets
-them once it has started.
+them once it has started. Until then the robot stands: the standing controller steps to keep its balance, not because a
+twist was commanded that it cannot follow.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from golem import registry
-from golem.capabilities.legs.base import Envelope, LegCommand, Motion, Starting
+from golem.capabilities.legs.base import Envelope, LegCommand, LowerBody, Motion, Starting
 from golem.capabilities.legs.blend import Blend
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.pacing import Paced
@@ -67,11 +68,11 @@ class Handover:
     Attributes:
         rate, latency: the higher of the two controllers' rates; each runs at its own. The longer latency.
         envelope: that of the walking controller.
-        gait: the clock that the controller in charge wants.
+        gait: the clock that the controller in charge wants; while it stands, without a start at a command.
     """
 
     def __init__(self, config: HandoverConfig, onboard: Onboard | None = None) -> None:
-        """Make both controllers; the standing one begins.
+        """Make both controllers.
 
         Args:
             config: which ones.
@@ -96,20 +97,28 @@ class Handover:
         return self._active is self._walk
 
     def reset(self, state: LowState) -> None:
-        """Stand, from the measured `state` on."""
+        """Start from the measured `state`, with the controller for what the robot does at the next tick."""
         self._begin()
         self._active.reset(state)
 
     def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
         """Run the controller in charge, after a change of hands where one is due; see `LowerBody.step`."""
         self._healthy = self._healthy + dt if self._is_healthy(state, base) else 0.0
-        if not self._other_wanted(motion):
+        # Another controller died in the middle of a step, maybe at full speed: who walks can end it, if he is ready.
+        found = self._last is None and motion.stepping and self.gait.start != "always"
+        may_change = found or self._is_calm(dt)
+        if not (found or self._other_wanted(motion)):
             self._coming = None
-        elif self._coming is None and self._is_calm(dt):
+        elif self._coming is None and may_change:
             self._coming = self._stand if self.walking else self._walk
             self._coming.reset(state)
         command = None if self._coming is None else self._coming.step(state, base, motion, dt)
-        if self._coming is not None and command is not None and self._may_take_over(self._coming, dt):
+        if (
+            self._coming is not None
+            and command is not None
+            and may_change
+            and _is_ready(self._coming.controller)
+        ):
             self._take_over(self._coming)
             self._blend.begin(self._last)
         else:
@@ -121,7 +130,8 @@ class Handover:
 
     def _take_over(self, controller: Paced) -> None:
         self._active = controller
-        self.gait: GaitConfig = controller.controller.gait
+        gait = controller.controller.gait
+        self.gait: GaitConfig = gait if self.walking else gait.without_commands()
         self._coming: Paced | None = None
 
     def _begin(self) -> None:
@@ -133,11 +143,6 @@ class Handover:
     def _is_calm(self, dt: float) -> bool:
         """Return whether the robot has been healthy for long enough."""
         return self._healthy > self.config.calm - 0.5 * dt
-
-    def _may_take_over(self, coming: Paced, dt: float) -> bool:
-        """Return whether the legs may change hands now: one that took long to start may find the robot in a step."""
-        controller = coming.controller
-        return self._is_calm(dt) and (not isinstance(controller, Starting) or controller.started)
 
     def _is_healthy(self, state: LowState, base: BaseEstimate) -> bool:
         """Return whether the measured robot is calm, upright, in place, and not on one leg."""
@@ -167,3 +172,8 @@ class Handover:
         if not motion.stepping:
             return True
         return self.gait.start == "always" and bool((motion.phase < self.gait.stance).all())
+
+
+def _is_ready(controller: LowerBody) -> bool:
+    """Return whether `controller` can carry the robot now."""
+    return not isinstance(controller, Starting) or controller.started
