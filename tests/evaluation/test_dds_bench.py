@@ -17,14 +17,14 @@ def test_losses_latency_and_jitter_are_those_of_what_came() -> None:
     ms = 1_000_000
     sent = {
         "began": [0, 2 * ms, 4 * ms, 6 * ms],
-        "answered": [1, 2],
+        "answered": [0, 1, 2],
         "cpu": 0.001,
         "wall": 0.008,
         "images": {"image": [0.001, 0.003], "cloud": [0.0]},
     }
     heard = {
         "controller": {
-            "came": [(1, ms, 50.0), (2, 3 * ms, 60.0), (2, 3 * ms, 60.0), (4, 9 * ms, 70.0)],
+            "came": [(0, 0, 900.0), (1, ms, 50.0), (2, 3 * ms, 60.0), (2, 3 * ms, 60.0), (4, 9 * ms, 70.0)],
             "cpu": 0.002,
         },
         "viewer": {"came": {"a": 1, "b": 2}, "cpu": 0.004},

@@ -132,6 +132,8 @@ def _loop(
 def _measures(name: str, sent: dict[str, Any], heard: dict[str, Any]) -> Loop:
     began = np.array(sent["began"])
     came = np.array(heard["controller"]["came"]).reshape(-1, 3)
+    came = came[came[:, 0] > 0]
+    answered = set(sent["answered"]) - {0}
     numbers, first = np.unique(came[:, 0], return_index=True)
     latency = (came[first, 1] - began[numbers.astype(int) - 1]) * 1e-3
     jitter = np.abs(np.diff(came[:, 1]) * 1e-3 - PERIOD * 1e6)
@@ -147,7 +149,7 @@ def _measures(name: str, sent: dict[str, Any], heard: dict[str, Any]) -> Loop:
         rate=len(began) / wall,
         states=len(began),
         lost_states=len(began) - len(numbers),
-        lost_commands=len(came) - len(set(sent["answered"])),
+        lost_commands=len(came) - len(answered),
         latency=_median_p99(latency),
         transport=_median_p99(came[first, 2]),
         jitter=_median_p99(jitter),

@@ -1,7 +1,9 @@
 """One process of `golem bench dds`: the robot's or the controller's side of a 500 Hz loop, or a viewer of images.
 
 The robot's side encodes a state with checksum, writes it and takes commands; the controller decodes each state as it
-comes and answers it. All measure on this machine's monotonic clock and print one line of JSON at the end.
+comes and answers it. States have numbers from 1; those with number 0 come before and are not measured: who has found
+the other need not have been found by it, and what is written until then is for nobody. All measure on this machine's
+monotonic clock and print one line of JSON at the end.
 """
 
 from __future__ import annotations
@@ -16,10 +18,11 @@ from collections.abc import Callable
 import numpy as np
 
 from golem.errors import GolemError
-from golem.middleware.dds.base import SENSOR, Qos
+from golem.middleware.dds.base import SENSOR, DdsError, Qos
 from golem.middleware.dds.checks import wait_for_peer
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.dds.endpoints import CycloneReader, CycloneWriter
 from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.message import Message
@@ -59,8 +62,7 @@ def robot(participant: CycloneParticipant, seconds: float, cameras: bool) -> dic
     reader = participant.reader("rt/lowcmd", hg.LOW_CMD.type_name, PATIENT)
     for endpoint in (writer, reader):
         wait_for_peer(participant, endpoint, "the controller's process has failed", 20.0)
-    imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
-    zeros = np.zeros(NUM_JOINTS)
+    _wait_for_an_answer(writer, reader)
     count = int(seconds * 1e9 / PERIOD_NS)
     began, answered = np.zeros(count, np.int64), []
     side = Imagery(participant) if cameras else None
@@ -68,8 +70,7 @@ def robot(participant: CycloneParticipant, seconds: float, cameras: bool) -> dic
     for i in range(count):
         sleep_until(start + i * PERIOD_NS)
         began[i] = time.monotonic_ns()
-        state = LowState((i + 1) * 1e-3, zeros, zeros, zeros, imu)
-        writer.write(convert.encode_low_state(state))
+        writer.write(_state(i + 1))
         for sample in reader.take():
             convert.decode_low_command(sample.payload, 0.0)
             answered.append(round(convert.answered(sample.payload) * 1e3))
@@ -80,6 +81,27 @@ def robot(participant: CycloneParticipant, seconds: float, cameras: bool) -> dic
     ]
     images = side.stop() if side is not None else {}
     return {"began": began.tolist(), "answered": answered, "cpu": spent, "wall": wall, "images": images}
+
+
+def _state(number: int) -> bytes:
+    """Encode the state of a robot at rest, its number in milliseconds of its time."""
+    zeros = np.zeros(NUM_JOINTS)
+    imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
+    return convert.encode_low_state(LowState(number * 1e-3, zeros, zeros, zeros, imu))
+
+
+def _wait_for_an_answer(writer: CycloneWriter, reader: CycloneReader) -> None:
+    """Write states of number 0 until a command comes.
+
+    Raises:
+        DdsError: none came within 20 s.
+    """
+    end = time.monotonic() + 20.0
+    while not reader.take():
+        if time.monotonic() > end:
+            raise DdsError("The controller's process got states, but none of its answers came within 20 s.")
+        writer.write(_state(0))
+        time.sleep(0.02)
 
 
 def controller(participant: CycloneParticipant) -> dict[str, object]:

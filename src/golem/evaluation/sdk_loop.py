@@ -1,7 +1,8 @@
 """The same two sides as `dds_loop`, by the vendor's own classes: a script that needs unitree_sdk2py, and not GOLEM.
 
 It runs in any Python that can import the SDK, so it imports nothing else. The SDK has no checks to leave out: states
-go without checksum, as in the vendor's simulator, commands with it, as in its examples.
+go without checksum, as in the vendor's simulator, commands with it, as in its examples. States of number 0 come before
+those that are measured, as there.
 """
 
 # pyright: reportMissingImports=false
@@ -40,7 +41,10 @@ def robot(seconds: float) -> dict:
     subscriber = ChannelSubscriber("rt/lowcmd", LowCmd_)
     subscriber.Init(lambda command: answered.append(command.reserve[0]), 10)
     state = unitree_hg_msg_dds__LowState_()
-    time.sleep(2.0)
+    end = time.monotonic() + 20.0
+    while not answered and time.monotonic() < end:
+        publisher.Write(state)
+        time.sleep(0.02)
     count = int(seconds * 1e9 / PERIOD_NS)
     began = []
     cpu, start = time.process_time(), time.monotonic_ns()
