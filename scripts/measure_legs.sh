@@ -1,0 +1,58 @@
+#!/usr/bin/env bash
+# Measures everything that docs/results.md says of the legs, on the code that this checkout holds: hours on two cores.
+# An interrupted run goes on where it was. Usage:
+#     scripts/measure_legs.sh OUT PROCESSES [MEASUREMENT...]
+# ALMI and RL_GYM name the weights of the public checkpoints, MJCF the vendor's model; what needs one that is not given
+# is left out.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+GOLEM=${GOLEM:-.venv/bin/golem}
+OUT=${1:?where the results go} JOBS=${2:?how many processes}
+shift 2
+export OMP_NUM_THREADS=1
+
+push() { "$GOLEM" bench push -j "$JOBS" --out "$OUT/$name" "$@"; }
+legs() { "$GOLEM" bench legs -j "$JOBS" --out "$OUT/$name" "$@"; }
+ladder() { "$GOLEM" ladder -j "$JOBS" --out "$OUT/$name" --seed 0 "$@"; }
+
+peers=(wbc mpc vendor)
+[ -z "${ALMI:-}" ] || peers+=("policy:almi_open:$ALMI")
+[ -z "${RL_GYM:-}" ] || peers+=("policy:unitree_rl_gym:$RL_GYM")
+
+# Standing.
+shoves() { push --phase standing --first 60; }
+rods() { push --kind rod --phase standing --first 150 --last 150; }
+quiet() { legs --test quiet; }
+arms() { legs --test arms -n 100; }
+push_rung() { ladder --rung push --method almi -n 300; }
+# Walking.
+swings() { push --phase left_swing right_swing; }
+tracking() { legs --test tracking -n 30; }
+stopping() { legs --test stopping -n 200 --profile field; }
+line() { ladder --rung navigate-line --method almi -n 30; }
+endurance() { legs --test endurance -n 120; }
+rough() { legs --test slope rubble -n 20; }
+# Beside others, and on another plant.
+side_standing() { push --phase standing --method almi "${peers[@]}"; }
+side_swings() { push --phase left_swing right_swing --method vendor "${peers[@]:3}"; }
+plans() { legs --test plans -n 5 --method mpc; }
+box_feet() { push --phase standing --first 60 --robot feet=box cone=elliptic; }
+vendor_model() { [ -z "${MJCF:-}" ] || push --phase standing --first 60 --robot "mjcf=$MJCF"; }
+estimators() { "$GOLEM" bench estimation; }
+# The work.
+tether() { ladder --rung tether -n 100; }
+stand() { ladder --rung stand -n 100; }
+mcnemar() { "$GOLEM" compare "$OUT/tether" "$OUT/stand"; }
+
+ALL=(shoves rods quiet tracking stopping push_rung rough swings line arms endurance stand tether mcnemar
+    side_standing box_feet vendor_model plans estimators side_swings)
+[ $# -gt 0 ] || set -- "${ALL[@]}"
+mkdir -p "$OUT"
+for name; do
+    [[ " ${ALL[*]} " == *" $name "* ]] || { echo "Unknown measurement '$name'; choose from: ${ALL[*]}." >&2; exit 2; }
+done
+for name; do
+    echo "== $name =="
+    "$name" | tee "$OUT/$name.txt"
+done
