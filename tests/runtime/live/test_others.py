@@ -19,6 +19,7 @@ from golem.middleware.dds.base import Qos
 from golem.middleware.ros import convert, images
 from golem.middleware.topics import LookRequest
 from golem.middleware.unitree_api import Request, encode
+from golem.middleware.wire import convert as wire
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import answered, encode_low_state
 from golem.middleware.wire.rpc import RpcServer
@@ -27,6 +28,7 @@ from golem.robots.sensors.cameras import CAMERAS
 from golem.runtime.cameras import OPTICAL_FRAMES
 from golem.runtime.executor import Executor
 from golem.runtime.live import authority
+from golem.runtime.live.gate import LiveGate
 from golem.runtime.live.motors import RequestOut
 from golem.runtime.live.surface import Surface
 from golem.stack import Choice
@@ -191,10 +193,50 @@ def test_a_motion_switcher_that_falls_silent_keeps_the_gate_shut_but_stops_nobod
     monkeypatch.setattr(RpcServer, "reply", lambda server, response: None)
     live.run(2.5 * authority.SILENCE)
     assert live.state is GateState.ACTIVE
+    motors = participant.reader("rt/lowcmd", hg.LOW_CMD.type_name, Qos(reliable=False, depth=1000))
     assert live.ask("stop")[0]
+    live.run(1.0)
+    told = [wire.decode_low_command(sample.payload, 0.0) for sample in motors.take(1000)]
+    assert len(told) > 450  # it is damped all the same
+    assert not any(command.kp.any() for command in told[1:]) and told[-1].kd.any()
     assert not live.ask("reset")[0]
     live.leave("safety")
     live.start_gate(real=True)
     live.run(0.5)
     assert (live.state, live.reason) == (GateState.INIT, "motors_held")
     assert live.gate is not None and "does not say" in live.gate.status.detail
+
+
+def test_a_name_that_cannot_be_printed_is_no_answer(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    live.leave("safety")
+    live.start_gate(real=True)
+    assert live.gate is not None
+    live.run(0.2)
+    assert live.gate.status.detail.startswith("the robot's own controller 'ai'")
+    reply = RpcServer.reply
+    nonsense = '{"form": "0", "name": "\\ud800"}'
+    monkeypatch.setattr(RpcServer, "reply", lambda server, said: reply(server, replace(said, data=nonsense)))
+    live.run(2.5 * authority.SILENCE)
+    assert live.gate.status.detail.startswith("the robot's own controller 'ai'")
+
+
+def test_a_gate_that_fails_can_still_damp(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    participant, _ = live.member("listener")
+    motors = participant.reader("rt/lowcmd", hg.LOW_CMD.type_name, Qos(reliable=False, depth=1))
+    live.activate()
+    live.run(2.0)
+
+    def stiffness() -> float:
+        return max(wire.decode_low_command(s.payload, 0.0).kp.max() for s in motors.take())
+
+    assert stiffness() > 0.0
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("no")
+
+    monkeypatch.setattr(LiveGate, "_judge", fail)
+    assert live.gate is not None
+    with pytest.raises(RuntimeError):
+        live.gate.stop()
+    live.gate.damp()
+    assert stiffness() == 0.0

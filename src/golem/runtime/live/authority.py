@@ -61,7 +61,8 @@ class Authority:
                 name = decode(response.data).get("name")
             except ValueError:
                 continue
-            if response.code == OK and isinstance(name, str):
+            # What cannot be printed cannot be reported either, and is no controller's name.
+            if response.code == OK and isinstance(name, str) and name.isprintable():
                 self._answered, self.owner = now, name
         if self._client.connected and self._ask.due(now):
             self._call(CHECK_MODE)

@@ -15,6 +15,7 @@ from dataclasses import replace
 from golem.hardware.estop.base import EstopFrame
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import Fault, GateState, GateStatus, Reason, Request, SafetyLimits
+from golem.hardware.safety.gate import passive
 from golem.middleware import topics
 from golem.middleware.bus import Bus, News
 from golem.middleware.dds.base import Participant, Qos, Sample
@@ -152,7 +153,7 @@ class LiveGate:
         """
         if patient:
             limits = pace.patient(limits)
-        self._patient = patient
+        self._patient, self._damping = patient, limits.damping
         self.bus = Bus()
         self._node, self._clock, self._who = node, clock, who
         self._surface = surface = Surface("safety", participant, node)
@@ -199,6 +200,10 @@ class LiveGate:
         self.step()
         return self.status.state is not GateState.STOP1
 
+    def damp(self) -> None:
+        """Tell the motors to damp, whatever may have failed: the last command on the wire must not be a stiff one."""
+        self._tell(passive(self._clock(), None, self._damping))
+
     def _judge(self) -> None:
         """Run the gate once, and publish what follows."""
         now, before = self._clock(), self.status
@@ -214,17 +219,24 @@ class LiveGate:
         command = self.bus.latest(topics.LOW_CMD, LowCommand)
         assert status is not None and command is not None
         self.status = status
-        # Motors that the robot's own controllers have, or that a gate shut from the start never had, are left to them.
-        if self._arrivals.mode_machine is not None and status.state is not GateState.INIT and not held:
-            waited_for = self._patient and status.state is GateState.ACTIVE
-            answers = self._arrivals.answered if waited_for else 0.0
-            self._out.write(convert.encode_low_command(command, self._arrivals.mode_machine, answers))
+        waited_for = self._patient and status.state is GateState.ACTIVE
+        self._tell(command, self._arrivals.answered if waited_for else 0.0)
         frame = self._estops.read()
         if frame is not None and self._surface.heard("/estop"):
             message = golem_interfaces.EstopFrame(header(now), frame.sequence, frame.pressed)
             self._surface.publish("/estop", message)
         if (status.state, status.reason) != (before.state, before.reason) or self._reports.due(now):
             self._surface.publish("/safety/status", status_message(status))
+
+    def _tell(self, command: LowCommand, answers: float = 0.0) -> None:
+        """Write `command` to the motors, unless the robot's own controllers have them or a shut gate never had them.
+
+        A stop is written on, whether or not the robot still says whose they are: the drives hold the last command.
+        """
+        theirs = self._real and bool(self._authority.owner)
+        machine = self._arrivals.mode_machine
+        if machine is not None and self.status.state is not GateState.INIT and not theirs:
+            self._out.write(convert.encode_low_command(command, machine, answers))
 
     def _crowd(self) -> str:
         """Return who else writes what one process alone may write; empty if nobody does."""

@@ -148,10 +148,11 @@ def run_safety(config: SafetyConfig) -> None:
                 gate.commands.wait(TICK)
                 gate.step()
                 said = report(said, gate.status, tell)
-        finally:
-            # Whatever ended the loop: the last command on the wire must not be a stiff one.
             while not gate.stop():
                 gate.commands.wait(TICK)
+        except BaseException:
+            gate.damp()
+            raise
         report(said, gate.status, tell)
 
 
