@@ -11,6 +11,7 @@ from golem.capabilities.legs.base import STANDING, Envelope, LowerBody
 from golem.capabilities.legs.mpc.controller import MPC, MPCConfig
 from golem.capabilities.legs.mpc.planner import PlannerConfig
 from golem.errors import ConfigError
+from golem.evaluation.pool import CAN_COPY, in_a_copy
 from golem.types import Array
 
 QUICK = MPCConfig(threads=0, plan_rate=25.0)
@@ -48,6 +49,15 @@ def test_a_reset_repeats_everything_and_the_seed_changes_it() -> None:
     np.testing.assert_array_equal(commands(legs), first)
     np.testing.assert_array_equal(commands(MPC(replace(QUICK, threads=2))), first)
     assert not np.array_equal(commands(MPC(replace(QUICK, planner=PlannerConfig(seed=1)))), first)
+
+
+@pytest.mark.skipif(not CAN_COPY, reason="the system cannot go on in a copy of a process")
+@pytest.mark.timeout(60)
+def test_a_copy_of_the_process_plans_on_without_the_threads_that_it_left_behind() -> None:
+    legs = MPC(replace(QUICK, threads=2))
+    first = commands(legs)
+    np.testing.assert_array_equal(in_a_copy(lambda: commands(legs)), first)
+    np.testing.assert_array_equal(commands(legs), first)
 
 
 def test_between_plans_the_present_one_is_followed_to_where_the_command_arrives() -> None:

@@ -7,6 +7,7 @@ the pelvis, which halves the cost of a step against a model with all 27 joints.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import mujoco
@@ -123,7 +124,8 @@ class PlanningModel:
         self._body = self._model.body(_UPPER_BODY).id
         self._data = mujoco.MjData(self._model)
         self._workers = [mujoco.MjData(self._model) for _ in range(max(threads, 1))]
-        self._rollout = Rollout(nthread=threads)
+        self._threads = threads
+        self._pools: dict[int, Rollout] = {}
         self._qpos = np.array([self._model.joint(n).qposadr[0] for n in JOINT_NAMES[LEGS]])
         self._qvel = np.array([self._model.joint(n).dofadr[0] for n in JOINT_NAMES[LEGS]])
         self._state = np.zeros(1 + self._model.nq + self._model.nv)
@@ -155,7 +157,7 @@ class PlanningModel:
         n, m = targets.shape[:2]
         state: Array = np.empty((n, m, self._state.size))
         sensors: Array = np.empty((n, m, self._model.nsensordata))
-        self._rollout.rollout(
+        self._pool().rollout(
             self._model, self._workers, self._state, targets, state=state, sensordata=sensors
         )
         vectors = sensors[..., : 3 * 7].reshape(n, m, 7, 3)
@@ -169,6 +171,17 @@ class PlanningModel:
             torque=sensors[..., 3 * 7 :],
             q=state[..., 1 + self._qpos],
         )
+
+    def _pool(self) -> Rollout:
+        """Return the worker threads of this process.
+
+        Those of the process that it was forked from did not come along; they are kept, since to drop them is to wait
+        for their end.
+        """
+        process = os.getpid()
+        if process not in self._pools:
+            self._pools[process] = Rollout(nthread=self._threads)
+        return self._pools[process]
 
     def _weld(self, q: Array) -> None:
         """Give the rigid upper body the inertia of the joints `q` (27,) [rad] and find the stance that goes with it."""
