@@ -1,6 +1,8 @@
 # ruff: noqa: E402 (nothing of the trainer can be imported where torch is absent)
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -55,6 +57,32 @@ def test_a_robot_that_lies_down_ends_its_episode_and_starts_anew() -> None:
     env.restart(fallen)
     assert (env.age[fallen] == 0.0).all()
     np.testing.assert_allclose(env.world.truth.height[fallen], 0.97, atol=0.03)
+
+
+def test_a_robot_that_diverges_is_a_fall_and_teaches_nothing_that_is_not_a_number() -> None:
+    env = LegsEnv(4, EnvConfig(), 0, 1)
+    true_rewards = env._rewards
+
+    def rewards(*args: Any) -> tuple[Any, Any]:
+        reward, terms = true_rewards(*args)
+        reward[2] = np.nan
+        return reward, terms
+
+    env._rewards = rewards  # pyright: ignore[reportAttributeAccessIssue]
+    step = env.step(np.zeros((4, 12)), NOBODY, np.zeros((0, 15)))
+    assert step.ended.tolist() == [False, False, True, False]
+    assert step.reward[2] == -EnvConfig().fall and np.isfinite(step.reward).all()
+
+
+def test_a_run_that_goes_on_meets_other_draws_and_the_same_ones_each_time() -> None:
+    def begins(*seed: int) -> np.ndarray:
+        env = LegsEnv(6, EnvConfig(), 0, 1)
+        env.reseed(seed)
+        return env.world.friction
+
+    np.testing.assert_array_equal(begins(0, 500), begins(0, 500))
+    assert not np.array_equal(begins(0, 500), begins(0, 1000))
+    assert not np.array_equal(begins(0, 500), begins(1, 500))
 
 
 def test_commands_stay_inside_the_trained_envelope_and_change_slowly() -> None:

@@ -50,6 +50,10 @@ def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(
         changed.setitem(TASKS, "walk", replace(TASKS["walk"], fall=7.0))
         train(small(tmp_path / "a", updates=12, learned_from=0.0))
     draw_curves([tmp_path / name for name in "abc"], tmp_path / "curve.png")
+    with pytest.raises(ConfigError, match="8 runs at most, not 9"):
+        draw_curves([tmp_path / "a"] * 9, tmp_path / "curve.png")
+    with pytest.raises(ConfigError, match="different names"):
+        draw_curves([tmp_path / "a"] * 2, tmp_path / "curve.png")
     assert (tmp_path / "curve.png").stat().st_size > 1000
 
 
@@ -150,7 +154,8 @@ def test_disturbances_grow_with_the_steps(adversary: Adversary, tmp_path: Path) 
     train(small(tmp_path, updates=10, adversary=adversary, **ramps))
     with (tmp_path / CURVE).open() as file:
         rows = list(csv.DictReader(file))
-    push, motion = ([float(row[name]) for row in rows] for name in ("push", "amplitude"))
+    push, motion, payload = ([float(row[name]) for row in rows] for name in ("push", "amplitude", "payload"))
+    assert payload == motion
     assert push[0] == pytest.approx(0.525) and push[1:] == [1.0] * 9
     assert motion == ([0.05, 0.05, 0.525] + [1.0] * 7 if adversary == "motions" else [0.0] * 10)
 

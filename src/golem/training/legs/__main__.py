@@ -32,7 +32,8 @@ def run(
         seed: of weights, episodes and noise.
         task: what is learned: to walk as told, or to stand against pushes.
         steps: actions of all robots together, those of `start` included.
-        adversary: what moves the upper body: none, motions (a curriculum), or learned (motions, then a policy as well).
+        adversary: who works against the legs through arms, waist and payloads: none, motions (a curriculum), or learned
+            (motions, then a policy as well).
         robots: how many are simulated at once.
         threads: of physics and networks.
         start: checkpoint of another run to go on from, under this command's options.

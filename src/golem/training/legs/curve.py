@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from golem.errors import ConfigError
 from golem.training.legs.checkpoint import read_curve
 
 PANELS = (
@@ -20,7 +21,7 @@ PANELS = (
 SIZE = (360, 300)
 MARGIN = (50, 30, 22, 40)
 """Left, top, right, bottom of a panel [px]."""
-COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
+COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#888888", "#000000")
 
 
 def draw_curves(runs: Sequence[Path], out: Path) -> None:
@@ -29,8 +30,15 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
     Args:
         runs: folders of training runs.
         out: the PNG file.
+
+    Raises:
+        ConfigError: more runs than colours, or two folders of one name.
     """
-    curves = {run.name: read_curve(run) for run in runs}
+    if len(runs) > len(COLOURS):
+        raise ConfigError(f"One picture shows {len(COLOURS)} runs at most, not {len(runs)}; draw two.")
+    curves = {run.resolve().name: read_curve(run) for run in runs}
+    if len(curves) < len(runs):
+        raise ConfigError("The picture names the runs by their folders; give them different names.")
     last = max(float(curve["steps"][-1]) for curve in curves.values())
     image = Image.new("RGB", (SIZE[0] * len(PANELS), SIZE[1] + 20 * len(curves)), "white")
     pen, font = ImageDraw.Draw(image), ImageFont.load_default(12)

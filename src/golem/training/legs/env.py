@@ -153,6 +153,11 @@ class LegsEnv:
         """(n,) which robots are commanded to move."""
         return np.asarray(np.abs(self.twist).max(axis=1) > 1e-6)
 
+    def reseed(self, seed: tuple[int, ...]) -> None:
+        """Begin with other draws, as if `seed` had been given at the start."""
+        self._rng.bit_generator.state = np.random.default_rng(seed).bit_generator.state
+        self.begin()
+
     def begin(self) -> None:
         """Start every robot, each somewhere in its episode, so that they do not all end at once."""
         self.restart(np.arange(self.n))
@@ -238,8 +243,9 @@ class LegsEnv:
         self.age += dt
         low = truth.height - truth.clearance.mean(axis=1) < 0.6
         tilted = truth.R[:, 2, 2] < np.cos(self._limits.tilt)
-        ended = low | tilted | self.world.stopped | ~np.isfinite(truth.q).all(axis=1)
-        reward = reward - config.fall * ended
+        diverged = ~np.isfinite(truth.q).all(axis=1) | ~np.isfinite(reward)
+        ended = low | tilted | self.world.stopped | diverged
+        reward = np.where(diverged, 0.0, reward) - config.fall * ended
         truncated = ~ended & (self.age >= config.episode)
         self._left -= dt
         self._command(np.flatnonzero(self._left <= 0.0))

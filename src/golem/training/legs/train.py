@@ -37,8 +37,9 @@ class TrainConfig:
         robots: how many are simulated at once.
         threads: of the physics and of the networks.
         start: checkpoint of another run whose networks and steps this one begins with, and with the noise of `noise`.
-        adversary: what moves the upper body: `none` (it rests in random postures), `motions` (the curriculum), or
-            `learned` (motions, and a policy that moves half of the robots once `learned_from` steps are done).
+        adversary: who works against the legs through the upper body: `none` (it rests at home, ready or straight, its
+            hands empty), `motions` (the curriculum of motions and payloads), or `learned` (that, and a policy that
+            moves half of the robots once `learned_from` steps are done).
         learned_from: steps after which the learned adversary begins.
         push_ramp, motion_ramp: steps before which pushes, and motions and payloads of the upper body, are light, and
             after which they have their full range. They grow whether or not the robot survives: tied to survival, as
@@ -196,7 +197,7 @@ class _Run:
         self.steps, self.updates, self._cpu = saved["steps"], saved["updates"], saved["cpu"]
         self._survival = saved["survival"]
         self._harden()
-        self.env.begin()
+        self.env.reseed((self.config.seed, self.steps))
         self._obs, self._known = self.env.observe()
 
     def begin_with(self, path: Path) -> None:
@@ -221,8 +222,8 @@ class _Run:
         config, difficulty = self.config, self.env.difficulty
         difficulty.push = float(np.interp(self.steps, config.push_ramp, (0.05, 1.0)))
         motion = float(np.interp(self.steps, config.motion_ramp, (0.05, 1.0)))
-        difficulty.payload = motion
-        difficulty.amplitude = difficulty.speed = 0.0 if config.adversary == "none" else motion
+        motion = 0.0 if config.adversary == "none" else motion
+        difficulty.amplitude = difficulty.speed = difficulty.payload = motion
 
     def _write(self) -> None:
         """Append what was logged to the curve, and print the newest row."""
