@@ -131,6 +131,23 @@ def test_a_stopped_robot_aborts_its_skill_and_begins_none(client: Client) -> Non
     assert status is GoalStatus.ABORTED and "stop_requested" in result.reason
 
 
+def test_a_robot_that_falls_silent_aborts_its_skill_and_begins_none(client: Client) -> None:
+    live = client.live
+    goal = client.send("/skill/stand", stand(5.0))
+    twin, live.twin = live.twin, None  # its clock stands still, and with it everything that goes by it
+    status, result = client.outcome(goal, 4.0)
+    assert (status, result.stage) == (GoalStatus.ABORTED, "robot") and "silent" in result.reason
+    status, result = client.outcome(client.send("/skill/stand", stand(0.1)))
+    assert (status, result.stage) == (GoalStatus.ABORTED, "refused") and "silent" in result.reason
+    live.twin = twin
+    live.run(0.2)
+    live.ask("reset")
+    live.activate()
+    live.run(0.02)
+    status, result = client.outcome(client.send("/skill/stand", stand(0.1)))
+    assert status is GoalStatus.SUCCEEDED, result.reason
+
+
 def test_a_robot_that_is_started_anew_aborts_its_skill(client: Client) -> None:
     goal = client.send("/skill/stand", stand(50.0))
     client.live.leave("twin")

@@ -127,9 +127,14 @@ def run_errand(errand: tuple[str, Errand]) -> int:
         result, asked = pursued.result(), None
         while not result.done:
             node.spin_once(0.1)
-            if stop.is_set() and asked is None:
-                say("Canceling.")
-                asked = pursued.cancel()
+            if not stop.is_set():
+                continue
+            stop.clear()
+            if asked is not None:
+                say("Leaving without an answer; the robot may still be at it.")
+                return CANCELED
+            say("Canceling; Ctrl-C again leaves at once.")
+            asked = pursued.cancel()
         outcome = result.result()
     ended = outcome.result.result
     say(f"{GoalStatus(outcome.status).name.lower()}: {ended.reason}")

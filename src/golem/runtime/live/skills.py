@@ -29,6 +29,7 @@ from golem.types import SIDES
 
 MARGIN = 10.0
 """Time a skill gets on top of what its goal allows it [s]: it ends by itself unless it hangs."""
+SILENT = "The robot has fallen silent."
 REFUSED = "refused"
 """Stage of the result of a goal that was never begun."""
 
@@ -113,6 +114,7 @@ class Skills:
         """Offer the actions on `surface`."""
         self._stack: StackSide | None = None
         self._t = 0.0
+        self._silent = False
         self._pursuit: Pursuit | None = None
         surface.act({name: Handler(self, offer) for name, offer in OFFERS.items()})
 
@@ -123,6 +125,13 @@ class Skills:
             self._pursuit.run.fail("robot", anew.reason)
             self._give_up(anew)
         self._stack = stack
+
+    def hear(self, silent: bool) -> None:
+        """Note whether the robot is silent: its clock, by which everything here goes, then stands still."""
+        if silent and not self._silent and self._pursuit is not None:
+            self._pursuit.run.cancel()
+            self._give_up(SkillResult(False, "robot", "robot", SILENT))
+        self._silent = silent
 
     def busy(self) -> bool:
         """Return whether a goal is pursued."""
@@ -136,6 +145,8 @@ class Skills:
         try:
             if stack is None or safety is None:
                 raise GolemError("The robot does not report yet.")
+            if self._silent:
+                raise GolemError(SILENT)
             if self._pursuit is not None:
                 raise GolemError("Another skill is running; cancel it first.")
             if safety.state is not GateState.ACTIVE:

@@ -36,6 +36,8 @@ from golem.runtime.sides import StackSide
 from golem.stack import Stack
 from golem.types import SIDES, Array
 
+SILENCE = 2.0
+"""Time without a new state, by this process's clock, after which no goal is pursued any longer [s]."""
 SHOWN = ("/clock", "/joint_states", "/tf", "/tf_static", "/robot_description")
 """What of the robot's surface follows from its state, and is not the vendor's to publish."""
 
@@ -83,7 +85,8 @@ class LiveStack:
             )
         self._stack, self._node, self._real = stack, node, real
         self._bus = Bus()
-        self._robot = RobotClock()
+        self._robot, self._clock = RobotClock(), clock
+        self._heard = clock()
         self._calibration: dict[str, Array] = {name: np.eye(4) for name in public.CAMERAS}
         self._surface = surface = Surface("stack", participant, node)
         self.side: StackSide | None = None
@@ -111,6 +114,7 @@ class LiveStack:
         """Take the states that have come, and tick for each of them."""
         if not self.states.poll():
             self._node.poll()
+        self._skills.hear(silent=self._clock() - self._heard > SILENCE)
 
     def _now(self) -> float:
         return max(self._robot.t, 0.0)
@@ -130,6 +134,7 @@ class LiveStack:
             self._executor = self._build(state.t)
         self._bus.publish(topics.LOW_STATE, state, state.t)
         self._executor.advance(state.t, CATCH_UP)
+        self._heard = self._clock()
 
     def _build(self, t: float) -> Executor:
         """Build every module anew, for a robot whose time begins anew at `t` [s]."""
