@@ -12,14 +12,13 @@ from golem.middleware.bus import Bus, News
 from golem.middleware.topics import Exposure, LookRequest, Sightings
 from golem.robots.base import SLACK, Robot
 from golem.robots.model.kinematics import Kinematics
+from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.runtime.executor import TICK
 from golem.runtime.guard import Guard
-from golem.types import SIDES, Array, BaseEstimate, Frame, LocalizedObject, LowState
+from golem.types import Array, BaseEstimate, Frame, LocalizedObject, LowState
 
 LATENCY = 0.033
 """Time from exposure to the frame being available [s]: one frame period of a D400 at 30 Hz."""
-OPTICAL_FRAMES = {"head": "head_camera_optical"} | {f"{s}_hand": f"{s}_hand_camera_optical" for s in SIDES}
-"""Frame of the nominal model per camera."""
 MEMORY = 1.0
 """How old an exposure may be when its frame arrives [s]."""
 

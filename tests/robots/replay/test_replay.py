@@ -73,8 +73,8 @@ class Scribe:
         ):
             self.write(image("head", what), message.__msgtype__, codec.serialize(message), arrival)
 
-    def calibration(self, T: np.ndarray) -> None:
-        message = convert.transforms(0.0, [("head_camera_optical", optical_frame("head"))], T[np.newaxis])
+    def calibration(self, T: np.ndarray, parent: str = "head_camera_optical") -> None:
+        message = convert.transforms(0.0, [(parent, optical_frame("head"))], T[np.newaxis])
         self.write("/tf_static", message.__msgtype__, codec.serialize(message), 0.0)
 
     def close(self) -> None:
@@ -86,7 +86,11 @@ def test_everything_comes_at_its_time(tmp_path: Path, origin: float) -> None:
     T = np.eye(4)
     T[:3, 3] = 0.01, -0.02, 0.03
     scribe = Scribe(tmp_path / "bag", origin)
+    of_its_driver = np.eye(4)
+    of_its_driver[0, 3] = 0.5
+    scribe.calibration(of_its_driver, "camera_color_frame")
     scribe.calibration(T)
+    scribe.calibration(of_its_driver, "camera_color_frame")
     for k in range(501):
         t = k * 0.002
         scribe.state(t)

@@ -24,8 +24,8 @@ from golem.middleware.wire import hg
 from golem.middleware.wire.convert import answered, encode_low_state
 from golem.middleware.wire.rpc import RpcServer
 from golem.robots.onboard import motion_switcher
+from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.robots.sensors.cameras import CAMERAS
-from golem.runtime.cameras import OPTICAL_FRAMES
 from golem.runtime.executor import Executor
 from golem.runtime.live import authority
 from golem.runtime.live.gate import LiveGate

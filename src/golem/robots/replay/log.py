@@ -24,6 +24,7 @@ from golem.middleware.ros.msgs.sensor_msgs import Image
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
 from golem.middleware.wire.convert import decode_low_state
 from golem.robots.base import SLACK
+from golem.robots.sensors.calibration import calibrations
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.pairing import Pairing
 from golem.types import SIDES, Array, CameraInfo, HandState, LowState, Side
@@ -139,20 +140,18 @@ def _image(take: Callable[[Image], None], message: Message) -> None:
 def _cameras(bag: Bag) -> tuple[dict[str, CameraInfo], dict[str, Array]]:
     """Return the recorded cameras and their calibration; what ROS does not say of a camera, its table does."""
     infos = {public.image(name, public.CAMERA_INFO): name for name in CAMERAS}
-    missing = {topic for topic in (*infos, STATIC) if topic in bag.topics}
+    recorded = [topic for topic in infos if topic in bag.topics]
     found: dict[str, CameraInfo] = {}
     claimed: dict[str, Array] = {}
-    for message in bag.messages(tuple(missing)):
+    for message in bag.messages((*recorded, STATIC)):
         topic = message.topic.name
         if topic == STATIC:
-            for link in codec.deserialize(message.payload, TFMessage).transforms:
-                claimed[link.child_frame_id] = convert.transform_matrix(link.transform)
+            claimed |= calibrations(codec.deserialize(message.payload, TFMessage))
         elif infos[topic] not in found:
             nominal = CAMERAS[infos[topic]]
             info = codec.deserialize(message.payload, InfoMessage)
             camera = images.to_camera(info, nominal.name, nominal.near, nominal.far, nominal.rate)
             found[camera.name] = camera
-        missing.discard(topic)
-        if not missing:
+        if len(found) == len(recorded) and claimed.keys() >= found.keys():
             break
-    return found, {name: claimed.get(public.optical_frame(name), np.eye(4)) for name in found}
+    return found, {name: claimed.get(name, np.eye(4)) for name in found}

@@ -22,8 +22,8 @@ PATIENCE = 1.0
 """How long the robot's time stands still for an answer or an image at most [s] [own: with two cores for three times as
 many busy threads, processes were held up for 0.6 s]."""
 SILENCE = 2.0 * PATIENCE
-"""Age of state or command at which the gate stops a simulated robot, and at which the stack takes the gate for dead
-[s]."""
+"""Age of state or command at which the gate stops a simulated robot, and at which the stack takes the gate, or the
+robot that it works with, for dead [s]."""
 
 
 def patient(limits: SafetyLimits) -> SafetyLimits:

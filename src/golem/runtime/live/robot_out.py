@@ -15,7 +15,7 @@ from golem.middleware.ros.msgs.std_msgs import String
 from golem.middleware.topics import Exposure
 from golem.robots.model import tree
 from golem.robots.model.export import export_urdf
-from golem.runtime.cameras import OPTICAL_FRAMES
+from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.runtime.executor import TICK
 from golem.runtime.live.surface import Surface
 from golem.types import SIDES, Array, HandState, LowState, Side

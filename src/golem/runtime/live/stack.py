@@ -27,7 +27,7 @@ from golem.runtime.live import stack_out as out
 from golem.runtime.live.clock import RobotClock
 from golem.runtime.live.motors import RequestOut
 from golem.runtime.live.onboard import AnswersIn, CallsOut, Identities, LegsIn
-from golem.runtime.live.pace import CATCH_UP
+from golem.runtime.live.pace import CATCH_UP, SILENCE
 from golem.runtime.live.robot_out import ClockOut, FramesOut, JointsOut, describe
 from golem.runtime.live.skills import Skills
 from golem.runtime.live.stack_in import CameraIn, GateIn, RemoteBand, listen
@@ -36,8 +36,6 @@ from golem.runtime.sides import StackSide
 from golem.stack import Stack
 from golem.types import SIDES, Array
 
-SILENCE = 2.0
-"""Time without a new state, by this process's clock, after which no goal is pursued any longer [s]."""
 SHOWN = ("/clock", "/joint_states", "/tf", "/tf_static", "/robot_description")
 """What of the robot's surface follows from its state, and is not the vendor's to publish."""
 

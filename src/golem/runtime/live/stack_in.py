@@ -14,11 +14,11 @@ from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs import golem_interfaces, sensor_msgs
 from golem.middleware.ros.msgs.geometry_msgs import Twist
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
-from golem.middleware.ros.msgs.tf2_msgs import TFMessage
 from golem.middleware.topics import Exposure
+from golem.robots.sensors.calibration import calibrations
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.pairing import Pairing
-from golem.runtime.cameras import OPTICAL_FRAMES, looked_for
+from golem.runtime.cameras import looked_for
 from golem.runtime.executor import TICK
 from golem.runtime.live.member import say
 from golem.runtime.live.pace import SILENCE
@@ -167,14 +167,6 @@ def listen(
         now: robot time [s].
         busy: whether a skill has the robot: velocities from elsewhere are then ignored.
     """
-    cameras = {public.optical_frame(camera): camera for camera in public.CAMERAS}
-
-    def take_frames(message: TFMessage) -> None:
-        for link in message.transforms:
-            camera = cameras.get(link.child_frame_id)
-            # The drivers of the cameras publish frames of the same names, in other parents.
-            if camera is not None and link.header.frame_id == OPTICAL_FRAMES[camera]:
-                calibration[camera] = convert.transform_matrix(link.transform)
 
     def take_twist(message: Twist) -> None:
         if not busy():
@@ -184,7 +176,7 @@ def listen(
         topic = topics.hand_state(side)
         return lambda message: bus.publish(topic, convert.to_hand_state(message), now())
 
-    surface.subscribe("/tf_static", take_frames)
+    surface.subscribe("/tf_static", lambda message: calibration.update(calibrations(message)))
     surface.subscribe("/cmd_vel", take_twist)
     for side in SIDES:
         surface.subscribe(public.gripper(side, "state"), take_hand(side))
