@@ -106,8 +106,8 @@ def gripper(side: str, what: str) -> str:
 
 COLOR, COLOR_JPEG = "color/image_raw", "color/image_raw/compressed"
 DEPTH, DEPTH_PNG = "aligned_depth_to_color/image_raw", "aligned_depth_to_color/image_raw/compressedDepth"
-CAMERA_INFO = "color/camera_info"
-IMAGES = (CAMERA_INFO, COLOR, COLOR_JPEG, DEPTH, DEPTH_PNG)
+CAMERA_INFO, DEPTH_INFO = "color/camera_info", "aligned_depth_to_color/camera_info"
+IMAGES = (CAMERA_INFO, DEPTH_INFO, COLOR, COLOR_JPEG, DEPTH, DEPTH_PNG)
 """What there is of each camera; first what the others are read with."""
 
 
@@ -118,6 +118,7 @@ def _camera(camera: str) -> tuple[Topic, ...]:
         (DEPTH, "Image", ("stack",), "Depth aligned to colour, 16UC1 [mm], 0 where there is none."),
         (DEPTH_PNG, "CompressedImage", (), "The same as PNG, behind the 12 bytes of compressed_depth."),
         (CAMERA_INFO, "CameraInfo", ("stack",), "Pinhole intrinsics, no distortion."),
+        (DEPTH_INFO, "CameraInfo", (), "The same: the depth is aligned to colour."),
     )
     frame = optical_frame(camera)
     return tuple(

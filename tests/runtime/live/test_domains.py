@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+import tyro
 
 from golem.errors import ConfigError
 from golem.middleware.dds.domain import DdsConfig
@@ -37,6 +38,15 @@ def test_a_wrong_stack_file_is_found_before_anything_is_started() -> None:
         run_launch(LaunchConfig("nonsense"))
     with pytest.raises(ConfigError, match="No stack file 'nonsense'"):
         run_twin(TwinConfig("nonsense"))
+
+
+def test_a_command_line_says_what_is_not_the_default() -> None:
+    assert DdsConfig().command("safety") == "golem safety"
+    robot = DdsConfig(0, "eth0", ("10.0.0.2", "10.0.0.3"), robot=True, distro="humble")
+    assert robot.command("up stand") == (
+        "golem up stand --domain 0 --interface eth0 --peers 10.0.0.2 10.0.0.3 --robot --distro humble"
+    )
+    assert tyro.cli(DdsConfig, args=robot.words()) == robot
 
 
 def test_every_process_is_told_what_concerns_it() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
+from typing import Literal
 from xml.sax.saxutils import quoteattr
 
 from golem.errors import ConfigError
@@ -15,6 +16,8 @@ from golem.middleware.dds.base import DdsError
 from golem.middleware.dds.interfaces import Interface, find_interface
 from golem.middleware.dds.library import PRECONDITION_NOT_MET, Cyclone
 
+Distro = Literal["humble", "jazzy"]
+"""ROS 2 distributions that differ on the wire: of the types GOLEM uses, in `rmw_dds_common/msg/Gid` alone."""
 ROBOT_DOMAIN = 0
 """The domain of the real robot."""
 LAST_DOMAIN = 232
@@ -33,6 +36,8 @@ class DdsConfig:
     """Addresses of machines to look for besides those that multicast finds; for networks without multicast."""
     robot: bool = False
     """Take part in the real robot's domain; its domain and interface have to be named as well."""
+    distro: Distro = "jazzy"
+    """Whose `ros2 node list` shows our nodes: ROS 2 humble's, or jazzy's, which is that of all since iron."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.domain <= LAST_DOMAIN:
@@ -50,6 +55,18 @@ class DdsConfig:
             raise ConfigError(
                 "The real robot is not on this machine: add --interface with the one its cable is in."
             )
+
+    def words(self) -> list[str]:
+        """Return what a command line says of it; nothing where it is the default."""
+        words = [] if self.domain == 1 else ["--domain", str(self.domain)]
+        words += [] if self.interface == "lo" else ["--interface", self.interface]
+        words += ["--peers", *self.peers] if self.peers else []
+        words += ["--robot"] if self.robot else []
+        return words + ([] if self.distro == "jazzy" else ["--distro", self.distro])
+
+    def command(self, words: str) -> str:
+        """Return the command `golem words` as it is to be given to take part here."""
+        return " ".join(["golem", words, *self.words()])
 
     def __str__(self) -> str:
         return f"domain {self.domain}, interface {self.interface}"

@@ -11,15 +11,14 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast, get_args
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 from golem.errors import MissingExtra, unknown_name
+from golem.middleware.dds.domain import Distro
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
-Distro = Literal["humble", "jazzy"]
-"""A ROS 2 distribution whose standard types are known; of those GOLEM uses, only `rmw_dds_common/msg/Gid` differs."""
 SHARE = Path(__file__).parent / "share"
 """Folder of the interface packages."""
 SEPARATOR = "---"

@@ -123,7 +123,7 @@ def run_errand(errand: tuple[str, Errand]) -> int:
     action, what = errand
     goal = what.goal
     with interrupted() as stop, member("skill", what.dds) as (_, node):
-        pursued = propose(node, action, goal, f"start a stack with: golem up STACK, on {what.dds}")
+        pursued = propose(node, action, goal, f"start a stack with: {what.dds.command('up STACK')}")
         result, asked = pursued.result(), None
         while not result.done:
             node.spin_once(0.1)

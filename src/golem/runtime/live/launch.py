@@ -60,9 +60,7 @@ def commands(config: LaunchConfig) -> dict[Part, list[str]]:
             "golem safety --robot --domain 0 --interface NAME; golem up STACK --robot --domain 0 --interface NAME."
         )
     stack = load_stack(config.stack, profile=config.profile)
-    dds = ["--domain", str(config.dds.domain), "--interface", config.dds.interface]
-    if config.dds.peers:
-        dds += ["--peers", *config.dds.peers]
+    dds = config.dds.words()
     profile = ["--profile", config.profile] if config.profile else []
     world = ["--world", config.world] if config.world else []
     return {

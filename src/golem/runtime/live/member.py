@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from queue import SimpleQueue
 
+from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
@@ -30,8 +31,21 @@ def member(name: str, dds: DdsConfig) -> Iterator[tuple[CycloneParticipant, DdsN
         ConfigError, DdsError: the domain cannot be joined.
     """
     with closing(connect(dds, f"{PARTICIPANT_USER_DATA}golem={name};")) as participant:
-        with closing(DdsNode(participant, name)) as node:
+        with closing(DdsNode(participant, name, distro=dds.distro)) as node:
             yield participant, node
+
+
+def company(participant: CycloneParticipant, dds: DdsConfig) -> str:
+    """Return how many others are on the domain, and where there is nobody, what to look at."""
+    others = sum(other.guid != participant.guid for other in discovery.members(participant))
+    if others:
+        return f"{others} others are there"
+    if dds.interface == "lo":
+        return "nobody else is there"
+    return (
+        "nobody else is there: look at the cable and the address of the interface, and where multicast does not pass, "
+        "name the other machine with --peers ADDRESS"
+    )
 
 
 def until(node: Node, condition: Callable[[], bool], timeout: float) -> bool:

@@ -68,7 +68,7 @@ def run_request(what: str, config: RequestConfig) -> bool:
         if not service:
             return _status(node, config.dds)
         kind = next(row.type for row in public.SERVICES if row.name == service)
-        response = ask(node, service, kind, request, f"start it with: golem safety, on {config.dds}")
+        response = ask(node, service, kind, request, f"start it with: {config.dds.command('safety')}")
         say(response.message)
         return response.success
 
@@ -109,7 +109,7 @@ def _status(node: Node, dds: DdsConfig) -> bool:
     row = public.topic("/safety/status")
     subscription = node.subscription(row.name, row.type, None, row.qos)
     if not until(node, lambda: subscription.latest() is not None, SEARCH):
-        raise RosError(f"No safety gate on {dds}; start one with: golem safety.")
+        raise RosError(f"No safety gate on {dds}; start one with: {dds.command('safety')}")
     message = subscription.latest()
     assert message is not None
     status = to_status(message, 0.0)

@@ -23,7 +23,7 @@ from golem.runtime.assembly import build_robot
 from golem.runtime.executor import TICK
 from golem.runtime.live.darkroom import Darkroom
 from golem.runtime.live.gate import LiveGate
-from golem.runtime.live.member import Teller, member, say
+from golem.runtime.live.member import Teller, company, member, say
 from golem.runtime.live.stack import LiveStack
 from golem.runtime.live.twin import Twin
 from golem.runtime.live.verdict import told
@@ -181,7 +181,12 @@ def run_up(config: UpConfig) -> None:
             if live.side is None:
                 if waiting_since is not None and time.monotonic() - waiting_since > ALONE:
                     waiting_since = None
-                    say(f"No robot on {config.dds} yet; start one with: golem twin {config.stack}")
+                    start = (
+                        ""
+                        if config.dds.robot
+                        else f" Start one with: {config.dds.command('twin ' + config.stack)}"
+                    )
+                    say(f"No robot on {config.dds} yet; {company(participant, config.dds)}.{start}")
                 continue
             if live.restarts != restarts:
                 restarts = live.restarts

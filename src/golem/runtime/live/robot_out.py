@@ -11,6 +11,7 @@ from golem.middleware.bus import Bus, News
 from golem.middleware.ros import convert, images
 from golem.middleware.ros.msgs.golem_interfaces import HandCommand as HandCommandMessage
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
+from golem.middleware.ros.msgs.sensor_msgs import CameraInfo
 from golem.middleware.ros.msgs.std_msgs import String
 from golem.middleware.topics import Exposure
 from golem.robots.model import tree
@@ -112,12 +113,17 @@ class CameraOut:
         if e is None:
             return
         frame = self._frame
+
+        def info() -> CameraInfo:
+            return images.camera_info(e.t, e.info, frame)
+
         forms = {
             public.COLOR: lambda: images.color_image(e.t, e.rgb, frame),
             public.COLOR_JPEG: lambda: images.color_jpeg(e.t, e.rgb, frame),
             public.DEPTH: lambda: images.depth_image(e.t, e.depth, frame),
             public.DEPTH_PNG: lambda: images.depth_png(e.t, e.depth, frame),
-            public.CAMERA_INFO: lambda: images.camera_info(e.t, e.info, frame),
+            public.CAMERA_INFO: info,
+            public.DEPTH_INFO: info,
         }
         for what, topic in self._topics.items():
             if self._surface.heard(topic):
