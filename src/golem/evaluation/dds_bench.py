@@ -23,9 +23,7 @@ from golem.types import Array
 GOLEM = (sys.executable, "-m", "golem.evaluation.dds_loop")
 SDK_SCRIPT = Path(__file__).with_name("sdk_loop.py")
 PERIOD = 0.002
-TARGETS = (
-    "0 lost, median latency of the transport 150 us, robot 20 % of a core without images, 3 ms per image"
-)
+TARGETS = "0 lost, median latency 150 us, robot 20 % of a core without images, 3 ms per image"
 
 
 class BenchFailed(GolemError):

@@ -28,7 +28,7 @@ wait_for_peer(participant, states, "start it", 10.0)
 wait_for_peer(participant, images, "start it", 10.0)
 print("matched", flush=True)
 longest, sent = 0.0, 0
-end = time.monotonic() + 6.0
+end = time.monotonic() + 5.0 + float(sys.argv[2])
 i = 0
 while time.monotonic() < end:
     start = time.monotonic()
@@ -96,14 +96,17 @@ def run(end: End, script: str, *arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
 
-def test_a_cut_link_neither_holds_up_the_writer_nor_ends_the_stream(ends: tuple[End, End]) -> None:
+@pytest.mark.parametrize("seconds", [1.0, pytest.param(5.0, marks=pytest.mark.slow)])
+def test_a_cut_link_neither_holds_up_the_writer_nor_ends_the_stream(
+    ends: tuple[End, End], seconds: float
+) -> None:
     here, there = ends
-    reader, writer = run(there, READER), run(here, WRITER)
+    reader, writer = run(there, READER), run(here, WRITER, str(seconds))
     try:
         assert writer.stdout is not None and writer.stdout.readline().strip() == "matched"
         time.sleep(1.5)
         there.plug(False)
-        time.sleep(1.0)
+        time.sleep(seconds)
         there.plug(True)
         wrote = json.loads(writer.communicate(timeout=30.0)[0])
         read = json.loads(reader.communicate(timeout=30.0)[0])
@@ -111,8 +114,8 @@ def test_a_cut_link_neither_holds_up_the_writer_nor_ends_the_stream(ends: tuple[
         writer.kill()
         reader.kill()
     assert wrote["longest"] < 0.6, "the writer waited for the link"  # 1 to 2 s with the default send buffer
-    assert read["gap"] > 0.7, "the link was not cut"
-    assert read["after"] > 200 and read["images"] > wrote["images"] / 4
+    assert read["gap"] > seconds - 0.3, "the link was not cut"
+    assert read["after"] > 200 and read["images"] > wrote["images"] / 6
 
 
 def test_where_multicast_does_not_pass_one_side_has_to_name_the_other_which_may_come_late(
