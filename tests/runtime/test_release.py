@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from golem.errors import ModuleFault
 from golem.robots.base import Banded
 from golem.runtime.assembly import Running, build, start_posture
 from golem.runtime.release import READY
@@ -90,3 +93,22 @@ def test_each_support_has_its_posture() -> None:
     # Knees: slightly bent where the legs hang, a crouch where they carry.
     assert start_posture()[3] == pytest.approx(0.36)
     assert start_posture(on_ground=True)[3] == pytest.approx(0.8)
+
+
+BLIND = """
+from dataclasses import replace
+from golem.hardware.estimator.random_walk_kf import RandomWalkKF
+
+class Blind(RandomWalkKF):
+    def step(self, *args):
+        return replace(super().step(*args), stale=True)
+"""
+
+
+def test_an_estimator_that_finds_no_floor_is_named(tmp_path: Path) -> None:
+    (tmp_path / "blind.py").write_text(BLIND)
+    running, robot = build(replace(STANDING, estimator=Choice(f"{tmp_path / 'blind.py'}:Blind")), seed=0)
+    assert released_at(running, robot, READY + 1.0) is not None
+    with pytest.raises(ModuleFault, match="Module estimator: .*Blind failed: it found no foot"):
+        running.executor.run(READY + 1.0)
+    robot.close()

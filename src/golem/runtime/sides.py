@@ -176,12 +176,13 @@ class StackSide:
         self._skills = nodes.SkillNode(self.context)
         # One for all goals: it may learn how these legs stop.
         self.navigator: Navigator = GuardedNavigator(*make("navigator"))
+        estimator, estimator_guard = make("estimator")
         localizer, guard = make("localizer")
         lower_body = make("lower_body", onboard=BusOnboard(bus))
         reserve = make("lower_body", stack.legs_in_reserve, onboard=BusOnboard(bus))
         self.legs = LowerBodyNode(bus, Legs(*lower_body), Legs(*reserve))
         self.nodes: list[Placed] = [
-            (Phase.ESTIMATE, nodes.EstimatorNode(bus, *make("estimator"))),
+            (Phase.ESTIMATE, nodes.EstimatorNode(bus, estimator, estimator_guard)),
             (Phase.PERCEIVE, cameras.FrameNode(bus, calibration, latency)),
             *(
                 (Phase.PERCEIVE, cameras.LocalizerNode(bus, localizer, name, guard, beside))
@@ -196,7 +197,8 @@ class StackSide:
             self.nodes.append((Phase.CONTROL, nodes.HandNode(bus, hand, side, hand_guard)))
         self.nodes.append((Phase.CONTROL, nodes.ServoNode(bus, *make("servo"))))
         if band is not None:
-            self.nodes.append((Phase.OPERATE, ReleaseNode(bus, band, Guard("robot", stack.robot.use))))
+            robot_guard = Guard("robot", stack.robot.use)
+            self.nodes.append((Phase.OPERATE, ReleaseNode(bus, band, robot_guard, estimator_guard)))
 
     @property
     def method(self) -> GraspMethod:
