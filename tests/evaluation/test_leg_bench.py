@@ -135,6 +135,8 @@ def test_who_was_lost_did_not_arrive(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_rate_of_the_planner_is_timed_alone(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="alone"):
         run_leg_bench(LegBenchConfig(test=("plans",), j=2, out=tmp_path / "run"))
+    with pytest.raises(ConfigError, match="give --method mpc"):
+        run_leg_bench(LegBenchConfig(test=("plans",), out=tmp_path / "run"))
     with pytest.raises(ConfigError, match="twice"):
         run_leg_bench(LegBenchConfig(test=("quiet", "quiet"), out=tmp_path / "run"))
 

@@ -15,7 +15,7 @@ from tyro.conf import arg
 
 from golem.errors import ConfigError, ModuleFault, unknown_name
 from golem.evaluation.campaign import Done, Result, robot_options, run_campaign, write_files
-from golem.evaluation.episode import LATENCY
+from golem.evaluation.episode import LATENCY, legs_stack
 from golem.evaluation.leg_tests import LOST, MISSED, TESTS, lost_in, plans
 from golem.evaluation.provenance import commit
 from golem.evaluation.subject import Subject, labels
@@ -31,8 +31,8 @@ class LegBenchConfig:
 
     quiet: 60 s of standing. arms: the same with both arms sweeping and 1 kg in each hand. tracking: one twist of the
     envelope per trial, its 26 ends, edges and corners first. endurance: 60 s of random twists and shoves up to 30 N s
-    per trial. slope, rubble: 15 s ahead on rough ground. stopping: at a pose 2 m away. plans: rate of the MPC's
-    planner for several numbers of samples, one per trial.
+    per trial. slope, rubble: 10 s ahead on rough ground. stopping: at a pose 2 m away. plans: rate of the
+    planner of --method mpc with several numbers of samples, one per trial.
     """
 
     test: tuple[str, ...] = ("quiet", "tracking", "stopping")
@@ -46,7 +46,7 @@ class LegBenchConfig:
     latency: float = LATENCY
     """Delay of motor commands on top of the profile's [s]."""
     robot: tuple[str, ...] = ()
-    """Further options of the twin, e.g. feet=box cone=elliptic mjcf=../h1_2.xml."""
+    """Further options of the twin, e.g. feet=box cone=elliptic, or mjcf=../h1_2.xml."""
     seed: int = 0
     """Seed; trial i of every method meets the same draws."""
     out: Path = Path("runs/leg-bench")
@@ -102,6 +102,8 @@ def run_leg_bench(config: LegBenchConfig) -> list[dict[str, Any]]:
             raise ConfigError(f"--{option} names one of them twice.")
     if plans.__name__ in config.test and (config.j, config.test, len(config.method)) != (1, ("plans",), 1):
         raise ConfigError("The test plans times the machine: give it alone, with one --method and -j 1.")
+    if plans.__name__ in config.test and legs_stack(config.method[0], config.profile).lower_body.use != "mpc":
+        raise ConfigError('The test plans is of the MPC: give --method mpc, or "{use: mpc, option: value}".')
     robot = {"latency": config.latency, **robot_options(config.robot)}
     subjects = [Subject.of(method, config.profile, robot) for method in config.method]
     trials = [

@@ -45,8 +45,8 @@ COMMAND, COUNTED = 7.0, 4.0
 """How long one twist is commanded, and the last part of it that is counted [s]: whole gait cycles, nearly."""
 ROUGH = Twist(vx=0.4)
 """Twist on slope and rubble."""
-ROUGH_TIME = 15.0
-"""Time it is commanded [s]: the ramp begins a metre ahead."""
+ROUGH_TIME = 10.0
+"""Time it is commanded [s]: ramp and tiles begin a metre ahead and end after three more."""
 MAX_SHOVE = 30.0
 """Largest push of the endurance test [N s]."""
 PATIENCE = 4.0
@@ -187,11 +187,17 @@ def plans(subject: Subject, seed: int, index: int) -> Figures:
     """Stand for 10 s with an MPC of so many samples: plans per second on this machine's cores, and whether it stands.
 
     In lock-step a plan is there after the latency the controller declares, however long it took; it stands in real time
-    where it stands and plans at least as often as it says. The subject's method does not matter, its plant does.
+    where it stands and 95 of 100 plans take no longer than that, nor than the time between two.
     """
     samples = SAMPLES[index % len(SAMPLES)]
-    stack = legs_stack("mpc", subject.profile, robot=subject.robot)
-    stack = replace(stack, lower_body=Choice("mpc", {"planner": {"samples": samples}}))
+    stack = legs_stack(subject.method, subject.profile, robot=subject.robot)
+    options = dict(stack.lower_body.options)
+    options["planner"] = {**options.get("planner", {}), "samples": samples}
+    stack = replace(stack, lower_body=Choice(stack.lower_body.use, options))
+    allowed = (
+        options.get("latency", MPCConfig().latency),
+        1.0 / options.get("plan_rate", MPCConfig().plan_rate),
+    )
     with closing(Episode(stack, episode_seed(seed, index))) as episode:
         with (
             stopwatch(MPC, "plan", time.perf_counter) as wall,
@@ -201,10 +207,11 @@ def plans(subject: Subject, seed: int, index: int) -> Figures:
             episode.run(PLANNED)
         if not wall:
             return _lost(episode)
-        rate = 1.0 / float(np.median(wall))
-        stands = rate >= MPCConfig().plan_rate and not episode.over
+        in_time = float((np.array(wall) <= min(allowed)).mean())
+        stands = in_time >= 0.95 and not episode.over
         return {
-            f"plans_per_second_{samples}": rate,
+            f"plans_per_second_{samples}": 1.0 / float(np.median(wall)),
+            f"in_time_{samples}": in_time,
             f"cpu_per_plan_{samples}": float(np.median(cpu)),
             f"stands_{samples}": float(not episode.over),
             f"stands_in_real_time_{samples}": float(stands),
@@ -226,7 +233,7 @@ def command(envelope: Envelope, rng: np.random.Generator, index: int) -> Twist:
 
 def can_walk(envelope: Envelope) -> bool:
     """Return whether a lower body follows any twist at all."""
-    return any(limit for axis in (envelope.vx, envelope.vy, envelope.wz) for limit in axis)
+    return any(envelope.axes)
 
 
 def _random(envelope: Envelope, rng: np.random.Generator, still: bool) -> Twist:

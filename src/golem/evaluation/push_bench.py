@@ -78,7 +78,7 @@ class PushBenchConfig:
     latency: float = LATENCY
     """Delay of motor commands on top of the profile's [s]."""
     robot: tuple[str, ...] = ()
-    """Further options of the twin, e.g. feet=box cone=elliptic mjcf=../h1_2.xml."""
+    """Further options of the twin, e.g. feet=box cone=elliptic, or mjcf=../h1_2.xml."""
     seed: int = 0
     """Seed; trial i of every method meets the same draws."""
     out: Path = Path("runs/push-bench")

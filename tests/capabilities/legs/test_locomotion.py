@@ -236,6 +236,13 @@ def test_a_robot_that_lags_is_asked_for_more_within_bounds_and_for_nothing_when_
     assert driver.applied.vx < 0.5 + most  # begun anew
 
 
+def test_a_component_that_the_controller_does_not_have_is_not_asked_for() -> None:
+    driver = Driver(Recorder(envelope=Envelope((0.0, 0.8), (0.0, 0.0), (0.0, 0.0))), trim=0.5)
+    driver.base = replace(still(), velocity=np.array([0.0, 0.1, 0.0]))  # it drifts
+    driver.run(3.0, Twist(0.5))
+    assert driver.applied.vx > 0.5 and (driver.applied.vy, driver.applied.wz) == (0.0, 0.0)
+
+
 @pytest.mark.parametrize("start", ["never", "command", "balance", "recovery", "always"])
 def test_moving_is_what_the_robot_does_whatever_its_clock(start: Any) -> None:
     driver = Driver(Recorder(gait=GaitConfig(start=start)))

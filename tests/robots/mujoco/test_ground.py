@@ -201,6 +201,8 @@ def test_a_file_that_is_no_such_robot_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "robot.xml"
     with pytest.raises(ConfigError, match="cannot be read"):
         twin(mjcf=str(file))
+    with pytest.raises(ConfigError, match="leave feet, torque_profile and self_collision out"):
+        twin(mjcf=str(file), feet="box")
     file.write_text("<mujoco><worldbody><body name='pelvis'/></worldbody></mujoco>")
     with pytest.raises(ConfigError, match="27|vendor's order"):
         twin(mjcf=str(file))

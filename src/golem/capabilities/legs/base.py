@@ -50,6 +50,11 @@ class Envelope:
             if not (-inf < low <= 0.0 <= high < inf):
                 raise ConfigError(f"The envelope.{axis} is a range around zero, not {low:g} to {high:g}.")
 
+    @property
+    def axes(self) -> tuple[bool, bool, bool]:
+        """Which of vx, vy and wz the controller follows at all."""
+        return self.vx != (0.0, 0.0), self.vy != (0.0, 0.0), self.wz != (0.0, 0.0)
+
     def clamp(self, twist: Twist) -> Twist:
         """Return the nearest twist inside, each component by itself."""
         return Twist(
@@ -65,7 +70,7 @@ class Motion:
 
     Attributes:
         twist: velocity to aim at: a twist inside the controller's envelope, and the base layer's small correction (see
-            `trim.TrimConfig.most`); exactly zero means stand.
+            `trim.TrimConfig.most`) of the components that the envelope has; exactly zero means stand.
         phase: (2,) gait phase of the left and the right leg, 0 to 1, a leg's stance first (see `gait.Gait`).
         stepping: whether the gait clock runs; while it does not, both feet belong on the ground.
         commanded: whether the robot shall move; if not, `twist` corrects what the last steps of a stop, or those after

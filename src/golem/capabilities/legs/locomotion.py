@@ -213,7 +213,8 @@ class Locomotion:
         else:
             # Also through the last steps of a stop, and those after a push: they shall not carry it away.
             wanted = np.array(_values(self.applied))
-            self._trimmed = Twist(*self._trim.step(wanted, R, base.velocity, rate, dt).tolist())
+            trimmed = self._trim.step(wanted, R, base.velocity, rate, dt)
+            self._trimmed = Twist(*np.where(self.controller.envelope.axes, trimmed, wanted).tolist())
 
     def _feet(self, q: Array) -> Array:
         """Return the (2, 4, 4) poses of the soles' centres in base_link at the joints `q` (27,)."""

@@ -40,7 +40,7 @@ class MujocoConfig:
         payload: mass fixed in the left and the right hand, at the grasp frame [kg].
         latency: delay of motor commands on top of the profile's [s].
         mjcf: the robot from this file instead of ours: the joints, motors, `imu` site and link names of the vendor's
-            27-motor model, to which our hands are mounted.
+            27-motor model, to which our hands are mounted. Its soles, torque limits and contacts are its own.
     """
 
     support: Support = "hoist"
@@ -76,3 +76,9 @@ class MujocoConfig:
         ):
             if not least <= value <= most:
                 raise ConfigError(f"The twin's {name} is from {least:g} to {most:g}, not {value:g}.")
+        own = (self.feet, self.torque_profile, self.self_collision)
+        if self.mjcf is not None and own != ("spheres", "urdf", None):
+            raise ConfigError(
+                "The robot of an mjcf file has soles, torque limits and contacts of its own: leave feet, "
+                "torque_profile and self_collision out beside it."
+            )
