@@ -15,7 +15,7 @@ BROKEN = {
     "command": (["ladr"], "Did you mean 'ladder'?"),
     "rung": (
         ["ladder", "--rung", "teter"],
-        "valid: navigate-line, push, stand, tether. Did you mean 'tether'?",
+        "valid: navigate-line, push, push-ramp, stand, tether. Did you mean 'tether'?",
     ),
     "method": (["ladder", "--method", "centriod"], "Did you mean 'centroid'?"),
     "method file": (["ladder", "--method", "x.py:Mine"], "does not exist"),

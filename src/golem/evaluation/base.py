@@ -24,6 +24,7 @@ RUNGS: dict[str, str] = {
     "tether": "golem.evaluation.rungs.pick:Tether",
     "stand": "golem.evaluation.rungs.pick:Stand",
     "push": "golem.evaluation.rungs.push:PushRung",
+    "push-ramp": "golem.evaluation.rungs.push_ramp:PushRampRung",
     "navigate-line": "golem.evaluation.rungs.navigate_line:NavigateLine",
 }
 """Rung name -> `module:Class`; the module is imported when the rung is used."""

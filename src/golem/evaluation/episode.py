@@ -195,6 +195,10 @@ class Episode:
         """Begin `push` now; it goes on while the episode runs."""
         self._pusher.begin(push, self.t, self.recorder.yaw)
 
+    def let_go(self) -> None:
+        """Take the push away."""
+        self._pusher.end()
+
     def close(self) -> None:
         """Release what the twin holds."""
         self.robot.close()

@@ -31,6 +31,7 @@ PAPER: dict[tuple[str, str], tuple[PaperFigure, ...]] = {
     ("stand", "visual_servo"): (PaperFigure("screw, simulation", 30), PaperFigure("screw, real robot", 26)),
     # Its MPC, of which it gives no count, was stopped by the operator; the vendor's policy did not stand still.
     ("push", "almi"): (PaperFigure("positive margin recovered, real robot", 14, 15),),
+    ("push-ramp", "almi"): (PaperFigure("positive margin recovered, real robot", 14, 15),),
     ("navigate-line", "vendor"): (PaperFigure("goal reached, real robot", 19, 20),),
 }
 """(rung, method) -> published figures."""

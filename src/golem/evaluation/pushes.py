@@ -31,7 +31,7 @@ class Push:
         direction: name in `DIRECTIONS`.
         peak: largest force [N].
         duration: how long [s].
-        shape: constant, or half a sine.
+        shape: constant, half a sine, or a ramp up to the peak.
     """
 
     body: str
@@ -39,7 +39,7 @@ class Push:
     direction: str
     peak: float
     duration: float
-    shape: Literal["constant", "half_sine"]
+    shape: Literal["constant", "half_sine", "ramp"]
 
     def force(self, elapsed: float, yaw: float) -> Array:
         """Return the (3,) force in the world [N].
@@ -50,9 +50,10 @@ class Push:
         """
         if not 0.0 <= elapsed < self.duration:
             return np.zeros(3)
-        size = self.peak
-        if self.shape == "half_sine":
-            size *= math.sin(math.pi * elapsed / self.duration)
+        share = elapsed / self.duration
+        size = (
+            self.peak * {"constant": 1.0, "half_sine": math.sin(math.pi * share), "ramp": share}[self.shape]
+        )
         angle = yaw + self.bearing
         return size * np.array([math.cos(angle), math.sin(angle), 0.0])
 
@@ -64,7 +65,9 @@ class Push:
     @property
     def impulse(self) -> float:
         """Its impulse [N s]."""
-        return self.peak * self.duration * (1.0 if self.shape == "constant" else 2.0 / math.pi)
+        return (
+            self.peak * self.duration * {"constant": 1.0, "half_sine": 2.0 / math.pi, "ramp": 0.5}[self.shape]
+        )
 
 
 def rod(direction: str, peak: float) -> Push:
@@ -73,6 +76,11 @@ def rod(direction: str, peak: float) -> Push:
     The paper's rod is moved by a person, who pushes until the robot yields; the force's course is not published.
     """
     return Push(BASE_LINK, (0.0, 0.0, 0.0), direction, peak, ROD_TIME, "half_sine")
+
+
+def ramp(direction: str, peak: float, duration: float) -> Push:
+    """Return a push with the same rod that grows evenly to `peak` [N] in `duration` [s], or until it is taken away."""
+    return Push(BASE_LINK, (0.0, 0.0, 0.0), direction, peak, duration, "ramp")
 
 
 def shove(direction: str, impulse: float) -> Push:
@@ -95,10 +103,15 @@ class Pusher:
 
     def begin(self, push: Push, t: float, yaw: float) -> None:
         """Begin `push` at time `t` [s], when the robot's heading is `yaw` [rad]; it replaces one that goes on."""
-        if self._push is not None:
-            self._apply(self._push[0], np.zeros(3))
+        self.end()
         self._push = (push, t, yaw)
         self.drive(t)
+
+    def end(self) -> None:
+        """Take the push away that goes on, if one does."""
+        if self._push is not None:
+            self._apply(self._push[0], np.zeros(3))
+        self._push = None
 
     def drive(self, t: float) -> None:
         """Apply the push for the tick that begins at `t` [s]; call it at every tick."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ from golem.evaluation.balance import TRACE, BalanceTrace
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.episode import Loss
 from golem.evaluation.pushes import DIRECTIONS, ROD_TIME, rod
-from golem.evaluation.rungs.push import LEAST_PEAK, PEAK, PushRung, draw, judge
+from golem.evaluation.rungs.push import LEAST_PEAK, PEAK, PushRung, judge
+from golem.evaluation.rungs.push_ramp import MOST, RATE, PushRampRung
 
 METHODS = Path(__file__).parents[1] / "leg_methods.py"
 STIFF = f"{METHODS}:Stiff"
@@ -22,13 +24,13 @@ def spec(method: str = STIFF, index: int = 0) -> TrialSpec:
 
 
 def test_pushes_are_drawn_like_the_papers_and_not_by_the_method() -> None:
-    draws = [draw(spec(index=i).rng("push")) for i in range(2000)]
+    draws = [PushRung().draw(spec(index=i).rng("push")) for i in range(2000)]
     peaks = np.array([push.peak for push, _ in draws])
     assert peaks.mean() == pytest.approx(PEAK[0], abs=0.6)
     assert peaks.std() == pytest.approx(PEAK[1], abs=0.5)
     assert peaks.min() >= LEAST_PEAK
     assert {push.direction for push, _ in draws} == set(DIRECTIONS)
-    assert draw(spec("other", 5).rng("push")) == draw(spec(index=5).rng("push"))
+    assert PushRung().draw(spec("other", 5).rng("push")) == PushRung().draw(spec(index=5).rng("push"))
 
 
 def test_a_trial_is_recorded_and_depends_on_its_spec_alone(tmp_path: Path) -> None:
@@ -36,7 +38,7 @@ def test_a_trial_is_recorded_and_depends_on_its_spec_alone(tmp_path: Path) -> No
     first = rung.run(spec(), tmp_path / "first")
     again = PushRung().run(spec(), None)
     assert first == again
-    push, _ = draw(spec().rng("push"))
+    push, _ = rung.draw(spec().rng("push"))
     assert first.series["peak_force"] == pytest.approx(push.peak, rel=1e-3)
     assert first.series["margin_before"] > 0.08
     assert first.picture is not None and first.picture.startswith(b"\x89PNG"), "trial 0 is shown"
@@ -50,7 +52,8 @@ def trace(margin: float) -> BalanceTrace:
     zeros = np.zeros((n, 3))
     t = 0.01 * np.arange(n, dtype=np.float64)
     margins = np.where((t > 2.2) & (t < 2.6), -0.04, margin)
-    return BalanceTrace(t, margins, zeros, zeros, np.zeros(n), zeros, np.ones((n, 2), bool), zeros)
+    force = np.where((t > 2.0) & (t < 2.2), 22.0, 0.0)[:, None] * [0.0, 1.0, 0.0]
+    return BalanceTrace(t, margins, zeros, zeros, np.zeros(n), zeros, np.ones((n, 2), bool), force)
 
 
 def test_standing_again_is_a_success_with_the_time_it_took() -> None:
@@ -82,3 +85,23 @@ def test_a_robot_that_fell_before_the_push_is_not_blamed_on_it() -> None:
     outcome = PushRung().run(spec(f"{METHODS}:Limp"), None)
     assert not outcome.success and outcome.module == f"lower_body: {METHODS}:Limp"
     assert outcome.stage == "settle" and outcome.series == {} and "not pushed yet" in outcome.detail
+
+
+def test_the_ramp_grows_until_the_balance_is_lost_and_lets_go(tmp_path: Path) -> None:
+    outcome = PushRampRung().run(replace(spec(), rung="push-ramp"), tmp_path)
+    assert not outcome.success and outcome.stage in ("fall", "safety")  # it is stiff
+    trace = BalanceTrace.load(tmp_path / TRACE)
+    force = np.linalg.norm(trace.force, axis=1)
+    pushed = np.flatnonzero(force)
+    assert np.diff(force[pushed]) / np.diff(trace.t[pushed]) == pytest.approx(RATE, rel=0.05)
+    assert (trace.margin[pushed[:-1]] >= 0.0).all() and trace.margin[pushed[-1] + 1] < 0.0
+    assert outcome.series["peak_force"] == pytest.approx(force.max())
+    assert 20.0 < force.max() < MOST
+    assert len(trace.t) > pushed[-1] + 20
+
+
+def test_a_ramp_ends_at_its_peak() -> None:
+    push, _ = PushRampRung().draw(spec().rng("push"))
+    assert np.linalg.norm(push.force(0.5 * push.duration, 0.3)) == pytest.approx(0.5 * MOST)
+    assert not push.force(push.duration, 0.3).any()
+    assert push.impulse == pytest.approx(0.5 * MOST * push.duration)

@@ -62,7 +62,7 @@ class PushRung:
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
         stack = legs_stack(spec.method, spec.profile, spec.overrides, PLANT)
-        push, settle = draw(spec.rng("push"))
+        push, settle = self.draw(spec.rng("push"))
         with closing(Episode(stack, episode_seed(spec.seed, spec.index))) as episode:
             episode.start(Exercise(ArmMotion(spec.rng("arms"))))
             strip = Strip(episode.robot, push.bearing)
@@ -71,9 +71,7 @@ class PushRung:
                 return never_pushed(episode.loss, spec.method)
             start = episode.t
             episode.push(push)
-            for seconds in MOMENTS:
-                strip.keep(episode.t, episode.force)
-                episode.run(seconds)
+            self.pursue(episode, strip)
             episode.run(PATIENCE, until=lambda: episode.recorder.quiet >= QUIET)
             strip.keep(episode.t, episode.force)
             trace = episode.recorder.trace()
@@ -84,17 +82,22 @@ class PushRung:
             shown = not outcome.success or spec.index == 0
             return replace(outcome, picture=strip.picture() if shown else None)
 
+    def draw(self, rng: np.random.Generator) -> tuple[Push, float]:
+        """Return the push of one trial, and the time before it [s]."""
+        direction = DIRECTIONS[rng.integers(len(DIRECTIONS))]
+        peak = max(float(rng.normal(*PEAK)), LEAST_PEAK)
+        return rod(direction, peak), float(rng.uniform(*SETTLE))
+
+    def pursue(self, episode: Episode, strip: Strip) -> None:
+        """Go on with the push that has begun until it is over, and keep pictures of it."""
+        for seconds in MOMENTS:
+            strip.keep(episode.t, episode.force)
+            episode.run(seconds)
+
 
 def never_pushed(loss: Loss, method: str) -> TrialOutcome:
     """Return the outcome of a robot that was lost before its push."""
     return TrialOutcome(False, "settle", f"lower_body: {method}", f"{loss.detail} It was not pushed yet.")
-
-
-def draw(rng: np.random.Generator) -> tuple[Push, float]:
-    """Return the push of one trial, and the time before it [s]."""
-    direction = DIRECTIONS[rng.integers(len(DIRECTIONS))]
-    peak = max(float(rng.normal(*PEAK)), LEAST_PEAK)
-    return rod(direction, peak), float(rng.uniform(*SETTLE))
 
 
 def measures(trace: BalanceTrace, start: float) -> dict[str, float]:
@@ -118,7 +121,7 @@ def judge(
 ) -> TrialOutcome:
     """Say whether the robot stands again after `push`, which began at `start` [s], and if not, how it failed."""
     series = measures(trace, start)
-    pushed = f"pushed with {push.peak:.0f} N to the {push.direction.replace('_', ' ')}"
+    pushed = f"pushed with {series['peak_force']:.0f} N to the {push.direction.replace('_', ' ')}"
     if loss is None and series["margin_final"] <= 0.0:
         loss = Loss("balance", f"The CoM margin ends at {1e3 * series['margin_final']:.0f} mm.")
     if loss is None and not rests:

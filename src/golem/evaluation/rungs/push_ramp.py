@@ -1,0 +1,48 @@
+"""Rung `push-ramp`: the rod pushes harder and harder until the robot has lost its balance, and then lets go."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from golem.evaluation.episode import Episode
+from golem.evaluation.pushes import DIRECTIONS, Push, ramp
+from golem.evaluation.rungs.push import MOMENTS, SETTLE, PushRung
+from golem.evaluation.strip import Strip
+
+RATE = 40.0
+"""Growth of the force [N/s] [own: a person's; the paper does not say]."""
+MOST = 300.0
+"""Force at which the rod is taken away from who has not lost his balance [N] [own: nearly half the robot's weight]."""
+
+
+class PushRampRung(PushRung):
+    """One push per trial, as long as the CoM is inside the support polygon; success is standing again afterwards.
+
+    The paper's robots were pushed so by hand: "until the robot loses balance", by a margin that becomes negative. Who
+    steps is pushed on while the polygon follows, so `peak_force` says what a method takes, and the rest of the figures
+    what it makes of a balance that is lost.
+    """
+
+    name = "push-ramp"
+
+    def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
+        """Return what determines a trial besides its seed; see `Rung`."""
+        return {**super().config(method, profile, overrides), "peak": (MOST, RATE)}
+
+    def draw(self, rng: np.random.Generator) -> tuple[Push, float]:
+        """Return the push of one trial, and the time before it [s]."""
+        direction = DIRECTIONS[rng.integers(len(DIRECTIONS))]
+        return ramp(direction, MOST, MOST / RATE), float(rng.uniform(*SETTLE))
+
+    def pursue(self, episode: Episode, strip: Strip) -> None:
+        """Push until the balance is lost, and keep pictures of what comes then."""
+        strip.keep(episode.t, episode.force)
+        episode.run(MOST / RATE, until=lambda: episode.recorder.margin < 0.0)
+        strip.keep(episode.t, episode.force)
+        episode.let_go()
+        for seconds in MOMENTS[:-1]:
+            episode.run(seconds)
+            strip.keep(episode.t, episode.force)
