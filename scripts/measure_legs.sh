@@ -26,6 +26,7 @@ rods() { push --kind rod --phase standing --first 150 --last 150; }
 quiet() { legs --test quiet; }
 arms() { legs --test arms -n 100; }
 push_rung() { ladder --rung push --method almi -n 300; }
+ramp() { ladder --rung push-ramp --method almi wbc -n 40; }
 # Walking.
 swings() { push --phase left_swing right_swing; }
 tracking() { legs --test tracking -n 30; }
@@ -45,7 +46,7 @@ tether() { ladder --rung tether -n 100; }
 stand() { ladder --rung stand -n 100; }
 mcnemar() { "$GOLEM" compare "$OUT/tether" "$OUT/stand"; }
 
-ALL=(shoves rods quiet tracking stopping push_rung rough swings line arms endurance stand tether mcnemar
+ALL=(shoves rods quiet tracking stopping push_rung ramp rough swings line arms endurance stand tether mcnemar
     side_standing box_feet vendor_model plans estimators side_swings)
 [ $# -gt 0 ] || set -- "${ALL[@]}"
 mkdir -p "$OUT"
