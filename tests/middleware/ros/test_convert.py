@@ -160,6 +160,9 @@ def test_hands_survive() -> None:
         [0.02, 0.03],
         [1.0, 2.0],
     )
+    for change in ({"gap": np.nan}, {"fingers": np.array([0.0, np.inf])}, {"force": np.array([np.nan, 0.0])}):
+        with pytest.raises(CodecError, match="reports a gap"):
+            convert.to_hand_state(convert.hand_state(replace(state, **change), "left"))
     command = HandCommand(2.0, 0.01, 16.0)
     assert convert.to_hand_command(convert.hand_command(command, "right")) == command
     for change in ({"gap": np.nan}, {"force": np.inf}):

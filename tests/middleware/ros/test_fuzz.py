@@ -5,6 +5,9 @@ from __future__ import annotations
 import random
 import struct
 import tracemalloc
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,21 +16,40 @@ pytest.importorskip("rosbags")
 
 from tests.middleware.ros.samples import mutated, random_message, travelling
 
+from golem.middleware import public
 from golem.middleware.ros import codec, images
-from golem.middleware.ros.convert import to_base_estimate, to_twist
+from golem.middleware.ros.convert import (
+    to_base_estimate,
+    to_hand_command,
+    to_hand_state,
+    to_twist,
+    transforms,
+)
 from golem.middleware.ros.message import CodecError
+from golem.robots.sensors.calibration import OPTICAL_FRAMES, calibrations
+from golem.runtime.live.verdict import to_status
 
-READ = {
-    "geometry_msgs/msg/Twist": to_twist,
-    "golem_interfaces/msg/BaseEstimate": to_base_estimate,
-    "sensor_msgs/msg/CameraInfo": lambda message: images.to_camera(message, "head", 0.1, 3.0, 15.0),
-    "sensor_msgs/msg/Image": images.to_rgb,
-    "sensor_msgs/msg/PointCloud2": images.to_points,
+READ: dict[str, tuple[Callable[[Any], object], ...]] = {
+    "geometry_msgs/msg/Twist": (to_twist,),
+    "golem_interfaces/msg/BaseEstimate": (to_base_estimate,),
+    "golem_interfaces/msg/HandState": (to_hand_state,),
+    "golem_interfaces/msg/HandCommand": (to_hand_command,),
+    "golem_interfaces/msg/SafetyStatus": (lambda message: to_status(message, 0.0),),
+    "sensor_msgs/msg/CameraInfo": (lambda message: images.to_camera(message, "head", 0.1, 3.0, 15.0),),
+    "sensor_msgs/msg/Image": (images.to_rgb, images.to_depth),
+    "sensor_msgs/msg/PointCloud2": (images.to_points,),
+    "tf2_msgs/msg/TFMessage": (calibrations,),
 }
 """What reads a message further, by type."""
 SOUND = {
-    "sensor_msgs/msg/Image": images.color_image(0.0, np.zeros((4, 6, 3), np.uint8), "camera"),
-    "sensor_msgs/msg/PointCloud2": images.point_cloud(0.0, np.zeros(8, images.LIVOX_POINT), "lidar_link"),
+    "sensor_msgs/msg/Image": [
+        images.color_image(0.0, np.zeros((4, 6, 3), np.uint8), "camera"),
+        images.depth_image(0.0, np.ones((4, 6), np.float32), "camera"),
+    ],
+    "sensor_msgs/msg/PointCloud2": [images.point_cloud(0.0, np.zeros(8, images.LIVOX_POINT), "lidar_link")],
+    "tf2_msgs/msg/TFMessage": [
+        transforms(0.0, [(OPTICAL_FRAMES["head"], public.optical_frame("head"))], np.eye(4)[np.newaxis])
+    ],
 }
 """Messages whose fields must agree, which random ones do not."""
 PER_BYTE = 128
@@ -41,15 +63,18 @@ def attack(name: str, count: int, rng: random.Random) -> tuple[int, int]:
     kind = known.message(name)
     taken = refused = 0
     while taken + refused < count:
-        payload = known.serialize(SOUND.get(name) or random_message(known, name, rng))
+        sound = rng.choice(SOUND[name]) if name in SOUND else random_message(known, name, rng)
+        payload = known.serialize(sound)
         for _ in range(20):
             try:
                 message = known.deserialize(mutated(payload, rng), kind)
-                if name in READ:
-                    READ[name](message)
-                taken += 1
             except CodecError:
                 refused += 1
+                continue
+            for read in READ.get(name, ()):
+                with suppress(CodecError):
+                    read(message)
+            taken += 1
     return taken, refused
 
 
@@ -63,6 +88,12 @@ def test_mutated_payloads_of_every_type() -> None:
 def test_mutated_payloads_of_types_that_are_read_further(name: str) -> None:
     taken, refused = attack(name, 400, random.Random(name))
     assert taken > 0 and refused > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(READ))
+def test_a_hundred_thousand_mutated_payloads_of_each_type_that_is_read_further(name: str) -> None:
+    assert sum(attack(name, 100_000, random.Random(name))) >= 100_000
 
 
 @pytest.mark.slow

@@ -221,9 +221,17 @@ def hand_state(state: HandState, side: str) -> golem_interfaces.HandState:
 
 
 def to_hand_state(message: golem_interfaces.HandState) -> HandState:
-    """Return what one hand reports."""
-    stamp = seconds(message.header.stamp)
-    return HandState(stamp, message.gap, np.array(message.fingers), np.array(message.force))
+    """Return what one hand reports.
+
+    Raises:
+        CodecError: gap, a finger or a force is not finite.
+    """
+    fingers, force = np.array(message.fingers), np.array(message.force)
+    if not np.isfinite([message.gap, *fingers, *force]).all():
+        raise CodecError(
+            f"A hand reports a gap of {message.gap} m, fingers at {fingers}, forces of {force} N."
+        )
+    return HandState(seconds(message.header.stamp), message.gap, fingers, force)
 
 
 def hand_command(command: HandCommand, side: str) -> golem_interfaces.HandCommand:
