@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+LIFELINE = "GOLEM_LIFELINE"
+"""Environment variable of a process that is to end with the one that started it: its standard input does."""
+
+
+def _hold(stop: threading.Event) -> None:
+    sys.stdin.buffer.read()
+    stop.set()
+
 
 @contextmanager
 def interrupted() -> Iterator[threading.Event]:
-    """Yield an event that Ctrl-C, SIGTERM or SIGHUP sets; to be entered in the main thread.
+    """Yield an event that Ctrl-C, SIGTERM or SIGHUP sets, or the end of a `LIFELINE`; to be entered in the main thread.
 
     Afterwards the three are as before. A SIGHUP that is ignored stays so: that is what nohup is for.
     """
@@ -24,6 +34,8 @@ def interrupted() -> Iterator[threading.Event]:
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         heeded.append(signal.SIGHUP)
     before = {number: signal.signal(number, interrupt) for number in heeded}
+    if os.environ.get(LIFELINE):
+        threading.Thread(target=_hold, args=(stop,), daemon=True).start()
     try:
         yield stop
     finally:

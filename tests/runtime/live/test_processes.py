@@ -127,6 +127,25 @@ def test_ctrl_c_ends_everything_in_order(launched: Launched) -> None:
     assert "Nobody is on domain" in golem("topics", "--seconds", "0.2").stdout
 
 
+def test_nobody_outlives_a_launcher_that_is_killed(launched: Launched) -> None:
+    left = {pid_of(name) for name in ("twin", "safety", "up")}
+    launched.process.kill()
+    launched.process.wait()
+    end = time.monotonic() + 60.0
+    while left and time.monotonic() < end:
+        left = {pid for pid in left if alive(pid)}
+        time.sleep(0.1)
+    assert not left
+
+
+def alive(pid: int) -> bool:
+    """Return whether a process runs; one that nobody has waited for does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
 def test_a_second_twin_is_refused_and_told_who_is_there(launched: Launched) -> None:
     answer = golem("twin", "tether")
     assert (

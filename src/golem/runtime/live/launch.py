@@ -7,6 +7,7 @@ robot.
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from typing import Any, Literal
 from golem.errors import ConfigError
 from golem.hardware.safety.base import GateState, GateStatus
 from golem.middleware import public
-from golem.middleware.interrupt import interrupted
+from golem.middleware.interrupt import LIFELINE, interrupted
 from golem.middleware.ros.base import Node
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
@@ -80,13 +81,16 @@ class Process:
     def __init__(self, name: str, words: Sequence[str]) -> None:
         """Start `golem WORDS`."""
         self.name = name
-        # A group of its own: Ctrl-C in the terminal is for the launcher, which ends them in order.
+        # A group of its own: Ctrl-C in the terminal is for the launcher, which ends them in order. Its standard input
+        # ends with the launcher, however that ends.
         self._process = subprocess.Popen(
             [sys.executable, "-m", "golem", *words],
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
             start_new_session=True,
+            env={**os.environ, LIFELINE: "1"},
         )
         self._reader = threading.Thread(target=self._pass_on, daemon=True)
         self._reader.start()
