@@ -10,18 +10,19 @@ import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch", reason="training needs the extra 'train'")
-pytest.importorskip("onnx", reason="export needs the extra 'train'")
+onnx = pytest.importorskip("onnx", reason="export needs the extra 'train'")
 
 from golem.capabilities.legs.description import load_description
 from golem.capabilities.legs.network import load_network
 from golem.capabilities.legs.observation import Layout
 from golem.errors import ConfigError
+from golem.evaluation.provenance import commit
 from golem.robots.model.leg_kinematics import leg_poses
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, read_curve
 from golem.training.legs.curve import draw_curves
 from golem.training.legs.disturbances import ACROSS, BACK, GENTLE, Difficulty, Pushes, UpperBodyMotion
 from golem.training.legs.env import LAYOUT, TASKS, LegsEnv, Task
-from golem.training.legs.export import export, load_actor
+from golem.training.legs.export import TRAINED, export, load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.model import STANCE
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
@@ -101,8 +102,14 @@ def test_the_exported_network_is_the_trained_one_and_its_description_fits(task: 
     export(tmp_path / "run" / CHECKPOINT, tmp_path)
     description, path = load_description(tmp_path / f"almi_{task}.yaml")
     layout = description.layout()
-    network, (actor, learned) = load_network(path, layout.size), load_actor(tmp_path / "run" / CHECKPOINT)
+    network, (actor, learned, command) = (
+        load_network(path, layout.size),
+        load_actor(tmp_path / "run" / CHECKPOINT),
+    )
     assert learned == task
+    assert command.startswith(f"golem train legs run --task {task} --seed 0 ") and commit() in command
+    (said,) = onnx.load(str(path)).metadata_props
+    assert (said.key, said.value) == (TRAINED, command)
     for observation in np.random.default_rng(0).normal(size=(3, layout.size)).astype(np.float32):
         with torch.no_grad():
             expected = actor(torch.from_numpy(observation)).numpy()

@@ -24,7 +24,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     """
     try:
         saved = torch.load(path, weights_only=True)
-        whole = {"legs", "upper", "steps", "config"} <= saved.keys() and "task" in saved["config"]
+        whole = {"legs", "upper", "steps", "config", "code"} <= saved.keys() and "task" in saved["config"]
     except OSError as error:
         raise ConfigError(f"The checkpoint {path} cannot be read: {error.strerror or error}.") from error
     except Exception as error:  # of any kind: what is read is taken for a program

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -29,13 +30,17 @@ DECLARED = Envelope((-0.4, 0.8), (-0.3, 0.3), (-0.6, 0.6))
 """The twists the shipped controller promises to follow; training commands a little more."""
 
 
-def load_actor(checkpoint: Path) -> tuple[Actor, Task]:
-    """Return the trained actor of a checkpoint of `train`, and what it learned."""
+TRAINED = "golem.trained"
+"""Name of the network's metadata that say what trained it."""
+
+
+def load_actor(checkpoint: Path) -> tuple[Actor, Task, str]:
+    """Return the trained actor of a checkpoint of `train`, what it learned, and the command that trained it."""
     layout = Layout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
     actor = Actor(Mirror(layout.components), leg_mirror(), PpoConfig().hidden)
     saved = read_checkpoint(checkpoint)
     actor.load_state_dict(saved["legs"]["actor"])
-    return actor.eval(), saved["config"]["task"]
+    return actor.eval(), saved["config"]["task"], _command(saved)
 
 
 def export(checkpoint: Path, folder: Path) -> tuple[Path, Path]:
@@ -44,14 +49,25 @@ def export(checkpoint: Path, folder: Path) -> tuple[Path, Path]:
     Raises:
         ConfigError: it is no checkpoint.
     """
-    actor, task = load_actor(checkpoint)
+    actor, task, command = load_actor(checkpoint)
     name = f"almi_{task}"
     folder.mkdir(parents=True, exist_ok=True)
     network = folder / f"{name}.onnx"
-    onnx.save(_graph(actor), str(network))
+    graph = _graph(actor)
+    helper.set_model_props(graph, {TRAINED: command})
+    onnx.save(graph, str(network))
     description = folder / f"{name}.yaml"
     description.write_text(_description(network.name, TASKS[task]), encoding="utf-8")
     return network, description
+
+
+def _command(saved: dict[str, Any]) -> str:
+    """Return the command that made a checkpoint, and with what code."""
+    config = saved["config"]
+    words = ("task", "seed", "adversary", "robots")
+    options = " ".join(f"--{word} {config[word]}" for word in words)
+    start = " --start CHECKPOINT" if config["start"] is not None else ""
+    return f"golem train legs run {options} --steps {config['steps']:g}{start} (commit {saved['code']})"
 
 
 def _graph(actor: Actor) -> onnx.ModelProto:

@@ -14,6 +14,7 @@ import torch
 from numpy.typing import NDArray
 
 from golem.errors import ConfigError, OutputError
+from golem.evaluation.provenance import commit
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, cut_curve, read_checkpoint
 from golem.training.legs.disturbances import NUM_UPPER
 from golem.training.legs.env import PERIOD, TASKS, EnvConfig, LegsEnv, Task
@@ -99,6 +100,7 @@ class _Run:
 
     def __init__(self, config: TrainConfig) -> None:
         self.config = config
+        self._code = commit()
         self.steps = 0
         self.updates = 0
         self._cpu = 0.0
@@ -171,6 +173,7 @@ class _Run:
                 "survival": self._survival,
                 "config": _plain(self.config),
                 "env": _plain(TASKS[self.config.task]),
+                "code": self._code,
             },
             part,
         )
