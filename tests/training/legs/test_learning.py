@@ -56,6 +56,10 @@ def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(
     with pytest.raises(ConfigError, match="different names"):
         draw_curves([tmp_path / "a"] * 2, tmp_path / "curve.png")
     assert (tmp_path / "curve.png").stat().st_size > 1000
+    with (tmp_path / "curve.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert {row["run"] for row in rows} == set("abc")
+    assert float(rows[0]["steps"]) == read_curve(tmp_path / "a")["steps"][0]
 
 
 def test_rows_of_the_curve_that_are_learned_again_are_left_out(tmp_path: Path) -> None:

@@ -55,11 +55,11 @@ def export(checkpoint: Path = RUNS / "seed0" / CHECKPOINT, folder: Path = RUNS /
 
 
 def curve(runs: tyro.conf.Positional[tuple[Path, ...]], out: Path = RUNS / "curve.png") -> None:
-    """Draw the learning curves of several runs beside each other.
+    """Draw the learning curves of several runs beside each other, and tabulate every fifth update.
 
     Args:
         runs: folders of `run`.
-        out: the picture.
+        out: the picture; the table is the CSV file beside it.
     """
     draw_curves(runs, out)
 

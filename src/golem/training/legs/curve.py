@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,15 +22,22 @@ PANELS = (
 SIZE = (360, 300)
 MARGIN = (50, 30, 22, 40)
 """Left, top, right, bottom of a panel [px]."""
+KEPT = (
+    *("steps", "cpu_s", "falls", "error_moving", "error_standing", "survival"),
+    *("push", "amplitude", "payload", "std"),
+)
+"""Columns of the table beside the picture."""
+THIN = 5
+"""Updates per row of it."""
 COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#888888", "#000000")
 
 
 def draw_curves(runs: Sequence[Path], out: Path) -> None:
-    """Draw what the run folders' curves say, one colour a run, over millions of steps.
+    """Draw what the run folders' curves say, one colour a run, over millions of steps, and tabulate every fifth update.
 
     Args:
         runs: folders of training runs.
-        out: the PNG file.
+        out: the PNG file; the table is the CSV file beside it.
 
     Raises:
         ConfigError: more runs than colours, or two folders of one name.
@@ -68,3 +76,9 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         pen.line([(left, y + 6), (left + 24, y + 6)], fill=colour, width=3)
         pen.text((left + 32, y), name, fill="black", font=font)
     image.save(out)
+    with out.with_suffix(".csv").open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(("run", *KEPT))
+        for name, curve in curves.items():
+            columns = (curve[column][::THIN] for column in KEPT)
+            writer.writerows((name, *(f"{value:.5g}" for value in row)) for row in zip(*columns, strict=True))
