@@ -5,20 +5,21 @@
 # ALMI and RL_GYM name the weights of the public checkpoints, MJCF the vendor's model; what needs one that is not given
 # is left out.
 set -euo pipefail
-cd "$(dirname "$0")/.."
 
+OUT=$(realpath -m "${1:?where the results go}") JOBS=${2:?how many processes}
+ALMI=${ALMI:+$(realpath "$ALMI")} RL_GYM=${RL_GYM:+$(realpath "$RL_GYM")} MJCF=${MJCF:+$(realpath "$MJCF")}
+cd "$(dirname "$0")/.."
 GOLEM=${GOLEM:-.venv/bin/golem}
-OUT=${1:?where the results go} JOBS=${2:?how many processes}
 shift 2
 export OMP_NUM_THREADS=1
 
 push() { "$GOLEM" bench push -j "$JOBS" --out "$OUT/$name" "$@"; }
-legs() { "$GOLEM" bench legs -j "$JOBS" --out "$OUT/$name" "$@"; }
+legs() { "$GOLEM" bench legs --out "$OUT/$name" -j "$JOBS" "$@"; }
 ladder() { "$GOLEM" ladder -j "$JOBS" --out "$OUT/$name" --seed 0 "$@"; }
 
 peers=(wbc mpc vendor)
-[ -z "${ALMI:-}" ] || peers+=("policy:almi_open:$ALMI")
-[ -z "${RL_GYM:-}" ] || peers+=("policy:unitree_rl_gym:$RL_GYM")
+[ -z "$ALMI" ] || peers+=("policy:almi_open:$ALMI")
+[ -z "$RL_GYM" ] || peers+=("policy:unitree_rl_gym:$RL_GYM")
 
 # Standing.
 shoves() { push --phase standing --first 60; }
@@ -37,9 +38,9 @@ rough() { legs --test slope rubble -n 20; }
 # Beside others, and on another plant.
 side_standing() { push --phase standing --method almi "${peers[@]}"; }
 side_swings() { push --phase left_swing right_swing --method vendor "${peers[@]:3}"; }
-plans() { legs --test plans -n 5 --method mpc; }
+plans() { legs --test plans -n 5 --method mpc -j 1; }
 box_feet() { push --phase standing --first 60 --robot feet=box cone=elliptic; }
-vendor_model() { [ -z "${MJCF:-}" ] || push --phase standing --first 60 --robot "mjcf=$MJCF"; }
+vendor_model() { [ -z "$MJCF" ] || push --phase standing --first 60 --robot "mjcf=$MJCF"; }
 estimators() { "$GOLEM" bench estimation; }
 # The work.
 tether() { ladder --rung tether -n 100; }

@@ -73,7 +73,7 @@ def test_measures_of_a_known_trace() -> None:
     base = np.stack([0.004 * np.sin(2 * np.pi * t), 0.001 * np.cos(2 * np.pi * t), 0.95 + 0 * t], axis=1)
     known = replace(trace(), margin=margin, base=base)
     assert known.below_zero == pytest.approx(0.3)
-    assert known.recovery_time(0.4) == pytest.approx(0.4)
+    assert known.recovery_time(0.4) == pytest.approx(0.3)
     assert known.recovery_time(1.0) == 0.0
     assert known.final_margin == pytest.approx(0.1)
     assert known.base_range == pytest.approx(0.008, rel=0.01)

@@ -128,9 +128,9 @@ class BalanceTrace:
         return float(self.margin[-round(FINAL / PERIOD) :].mean())
 
     def recovery_time(self, since: float) -> float:
-        """Return how long after `since` [s] the margin was negative for the last time [s]; 0 where it never was."""
+        """Return the time [s] from the first to the last negative margin after `since` [s]; 0 where there is none."""
         late = self.t[(self.margin < 0.0) & (self.t >= since)]
-        return float(late[-1] - since) + PERIOD if len(late) else 0.0
+        return float(late[-1] - late[0]) + PERIOD if len(late) else 0.0
 
     def save(self, path: Path) -> None:
         """Write the trace as a compressed npz with one float32 array per attribute; the folder is made."""

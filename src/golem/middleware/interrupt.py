@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,8 +12,10 @@ LIFELINE = "GOLEM_LIFELINE"
 """Environment variable of a process that is to end with the one that started it: its standard input does."""
 
 
-def _hold(stop: threading.Event) -> None:
-    sys.stdin.buffer.read()
+def _end_with_it(stop: threading.Event) -> None:
+    # Past Python's buffer: a thread that holds its lock makes the interpreter abort at its end.
+    while os.read(0, 4096):
+        pass
     stop.set()
 
 
@@ -35,7 +36,7 @@ def interrupted() -> Iterator[threading.Event]:
         heeded.append(signal.SIGHUP)
     before = {number: signal.signal(number, interrupt) for number in heeded}
     if os.environ.get(LIFELINE):
-        threading.Thread(target=_hold, args=(stop,), daemon=True).start()
+        threading.Thread(target=_end_with_it, args=(stop,), daemon=True).start()
     try:
         yield stop
     finally:

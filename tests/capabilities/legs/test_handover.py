@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -236,9 +235,9 @@ def test_who_stands_does_not_step_for_a_twist_while_it_waits_for_the_one_that_wa
     assert robot.legs.walking and robot.walk.motions[-1].stepping
 
 
-@pytest.mark.parametrize(("start", "walking"), [("recovery", True), ("always", False)])
-def test_a_step_that_is_found_is_ended_by_the_one_that_walks(start: Any, walking: bool) -> None:
-    robot = Robot(stand={"gait": GaitConfig(start=start)})
+@pytest.mark.parametrize("speed", [0.5, 0.1])
+def test_a_walk_that_is_found_is_ended_by_the_one_that_walks_and_a_step_in_place_is_not(speed: float) -> None:
+    robot = Robot()
     former = Locomotion(Recorder(), LocomotionConfig(trim=TrimConfig(gain=0.0)))
     former.reset(robot.state)
     for _ in range(15):
@@ -246,8 +245,10 @@ def test_a_step_that_is_found_is_ended_by_the_one_that_walks(start: Any, walking
     assert former.gait.stepping
     former.hand_over(robot.legs, robot.state, None)
     robot.layer = former
+    robot.base = replace(still(), velocity=np.array([speed, 0.0, 0.0]))
     robot.run(DT)
-    assert robot.legs.walking == walking
+    assert robot.legs.walking == (speed > 0.2)
+    robot.base = still()
     robot.run(1.5)
     assert not robot.legs.walking
 

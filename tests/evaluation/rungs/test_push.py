@@ -59,7 +59,7 @@ def trace(margin: float) -> BalanceTrace:
 def test_standing_again_is_a_success_with_the_time_it_took() -> None:
     outcome = judge(trace(0.1), 2.0, rod("left", 22.0), None, True, "mine")
     assert outcome.success
-    assert outcome.timings["recovery"] == pytest.approx(0.6, abs=0.02)
+    assert outcome.timings["recovery"] == pytest.approx(0.4, abs=0.02)
     assert outcome.series["margin_min"] == pytest.approx(-0.04)
     assert outcome.series["below_zero"] == pytest.approx(0.4, abs=0.02)
 

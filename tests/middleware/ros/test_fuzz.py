@@ -62,6 +62,7 @@ def attack(name: str, count: int, rng: random.Random) -> tuple[int, int]:
     known = codec.codec()
     kind = known.message(name)
     taken = refused = 0
+    understood: set[Callable[[Any], object]] = set()
     while taken + refused < count:
         sound = rng.choice(SOUND[name]) if name in SOUND else random_message(known, name, rng)
         payload = known.serialize(sound)
@@ -74,7 +75,9 @@ def attack(name: str, count: int, rng: random.Random) -> tuple[int, int]:
             for read in READ.get(name, ()):
                 with suppress(CodecError):
                     read(message)
+                    understood.add(read)
             taken += 1
+    assert len(understood) == len(READ.get(name, ())) or count < 400, "a reader took nothing for sound"
     return taken, refused
 
 
@@ -93,7 +96,8 @@ def test_mutated_payloads_of_types_that_are_read_further(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(READ))
 def test_a_hundred_thousand_mutated_payloads_of_each_type_that_is_read_further(name: str) -> None:
-    assert sum(attack(name, 100_000, random.Random(name))) >= 100_000
+    taken, refused = attack(name, 100_000, random.Random(name))
+    assert taken > 0 and refused > 0
 
 
 @pytest.mark.slow

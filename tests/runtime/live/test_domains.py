@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import time
+from dataclasses import replace
+
 import pytest
 import tyro
 
 from golem.errors import ConfigError
 from golem.middleware.dds.domain import DdsConfig
 from golem.runtime.live.launch import LaunchConfig, commands, run_launch
+from golem.runtime.live.member import company, member
 from golem.runtime.live.process import TwinConfig, run_twin
 
 ROBOT = DdsConfig(domain=0, interface="eth7", robot=True)
@@ -68,3 +73,17 @@ def test_every_process_is_told_what_concerns_it() -> None:
     assert words["up"] == ["up", "stand", "--profile", "ideal", *where]
     strict = commands(LaunchConfig(strict=True, dds=dds))
     assert strict["safety"] == ["safety", "--limits", "urdf", "--strict", *where]
+
+
+def test_who_else_is_there_is_said_with_what_to_look_at() -> None:
+    pytest.importorskip("cyclonedds")
+    here = DdsConfig(domain=20 + os.getpid() % 180)
+    with member("one", here) as (participant, _):
+        assert company(participant, here) == "nobody else is there"
+        elsewhere = replace(here, interface="eth0")
+        assert "--peers" in company(participant, elsewhere)
+        with member("two", here):
+            end = time.monotonic() + 10.0
+            while (said := company(participant, here)) != "one other is there":
+                assert time.monotonic() < end, said
+                time.sleep(0.05)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -12,10 +14,11 @@ from tests.runtime.live.conftest import Live
 from tests.runtime.live.test_live import VENDOR
 
 from golem.errors import ConfigError
-from golem.hardware.safety.base import GateState
+from golem.hardware.safety.base import GateState, SafetyLimits
 from golem.middleware import public, topics
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Qos
+from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros import convert, images
 from golem.middleware.topics import LookRequest
 from golem.middleware.unitree_api import Request, encode
@@ -30,6 +33,7 @@ from golem.runtime.executor import Executor
 from golem.runtime.live import authority
 from golem.runtime.live.gate import LiveGate
 from golem.runtime.live.motors import RequestOut
+from golem.runtime.live.process import SafetyConfig, run_safety
 from golem.runtime.live.surface import Surface
 from golem.stack import Choice
 from golem.types import NUM_JOINTS, Imu, LowCommand, LowState
@@ -207,17 +211,18 @@ def test_a_motion_switcher_that_falls_silent_keeps_the_gate_shut_but_stops_nobod
     assert live.gate is not None and "does not say" in live.gate.status.detail
 
 
-def test_a_name_that_cannot_be_printed_is_no_answer(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_controller_whose_name_cannot_be_printed_has_the_motors_all_the_same(
+    live: Live, monkeypatch: pytest.MonkeyPatch
+) -> None:
     live.leave("safety")
     live.start_gate(real=True)
     assert live.gate is not None
     live.run(0.2)
-    assert live.gate.status.detail.startswith("the robot's own controller 'ai'")
     reply = RpcServer.reply
     nonsense = '{"form": "0", "name": "\\ud800"}'
     monkeypatch.setattr(RpcServer, "reply", lambda server, said: reply(server, replace(said, data=nonsense)))
-    live.run(2.5 * authority.SILENCE)
-    assert live.gate.status.detail.startswith("the robot's own controller 'ai'")
+    live.run(1.0)
+    assert live.gate.status.detail.startswith(r"the robot's own controller '\ud800' has the motors")
 
 
 def test_a_gate_that_fails_can_still_damp(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -240,3 +245,19 @@ def test_a_gate_that_fails_can_still_damp(live: Live, monkeypatch: pytest.Monkey
         live.gate.stop()
     live.gate.damp()
     assert stiffness() == 0.0
+
+
+def test_a_safety_process_that_fails_damps_for_as_long_as_a_stop_takes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("cyclonedds")
+    damped: list[float] = []
+
+    def fail(gate: LiveGate) -> None:
+        raise RuntimeError("no")
+
+    monkeypatch.setattr(LiveGate, "step", fail)
+    monkeypatch.setattr(LiveGate, "damp", lambda gate: damped.append(time.monotonic()))
+    with pytest.raises(RuntimeError):
+        run_safety(SafetyConfig(dds=DdsConfig(domain=20 + os.getpid() % 180)))
+    assert damped[-1] - damped[0] > 0.9 * SafetyLimits.from_profile().damping_time and len(damped) > 100

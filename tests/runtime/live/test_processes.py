@@ -124,6 +124,7 @@ def test_ctrl_c_ends_everything_in_order(launched: Launched) -> None:
     launched.process.send_signal(signal.SIGINT)
     assert launched.process.wait(60) == 0
     assert any("stop" in line for line in launched.lines if line.startswith("[safety]"))
+    assert not any("exit code" in line or "Fatal" in line for line in launched.lines)
     assert "Nobody is on domain" in golem("topics", "--seconds", "0.2").stdout
 
 

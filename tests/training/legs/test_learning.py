@@ -53,6 +53,8 @@ def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(
     draw_curves([tmp_path / name for name in "abc"], tmp_path / "curve.png")
     with pytest.raises(ConfigError, match="8 runs at most, not 9"):
         draw_curves([tmp_path / "a"] * 9, tmp_path / "curve.png")
+    with pytest.raises(ConfigError, match="would replace the run's own curve.csv"):
+        draw_curves([tmp_path / "a"], tmp_path / "a" / "curve.png")
     with pytest.raises(ConfigError, match="different names"):
         draw_curves([tmp_path / "a"] * 2, tmp_path / "curve.png")
     assert (tmp_path / "curve.png").stat().st_size > 1000

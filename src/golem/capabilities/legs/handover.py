@@ -97,15 +97,15 @@ class Handover:
         return self._active is self._walk
 
     def reset(self, state: LowState) -> None:
-        """Start from the measured `state`, with the controller for what the robot does at the next tick."""
+        """Stand, from the measured `state` on; a robot that is found walking is first brought to a stop."""
         self._begin()
         self._active.reset(state)
 
     def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
         """Run the controller in charge, after a change of hands where one is due; see `LowerBody.step`."""
         self._healthy = self._healthy + dt if self._is_healthy(state, base) else 0.0
-        # Another controller died in the middle of a step, maybe at full speed: who walks can end it, if he is ready.
-        found = self._last is None and motion.stepping and self.gait.start != "always"
+        # Another controller failed while it walked: the walking one ends that, if it is ready.
+        found = self._last is None and motion.stepping and not self._is_in_place(base)
         may_change = found or self._is_calm(dt)
         if not (found or self._other_wanted(motion)):
             self._coming = None
@@ -144,6 +144,10 @@ class Handover:
         """Return whether the robot has been healthy for long enough."""
         return self._healthy > self.config.calm - 0.5 * dt
 
+    def _is_in_place(self, base: BaseEstimate) -> bool:
+        """Return whether the base hardly moves over the floor."""
+        return math.hypot(base.velocity[0], base.velocity[1]) < self.config.speed
+
     def _is_healthy(self, state: LowState, base: BaseEstimate) -> bool:
         """Return whether the measured robot is calm, upright, in place, and not on one leg."""
         config = self.config
@@ -155,7 +159,7 @@ class Handover:
             float(np.abs(state.imu.gyro).max()) < config.gyro
             and float(np.abs(state.dq[LEGS]).max()) < config.joint_speed
             and lean < config.lean
-            and math.hypot(base.velocity[0], base.velocity[1]) < config.speed
+            and self._is_in_place(base)
             and bool(loaded[0] == loaded[1])
         )
 

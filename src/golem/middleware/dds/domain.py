@@ -7,7 +7,7 @@ with the vendor's SDK.
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 from xml.sax.saxutils import quoteattr
 
@@ -58,11 +58,13 @@ class DdsConfig:
 
     def words(self) -> list[str]:
         """Return what a command line says of it; nothing where it is the default."""
-        words = [] if self.domain == 1 else ["--domain", str(self.domain)]
-        words += [] if self.interface == "lo" else ["--interface", self.interface]
-        words += ["--peers", *self.peers] if self.peers else []
-        words += ["--robot"] if self.robot else []
-        return words + ([] if self.distro == "jazzy" else ["--distro", self.distro])
+        words: list[str] = []
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value != field.default:
+                given = value if isinstance(value, tuple) else () if value is True else (value,)
+                words += [f"--{field.name}", *map(str, given)]
+        return words
 
     def command(self, words: str) -> str:
         """Return the command `golem words` as it is to be given to take part here."""

@@ -143,15 +143,12 @@ def _cameras(bag: Bag) -> tuple[dict[str, CameraInfo], dict[str, Array]]:
     recorded = [topic for topic in infos if topic in bag.topics]
     found: dict[str, CameraInfo] = {}
     claimed: dict[str, Array] = {}
-    for message in bag.messages((*recorded, STATIC)):
-        topic = message.topic.name
-        if topic == STATIC:
-            claimed |= calibrations(codec.deserialize(message.payload, TFMessage))
-        elif infos[topic] not in found:
-            nominal = CAMERAS[infos[topic]]
-            info = codec.deserialize(message.payload, InfoMessage)
-            camera = images.to_camera(info, nominal.name, nominal.near, nominal.far, nominal.rate)
-            found[camera.name] = camera
-        if len(found) == len(recorded) and claimed.keys() >= found.keys():
+    for message in bag.messages((STATIC,)):
+        claimed |= calibrations(codec.deserialize(message.payload, TFMessage))
+    for message in bag.messages(recorded):
+        nominal = CAMERAS[infos[message.topic.name]]
+        info = codec.deserialize(message.payload, InfoMessage)
+        found[nominal.name] = images.to_camera(info, nominal.name, nominal.near, nominal.far, nominal.rate)
+        if len(found) == len(recorded):
             break
     return found, {name: claimed.get(name, np.eye(4)) for name in found}

@@ -61,9 +61,9 @@ class Authority:
                 name = decode(response.data).get("name")
             except ValueError:
                 continue
-            # What cannot be printed cannot be reported either, and is no controller's name.
-            if response.code == OK and isinstance(name, str) and name.isprintable():
-                self._answered, self.owner = now, name
+            if response.code == OK and isinstance(name, str):
+                # Escaped: what cannot be encoded could not be reported.
+                self._answered, self.owner = now, name.encode("unicode_escape").decode()
         if self._client.connected and self._ask.due(now):
             self._call(CHECK_MODE)
 

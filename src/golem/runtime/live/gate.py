@@ -201,7 +201,7 @@ class LiveGate:
         return self.status.state is not GateState.STOP1
 
     def damp(self) -> None:
-        """Tell the motors to damp, whatever may have failed: the last command on the wire must not be a stiff one."""
+        """Tell the motors to damp, whatever may have failed."""
         self._tell(passive(self._clock(), None, self._damping))
 
     def _judge(self) -> None:
@@ -231,9 +231,11 @@ class LiveGate:
     def _tell(self, command: LowCommand, answers: float = 0.0) -> None:
         """Write `command` to the motors, unless the robot's own controllers have them or a shut gate never had them.
 
-        A stop is written on, whether or not the robot still says whose they are: the drives hold the last command.
+        While the robot moves and is damped only an answer says that they have: drives that hear nothing may go on with
+        the last command. Once it is limp, as after a reboot, silence says so, too.
         """
-        theirs = self._real and bool(self._authority.owner)
+        limp, authority = self.status.state is GateState.STOP0, self._authority
+        theirs = self._real and bool(authority.owner or (limp and not authority.free))
         machine = self._arrivals.mode_machine
         if machine is not None and self.status.state is not GateState.INIT and not theirs:
             self._out.write(convert.encode_low_command(command, machine, answers))

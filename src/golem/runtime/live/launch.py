@@ -115,6 +115,8 @@ class Process:
                 say(f"{self.name} does not end; it is killed.")
                 self._process.kill()
                 self._process.wait()
+            if self.code:
+                say(f"{self.name} ended with exit code {self.code}.")
         self._reader.join(1.0)
 
     def _pass_on(self) -> None:

@@ -39,7 +39,7 @@ def company(participant: CycloneParticipant, dds: DdsConfig) -> str:
     """Return how many others are on the domain, and where there is nobody, what to look at."""
     others = sum(other.guid != participant.guid for other in discovery.members(participant))
     if others:
-        return f"{others} others are there"
+        return "one other is there" if others == 1 else f"{others} others are there"
     if dds.interface == "lo":
         return "nobody else is there"
     return (

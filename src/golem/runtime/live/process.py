@@ -151,7 +151,11 @@ def run_safety(config: SafetyConfig) -> None:
             while not gate.stop():
                 gate.commands.wait(TICK)
         except BaseException:
-            gate.damp()
+            # Without the gate, which has just failed: the last command must not be a stiff one.
+            end = time.monotonic() + limits.damping_time
+            while time.monotonic() < end:
+                gate.damp()
+                time.sleep(TICK)
             raise
         report(said, gate.status, tell)
 

@@ -24,13 +24,13 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     """
     try:
         saved = torch.load(path, weights_only=True)
-        whole = {"legs", "upper", "steps", "config", "code"} <= saved.keys() and "task" in saved["config"]
+        whole = {"legs", "upper", "steps", "config"} <= saved.keys() and "task" in saved["config"]
     except OSError as error:
         raise ConfigError(f"The checkpoint {path} cannot be read: {error.strerror or error}.") from error
     except Exception as error:  # of any kind: what is read is taken for a program
         raise ConfigError(f"{path} is no checkpoint of 'golem train legs run'.") from error
     if not whole:
-        raise ConfigError(f"{path} is no checkpoint of 'golem train legs run', or of an older one.")
+        raise ConfigError(f"{path} is no checkpoint of 'golem train legs run', or an older GOLEM wrote it.")
     return saved
 
 

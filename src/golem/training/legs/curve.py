@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from golem.errors import ConfigError
-from golem.training.legs.checkpoint import read_curve
+from golem.training.legs.checkpoint import CURVE, read_curve
 
 PANELS = (
     ("falls", "falls per robot second", 1.0),
@@ -40,8 +40,13 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         out: the PNG file; the table is the CSV file beside it.
 
     Raises:
-        ConfigError: more runs than colours, or two folders of one name.
+        ConfigError: more runs than colours, two folders of one name, or the table would replace a run's own curve.
     """
+    table = out.with_suffix(".csv")
+    if table.resolve() in [(run / CURVE).resolve() for run in runs]:
+        raise ConfigError(
+            f"The table beside {out} would replace the run's own {CURVE}; choose another --out."
+        )
     if len(runs) > len(COLOURS):
         raise ConfigError(f"One picture shows {len(COLOURS)} runs at most, not {len(runs)}; draw two.")
     curves = {run.resolve().name: read_curve(run) for run in runs}
@@ -76,7 +81,7 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         pen.line([(left, y + 6), (left + 24, y + 6)], fill=colour, width=3)
         pen.text((left + 32, y), name, fill="black", font=font)
     image.save(out)
-    with out.with_suffix(".csv").open("w", newline="") as file:
+    with table.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("run", *KEPT))
         for name, curve in curves.items():

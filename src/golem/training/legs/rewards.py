@@ -211,4 +211,6 @@ class Rewards:
         weighted = {name: getattr(w, name) * value for name, value in terms.items()}
         total = np.asarray(sum(weighted.values()), dtype=np.float64)
         # A negative sum would teach the beginner to fall early.
-        return np.maximum(total, 0.0) * dt, {name: float(v.mean()) for name, v in weighted.items()}
+        return np.maximum(total, 0.0) * dt, {
+            name: float(v[np.isfinite(v)].mean()) for name, v in weighted.items()
+        }

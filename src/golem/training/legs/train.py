@@ -284,8 +284,9 @@ class _Meter:
         self._seconds += PERIOD * env.n
         moving = env.walking
         error = np.linalg.norm((env.world.truth.heading_velocity() - env.twist)[:, :2], axis=1)
-        self._moving.append(float(error[moving].mean()) if moving.any() else 0.0)
-        self._standing.append(float(error[~moving].mean()) if (~moving).any() else 0.0)
+        known = np.isfinite(error)
+        for errors, who in ((self._moving, moving & known), (self._standing, ~moving & known)):
+            errors.append(float(error[who].mean()) if who.any() else 0.0)
         self._stepping.append(float(env.gait.stepping[~moving].mean()) if (~moving).any() else 0.0)
         self._rewards.append(float(reward.mean()))
         self._terms.append(terms)
