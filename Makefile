@@ -14,7 +14,8 @@ test: lint  ## lint, types and the fast tests
 	$(BIN)/pytest -n 2 -m "not slow"
 
 test-slow: venv-dev  ## the tests that take more than a few seconds
-	@if $(BIN)/pytest -q --collect-only -m slow >/dev/null; then $(BIN)/pytest -n 2 -m slow; else [ $$? = 5 ]; fi  # 5: none
+	$(BIN)/pytest -n 2 -m "slow and not alone"
+	$(BIN)/pytest -m "slow and alone"
 
 lint: venv-dev  ## style and types
 	$(BIN)/ruff check src tests

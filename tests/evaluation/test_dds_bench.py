@@ -47,6 +47,7 @@ def test_bad_options_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 def test_a_short_bench_loses_no_state_and_no_command(capsys: pytest.CaptureFixture[str]) -> None:
     domain = 20 + os.getpid() % 180
     loops = run_dds_bench(DdsBenchConfig(seconds=1.0, domain=domain))

@@ -96,7 +96,7 @@ def run(end: End, script: str, *arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
 
-@pytest.mark.parametrize("seconds", [1.0, pytest.param(5.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seconds", [1.0, 5.0])
 def test_a_cut_link_neither_holds_up_the_writer_nor_ends_the_stream(
     ends: tuple[End, End], seconds: float
 ) -> None:

@@ -22,7 +22,7 @@ from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.wire import hg
 
 pytest.importorskip("cyclonedds")
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.slow, pytest.mark.alone, pytest.mark.timeout(900)]
 
 DOMAIN = str(100 + os.getpid() % 100)
 STACK = """

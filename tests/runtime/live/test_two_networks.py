@@ -13,6 +13,7 @@ pytest.importorskip("cyclonedds")
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 @pytest.mark.timeout(300)
 def test_a_cut_cable_stops_the_robot_and_everything_goes_on_once_it_is_back(tmp_path: Path) -> None:
     (tmp_path / "blind.py").write_text(BLIND)

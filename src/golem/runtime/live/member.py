@@ -69,8 +69,8 @@ def find(node: Node, name: str, client: Client | ActionClient, remedy: str) -> N
 
 
 def say(text: str) -> None:
-    """Print a line at once, also into a pipe."""
-    print(text, flush=True)
+    """Print a line at once, also into a pipe, and whole, whichever thread says another."""
+    print(f"{text}\n", end="", flush=True)
 
 
 class Teller:
