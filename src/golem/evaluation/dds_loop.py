@@ -34,6 +34,9 @@ IMAGE_PERIOD, CLOUD_PERIOD = 1.0 / 15.0, 0.1
 OFFERED = Qos(depth=8)
 PATIENT = Qos(depth=256)
 """What a reader asks for that may be kept off its processor for half a second."""
+ZEROS = np.zeros(NUM_JOINTS)
+UPRIGHT = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
+"""Joints and IMU of a robot at rest; made once, since what encodes a state is timed."""
 CAMERAS = ("head", "left_hand", "right_hand")
 COLOR, DEPTH, CLOUD = "color/image_raw", "aligned_depth_to_color/image_raw", "livox/pointcloud"
 
@@ -85,9 +88,7 @@ def robot(participant: CycloneParticipant, seconds: float, cameras: bool) -> dic
 
 def _state(number: int) -> bytes:
     """Encode the state of a robot at rest, its number in milliseconds of its time."""
-    zeros = np.zeros(NUM_JOINTS)
-    imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
-    return convert.encode_low_state(LowState(number * 1e-3, zeros, zeros, zeros, imu))
+    return convert.encode_low_state(LowState(number * 1e-3, ZEROS, ZEROS, ZEROS, UPRIGHT))
 
 
 def _wait_for_an_answer(writer: CycloneWriter, reader: CycloneReader) -> None:

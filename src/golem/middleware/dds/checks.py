@@ -78,7 +78,7 @@ def _reason(participant: CycloneParticipant, endpoint: CycloneWriter | CycloneRe
     writing = isinstance(endpoint, CycloneWriter)
     does = "reads" if writing else "writes"
     topic = endpoint.topic
-    others = [m for m in discovery.members(participant) if m.guid != participant.guid]
+    others = discovery.others(participant)
     if not others:
         return "Nobody else is on the DDS domain"
     there = discovery.readers(participant) if writing else discovery.writers(participant)

@@ -69,6 +69,11 @@ def members(participant: CycloneParticipant) -> list[Member]:
     return _take(participant, _PARTICIPANTS, ParticipantData, read)
 
 
+def others(participant: CycloneParticipant) -> list[Member]:
+    """Return every participant of the domain but `participant`."""
+    return [member for member in members(participant) if member.guid != participant.guid]
+
+
 def writers(participant: CycloneParticipant) -> list[Endpoint]:
     """Return every writer of the domain, those of `participant` among them, of DDS itself none."""
     return _endpoints(participant, _WRITERS)

@@ -37,7 +37,7 @@ def member(name: str, dds: DdsConfig) -> Iterator[tuple[CycloneParticipant, DdsN
 
 def company(participant: CycloneParticipant, dds: DdsConfig) -> str:
     """Return how many others are on the domain, and where there is nobody, what to look at."""
-    others = sum(other.guid != participant.guid for other in discovery.members(participant))
+    others = len(discovery.others(participant))
     if others:
         return "one other is there" if others == 1 else f"{others} others are there"
     if dds.interface == "lo":
