@@ -9,8 +9,10 @@ import pytest
 pytest.importorskip("torch", reason="training needs the extra 'train'")
 
 from golem.capabilities.legs.gait import GaitConfig
+from golem.hardware.safety.base import SafetyLimits
 from golem.training.legs.env import PERIOD, EnvConfig, LegsEnv
 from golem.training.legs.model import STANCE
+from golem.training.legs.rewards import Weights
 from golem.training.legs.world import WorldConfig
 
 NOBODY = np.arange(0)
@@ -72,6 +74,18 @@ def test_a_robot_that_diverges_is_a_fall_and_teaches_nothing_that_is_not_a_numbe
     step = env.step(np.zeros((4, 12)), NOBODY, np.zeros((0, 15)))
     assert step.ended.tolist() == [False, False, True, False]
     assert step.reward[2] == -EnvConfig().fall and np.isfinite(step.reward).all()
+
+
+def test_the_speed_that_stops_a_robot_has_its_price_where_nothing_is_left_to_lose() -> None:
+    env = LegsEnv(2, EnvConfig(), 0, 1)
+    truth, still = env.world.truth, np.zeros((2, 3))
+    truth.R[:, 2] = [0.9, 0.0, np.sqrt(1.0 - 0.81)]
+    truth.dq[:] = 0.0
+    truth.dq[1, 3] = 16.0
+    idle = np.zeros((2, 12))
+    reward, _ = env._rewards(truth, still, env.gait, idle, idle, still[:, :2], np.full(2, 0.5), PERIOD)
+    above = 16.0 - 0.7 * SafetyLimits.from_profile().velocity[3]
+    np.testing.assert_allclose(reward, [0.0, Weights().fast * above * PERIOD])
 
 
 def test_a_run_that_goes_on_meets_other_draws_and_the_same_ones_each_time() -> None:

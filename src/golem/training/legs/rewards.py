@@ -50,7 +50,9 @@ class Weights:
         torque, ankle_torque, acceleration, speed: squared, of the leg joints.
         smooth: change of the action squared.
         limits: how far joints are beyond 90 % of their range [rad].
-        fast: how much faster a joint is than 70 % of what stops the robot [rad/s].
+        fast: how much faster a joint is than 70 % of what stops the robot [rad/s]. The only price that a sum below zero
+            is paid for: in the second after a hard push it is below zero all the time, and when nothing was paid there,
+            123 of 125 lost shoves were stops by the gate.
         hips: yaw and roll of the hips squared [rad^2].
         toes: yaw of the hips squared [rad^2]: with the toes 10 degrees out, each foot turned on the ground when the
             standing network took over, and the robot with them.
@@ -209,8 +211,10 @@ class Rewards:
         }
         self._speed = speed.copy()
         weighted = {name: getattr(w, name) * value for name, value in terms.items()}
-        total = np.asarray(sum(weighted.values()), dtype=np.float64)
-        # A negative sum would teach the beginner to fall early.
-        return np.maximum(total, 0.0) * dt, {
+        fast = weighted["fast"]
+        total = np.asarray(sum(weighted.values()), dtype=np.float64) - fast
+        # A negative sum would teach the beginner to fall early. In the step after a hard push it mostly is, though, and
+        # there the speed of the legs must still have its price: what it leads to is a stop.
+        return (np.maximum(total, 0.0) + fast) * dt, {
             name: float(v[np.isfinite(v)].mean()) for name, v in weighted.items()
         }
