@@ -13,7 +13,7 @@ import pytest
 
 from golem.errors import ConfigError, GolemError, OutputError
 from golem.evaluation import campaign
-from golem.evaluation.campaign import Job, Result, robot_options, run_campaign
+from golem.evaluation.campaign import Job, Result, run_campaign
 from golem.evaluation.provenance import Unchanged
 
 
@@ -64,22 +64,12 @@ def test_what_a_user_can_cause_comes_back_as_a_sentence(tmp_path: Path, log: Pat
         run_campaign(tmp_path / "run", [Count(13, str(log))], 1)
     with pytest.raises(ConfigError, match="-j is 0"):
         run_campaign(tmp_path / "run", [], 0)
-    with pytest.raises(ConfigError, match="option=value"):
-        robot_options(["feet"])
-    assert robot_options(["feet=box", "payload=[1, 2]"]) == {"feet": "box", "payload": [1, 2]}
 
 
 def test_a_file_that_holds_no_jobs_is_refused(tmp_path: Path, log: Path) -> None:
     (tmp_path / "jobs.jsonl").write_text(json.dumps({"something": "else"}) + "\n")
     with pytest.raises(OutputError, match="Line 1"):
         run_campaign(tmp_path, [Count(1, str(log))], 1)
-
-
-def test_options_of_the_robot_are_words_and_numbers() -> None:
-    with pytest.raises(ConfigError, match="a value is a word"):
-        robot_options(["payload=2024-01-01"])
-    with pytest.raises(ConfigError, match="--latency"):
-        robot_options(["latency=0"])
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from golem.errors import ConfigError, GolemError, OutputError
 from golem.evaluation.pool import Workers
 from golem.evaluation.provenance import Unchanged, code_digest, commit, digest, versions
 from golem.evaluation.records import RunFolder, append_line, whole_lines
-from golem.options import check_values, read_yaml
 
 Result = dict[str, Any]
 """What a job found: JSON-like."""
@@ -115,24 +114,6 @@ def write_files(out: Path, files: Mapping[str, str]) -> None:
     with RunFolder(out) as folder:
         for name, text in files.items():
             folder.write_text(name, text)
-
-
-def robot_options(words: Iterable[str]) -> dict[str, Any]:
-    """Return the twin's options that `name=value` words give; values are YAML, e.g. `payload=[1, 1]`.
-
-    Raises:
-        ConfigError: a word is no option.
-    """
-    options: dict[str, Any] = {}
-    for word in words:
-        name, equals, value = word.partition("=")
-        if not (name and equals):
-            raise ConfigError(f"--robot '{word}' must read option=value, e.g. feet=box or payload=[1,1].")
-        if name == "latency":
-            raise ConfigError("The latency has an option of its own, --latency.")
-        options[name] = read_yaml(value, f"--robot {name}")
-        check_values(f"--robot {name}", options[name])
-    return options
 
 
 @contextmanager

@@ -20,6 +20,7 @@ from golem.evaluation.records import Provenance, RunFolder, TrialRecord, artefac
 from golem.evaluation.report import render
 from golem.evaluation.summary import Summary, summarise
 from golem.evaluation.trials import Finished, Refused, run_trial
+from golem.evaluation.words import replaced_modules
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def run_ladder(config: LadderConfig) -> LadderResult:
         LadderInterrupted: Ctrl-C.
     """
     code = Unchanged()
-    overrides = _overrides(config.use)
+    overrides = replaced_modules(config.use)
     target, provenance = _check(config, overrides)
     wanted = [
         TrialSpec(config.rung, method, config.profile, config.seed, index, overrides)
@@ -124,16 +125,6 @@ def run_ladder(config: LadderConfig) -> LadderResult:
         folder.write_text("summary.json", summary.json() + "\n")
         report = folder.write_text("report.html", render(config.command(), records, summary, folder.path))
     return LadderResult(config, tuple(records), summary, report)
-
-
-def _overrides(use: Sequence[str]) -> dict[str, str]:
-    overrides = {}
-    for item in use:
-        slot, equals, implementation = item.partition("=")
-        if not (slot and equals and implementation):
-            raise ConfigError(f"--use '{item}' must read slot=implementation, e.g. upper_body=my_ik.py:MyIk.")
-        overrides[slot] = implementation
-    return overrides
 
 
 def _check(config: LadderConfig, overrides: Mapping[str, str]) -> tuple[str, Provenance]:

@@ -14,11 +14,12 @@ from rich.table import Table
 from tyro.conf import arg
 
 from golem.errors import ConfigError, ModuleFault, unknown_name
-from golem.evaluation.campaign import Done, Result, robot_options, run_campaign, write_files
+from golem.evaluation.campaign import Done, Result, run_campaign, write_files
 from golem.evaluation.episode import LATENCY, legs_stack
 from golem.evaluation.leg_tests import LOST, MISSED, TESTS, lost_in, plans
 from golem.evaluation.provenance import commit
 from golem.evaluation.subject import Subject, labels
+from golem.evaluation.words import replaced_modules, robot_options
 from golem.robots.sensors.profiles import load_profile
 from golem.skills.runner import FAULT
 
@@ -47,6 +48,8 @@ class LegBenchConfig:
     """Delay of motor commands on top of the profile's [s]."""
     robot: tuple[str, ...] = ()
     """Further options of the twin, e.g. feet=box cone=elliptic, or mjcf=../h1_2.xml."""
+    use: tuple[str, ...] = ()
+    """Replace other modules of the stack: slot=implementation, e.g. estimator=invariant_ekf, or =mine.py:Mine."""
     seed: int = 0
     """Seed; trial i of every method meets the same draws."""
     out: Path = Path("runs/leg-bench")
@@ -105,7 +108,8 @@ def run_leg_bench(config: LegBenchConfig) -> list[dict[str, Any]]:
     if plans.__name__ in config.test and legs_stack(config.method[0], config.profile).lower_body.use != "mpc":
         raise ConfigError('The test plans is of the MPC: give --method mpc, or "{use: mpc, option: value}".')
     robot = {"latency": config.latency, **robot_options(config.robot)}
-    subjects = [Subject.of(method, config.profile, robot) for method in config.method]
+    use = replaced_modules(config.use)
+    subjects = [Subject.of(method, config.profile, robot, use) for method in config.method]
     trials = [
         LegTrial(test, subject, config.seed, index)
         for test in config.test

@@ -19,11 +19,12 @@ import numpy as np
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.mpc.controller import MPC, MPCConfig
 from golem.evaluation.bench import stopwatch
-from golem.evaluation.episode import Episode, episode_seed, legs_stack
+from golem.evaluation.episode import Episode, episode_seed
 from golem.evaluation.exercise import WIDE_AREA, ArmMotion, Exercise
 from golem.evaluation.odometry import SimulatedOdometry
 from golem.evaluation.pushes import DIRECTIONS, shove
 from golem.evaluation.subject import Subject
+from golem.options import fill
 from golem.skills.walk import Walk, WalkGoal
 from golem.stack import Choice
 from golem.types import PlanarPose, Twist
@@ -190,14 +191,12 @@ def plans(subject: Subject, seed: int, index: int) -> Figures:
     where it stands and 95 of 100 plans take no longer than that, nor than the time between two.
     """
     samples = SAMPLES[index % len(SAMPLES)]
-    stack = legs_stack(subject.method, subject.profile, robot=subject.robot)
+    stack = subject.stack()
     options = dict(stack.lower_body.options)
     options["planner"] = {**options.get("planner", {}), "samples": samples}
     stack = replace(stack, lower_body=Choice(stack.lower_body.use, options))
-    allowed = (
-        options.get("latency", MPCConfig().latency),
-        1.0 / options.get("plan_rate", MPCConfig().plan_rate),
-    )
+    config: MPCConfig = fill("option of lower_body: mpc", MPCConfig, options)
+    allowed = min(config.latency, 1.0 / config.plan_rate)
     with closing(Episode(stack, episode_seed(seed, index))) as episode:
         with (
             stopwatch(MPC, "plan", time.perf_counter) as wall,
@@ -207,7 +206,7 @@ def plans(subject: Subject, seed: int, index: int) -> Figures:
             episode.run(PLANNED)
         if not wall:
             return _lost(episode)
-        in_time = float((np.array(wall) <= min(allowed)).mean())
+        in_time = float((np.array(wall) <= allowed).mean())
         stands = in_time >= 0.95 and not episode.over
         return {
             f"plans_per_second_{samples}": 1.0 / float(np.median(wall)),

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, get_args
 from tyro.conf import arg
 
 from golem.errors import ConfigError, ModuleFault, unknown_name
-from golem.evaluation.campaign import Done, Job, Result, robot_options, run_campaign, write_files
+from golem.evaluation.campaign import Done, Job, Result, run_campaign, write_files
 from golem.evaluation.episode import LATENCY, Episode
 from golem.evaluation.exercise import ArmMotion, Exercise
 from golem.evaluation.leg_tests import can_walk
@@ -23,6 +23,7 @@ from golem.evaluation.pool import CAN_COPY, in_a_copy
 from golem.evaluation.provenance import commit
 from golem.evaluation.pushes import DIRECTIONS, rod, shove
 from golem.evaluation.subject import Subject, labels
+from golem.evaluation.words import replaced_modules, robot_options
 from golem.robots.sensors.profiles import load_profile
 from golem.skills.runner import FAULT
 from golem.types import Twist
@@ -79,6 +80,8 @@ class PushBenchConfig:
     """Delay of motor commands on top of the profile's [s]."""
     robot: tuple[str, ...] = ()
     """Further options of the twin, e.g. feet=box cone=elliptic, or mjcf=../h1_2.xml."""
+    use: tuple[str, ...] = ()
+    """Replace other modules of the stack: slot=implementation, e.g. estimator=invariant_ekf, or =mine.py:Mine."""
     seed: int = 0
     """Seed; trial i of every method meets the same draws."""
     out: Path = Path("runs/push-bench")
@@ -247,7 +250,8 @@ def run_push_bench(config: PushBenchConfig) -> list[dict[str, Any]]:
     """
     _check(config)
     robot = {"latency": config.latency, **robot_options(config.robot)}
-    subjects = [Subject.of(method, config.profile, robot) for method in config.method]
+    use = replaced_modules(config.use)
+    subjects = [Subject.of(method, config.profile, robot, use) for method in config.method]
     search = Search(config)
     found = cells(run_campaign(config.out, search.first(subjects), config.j, search.following))
     text = table(found, config)
@@ -293,7 +297,7 @@ def table(found: Sequence[dict[str, Any]], config: PushBenchConfig) -> str:
     """Return the results as a Markdown table with a row per method and phase."""
     unit = "N s" if config.kind == "shove" else "N"
     what = "shove of 0.2 s on the torso" if config.kind == "shove" else "half-sine push of 1 s at the pelvis"
-    words = " ".join(config.robot)
+    words = " ".join((*config.robot, *config.use))
     head = [
         f"Largest {what} survived in >= {100 * SURVIVED:.0f} % of {config.n} trials [{unit}]; profile "
         f"{config.profile}, latency {1e3 * config.latency:g} ms, seed {config.seed}{', ' + words if words else ''}.",

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.episode import Episode, episode_seed, legs_stack
 from golem.evaluation.provenance import digest, user_files
+from golem.stack import Stack
 
 
 def labels(methods: Sequence[str]) -> dict[str, str]:
@@ -27,22 +28,31 @@ class Subject:
         method: lower body, see `episode.lower_body`.
         profile: realism profile.
         robot: options of the twin that differ from the standing stack's, e.g. `{"latency": 0.02}`.
-        files: hash of the files the method names.
+        use: slot -> implementation that replaces the standing stack's own, e.g. of the estimator.
+        files: hash of the files that method and replacements name.
     """
 
     method: str
     profile: str
     robot: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    use: Mapping[str, str] = field(default_factory=dict[str, str])
     files: str = ""
 
     @classmethod
-    def of(cls, method: str, profile: str, robot: Mapping[str, Any]) -> Subject:
+    def of(
+        cls, method: str, profile: str, robot: Mapping[str, Any], use: Mapping[str, str] | None = None
+    ) -> Subject:
         """Return the subject `method`, with the hash of its files.
 
         Raises:
-            ConfigError: the standing stack cannot be read.
+            ConfigError: the standing stack cannot be read, or `use` replaces what the test itself brings.
         """
-        return cls(method, profile, dict(robot), digest(user_files(legs_stack(method, profile, robot=robot))))
+        subject = cls(method, profile, dict(robot), dict(use or {}))
+        return replace(subject, files=digest(user_files(subject.stack())))
+
+    def stack(self, **robot: object) -> Stack:
+        """Return the standing stack with this lower body, and further options of the twin."""
+        return legs_stack(self.method, self.profile, self.use, {**self.robot, **robot})
 
     def draw(self, seed: int, index: int) -> TrialSpec:
         """Return the trial whose noise streams trial `index` of every test draws from, whatever the method."""
@@ -50,5 +60,4 @@ class Subject:
 
     def episode(self, seed: int, index: int, **robot: object) -> Episode:
         """Return the robot of trial `index`, with further options of the twin."""
-        stack = legs_stack(self.method, self.profile, robot={**self.robot, **robot})
-        return Episode(stack, episode_seed(seed, index))
+        return Episode(self.stack(**robot), episode_seed(seed, index))

@@ -13,7 +13,7 @@ from golem.errors import ConfigError
 from golem.training.legs.checkpoint import CURVE, read_curve
 
 PANELS = (
-    ("falls", "falls per robot second", 1.0),
+    ("survival", "how much of its episode a robot survives", 1.0),
     ("error_moving", "velocity error while walking [m/s]", 0.7),
     ("push", "pushes, share of the largest", 1.0),
     ("amplitude", "upper-body motions, share of the range", 1.0),
