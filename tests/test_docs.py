@@ -24,17 +24,19 @@ def blocks(page: str, language: str) -> list[str]:
 def test_the_module_of_write_a_module_loads_and_grasps(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    module, usage, _ = blocks("write-a-module.md", "python")
+    module, usage, *_ = blocks("write-a-module.md", "python")
     (tmp_path / "my_grasp.py").write_text(module)
     monkeypatch.chdir(tmp_path)
     exec(compile(usage, "write-a-module.md", "exec"), {})
 
 
-def test_the_legs_of_write_a_module_stand(tmp_path: Path) -> None:
-    *_, module = blocks("write-a-module.md", "python")
-    file = tmp_path / "my_legs.py"
-    file.write_text(module)
-    trial = Trial(Subject(f"{file}:Stiff", "ideal"), "shove", "standing", ("front",), 5.0, index=0, seed=0)
+def test_the_legs_of_write_a_module_stand_by_its_estimator(tmp_path: Path) -> None:
+    *_, legs, estimator = blocks("write-a-module.md", "python")
+    file, mine = tmp_path / "my_legs.py", tmp_path / "my_estimator.py"
+    file.write_text(legs)
+    mine.write_text(estimator)
+    subject = Subject(f"{file}:Stiff", "ideal", use={"estimator": f"{mine}:Smooth"})
+    trial = Trial(subject, "shove", "standing", ("front",), 5.0, index=0, seed=0)
     assert trial.run() == {"front": None}
 
 
