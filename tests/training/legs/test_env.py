@@ -83,9 +83,11 @@ def test_the_speed_that_stops_a_robot_has_its_price_where_nothing_is_left_to_los
     truth.dq[:] = 0.0
     truth.dq[1, 3] = 16.0
     idle = np.zeros((2, 12))
-    reward, _ = env._rewards(truth, still, env.gait, idle, idle, still[:, :2], np.full(2, 0.5), PERIOD)
     above = 16.0 - 0.7 * SafetyLimits.from_profile().velocity[3]
-    np.testing.assert_allclose(reward, [0.0, Weights().fast * above * PERIOD])
+    for strictness in (0.0, 0.5, 1.0):
+        known = (idle, idle, still[:, :2], np.full(2, 0.5))
+        reward, _ = env._rewards(truth, still, env.gait, *known, strictness, PERIOD)
+        np.testing.assert_allclose(reward, [0.0, strictness * Weights().fast * above * PERIOD])
 
 
 def test_a_run_that_goes_on_meets_other_draws_and_the_same_ones_each_time() -> None:

@@ -164,11 +164,13 @@ def test_ppo_learns_which_way_to_act() -> None:
 @pytest.mark.parametrize("adversary", ["motions", "none"])
 def test_disturbances_grow_with_the_steps(adversary: Adversary, tmp_path: Path) -> None:
     ramps: dict[str, Any] = {"push_ramp": (0.0, 384.0), "motion_ramp": (384.0, 768.0)}
+    ramps["strict_ramp"] = (384.0, 576.0)
     train(small(tmp_path, updates=10, adversary=adversary, **ramps))
     with (tmp_path / CURVE).open() as file:
         rows = list(csv.DictReader(file))
     push, motion, payload = ([float(row[name]) for row in rows] for name in ("push", "amplitude", "payload"))
     assert payload == motion
+    assert [float(row["strictness"]) for row in rows] == [0.0, 0.0, 1.0] + [1.0] * 7
     assert push[0] == pytest.approx(0.525) and push[1:] == [1.0] * 9
     assert motion == ([0.05, 0.05, 0.525] + [1.0] * 7 if adversary == "motions" else [0.0] * 10)
 

@@ -28,19 +28,21 @@ TOP_SPEED = 2.5
 
 @dataclass
 class Difficulty:
-    """How hard the disturbances are, 0 to 1 each.
+    """How hard it is made for the legs, 0 to 1 each.
 
     Attributes:
         amplitude: share of the joint ranges that upper-body targets use.
         speed: share of `TOP_SPEED`.
         push: share of the largest impulse.
         payload: share of the largest payload.
+        strictness: share of the price of fast legs that is paid by who has nothing left to lose; see `Rewards`.
     """
 
     amplitude: float = 0.2
     speed: float = 0.2
     push: float = 0.1
     payload: float = 0.0
+    strictness: float = 0.0
 
 
 class UpperBodyMotion:

@@ -237,7 +237,15 @@ class LegsEnv:
         )
         truth = self.world.truth
         reward, terms = self._rewards(
-            truth, self.twist, self.gait, action, self._action, self._capture, self._misplaced, dt
+            truth,
+            self.twist,
+            self.gait,
+            action,
+            self._action,
+            self._capture,
+            self._misplaced,
+            self.difficulty.strictness,
+            dt,
         )
         self._action = action
         self.age += dt

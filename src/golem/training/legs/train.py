@@ -45,6 +45,7 @@ class TrainConfig:
         push_ramp, motion_ramp: steps before which pushes, and motions and payloads of the upper body, are light, and
             after which they have their full range. They grow whether or not the robot survives: tied to survival, as
             ALMI has it, the pushes went up and down below half, and beside full pushes the motions never grew.
+        strict_ramp: steps between which fast legs get their price where the sum of the rewards is negative, too.
         noise_ramp, noise: steps before the end at which the bound of the legs' exploration noise begins to fall, and
             has fallen, and the bound before and after. How to stand to the millimetre cannot be learned while the
             joints tremble by 0.1 rad.
@@ -61,6 +62,7 @@ class TrainConfig:
     start: Path | None = None
     push_ramp: tuple[float, float] = (1e6, 8e6)
     motion_ramp: tuple[float, float] = (3e6, 12e6)
+    strict_ramp: tuple[float, float] = (8e6, 10e6)
     noise_ramp: tuple[float, float] = (5e6, 1.5e6)
     noise: tuple[float, float] = (0.45, 0.1)
     ppo: PpoConfig = field(default_factory=PpoConfig)
@@ -224,6 +226,7 @@ class _Run:
         """Set the difficulty of the disturbances by the steps that were done."""
         config, difficulty = self.config, self.env.difficulty
         difficulty.push = float(np.interp(self.steps, config.push_ramp, (0.05, 1.0)))
+        difficulty.strictness = float(np.interp(self.steps, config.strict_ramp, (0.0, 1.0)))
         motion = float(np.interp(self.steps, config.motion_ramp, (0.05, 1.0)))
         motion = 0.0 if config.adversary == "none" else motion
         difficulty.amplitude = difficulty.speed = difficulty.payload = motion
