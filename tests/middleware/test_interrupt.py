@@ -26,6 +26,15 @@ def test_a_signal_sets_the_event_and_is_given_back(number: signal.Signals) -> No
     assert signal.getsignal(number) is before
 
 
+@pytest.mark.parametrize("number", [signal.SIGTSTP, signal.SIGQUIT])
+def test_who_must_not_be_frozen_or_killed_hears_those_keys_too(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
+    with interrupted(also=[number]) as stop:
+        signal.raise_signal(number)
+        assert stop.wait(10.0)
+    assert signal.getsignal(number) is before
+
+
 def test_who_was_started_by_nohup_outlives_its_terminal() -> None:
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     with interrupted() as stop:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 
 LIFELINE = "GOLEM_LIFELINE"
@@ -20,10 +20,13 @@ def _end_with_it(stop: threading.Event) -> None:
 
 
 @contextmanager
-def interrupted() -> Iterator[threading.Event]:
+def interrupted(also: Collection[signal.Signals] = ()) -> Iterator[threading.Event]:
     """Yield an event that Ctrl-C, SIGTERM or SIGHUP sets, or the end of a `LIFELINE`; to be entered in the main thread.
 
-    Afterwards the three are as before. A SIGHUP that is ignored stays so: that is what nohup is for.
+    Afterwards they are as before. A SIGHUP that is ignored stays so: that is what nohup is for.
+
+    Args:
+        also: further signals that set it.
     """
     stop = threading.Event()
 
@@ -31,7 +34,7 @@ def interrupted() -> Iterator[threading.Event]:
         # By another thread: the handler may run while this one holds the event's lock.
         threading.Thread(target=stop.set).start()
 
-    heeded = [signal.SIGINT, signal.SIGTERM]
+    heeded = [signal.SIGINT, signal.SIGTERM, *also]
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         heeded.append(signal.SIGHUP)
     before = {number: signal.signal(number, interrupt) for number in heeded}

@@ -1,4 +1,4 @@
-"""There is one robot on a domain, and who has what there."""
+"""What there is one of on a domain, and who has what there."""
 
 from __future__ import annotations
 
@@ -12,7 +12,12 @@ from golem.middleware.ros import names
 
 DISCOVERY = 0.3
 """Time that whoever is on the domain already gets to be seen [s]."""
-STATES = names.topic("/lowstate")
+SOLE = {
+    "/lowstate": "a robot",
+    "/lowcmd": "somebody who commands the motors",
+    "/safety/lowcmd_in": "a stack",
+}
+"""Topics that one process alone may write, and what that process is."""
 
 
 def owner(participant: CycloneParticipant, guid: bytes) -> str:
@@ -25,16 +30,18 @@ def owner(participant: CycloneParticipant, guid: bytes) -> str:
     return guid.hex()
 
 
-def refuse_second_robot(participant: CycloneParticipant, dds: DdsConfig) -> None:
-    """Take `DISCOVERY` to look whether a robot is on the domain, before another is put there.
+def refuse_second(participant: CycloneParticipant, dds: DdsConfig, topic: str) -> None:
+    """Take `DISCOVERY` to look whether anybody writes `topic`, one of `SOLE`, before a second one does.
+
+    For a robot in motion a second writer is a reason to stop, and so to fall.
 
     Raises:
-        ConfigError: one is.
+        ConfigError: somebody does.
     """
     time.sleep(DISCOVERY)
-    others = [e for e in discovery.writers(participant) if e.topic == STATES]
+    others = [e for e in discovery.writers(participant) if e.topic == names.topic(topic)]
     if others:
         raise ConfigError(
-            f"There is a robot on {dds} already: {owner(participant, others[0].guid)}; "
+            f"There is {SOLE[topic]} on {dds} already: {owner(participant, others[0].guid)}; "
             "end it, or choose another domain."
         )

@@ -208,13 +208,26 @@ def test_releasing_the_button_before_activation_starts_nothing(bench: Any) -> No
         assert bench.tick(request=Request.ACTIVATE).state is GateState.ARMED
 
 
-def test_a_pause_allows_no_leap(bench: Any, command_at: Make, state_at: Make, limits: SafetyLimits) -> None:
+def test_a_short_pause_allows_no_leap(bench: Any, command_at: Make, limits: SafetyLimits) -> None:
     bench.activate()
     before = bench.tick().command.q
-    bench.t += 5.0
+    bench.t += limits.stall - 0.01
     t = bench.t + 0.002
-    after = bench.tick(command=command_at(t, limits.upper.copy())).command.q
-    assert np.all(np.abs(after - before) <= limits.slew * limits.longest_tick + 1e-12)
+    result = bench.tick(command=command_at(t, limits.upper.copy()))
+    assert result.state is GateState.ACTIVE
+    assert np.all(np.abs(result.command.q - before) <= limits.slew * limits.longest_tick + 1e-12)
+
+
+def test_after_a_pause_the_robot_is_damped_however_fresh_everything_looks(
+    bench: Any, state_at: Make, limits: SafetyLimits
+) -> None:
+    bench.activate()
+    for _ in range(100):
+        bench.tick()
+    bench.t += limits.stall
+    result = bench.tick(state=state_at(bench.t + 0.002, np.full(27, 0.02)))
+    assert (result.state, result.reason) == (GateState.STOP1, Reason.STALLED)
+    assert damps(result.command)
 
 
 def test_check_is_pure(bench: Any, limits: SafetyLimits, state_at: Make, command_at: Make) -> None:

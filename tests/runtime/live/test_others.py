@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.middleware.wire.rpc import reach
 from tests.runtime.live.conftest import Live
 from tests.runtime.live.test_live import VENDOR
 
@@ -21,16 +20,12 @@ from golem.middleware.dds.base import Qos
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros import convert, images
 from golem.middleware.topics import LookRequest
-from golem.middleware.unitree_api import Request, encode
 from golem.middleware.wire import convert as wire
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import answered, encode_low_state
-from golem.middleware.wire.rpc import RpcServer
-from golem.robots.onboard import motion_switcher
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.robots.sensors.cameras import CAMERAS
 from golem.runtime.executor import Executor
-from golem.runtime.live import authority
 from golem.runtime.live.gate import LiveGate
 from golem.runtime.live.motors import RequestOut
 from golem.runtime.live.process import SafetyConfig, run_safety
@@ -157,72 +152,6 @@ def test_the_real_robots_own_leg_controller_is_not_commanded_against(live: Live)
     live.stack = replace(live.stack, lower_body=Choice("vendor"))
     with pytest.raises(ConfigError, match="moves its legs itself"):
         live.start_up(real=True)
-
-
-def test_a_real_robots_motors_are_not_touched_before_its_own_controller_lets_go_of_them(live: Live) -> None:
-    live.leave("safety")
-    live.start_gate(real=True)
-    assert live.gate is not None
-    participant, node = live.member("listener")
-    motors = participant.reader("rt/lowcmd", hg.LOW_CMD.type_name, Qos(reliable=False, depth=1000))
-    live.run(0.2)
-    assert (live.state, live.reason) == (GateState.INIT, "motors_held") and not motors.take(1000)
-    assert "'ai'" in live.gate.status.detail and "golem safety take --hanging" in live.gate.status.detail
-    assert not live.ask("activate")[0]
-
-    switcher = reach(participant, motion_switcher.SERVICE)
-    switcher.send(Request(1, motion_switcher.RELEASE_MODE))
-    live.run(1.0)
-    assert live.state is GateState.ARMED and motors.take(1000)
-    live.activate()
-
-    switcher.send(Request(2, motion_switcher.SELECT_MODE, encode({"name": motion_switcher.MODE})))
-    live.run(1.0)
-    assert (live.state, live.reason) == (GateState.STOP1, "motors_held")
-    motors.take(1000)
-    live.run(0.1)
-    assert not motors.take(1000)  # not even to damp them
-    live.leave_quietly(node)
-
-
-def test_a_motion_switcher_that_falls_silent_keeps_the_gate_shut_but_stops_nobody(
-    live: Live, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    live.leave("safety")
-    live.start_gate(real=True)
-    participant, _ = live.member("operator")
-    reach(participant, motion_switcher.SERVICE).send(Request(1, motion_switcher.RELEASE_MODE))
-    live.run(1.0)
-    live.activate()
-    monkeypatch.setattr(RpcServer, "reply", lambda server, response: None)
-    live.run(2.5 * authority.SILENCE)
-    assert live.state is GateState.ACTIVE
-    motors = participant.reader("rt/lowcmd", hg.LOW_CMD.type_name, Qos(reliable=False, depth=1000))
-    assert live.ask("stop")[0]
-    live.run(1.0)
-    told = [wire.decode_low_command(sample.payload, 0.0) for sample in motors.take(1000)]
-    assert len(told) > 450  # it is damped all the same
-    assert not any(command.kp.any() for command in told[1:]) and told[-1].kd.any()
-    assert not live.ask("reset")[0]
-    live.leave("safety")
-    live.start_gate(real=True)
-    live.run(0.5)
-    assert (live.state, live.reason) == (GateState.INIT, "motors_held")
-    assert live.gate is not None and "does not say" in live.gate.status.detail
-
-
-def test_a_controller_whose_name_cannot_be_printed_has_the_motors_all_the_same(
-    live: Live, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    live.leave("safety")
-    live.start_gate(real=True)
-    assert live.gate is not None
-    live.run(0.2)
-    reply = RpcServer.reply
-    nonsense = '{"form": "0", "name": "\\ud800"}'
-    monkeypatch.setattr(RpcServer, "reply", lambda server, said: reply(server, replace(said, data=nonsense)))
-    live.run(1.0)
-    assert live.gate.status.detail.startswith(r"the robot's own controller '\ud800' has the motors")
 
 
 def test_a_gate_that_fails_can_still_damp(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:

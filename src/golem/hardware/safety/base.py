@@ -40,6 +40,7 @@ class Reason(StrEnum):
     """Why the gate is not armed, or why it stopped."""
 
     CLOCK = "clock_backwards"
+    STALLED = "gate_stalled"
     REQUESTED = "stop_requested"
     ESTOP_MISSING = "estop_never_seen"
     ESTOP_STALE = "estop_stale"
@@ -49,6 +50,7 @@ class Reason(StrEnum):
     STATE_STALE = "state_stale"
     STATE_TIME = "state_time_invalid"
     STATE_INVALID = "state_not_finite"
+    STATE_RATE = "state_rate"
     POSITION = "joint_position"
     VELOCITY = "joint_velocity"
     TORQUE = "joint_torque"
@@ -57,6 +59,7 @@ class Reason(StrEnum):
     BASE_STALE = "base_estimate_stale"
     WRITERS = "two_writers"
     HELD = "motors_held"
+    UNHEARD = "motors_unheard"
     STATE_DAMAGED = "state_damaged"
     MOTOR = "motor_error"
     COMMAND_DAMAGED = "command_damaged"
@@ -124,7 +127,9 @@ class SafetyLimits:
         gross: multiple of the velocity limit, and violation of the position range [rad], that no sensor noise
             explains and that one sample of suffices [own].
         damping_time: how long STOP1 damps before STOP0 [s] [own: arms have sunk after 2 s].
-        longest_tick: time step up to which slewing accumulates [s]; a pause must not allow a leap [own].
+        longest_tick: time step up to which slewing accumulates [s] [own].
+        stall: time between two ticks that stops the robot [s]: meanwhile nobody looked, it may lie on the floor, and
+            what comes first after a pause looks fresh [own: as old as a command may be].
     """
 
     lower: Array
@@ -153,6 +158,7 @@ class SafetyLimits:
     gross: float = 3.0
     damping_time: float = 3.0
     longest_tick: float = 0.010
+    stall: float = 0.100
 
     @classmethod
     def from_profile(cls, profile: str = "urdf", ratio: float = LIMIT_RATIO) -> SafetyLimits:

@@ -52,7 +52,8 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     state, counters, state_fault = _state(inputs.state, memory, t, limits)
     command, command_fault = _command(inputs.command, memory.command, t, limits)
     grounded, base_fault = _base(inputs.base, memory, t, limits)
-    fault = (None if running else Fault(Reason.CLOCK)) or inputs.transport or estop_fault or state_fault
+    clock_fault = None if running else Fault(Reason.CLOCK)
+    fault = clock_fault or _pause(memory, t, limits) or inputs.transport or estop_fault or state_fault
     edge = inputs.request if inputs.request is not memory.request else Request.NONE
 
     mode, reason, detail, since = memory.mode, memory.reason, memory.detail, memory.since
@@ -136,6 +137,13 @@ class Gate:
 
 def _stamped(t_frame: float, t: float, limits: SafetyLimits) -> bool:
     return t_frame <= t + limits.future  # false for nan
+
+
+def _pause(memory: GateMemory, t: float, limits: SafetyLimits) -> Fault | None:
+    pause = t - memory.t
+    if memory.mode is GateState.ACTIVE and pause > limits.stall:
+        return Fault(Reason.STALLED, f"for {pause * 1e3:.0f} ms")
+    return None
 
 
 def _estop(

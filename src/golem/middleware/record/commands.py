@@ -21,7 +21,7 @@ from golem.middleware.record.reader import Bag, repair
 from golem.middleware.record.recorder import Recorder
 from golem.middleware.record.writer import BagConfig, BagWriter, Compression
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
-from golem.middleware.sole import refuse_second_robot
+from golem.middleware.sole import refuse_second
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def run_replay(config: ReplayConfig) -> int:
         )
     with closing(connect(config.dds, PARTICIPANT_USER_DATA)) as participant, interrupted() as stop:
         if "/lowstate" in (play.topics or bag.topics):
-            refuse_second_robot(participant, config.dds)
+            refuse_second(participant, config.dds, "/lowstate")
         with closing(Player(bag, participant, play)) as player:
             print(f"Playing {config.bag} on {config.dds}. Ctrl-C ends it.", flush=True)
             written = player.run(stop)

@@ -3,9 +3,50 @@
 from __future__ import annotations
 
 import math
+import time
 
 BACK = 0.1
 """How far back a stamp of one writer must be to mean a restart, not a sample that was overtaken [s]."""
+
+
+WINDOW = 1.0
+"""Time over which two clocks are compared [s]."""
+AGREEMENT = (0.9, 1.1)
+"""Rates of the robot's time that are taken for ours [own: what arrives may be late by 50 ms at either end]."""
+
+
+def awake_or_not() -> float:
+    """Return a monotonic time that goes on while the machine sleeps, where the system has one [s]."""
+    clock = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
+    return time.clock_gettime(clock)
+
+
+class Rate:
+    """How fast the robot's time runs by our clock: 2 ms a state if its unit is what we take it for.
+
+    Attributes:
+        value: over the last `WINDOW`; None before the first.
+    """
+
+    def __init__(self) -> None:
+        """Start before the first state."""
+        self.value: float | None = None
+        self._since: tuple[float, float] | None = None
+
+    def add(self, t: float, now: float) -> None:
+        """Take in the stamp `t` of a state that arrived at `now` [s]."""
+        if self._since is None or t < self._since[0]:
+            self._since = (t, now)
+        elif now - self._since[1] >= WINDOW:
+            self.value = (t - self._since[0]) / (now - self._since[1])
+            self._since = (t, now)
+
+    def doubt(self) -> str:
+        """Return why the robot's time cannot be relied on; empty if it can."""
+        if self.value is None:
+            return f"the robot's time is compared with ours for {WINDOW:g} s first"
+        least, most = AGREEMENT
+        return "" if least <= self.value <= most else f"the robot's time runs at {self.value:.2f} of ours"
 
 
 class RobotClock:

@@ -7,7 +7,6 @@ The robot's time serves only to tell a new state from a repeated one, and which 
 from __future__ import annotations
 
 import math
-import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -31,7 +30,7 @@ from golem.robots.model.table import JOINT_NAMES
 from golem.runtime.executor import in_order
 from golem.runtime.live import pace
 from golem.runtime.live.authority import Authority
-from golem.runtime.live.clock import Every, RobotClock
+from golem.runtime.live.clock import Every, Rate, RobotClock, awake_or_not
 from golem.runtime.live.surface import Surface
 from golem.runtime.live.verdict import status_message, told
 from golem.runtime.sides import SafetySide
@@ -56,6 +55,7 @@ class Arrivals:
         commands: what the process waits on.
         mode_machine: machine type that the robot reports; None before its first state.
         answered: robot time of the state that the newest command answers [s]; 0 where its sender does not say.
+        rate: of the robot's time.
         sole: what reads each of the topics that one process alone may write.
     """
 
@@ -67,6 +67,7 @@ class Arrivals:
         self.commands, self._states = WaitSet(), WaitSet()
         self.mode_machine: int | None = None
         self.answered = 0.0
+        self.rate = Rate()
         self._faulty = 0
         # Of each there is one: commands of two stacks would take turns, and states of two robots.
         self.sole = {
@@ -91,6 +92,7 @@ class Arrivals:
             self._arrived.clear()
         if self._robot.advances(state.t, sample.writer):
             self._arrived[state.t] = now
+            self.rate.add(state.t, now)
             if len(self._arrived) > REMEMBERED:
                 self._arrived.popitem(last=False)
             self._bus.publish(topics.LOW_STATE, replace(state, t=now), now)
@@ -133,7 +135,7 @@ class LiveGate:
         node: Node,
         limits: SafetyLimits,
         estop: VirtualEstop | None,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = awake_or_not,
         who: Callable[[bytes], str] = bytes.hex,
         patient: bool = False,
         real: bool = False,
@@ -149,11 +151,12 @@ class LiveGate:
             clock: monotonic [s].
             who: names the owner of an endpoint by its guid.
             patient: whether the robot's time may stand still for a stack that is behind; see `live.pace`.
-            real: whether the robot's own controllers must have let go of the motors first; a twin's move none.
+            real: whether the robot's own controllers must have let go of the motors first; a twin's move none. Its
+                motors must hear us then, and its time must run as ours does; that of a twin stands still at times.
         """
         if patient:
             limits = pace.patient(limits)
-        self._patient, self._damping = patient, limits.damping
+        self._patient, self._damping, self._stall = patient, limits.damping, limits.stall
         self.bus = Bus()
         self._node, self._clock, self._who = node, clock, who
         self._surface = surface = Surface("safety", participant, node)
@@ -171,6 +174,8 @@ class LiveGate:
         self._crowded = ""
         self._looks, self._reports, self._diagnoses = Every(LOOK), Every(REPORT), Every(DIAGNOSE)
         self._steps = 0
+        self._ending = False
+        self._stepped, self._pause = clock(), 0.0
         self.status = GateStatus(clock(), GateState.INIT)
         surface.subscribe("/base_estimate", self._base)
         surface.serve(
@@ -184,9 +189,10 @@ class LiveGate:
 
     def step(self) -> None:
         """Take what has come, judge it, and tell the motors."""
+        now = self._clock()
+        self._pause, self._stepped = now - self._stepped, now
         self._arrivals.poll()
         self._node.poll()
-        now = self._clock()
         if self._looks.due(now):
             self._crowded = self._crowd()
         self._authority.poll()
@@ -196,9 +202,10 @@ class LiveGate:
 
     def stop(self) -> bool:
         """Ask for a stop, and return whether the gate has done damping, if it had anything to damp."""
+        self._ending = True
         self._side.request(Request.STOP)
         self.step()
-        return self.status.state is not GateState.STOP1
+        return self.status.state not in (GateState.ACTIVE, GateState.STOP1)
 
     def damp(self) -> None:
         """Tell the motors to damp, whatever may have failed."""
@@ -208,8 +215,14 @@ class LiveGate:
         """Run the gate once, and publish what follows."""
         now, before = self._clock(), self.status
         moving = before.state is GateState.ACTIVE
-        held = self._authority.doubt(moving) if self._real else ""
-        for reason, detail in ((Reason.WRITERS, self._crowded), (Reason.HELD, held)):
+        doubts = [(Reason.WRITERS, self._crowded)]
+        if self._real:
+            deaf = "" if self._out.matched() else "nobody receives /lowcmd"
+            # A robot that moves is not dropped for the rate: its unit was right, and what arrives may be late.
+            rate = "" if moving else self._arrivals.rate.doubt()
+            held = self._authority.doubt(moving)
+            doubts += [(Reason.STATE_RATE, rate), (Reason.UNHEARD, deaf), (Reason.HELD, held)]
+        for reason, detail in doubts:
             if detail:
                 self.bus.publish(topics.TRANSPORT_FAULT, Fault(reason, detail), now)
         for node in self._nodes:
@@ -255,7 +268,14 @@ class LiveGate:
         return ", ".join(map(self._who, writers))
 
     def _ask(self, request: Request, *wanted: GateState) -> Trigger_Response:
-        """Pass on what an operator asks for; the answer says what came of it."""
+        """Pass on what an operator asks for; the answer says what came of it.
+
+        Not while this process ends, and nothing but a stop after a pause: who asked before may be beside the robot now.
+        """
+        if self._ending:
+            return Trigger_Response(False, "The safety process ends.")
+        if self._pause > self._stall and request is not Request.STOP:
+            return Trigger_Response(False, f"The gate was held up for {self._pause:.1f} s; ask again.")
         self._side.request(request)
         self._judge()
         self._side.request(Request.NONE)

@@ -28,4 +28,5 @@ robot that it works with, for dead [s]."""
 
 def patient(limits: SafetyLimits) -> SafetyLimits:
     """Return `limits` for a robot whose time may stand still."""
-    return replace(limits, state_age=SILENCE, command_age=SILENCE, base_age=SILENCE + limits.base_age)
+    base_age = SILENCE + limits.base_age
+    return replace(limits, state_age=SILENCE, command_age=SILENCE, base_age=base_age, stall=SILENCE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import signal
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -17,7 +18,7 @@ from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import GateState, GateStatus, SafetyLimits
 from golem.middleware.dds.domain import ROBOT_DOMAIN, DdsConfig
 from golem.middleware.interrupt import interrupted
-from golem.middleware.sole import owner, refuse_second_robot
+from golem.middleware.sole import owner, refuse_second
 from golem.robots.base import Recallable
 from golem.runtime.assembly import build_robot
 from golem.runtime.executor import TICK
@@ -29,6 +30,8 @@ from golem.runtime.live.twin import Twin
 from golem.runtime.live.verdict import told
 from golem.stack import Stack, load_stack
 
+ROBOT_LIMITS = "urdf"
+"""Limit profile of the real robot: the smaller torques."""
 ALONE = 5.0
 """Time without a robot after which the stack says what it waits for [s]."""
 
@@ -106,7 +109,7 @@ def run_twin(config: TwinConfig) -> None:
         )
     stack = twin_stack(config)
     with interrupted() as stop, member("twin", config.dds) as (participant, node):
-        refuse_second_robot(participant, config.dds)
+        refuse_second(participant, config.dds, "/lowstate")
         with closing(build_robot(stack, config.seed)) as robot, ExitStack() as closing_time:
             darkroom = None
             if isinstance(robot, Recallable):
@@ -125,17 +128,21 @@ def run_safety(config: SafetyConfig) -> None:
     """Guard until Ctrl-C; a robot in motion is damped first.
 
     Raises:
-        ConfigError: an option is wrong.
+        ConfigError: an option is wrong, or the motors are commanded already.
         DdsError: the domain cannot be joined.
     """
     limits = SafetyLimits.from_profile(config.limits)
+    if config.dds.robot and config.limits != ROBOT_LIMITS:
+        raise ConfigError(f"The real robot is guarded with --limits {ROBOT_LIMITS}, not '{config.limits}'.")
     patient = not (config.strict or config.dds.robot)
     estop = None if config.dds.robot else VirtualEstop()
     with (
-        interrupted() as stop,
+        # Ctrl-Z or Ctrl-\ in the wrong terminal would freeze or kill the gate, and leave the motors a stiff command.
+        interrupted(also=(signal.SIGTSTP, signal.SIGQUIT)) as stop,
         closing(Teller()) as tell,
         member("safety", config.dds) as (participant, node),
     ):
+        refuse_second(participant, config.dds, "/lowcmd")
         who = partial(owner, participant)
         gate = LiveGate(participant, node, limits, estop, who=who, patient=patient, real=config.dds.robot)
         tell(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
@@ -164,7 +171,7 @@ def run_up(config: UpConfig) -> None:
     """Run the stack until Ctrl-C.
 
     Raises:
-        ConfigError: an option or the stack file is wrong.
+        ConfigError: an option or the stack file is wrong, or a stack is on the domain already.
         DdsError: the domain cannot be joined.
         ModuleFault: a module broke its contract; the safety gate, which hears no more commands, damps the robot.
     """
@@ -174,6 +181,7 @@ def run_up(config: UpConfig) -> None:
         ThreadPoolExecutor(1, "localizer") as beside,
         member("up", config.dds) as (participant, node),
     ):
+        refuse_second(participant, config.dds, "/safety/lowcmd_in")
         live = LiveStack(stack, participant, node, real=config.dds.robot, beside=beside)
         say(f"The stack '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
         waiting_since: float | None = time.monotonic()
