@@ -15,7 +15,7 @@ from golem.runtime.assembly import build
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.stack import Choice, Stack
-from golem.types import HandState, LowCommand
+from golem.types import HandState, LowCommand, PalmTargets
 
 DYING_ARMS = """
 from golem.capabilities.arms.diff_ik import DiffIK
@@ -52,6 +52,48 @@ def test_the_motors_damp_when_a_module_dies(tmp_path: Path) -> None:
     command = running.bus.latest(topics.LOW_CMD, LowCommand)
     assert command is not None
     assert not command.kp.any() and (command.kd > 0.0).all() and not command.tau.any()
+
+
+class Reach:
+    """Sends the right hand 10 cm up, and stays there or ends."""
+
+    name = "reach"
+
+    def __init__(self, stay: bool) -> None:
+        self._stay = stay
+
+    async def run(self, context: Context, goal: object) -> SkillResult:
+        """Reach."""
+        arm = context.arms["right"]
+        T = arm.pose
+        T[2, 3] += 0.1
+        await arm.move(T, 0.3)
+        if self._stay:
+            await context.sleep(60.0)
+        return SkillResult(True, "done", None, "")
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_no_arm_is_drawn_to_where_a_skill_or_a_stop_left_it(stopped: bool) -> None:
+    running, robot = build(Stack(profile="ideal"), seed=0)
+
+    def sent() -> PalmTargets:
+        targets = running.bus.latest(topics.PALM_TARGETS, PalmTargets)
+        assert targets is not None
+        return targets
+
+    run = running.start(Reach(stay=stopped), None)
+    running.executor.run(0.5)
+    assert sent().right is not None and sent().left is None
+    if stopped:
+        running.estop.press()
+        running.executor.run(0.6)
+        run.cancel()
+    else:
+        running.executor.run(2.0, lambda: run.result is not None)
+    running.executor.run(running.executor.t + 0.02)
+    assert sent().right is None and sent().left is None
+    robot.close()
 
 
 def test_a_stopped_hand_stays_as_it_is_and_forgets_what_it_was_told() -> None:

@@ -179,6 +179,17 @@ def test_an_arm_that_was_never_moved_keeps_its_posture() -> None:
     assert targets is not None and targets.right is None and targets.left is not None
 
 
+def test_arms_that_are_released_start_from_where_they_are() -> None:
+    c = context()
+    c.arms["left"].approach(at(0.1, 0.0, 0.0), 0.1)
+    c.release_arms()
+    c.release_arms()
+    targets = c.bus.latest(topics.PALM_TARGETS, PalmTargets)
+    assert targets is not None and targets.left is None and targets.right is None
+    assert c.bus.count(topics.PALM_TARGETS) == 2  # the second time there was nothing to release
+    np.testing.assert_array_equal(c.arms["left"].commanded, c.arms["left"].pose)
+
+
 def test_the_pose_of_a_gripper_is_base_times_kinematics() -> None:
     c = Context(Bus(), Kinematics(), DT)
     T = at(0.01, 0.02, 0.03)

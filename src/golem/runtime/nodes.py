@@ -296,8 +296,13 @@ class SkillNode:
         self.run: SkillRun | None = None
 
     def step(self, t: float) -> None:
-        """Resume the skill until its next await."""
+        """Resume the skill until its next await.
+
+        No arm is drawn to where a skill that has ended, or a stop, left it: by then the robot may be elsewhere.
+        """
         self._context.refresh(t)
+        if self.run is None or self.run.result is not None or not moving(self._context.bus):
+            self._context.release_arms()
         if self.run is None:
             return
         legs = self._context.bus.latest(topics.LEG_STATUS, LegStatus)

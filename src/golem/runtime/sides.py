@@ -229,6 +229,7 @@ class StackSide:
         """
         if self._skills.run is not None and self._skills.run.result is None:
             raise GolemError("Another skill is running; cancel it first.")
+        self.context.release_arms()
         self._skills.run = SkillRun(skill.name, skill.run(self.context, goal))
         return self._skills.run
 

@@ -69,6 +69,15 @@ class Arm:
         """(4, 4) pose in odom the arm is being sent to."""
         return self.pose if self._commanded is None else self._commanded
 
+    @property
+    def sent(self) -> bool:
+        """Whether the arm is being sent anywhere."""
+        return self._commanded is not None
+
+    def forget(self) -> None:
+        """Forget where the arm was sent."""
+        self._commanded, self._velocity = None, np.zeros(3)
+
     async def move(
         self, T_goal: Array, v_max: float, w_max: float = 1.5, stop: Callable[[], bool] = lambda: False
     ) -> None:
@@ -212,6 +221,13 @@ class Context:
         """Publish where both arms are being sent; an arm that was never moved keeps its posture."""
         left, right = (self.arms[side]._commanded for side in ("left", "right"))
         self.publish(topics.PALM_TARGETS, PalmTargets(self.t, left, right))
+
+    def release_arms(self) -> None:
+        """Forget where the arms were sent: they keep their posture, and the next motion starts from where they are."""
+        if any(arm.sent for arm in self.arms.values()):
+            for arm in self.arms.values():
+                arm.forget()
+            self.send_palms()
 
     def say(self, stage: str, text: str, **data: object) -> None:
         """Give feedback: the stage, one line for a person, and numbers for a viewer."""

@@ -25,6 +25,7 @@ from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.ros.node import DdsNode
 from golem.middleware.topics import HandGoal
 from golem.runtime.executor import TICK
+from golem.runtime.live.velocity import LET_GO
 from golem.skills.base import SkillResult
 from golem.types import Twist
 
@@ -103,14 +104,45 @@ def test_velocities_from_elsewhere_wait_while_a_skill_has_the_robot(client: Clie
     live, row = client.live, public.topic("/cmd_vel")
     assert live.up is not None and live.up.side is not None
     velocity = client.node.publisher(row.name, row.type, row.qos)
+
+    def drive(twist: Twist) -> None:
+        velocity.publish(convert.twist(twist))
+        live.run(0.02)
+
     goal = client.send("/skill/stand", stand(0.2))
-    velocity.publish(convert.twist(Twist(0.3)))
-    live.run(0.02)
+    drive(Twist(0.3))
     assert live.up.side.bus.latest(topics.TWIST, Twist) == Twist()  # the skill's
     assert client.outcome(goal)[0] is GoalStatus.SUCCEEDED
-    velocity.publish(convert.twist(Twist(0.3)))
-    live.run(0.02)
+    drive(Twist(0.3))
+    assert live.up.side.bus.latest(topics.TWIST, Twist) == Twist()  # somebody still holds the joystick
+    drive(Twist())
+    drive(Twist(0.3))
     assert live.up.side.bus.latest(topics.TWIST, Twist) == Twist(0.3)
+
+
+def test_a_joystick_that_is_held_does_not_move_a_robot_that_is_released(client: Client) -> None:
+    live, row = client.live, public.topic("/cmd_vel")
+    assert live.up is not None and live.up.side is not None
+    velocity = client.node.publisher(row.name, row.type, row.qos)
+    bus = live.up.side.bus
+
+    def hold(seconds: float) -> None:
+        end = live.clock + seconds
+        while live.clock < end:
+            velocity.publish(convert.twist(Twist(0.3)))
+            live.run(0.05)
+
+    live.ask("stop")
+    live.run(0.1)
+    hold(0.5)
+    live.ask("reset")
+    hold(0.1)
+    live.activate()
+    hold(0.5)
+    assert bus.latest(topics.TWIST, Twist) is None
+    live.run(LET_GO + 0.1)
+    hold(0.1)
+    assert bus.latest(topics.TWIST, Twist) == Twist(0.3)
 
 
 def test_a_cancelled_skill_ends_as_cancelled_and_makes_room(client: Client) -> None:

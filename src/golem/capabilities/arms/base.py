@@ -63,7 +63,8 @@ class UpperBody(Protocol):
         """Set the command state and the posture to return to.
 
         Args:
-            q: (27,) joint positions in motor order [rad]; the upper body is clipped into the position limits.
+            q: (27,) joint positions in motor order [rad]; the upper body is clipped into the position limits. A waist
+                that is outside the range it works in stays there until a hand has a target, and comes back slowly.
 
         Raises:
             TargetError: `q` has another shape or is not finite.

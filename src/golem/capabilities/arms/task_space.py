@@ -141,6 +141,7 @@ class TaskSpaceController(ABC):
         self.kinematics = UpperKinematics()
         self.lower: Array = self.kinematics.lower + c.limit_margin
         self.upper: Array = self.kinematics.upper - c.limit_margin
+        self._widest = self.lower.copy(), self.upper.copy()
         self.lower[0] = max(self.lower[0], -c.torso_range)
         self.upper[0] = min(self.upper[0], c.torso_range)
         self.speed: Array = np.full(NUM_UPPER, c.arm_speed)
@@ -168,7 +169,8 @@ class TaskSpaceController(ABC):
     def reset(self, q: Array) -> None:
         """Start from the joints `q` (27,) [rad]; see `UpperBody.reset`."""
         self._left_over = 0.0
-        self._move(np.clip(check_joints("The posture to start from", q)[UPPER], self.lower, self.upper))
+        # Not into the range of the waist: a robot that was turned further while it was limp would swing back at once.
+        self._move(np.clip(check_joints("The posture to start from", q)[UPPER], *self._widest))
 
     def step(
         self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float
@@ -202,7 +204,11 @@ class TaskSpaceController(ABC):
                 residual = share * residual
                 to_frame = pin.exp6(-residual)
             reaches.append(Reach(side, to_frame, residual))
-        if reaches:
+        inside = np.clip(self.q, self.lower, self.upper)
+        if reaches and (inside != self.q).any():
+            limited = True
+            self._move(self.q + np.clip(inside - self.q, -room, room))
+        elif reaches:
             lower = np.maximum(self.lower - self.q, -room)
             upper = np.minimum(self.upper - self.q, room)
             step = self.solve(reaches, lower, upper, damping, dt)

@@ -23,7 +23,9 @@ from golem.runtime.executor import TICK
 from golem.runtime.live.member import say
 from golem.runtime.live.pace import SILENCE
 from golem.runtime.live.surface import Surface
+from golem.runtime.live.velocity import Velocities
 from golem.runtime.live.verdict import to_status
+from golem.runtime.nodes import moving
 from golem.types import SIDES, Array, CameraInfo, Side
 
 AHEAD = 0.05
@@ -167,10 +169,10 @@ def listen(
         now: robot time [s].
         busy: whether a skill has the robot: velocities from elsewhere are then ignored.
     """
+    velocities = Velocities(bus, now, lambda: busy() or not moving(bus))
 
     def take_twist(message: Twist) -> None:
-        if not busy():
-            bus.publish(topics.TWIST, convert.to_twist(message), now())
+        velocities.take(convert.to_twist(message))
 
     def take_hand(side: Side) -> Callable[[golem_interfaces.HandState], None]:
         topic = topics.hand_state(side)
