@@ -48,7 +48,7 @@ class LadderConfig:
     """Processes that run trials at the same time; the records do not depend on it."""
     use: tuple[str, ...] = ()
     """Replace other modules of the stack: slot=implementation, e.g. upper_body=my_ik.py:MyIk, or with options
-    "localizer={use: onnx, least_score: 0.7}"."""
+    "localizer={use: onnx, threshold: 0.7}"."""
     json: bool = False
     """Print the summary as a last line of JSON."""
 
