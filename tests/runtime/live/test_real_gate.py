@@ -51,7 +51,8 @@ def test_a_real_robots_motors_are_not_touched_before_its_own_controller_lets_go_
     switcher.send(Request(2, motion_switcher.SELECT_MODE, encode({"name": motion_switcher.MODE})))
     live.run(1.0)
     assert (live.state, live.reason) == (GateState.STOP1, "motors_held")
-    motors.take(1000)
+    *stiff, last = [wire.decode_low_command(sample.payload, 0.0) for sample in motors.take(1000)]
+    assert stiff[-1].kp.any() and not last.kp.any() and last.kd.all()
     live.run(0.1)
     assert not motors.take(1000)  # not even to damp them
     live.leave_quietly(node)

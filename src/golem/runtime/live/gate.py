@@ -174,7 +174,7 @@ class LiveGate:
         self._crowded = ""
         self._looks, self._reports, self._diagnoses = Every(LOOK), Every(REPORT), Every(DIAGNOSE)
         self._steps = 0
-        self._ending = False
+        self._ending, self._halts = False, False
         self._stepped, self._pause = clock(), 0.0
         self.status = GateStatus(clock(), GateState.INIT)
         surface.subscribe("/base_estimate", self._base)
@@ -232,6 +232,7 @@ class LiveGate:
         command = self.bus.latest(topics.LOW_CMD, LowCommand)
         assert status is not None and command is not None
         self.status = status
+        self._halts = moving and status.state is not GateState.ACTIVE
         waited_for = self._patient and status.state is GateState.ACTIVE
         self._tell(command, self._arrivals.answered if waited_for else 0.0)
         frame = self._estops.read()
@@ -244,11 +245,11 @@ class LiveGate:
     def _tell(self, command: LowCommand, answers: float = 0.0) -> None:
         """Write `command` to the motors, unless the robot's own controllers have them or a shut gate never had them.
 
-        While the robot moves and is damped only an answer says that they have: drives that hear nothing may go on with
+        Whoever gets them from a robot in motion gets them damped once: until they speak our last command stands. While the robot moves and is damped only an answer says that they have: drives that hear nothing may go on with
         the last command. Once it is limp, as after a reboot, silence says so, too.
         """
         limp, authority = self.status.state is GateState.STOP0, self._authority
-        theirs = self._real and bool(authority.owner or (limp and not authority.free))
+        theirs = self._real and bool(authority.owner or (limp and not authority.free)) and not self._halts
         machine = self._arrivals.mode_machine
         if machine is not None and self.status.state is not GateState.INIT and not theirs:
             self._out.write(convert.encode_low_command(command, machine, answers))
