@@ -245,8 +245,9 @@ class LiveGate:
     def _tell(self, command: LowCommand, answers: float = 0.0) -> None:
         """Write `command` to the motors, unless the robot's own controllers have them or a shut gate never had them.
 
-        Whoever gets them from a robot in motion gets them damped once: until they speak our last command stands. While the robot moves and is damped only an answer says that they have: drives that hear nothing may go on with
-        the last command. Once it is limp, as after a reboot, silence says so, too.
+        Whoever gets them from a robot in motion gets them damped once: until they speak our last command stands. While
+        the robot moves and is damped only an answer says that they have: drives that hear nothing may go on with the
+        last command. Once it is limp, as after a reboot, silence says so, too.
         """
         limp, authority = self.status.state is GateState.STOP0, self._authority
         theirs = self._real and bool(authority.owner or (limp and not authority.free)) and not self._halts
