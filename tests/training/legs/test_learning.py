@@ -20,7 +20,7 @@ from golem.evaluation.provenance import commit
 from golem.robots.model.leg_kinematics import leg_poses
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, read_curve
 from golem.training.legs.curve import draw_curves
-from golem.training.legs.disturbances import ACROSS, BACK, GENTLE, Difficulty, Pushes, UpperBodyMotion
+from golem.training.legs.disturbances import GENTLE, STRAIGHT, Difficulty, Pushes, UpperBodyMotion
 from golem.training.legs.env import LAYOUT, TASKS, LegsEnv, Task
 from golem.training.legs.export import TRAINED, export, load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror
@@ -221,7 +221,7 @@ def test_a_calm_episode_has_no_push_and_slow_arms() -> None:
     assert fastest[calm].max() < 2.01 * GENTLE < fastest[~calm].min()
 
 
-def test_pushes_go_to_the_sides_and_back_more_often_whichever_way_the_robot_looks() -> None:
+def test_pushes_go_straight_more_often_than_not_whichever_way_the_robot_looks() -> None:
     pushes = Pushes(2000, 50.0, np.random.default_rng(0))
     facing = np.tile([[0.0, -1.0], [1.0, 0.0]], (2000, 1, 1))  # along the world's y
     pushes.reset(np.arange(2000), 1.0, np.zeros(2000, dtype=bool))
@@ -230,10 +230,11 @@ def test_pushes_go_to_the_sides_and_back_more_often_whichever_way_the_robot_look
         pushes.step(1.0, facing, 0.005)
         force = np.linalg.norm(pushes.force, axis=1)
         ahead = np.where(force > 1.0, pushes.force[:, 1] / np.maximum(force, 1.0), ahead)
-    # Besides the straight ones, 0.6 / pi of the others are within 0.3 rad of the y axis, and half as many go back.
-    anywhere = 1.0 - ACROSS - BACK
-    assert abs((np.abs(ahead) < np.sin(0.3)).mean() - (ACROSS + anywhere * 0.6 / np.pi)) < 0.05
-    assert abs((ahead < -np.cos(0.3)).mean() - (BACK + anywhere * 0.3 / np.pi)) < 0.05
+    # Besides the straight ones, 0.3 / pi of the others are within 0.3 rad of each of the four directions.
+    each = 0.25 * STRAIGHT + (1.0 - STRAIGHT) * 0.3 / np.pi
+    assert abs((np.abs(ahead) < np.sin(0.3)).mean() - 2.0 * each) < 0.05
+    assert abs((ahead < -np.cos(0.3)).mean() - each) < 0.05
+    assert abs((ahead > np.cos(0.3)).mean() - each) < 0.05
 
 
 def test_pushes_have_the_impulse_they_were_drawn_with_at_most() -> None:

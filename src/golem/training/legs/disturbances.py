@@ -19,9 +19,9 @@ from golem.types import UPPER, Array
 NUM_UPPER = UPPER.stop - UPPER.start
 GENTLE = 0.3
 """Fastest motion of the upper body in a calm episode [rad/s]."""
-ACROSS, BACK = 0.35, 0.25
-"""Shares of the pushes straight to a side, where the legs are in each other's way, and straight back, where the feet
-are short and the knees bend the wrong way: both take more practice than pushes ahead."""
+STRAIGHT = 0.7
+"""Share of the pushes straight ahead, back or to a side. Each wants steps of its own kind: to a side the legs are in
+each other's way, behind the feet are short, and with few pushes ahead the robot fell forward first."""
 TOP_SPEED = 2.5
 """Speed of a target at full difficulty [rad/s]; the safety gate lets 3 pass."""
 
@@ -157,9 +157,8 @@ class Pushes:
         # Mostly near the edge of what the robot is known to take: easy pushes teach little.
         impulse = self._largest * difficulty * np.sqrt(rng.random(m))
         force = impulse / duration * np.where(slow, 0.5 * np.pi, 1.0) * ~self._calm[where]
-        straight = np.where(rng.random(m) < ACROSS / (ACROSS + BACK), rng.choice([-0.5, 0.5], m), 1.0) * np.pi
-        straight = straight + rng.uniform(-0.3, 0.3, m)
-        angle = np.where(rng.random(m) < ACROSS + BACK, straight, rng.uniform(-np.pi, np.pi, m))
+        straight = 0.5 * np.pi * rng.integers(4, size=m) + rng.uniform(-0.3, 0.3, m)
+        angle = np.where(rng.random(m) < STRAIGHT, straight, rng.uniform(-np.pi, np.pi, m))
         self._peak[where] = force[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         self._duration[where] = duration
         self._slow[where] = slow
