@@ -224,8 +224,8 @@ class World:
     def _judge(self) -> None:
         """Apply the safety gate's limits of leg speed, braking distance and torque to the present physics step.
 
-        Here no torque exceeds what the gate lets through. On the robot it does, because the gate predicts it from a state
-        as old as the command is late: a motor at that bound is as often above the limit.
+        Here no torque exceeds what the gate lets through. On the robot it does, because the gate predicts it from a
+        state as old as the command is late: a motor at that bound is as often above the limit.
         """
         limits = self._limits
         q, dq = self._qpos[:, 7 : 7 + LEGS.stop], self._qvel[:, 6 : 6 + LEGS.stop]
