@@ -132,7 +132,7 @@ def test_a_motor_that_gives_all_it_may_for_a_tenth_of_a_second_stops_the_robot()
     world = LegsEnv(3, EnvConfig(), 0, 1).world
     bound = world._limit[:, 3, 1]
     for step in range(10):
-        world._torque[:] = 0.0
+        world._torque = np.zeros_like(world._torque)
         world._torque[1:, 3] = -bound[1:]
         if step == 5:
             world._torque[2, 3] *= 0.9
