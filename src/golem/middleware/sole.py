@@ -14,14 +14,14 @@ DISCOVERY = 0.3
 """Time that whoever is on the domain already gets to be seen [s]."""
 SOLE = {
     "/lowstate": "a robot",
-    "/lowcmd": "somebody who commands the motors",
+    "/lowcmd": "a safety gate",
     "/safety/lowcmd_in": "a stack",
 }
 """Topics that one process alone may write, and what that process is."""
 
 
 def owner(participant: CycloneParticipant, guid: bytes) -> str:
-    """Return who has the endpoint with `guid` (16 bytes), for a person."""
+    """Return who has the endpoint with `guid` (16 bytes), for a person; one of ours begins with "golem"."""
     for found in discovery.members(participant):
         if found.guid[:12] == guid[:12]:
             name = found.user_data.partition("golem=")[2].partition(";")[0]
@@ -33,15 +33,17 @@ def owner(participant: CycloneParticipant, guid: bytes) -> str:
 def refuse_second(participant: CycloneParticipant, dds: DdsConfig, topic: str) -> None:
     """Take `DISCOVERY` to look whether anybody writes `topic`, one of `SOLE`, before a second one does.
 
-    For a robot in motion a second writer is a reason to stop, and so to fall.
+    For a robot in motion a second writer is a reason to stop, and so to fall. A robot may be anybody's; of gates and
+    stacks only ours count, since a robot's own controller may have a writer of the motors' command, which it does not
+    use: what to make of that is the gate's business.
 
     Raises:
         ConfigError: somebody does.
     """
     time.sleep(DISCOVERY)
-    others = [e for e in discovery.writers(participant) if e.topic == names.topic(topic)]
-    if others:
-        raise ConfigError(
-            f"There is {SOLE[topic]} on {dds} already: {owner(participant, others[0].guid)}; "
-            "end it, or choose another domain."
-        )
+    guids = [e.guid for e in discovery.writers(participant) if e.topic == names.topic(topic)]
+    for named in (owner(participant, guid) for guid in guids):
+        if topic == "/lowstate" or named.startswith("golem "):
+            raise ConfigError(
+                f"There is {SOLE[topic]} on {dds} already: {named}; end it, or choose another domain."
+            )

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import os
 import time
+from contextlib import closing
 from dataclasses import replace
 
 import pytest
 import tyro
 
 from golem.errors import ConfigError
+from golem.middleware.dds.base import Qos
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.sole import refuse_second
+from golem.middleware.wire import hg
 from golem.runtime.live.launch import LaunchConfig, commands, run_launch
 from golem.runtime.live.member import company, member
 from golem.runtime.live.process import TwinConfig, run_twin
@@ -87,3 +92,17 @@ def test_who_else_is_there_is_said_with_what_to_look_at() -> None:
             while (said := company(participant, here)) != "one other is there":
                 assert time.monotonic() < end, said
                 time.sleep(0.05)
+
+
+def test_a_second_gate_is_refused_before_it_joins_and_a_robots_own_writer_is_left_to_the_first() -> None:
+    pytest.importorskip("cyclonedds")
+    here = DdsConfig(domain=20 + (os.getpid() + 1) % 180)
+    kind, qos = hg.LOW_CMD.type_name, Qos(depth=1)
+    with member("looker", here) as (participant, _):
+        with closing(connect(here, "another make")) as stranger:
+            stranger.writer("rt/lowcmd", kind, qos)
+            refuse_second(participant, here, "/lowcmd")
+        with member("safety", here) as (ours, _):
+            ours.writer("rt/lowcmd", kind, qos)
+            with pytest.raises(ConfigError, match=r"There is a safety gate on .* already: golem safety, .*"):
+                refuse_second(participant, here, "/lowcmd")
