@@ -128,23 +128,16 @@ def test_slope_turns_gravity_and_roughness_lifts_soles() -> None:
     assert set(changed) <= set(world.ids.soles)
 
 
-def test_a_motor_that_gives_all_it_may_for_a_tenth_of_a_second_stops_the_robot() -> None:
-    world = LegsEnv(3, EnvConfig(), 0, 1).world
-    bound = world._limit[:, 3, 1]
-    for step in range(10):
-        world._torque = np.zeros_like(world._torque)
-        world._torque[1:, 3] = -bound[1:]
-        if step == 5:
-            world._torque[2, 3] *= 0.9
-        world._judge()
-        assert world.stopped.tolist() == [False, step == 9, False]
-
-
 def test_commands_come_late_by_each_robots_delay(monkeypatch: pytest.MonkeyPatch) -> None:
     world = LegsEnv(4, EnvConfig(), 0, 1).world
     world._delay[:], world._offset[:] = np.arange(4), 0.0
     seen: list[np.ndarray] = []
-    monkeypatch.setattr(world, "_judge", lambda: seen.append(world._ctrl[:, 0].copy()))
+
+    def limit(legs: np.ndarray, delay: np.ndarray) -> np.ndarray:
+        seen.append(legs[:, 0].copy())
+        return legs
+
+    monkeypatch.setattr(world._gate, "limit", limit)
     targets = np.array([0.01, 0.02, 0.03])
     for target in targets:
         world.step(np.full((4, 12), target), np.zeros((4, 15)), np.zeros((4, 3)), np.zeros(4, dtype=bool), 2)

@@ -17,6 +17,7 @@ from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gains import default_gains
 from golem.robots.model import magpie, mjcf
 from golem.robots.model.leg_kinematics import SOLE_CENTER, leg_poses, sole_centers
+from golem.robots.model.limits import load_limits
 from golem.robots.model.table import BASE_LINK, SOLE
 from golem.types import LEGS, NUM_JOINTS, SIDES, Array
 
@@ -129,10 +130,15 @@ def _strip(spec: mujoco.MjSpec) -> None:
 
 
 def _servos(spec: mujoco.MjSpec) -> None:
-    """Turn the motors into position servos with the stack's gains and the torque the safety gate lets through."""
+    """Turn the motors into position servos with the stack's gains.
+
+    Torques are bounded by what the safety gate lets through; those of the legs, to which `LegGate` sees, by the motors.
+    """
     gains, limits = default_gains(), SafetyLimits.from_profile("urdf")
     kp, kd = gains.kp.copy(), gains.kd.copy()
     kp[LEGS], kd[LEGS] = KP, KD
+    torque = limits.torque_command.copy()
+    torque[LEGS] = load_limits("urdf").torque[LEGS]
     for i, motor in enumerate(list(spec.actuators)[:NUM_JOINTS]):
         motor.gaintype = mujoco.mjtGain.mjGAIN_FIXED
         motor.biastype = mujoco.mjtBias.mjBIAS_AFFINE
@@ -140,4 +146,4 @@ def _servos(spec: mujoco.MjSpec) -> None:
         motor.biasprm = [0.0, -kp[i], -kd[i]] + [0.0] * (len(motor.biasprm) - 3)
         motor.ctrllimited = mujoco.mjtLimited.mjLIMITED_FALSE
         motor.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
-        motor.forcerange = [-limits.torque_command[i], limits.torque_command[i]]
+        motor.forcerange = [-torque[i], torque[i]]

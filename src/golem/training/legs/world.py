@@ -17,16 +17,11 @@ from numpy.typing import NDArray
 from golem.capabilities.legs.balance import GRAVITY, heading_frame
 from golem.hardware.estimator.contact import Contact, ContactConfig
 from golem.hardware.estimator.random_walk import RandomWalk, RandomWalkConfig
-from golem.hardware.safety.base import SafetyLimits
-from golem.hardware.safety.monitor import at_rest
+from golem.training.legs.gate import LegGate
 from golem.training.legs.model import STANCE, STAND_HEIGHT, STEP, build_model
 from golem.types import LEGS, NUM_JOINTS, Array
 
 Rows = NDArray[np.intp]
-AT_BOUND = 0.98
-"""Share of the torque that the gate lets through from which on a motor gives all it may."""
-SERVO_PERIOD = 0.002
-"""Time between two samples of the safety gate [s]."""
 
 
 @dataclass(frozen=True)
@@ -161,11 +156,7 @@ class World:
         self.slope: Array = np.zeros((n, 2))
         self._filter = RandomWalk(RandomWalkConfig(), (n,))
         self._contact = Contact(ContactConfig(), (n,))
-        self._limits = SafetyLimits.from_profile()
-        # The gate's rule in physics steps: speed, braking distance, torque.
-        samples = self._limits.leg_samples, self._limits.leg_samples, self._limits.torque_samples
-        self._patience = np.rint(np.array(samples) * SERVO_PERIOD / STEP)
-        self._bad: NDArray[np.int64] = np.zeros((n, 3), dtype=np.int64)
+        self._gate = LegGate(n)
         self.stopped: NDArray[np.bool_] = np.zeros(n, dtype=bool)
 
     def reset(self, where: Rows, upper: Array, payload: float) -> None:
@@ -189,7 +180,7 @@ class World:
         mask[where] = True
         self._filter.reset(mask)
         self._contact.reset(mask)
-        self._bad[where] = 0
+        self._gate.reset(where, q[:, LEGS])
 
     def step(
         self, legs: Array, upper: Array, force: Array, on_torso: NDArray[np.bool_], substeps: int
@@ -203,10 +194,12 @@ class World:
         for k in range(substeps):
             late = (self._delay - k)[:, None]
             before = np.where(late > substeps, self._previous[1], self._previous[0])
-            ctrl[:, LEGS] = np.where(late > 0, before, legs) - self._offset[:, LEGS]
+            targets = np.where(late > 0, before, legs) - self._offset[:, LEGS]
+            ctrl[:, LEGS] = self._gate.limit(targets, self._delay)
             self._batch.step(nstep=1, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
             self._estimate()
-            self._judge()
+            q, dq = self._qpos[:, 7 : 7 + LEGS.stop], self._qvel[:, 6 : 6 + LEGS.stop]
+            self.stopped |= self._gate.judge(q, dq, self._torque[:, LEGS])
         self._previous = np.stack([legs, self._previous[0]])
         self.read()
 
@@ -220,23 +213,6 @@ class World:
         force = self._sensors[:, self.ids.touch] * self._force_scale
         _, weight = self._contact.step(force, STEP)
         self._filter.step(np.einsum("nij,nkj->nki", self._to_level, measured), weight, STEP)
-
-    def _judge(self) -> None:
-        """Apply the safety gate's limits of leg speed, braking distance and torque to the present physics step.
-
-        Here no torque exceeds what the gate lets through. On the robot it does, because the gate predicts it from a
-        state as old as the command is late: a motor at that bound is as often above the limit.
-        """
-        limits = self._limits
-        q, dq = self._qpos[:, 7 : 7 + LEGS.stop], self._qvel[:, 6 : 6 + LEGS.stop]
-        rest = at_rest(q, dq, limits.deceleration[LEGS])
-        fast = np.any(np.abs(dq) > limits.velocity[LEGS], axis=1)
-        beyond = np.any((rest > limits.state_upper[LEGS]) | (rest < limits.state_lower[LEGS]), axis=1)
-        load, bound = self._torque[:, : LEGS.stop], self._limit[:, : LEGS.stop, 1]
-        strong = np.any(np.abs(load) > AT_BOUND * bound, axis=1)
-        now = np.stack([fast, beyond, strong], axis=1)
-        self._bad = np.where(now, self._bad + 1, 0)
-        self.stopped |= np.any(self._bad >= self._patience, axis=1)
 
     def read(self) -> None:
         """Fill `truth` and `sensed` from the present state."""
