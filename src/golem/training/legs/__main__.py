@@ -1,10 +1,14 @@
-"""`golem train legs run|export|curve`."""
+"""`golem train legs run|export|curve|shove`."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import tyro
+from rich.console import Console
+from rich.table import Table
+from tyro.conf import arg
 
 from golem.training.legs.checkpoint import CHECKPOINT
 from golem.training.legs.curve import draw_curves
@@ -64,10 +68,40 @@ def curve(runs: tyro.conf.Positional[tuple[Path, ...]], out: Path = RUNS / "curv
     draw_curves(runs, out)
 
 
+def shove(
+    checkpoint: Path = RUNS / "seed0" / CHECKPOINT,
+    impulse: float = 80.0,
+    n: Annotated[int, arg(aliases=("-n",))] = 20,
+    seed: int = 0,
+    threads: int = 2,
+) -> None:
+    """Shove robots in the training's own world, eight directions: which of two networks stands more, in seconds.
+
+    Args:
+        checkpoint: of `run`.
+        impulse: of each shove of 0.2 s on the torso [N s].
+        n: robots per direction.
+        seed: of the robots.
+        threads: of the physics.
+    """
+    from golem.training.legs.shoves import shove_all
+
+    rows = shove_all(checkpoint, impulse, n, seed, threads)
+    table = Table(
+        "direction", "survived", "stopped by the gate", "fell", title=f"{impulse:g} N s, n = {n} each"
+    )
+    for row in rows:
+        table.add_row(row.direction.replace("_", " "), str(row.survived), str(row.stopped), str(row.fell))
+    table.add_row(
+        "all", *(str(sum(getattr(row, what) for row in rows)) for what in ("survived", "stopped", "fell"))
+    )
+    Console().print(table)
+
+
 def main(args: list[str] | None = None) -> None:
     """Run the command line."""
     tyro.extras.subcommand_cli_from_dict(
-        {"run": run, "export": export, "curve": curve},
+        {"run": run, "export": export, "curve": curve, "shove": shove},
         prog="golem train legs",
         args=args,
         description="Train the leg policy.",

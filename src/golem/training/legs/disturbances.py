@@ -132,6 +132,11 @@ class Pushes:
         self._t[where] = 0.0
         self._draw(where, difficulty)
 
+    def once(self, force: Array, duration: float, start: float) -> None:
+        """Push each robot's torso once, with `force` (n, 2) in its heading frame [N], `start` [s] from now."""
+        self._calm[:], self._slow[:], self.on_torso[:] = True, False, True
+        self._peak[:], self._duration[:], self._start[:] = force, duration, self._t + start
+
     def step(self, difficulty: float, facing: Array, dt: float) -> None:
         """Advance the time, and draw anew where a push is over.
 

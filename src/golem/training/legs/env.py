@@ -180,6 +180,10 @@ class LegsEnv:
         self.twist[where] = 0.0
         self._command(where)
 
+    def shove(self, force: Array, duration: float, start: float) -> None:
+        """Push each robot once and never again; see `Pushes.once`."""
+        self._pushes.once(force, duration, start)
+
     def observe(self) -> tuple[Array, Array]:
         """Return what the policy sees (n, layout.size), and beside it what only the critic knows (n, m)."""
         sensed, truth = self.world.sensed, self.world.truth

@@ -1,0 +1,72 @@
+"""Shoves in the training's own world: what a network can stand, in seconds, before the twin is asked for an hour.
+
+It is harder there than in the twin, because soles are slippery, floors slope and commands come late by up to 40 ms; so
+the figures compare networks, and say little by themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from golem.errors import ConfigError
+from golem.evaluation.pushes import DIRECTIONS, SHOVE_TIME
+from golem.training.legs.env import PERIOD, TASKS, LegsEnv
+from golem.training.legs.export import load_actor
+
+SETTLE, PATIENCE = 2.0, 3.0
+"""Time of standing before the shove, and time after its begin that has to be survived [s]."""
+NOBODY = np.arange(0)
+
+
+@dataclass(frozen=True, slots=True)
+class Shoved:
+    """What became of the robots that were shoved in one direction.
+
+    Attributes:
+        direction: name in `DIRECTIONS`.
+        survived, stopped, fell: how many stood it, were stopped by the safety gate, and fell.
+    """
+
+    direction: str
+    survived: int
+    stopped: int
+    fell: int
+
+
+def shove_all(checkpoint: Path, impulse: float, n: int, seed: int, threads: int) -> list[Shoved]:
+    """Shove `n` standing robots in each direction once, arms at rest, without exploration.
+
+    Args:
+        checkpoint: of a training run.
+        impulse: of each shove on the torso [N s].
+        n: robots per direction.
+        seed: of the robots.
+        threads: of the physics.
+
+    Raises:
+        ConfigError: it is no checkpoint, or a number is not positive.
+    """
+    if impulse <= 0.0 or n < 1 or threads < 1 or seed < 0:
+        raise ConfigError(
+            "Give --impulse more than 0, -n 1 or more, --threads 1 or more and --seed 0 or more."
+        )
+    actor, task, _ = load_actor(checkpoint)
+    env = LegsEnv(n * len(DIRECTIONS), TASKS[task], seed, threads)
+    env.difficulty.amplitude = env.difficulty.speed = env.difficulty.payload = 0.0
+    env.restart(np.arange(env.n))
+    angle = np.repeat(np.arange(len(DIRECTIONS)) * np.pi / 4.0, n)
+    env.shove(impulse / SHOVE_TIME * np.stack([np.cos(angle), np.sin(angle)], axis=1), SHOVE_TIME, SETTLE)
+    stopped, fell = np.zeros(env.n, dtype=bool), np.zeros(env.n, dtype=bool)
+    for _ in range(round((SETTLE + PATIENCE) / PERIOD)):
+        seen = torch.from_numpy(env.observe()[0]).float()
+        with torch.no_grad():
+            step = env.step(actor(seen).double().numpy(), NOBODY, np.zeros((0, 15)))
+        lost = step.ended & ~stopped & ~fell
+        stopped |= lost & env.world.stopped
+        fell |= lost & ~env.world.stopped
+    rows = np.stack([~stopped & ~fell, stopped, fell]).reshape(3, len(DIRECTIONS), n).sum(axis=2)
+    return [Shoved(name, *(int(x) for x in rows[:, k])) for k, name in enumerate(DIRECTIONS)]
