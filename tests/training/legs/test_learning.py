@@ -45,6 +45,11 @@ def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(
     assert [int(float(row["steps"])) for row in rows] == [192 * k for k in range(1, 11)]
     train(small(tmp_path / "a", updates=11, learned_from=0.0))
     assert torch.load(tmp_path / "a" / CHECKPOINT, weights_only=True)["updates"] == 11
+    assert load_actor(tmp_path / "a" / CHECKPOINT)[2].endswith(f"(commit {commit()})")
+    with monkeypatch.context() as changed:
+        changed.setattr("golem.training.legs.train.commit", lambda: "later")
+        train(small(tmp_path / "a", updates=12, learned_from=0.0))
+    assert load_actor(tmp_path / "a" / CHECKPOINT)[2].endswith(f"(commit {commit()}, then later)")
     with pytest.raises(ConfigError, match="another configuration"):
         train(small(tmp_path / "a", seed=5, updates=12))
     with monkeypatch.context() as changed, pytest.raises(ConfigError, match="other rewards"):
@@ -89,7 +94,7 @@ def test_files_that_are_no_checkpoint_or_curve_are_named(tmp_path: Path) -> None
     for name, words in (
         ("nope.pt", "No such file"),
         ("notes.pt", "is no checkpoint"),
-        ("other.pt", "older one"),
+        ("other.pt", "older GOLEM"),
     ):
         with pytest.raises(ConfigError, match=words):
             export(tmp_path / name, tmp_path)

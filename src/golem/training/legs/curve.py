@@ -68,7 +68,7 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
             x = x0 + width * k / 4
             pen.text((x, top + height + 8), f"{last * k / 4e6:.1f}M", fill="black", font=font, anchor="ma")
         for curve, colour in zip(curves.values(), COLOURS, strict=False):
-            # A mean over ten updates: single updates see few falls.
+            # A mean over ten updates: few episodes end in one.
             values = np.convolve(curve[column], np.full(10, 0.1), mode="valid")
             steps = curve["steps"][-len(values) :]
             points = [

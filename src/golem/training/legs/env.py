@@ -120,7 +120,7 @@ class LegsEnv:
     """`n` robots with commands, gait clocks, disturbances and rewards.
 
     Attributes:
-        difficulty: of the disturbances.
+        difficulty: of the disturbances, and how strict the rewards are.
         layout: of the policy's observation.
         gait: the clocks.
         twist: (n, 3) present command.

@@ -67,7 +67,8 @@ def _command(saved: dict[str, Any]) -> str:
     words = ("task", "seed", "adversary", "robots")
     options = " ".join(f"--{word} {config[word]}" for word in words)
     start = " --start CHECKPOINT" if config["start"] is not None else ""
-    return f"golem train legs run {options} --steps {config['steps']:g}{start} (commit {saved.get('code', 'unknown')})"
+    codes = ", then ".join(saved.get("codes", ["unknown"]))
+    return f"golem train legs run {options} --steps {config['steps']:g}{start} (commit {codes})"
 
 
 def _graph(actor: Actor) -> onnx.ModelProto:

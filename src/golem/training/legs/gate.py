@@ -1,4 +1,8 @@
-"""What the safety gate makes of leg commands, and when it would stop: its own rules, for many robots at once."""
+"""What the safety gate makes of leg commands, and when it would stop: its own rules, for many robots at once.
+
+Left out are the rules that one sample suffices for, and that of a position outside its range: a joint on its way there
+breaks the one of the braking distance first.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +11,10 @@ from numpy.typing import NDArray
 
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.safety.monitor import at_rest
+from golem.runtime.executor import TICK
 from golem.training.legs.model import KD, KP, STANCE, STEP
 from golem.types import LEGS, Array
 
-SERVO_PERIOD = 0.002
-"""Time between two samples of the safety gate [s]."""
 REMEMBERED = 8
 """Physics steps of which the state is remembered: more than any delay."""
 
@@ -34,7 +37,7 @@ class LegGate:
         self._range = limits.lower[LEGS], limits.upper[LEGS]
         # Speed, braking distance, torque.
         samples = limits.leg_samples, limits.leg_samples, limits.torque_samples
-        self._patience = np.rint(np.array(samples) * SERVO_PERIOD / STEP)
+        self._patience = np.rint(np.array(samples) * TICK / STEP)
         self._bad: NDArray[np.int64] = np.zeros((n, 3), dtype=np.int64)
         self._rows = np.arange(n)
         self._newest = 0

@@ -6,7 +6,7 @@ the figures compare networks, and say little by themselves.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from golem.training.legs.env import PERIOD, TASKS, LegsEnv
 from golem.training.legs.export import load_actor
 
 SETTLE, PATIENCE = 2.0, 3.0
-"""Time of standing before the shove, and time after its begin that has to be survived [s]."""
+"""Time of standing before the shove, and time after its begin [s]; both have to be survived."""
 NOBODY = np.arange(0)
 
 
@@ -55,7 +55,7 @@ def shove_all(checkpoint: Path, impulse: float, n: int, seed: int, threads: int)
             "Give --impulse more than 0, -n 1 or more, --threads 1 or more and --seed 0 or more."
         )
     actor, task, _ = load_actor(checkpoint)
-    env = LegsEnv(n * len(DIRECTIONS), TASKS[task], seed, threads)
+    env = LegsEnv(n * len(DIRECTIONS), replace(TASKS[task], standing=1.0), seed, threads)
     env.difficulty.amplitude = env.difficulty.speed = env.difficulty.payload = 0.0
     env.restart(np.arange(env.n))
     angle = np.repeat(np.arange(len(DIRECTIONS)) * np.pi / 4.0, n)

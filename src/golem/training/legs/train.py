@@ -102,7 +102,7 @@ class _Run:
 
     def __init__(self, config: TrainConfig) -> None:
         self.config = config
-        self._code = commit()
+        self._codes = [commit()]
         self.steps = 0
         self.updates = 0
         self._cpu = 0.0
@@ -175,7 +175,7 @@ class _Run:
                 "survival": self._survival,
                 "config": _plain(self.config),
                 "env": _plain(TASKS[self.config.task]),
-                "code": self._code,
+                "codes": self._codes,
             },
             part,
         )
@@ -196,6 +196,14 @@ class _Run:
             raise ConfigError(
                 f"{path} was made with other rewards or another world; choose another --out, or the code of then."
             )
+        before = saved.get("codes", ["unknown"])
+        if before[-1] != self._codes[-1]:
+            print(
+                f"This run was begun by the code of commit {before[-1]} and goes on with that of {self._codes[-1]}."
+            )
+            self._codes = [*before, *self._codes]
+        else:
+            self._codes = before
         cut_curve(self.config.out / CURVE, saved["steps"])
         self.legs.load(saved["legs"])
         self.upper.load(saved["upper"])

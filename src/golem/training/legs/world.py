@@ -149,6 +149,7 @@ class World:
         self._delay: NDArray[np.int64] = np.zeros(n, dtype=np.int64)
         # The leg targets of the last two periods, the newest first.
         self._previous: Array = np.tile(STANCE, (2, n, 1))
+        self._strength: Array = np.ones((n, LEGS.stop))
         self._rough: Array = np.zeros(n)
         self._force_scale: Array = np.ones((n, 2))
         self.payload: Array = np.zeros((n, 2))
@@ -199,7 +200,8 @@ class World:
             self._batch.step(nstep=1, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
             self._estimate()
             q, dq = self._qpos[:, 7 : 7 + LEGS.stop], self._qvel[:, 6 : 6 + LEGS.stop]
-            self.stopped |= self._gate.judge(q, dq, self._torque[:, LEGS])
+            # What the drives would report is what they were asked for, however strong the motor is.
+            self.stopped |= self._gate.judge(q, dq, self._torque[:, LEGS] / self._strength)
         self._previous = np.stack([legs, self._previous[0]])
         self.read()
 
@@ -274,6 +276,7 @@ class World:
         self._mass[where[:, None], self.ids.hands] = model.body_mass[self.ids.hands] + self.payload[where]
         self._mass[where, self.ids.torso] = model.body_mass[self.ids.torso] + rng.uniform(*c.torso_mass, m)
         gain = rng.uniform(*c.strength, (m, NUM_JOINTS))
+        self._strength[where] = gain[:, LEGS]
         self._gain[where, :, 0] = model.actuator_gainprm[:, 0] * gain
         self._bias[where, :, 1:3] = model.actuator_biasprm[:, 1:3] * gain[:, :, None]
         self._limit[where] = model.actuator_forcerange * np.minimum(gain, 1.0)[:, :, None]
