@@ -104,7 +104,7 @@ def test_files_that_are_no_checkpoint_or_curve_are_named(tmp_path: Path) -> None
         draw_curves([tmp_path / "nope"], tmp_path / "curve.png")
     (tmp_path / CURVE).write_text("steps\n")
     with pytest.raises(ConfigError, match="is no learning curve"):
-        draw_curves([tmp_path], tmp_path / "curve.png")
+        draw_curves([tmp_path], tmp_path / "drawn.png")
 
 
 @pytest.mark.parametrize("task", TASKS)
