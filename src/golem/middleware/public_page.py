@@ -25,7 +25,7 @@ processes create their endpoints from; tests compare this page with the table, a
 offer. Names are those of ROS 2. On the wire the topic `/x` is `rt/x`: `/lowstate` is the vendor's `rt/lowstate`.
 
 - Time: everything from robot and stack is stamped with robot time, which is `/clock` and the tick of `/lowstate`; the
-  safety process stamps by its own monotonic clock.
+  safety process stamps by a clock of its own, the time since boot.
 - Frames: REP-103 and REP-105. `odom` coincides with the levelled `base_link` at the start; the link `pelvis` coincides
   with `base_link`; optical frames have z forward.
 - Units: SI. Quaternions on ROS topics are xyzw, in the vendor's messages wxyz.

@@ -50,7 +50,7 @@ class Reason(StrEnum):
     STATE_STALE = "state_stale"
     STATE_TIME = "state_time_invalid"
     STATE_INVALID = "state_not_finite"
-    STATE_RATE = "state_rate"
+    STATE_CLOCK = "state_clock"
     POSITION = "joint_position"
     VELOCITY = "joint_velocity"
     TORQUE = "joint_torque"

@@ -15,7 +15,7 @@ AGREEMENT = (0.9, 1.1)
 """Rates of the robot's time that are taken for ours [own: what arrives may be late by 50 ms at either end]."""
 
 
-def awake_or_not() -> float:
+def time_since_boot() -> float:
     """Return a monotonic time that goes on while the machine sleeps, where the system has one [s]."""
     clock = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
     return time.clock_gettime(clock)

@@ -30,7 +30,7 @@ from golem.robots.model.table import JOINT_NAMES
 from golem.runtime.executor import in_order
 from golem.runtime.live import pace
 from golem.runtime.live.authority import Authority
-from golem.runtime.live.clock import Every, Rate, RobotClock, awake_or_not
+from golem.runtime.live.clock import Every, Rate, RobotClock, time_since_boot
 from golem.runtime.live.surface import Surface
 from golem.runtime.live.verdict import status_message, told
 from golem.runtime.sides import SafetySide
@@ -42,6 +42,8 @@ PERSISTENT = 25
 """States in a row with a motor's error that are a fault [own: as many as stop the legs for a speed]."""
 LOOK = 0.05
 """Time between two looks for other writers of the motors' command [s]."""
+WARY = 1.0
+"""Time after a pause of the gate in which it is asked for nothing but a stop [s]."""
 REPORT = 0.05
 """Time between two reports while nothing changes [s]."""
 DIAGNOSE = 1.0
@@ -135,7 +137,7 @@ class LiveGate:
         node: Node,
         limits: SafetyLimits,
         estop: VirtualEstop | None,
-        clock: Callable[[], float] = awake_or_not,
+        clock: Callable[[], float] = time_since_boot,
         who: Callable[[bytes], str] = bytes.hex,
         patient: bool = False,
         real: bool = False,
@@ -171,11 +173,11 @@ class LiveGate:
         self._nodes = in_order(self._side.nodes)
         self._estops = News(self.bus, topics.ESTOP, EstopFrame)
         self._base_stamp = -math.inf
-        self._crowded = ""
+        self._crowded, self._unheard = "", ""
         self._looks, self._reports, self._diagnoses = Every(LOOK), Every(REPORT), Every(DIAGNOSE)
         self._steps = 0
         self._ending, self._halts = False, False
-        self._stepped, self._pause = clock(), 0.0
+        self._stepped, self._paused_until = clock(), -math.inf
         self.status = GateStatus(clock(), GateState.INIT)
         surface.subscribe("/base_estimate", self._base)
         surface.serve(
@@ -190,11 +192,13 @@ class LiveGate:
     def step(self) -> None:
         """Take what has come, judge it, and tell the motors."""
         now = self._clock()
-        self._pause, self._stepped = now - self._stepped, now
+        if now - self._stepped > self._stall:
+            self._paused_until, self._arrivals.rate = now + WARY, Rate()
+        self._stepped = now
         self._arrivals.poll()
         self._node.poll()
         if self._looks.due(now):
-            self._crowded = self._crowd()
+            self._crowded, self._unheard = self._crowd(), self._silence()
         self._authority.poll()
         self._judge()
         if self._diagnoses.due(now):
@@ -217,11 +221,10 @@ class LiveGate:
         moving = before.state is GateState.ACTIVE
         doubts = [(Reason.WRITERS, self._crowded)]
         if self._real:
-            deaf = "" if self._out.matched() else "nobody receives /lowcmd"
-            # A robot that moves is not dropped for the rate: its unit was right, and what arrives may be late.
-            rate = "" if moving else self._arrivals.rate.doubt()
+            # A robot that moves is not dropped for its clock: the unit was right, and what arrives may be late.
+            clock = "" if moving or self._arrivals.mode_machine is None else self._arrivals.rate.doubt()
             held = self._authority.doubt(moving)
-            doubts += [(Reason.STATE_RATE, rate), (Reason.UNHEARD, deaf), (Reason.HELD, held)]
+            doubts += [(Reason.STATE_CLOCK, clock), (Reason.UNHEARD, self._unheard), (Reason.HELD, held)]
         for reason, detail in doubts:
             if detail:
                 self.bus.publish(topics.TRANSPORT_FAULT, Fault(reason, detail), now)
@@ -266,18 +269,29 @@ class LiveGate:
                 return f"{topic} is written by {len(writers)}: {self._names(writers)}"
         return ""
 
+    def _silence(self) -> str:
+        """Return that the motors do not hear; empty if somebody does who is none of ours (this gate, recorders)."""
+        ours = self._out.guid[:12]
+        for guid in self._out.readers().values():
+            if guid[:12] != ours and not self._who(guid).startswith("golem "):
+                return ""
+        return "nobody receives /lowcmd"
+
     def _names(self, writers: Iterable[bytes]) -> str:
         return ", ".join(map(self._who, writers))
 
     def _ask(self, request: Request, *wanted: GateState) -> Trigger_Response:
         """Pass on what an operator asks for; the answer says what came of it.
 
-        Not while this process ends, and nothing but a stop after a pause: who asked before may be beside the robot now.
+        Not while this process ends, and for `WARY` after a pause nothing but a stop: who asked before may be beside the
+        robot by now, and what was asked comes out of the network's queues little by little.
         """
+        now = self._clock()
         if self._ending:
             return Trigger_Response(False, "The safety process ends.")
-        if self._pause > self._stall and request is not Request.STOP:
-            return Trigger_Response(False, f"The gate was held up for {self._pause:.1f} s; ask again.")
+        paused = now < self._paused_until or now - self._stepped > self._stall
+        if paused and request is not Request.STOP:
+            return Trigger_Response(False, f"The gate was held up; ask again in {WARY:g} s.")
         self._side.request(request)
         self._judge()
         self._side.request(Request.NONE)
