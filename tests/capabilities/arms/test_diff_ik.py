@@ -160,11 +160,16 @@ def test_a_waist_that_was_turned_far_stays_until_a_hand_is_sent_and_then_comes_b
     ik.reset(q)
     assert ik.step(None, None, q, DT).q[0] == 1.2
     goal = downward(0.43, -0.22, 0.15, -np.pi / 2)
-    waist = np.array([ik.step(None, goal, q, DT).q[0] for _ in range(600)])
+    at_waist: list[float] = []
+    for k in range(600):
+        command = ik.step(None, goal, q, DT)
+        at_waist.append(command.q[0])
+        # The hand does not wait for the waist.
+        assert k < 200 or command.error_position[1] < 0.05
+    waist = np.array(at_waist)
     steps = np.diff(np.append(1.2, waist))
     assert np.abs(steps).max() <= ik.speed[0] * DT + 1e-12
-    assert waist[-1] <= ik.upper[0] < waist[10]
-    assert ik.step(None, goal, q, DT).error_position[1] < 0.05
+    assert waist[-1] <= ik.upper[0] < waist[200]
 
 
 @pytest.mark.parametrize("z", [-0.6, 1.6])

@@ -124,7 +124,8 @@ class TaskSpaceController(ABC):
         rate, latency: see `UpperBody`.
         config: the options.
         kinematics: the model, always updated at the command state.
-        lower, upper: (15,) position limits it keeps, margin and torso range included [rad].
+        lower, upper: (15,) position limits it keeps, margin and torso range included [rad]; a waist that starts outside
+            that range comes back to it.
         speed: (15,) velocity limits it keeps [rad/s].
         rest: (15,) the posture the redundant joints return to [rad].
         q: (15,) the command state [rad].
@@ -204,21 +205,19 @@ class TaskSpaceController(ABC):
                 residual = share * residual
                 to_frame = pin.exp6(-residual)
             reaches.append(Reach(side, to_frame, residual))
-        inside = np.clip(self.q, self.lower, self.upper)
-        if reaches and (inside != self.q).any():
-            limited = True
-            self._move(self.q + np.clip(inside - self.q, -room, room))
-        elif reaches:
-            lower = np.maximum(self.lower - self.q, -room)
-            upper = np.minimum(self.upper - self.q, room)
+        if reaches:
+            # A waist that starts outside its range comes back at its speed, and the arms make up for it.
+            least, most = np.minimum, np.maximum  # np.clip takes three times as long
+            lower = least(most(self.lower - self.q, -room), room)
+            upper = least(most(self.upper - self.q, -room), room)
             step = self.solve(reaches, lower, upper, damping, dt)
             if step is None:
-                limited = True
+                limited, step = True, np.zeros(NUM_UPPER)
             else:
                 held = (step <= lower + 1e-9) | (step >= upper - 1e-9)
                 limited |= bool((held & (room > 0.0)).any())
-                step = np.minimum(np.maximum(step, lower), upper)
-                self._move(np.minimum(np.maximum(self.q + step, self.lower), self.upper))
+            q = self.q + least(most(step, lower), upper)
+            self._move(least(most(q, least(self.lower, self.q)), most(self.upper, self.q)))
         position, rotation = self._errors(goals)
         self._left_over = float(
             np.sqrt(c.position_weight * (position @ position) + c.rotation_weight * (rotation @ rotation))
