@@ -191,7 +191,7 @@ TOPICS: tuple[Topic, ...] = (
           "Pose of base_link in odom and its velocity in base_link."),
     Topic("/cmd_vel", "geometry_msgs/msg/Twist", "user", ("stack",), DEFAULT, None, BASE_FRAME,
           "Velocity for the legs [m/s], [rad/s]; to be repeated at least every 0.5 s, or the robot stands. Ignored "
-          "while a skill runs or the gate is shut; who sent any then lets go first: zero, or nothing for 0.5 s."),
+          "while a skill runs or the gate is shut; who sent any then lets go first: zero, or nothing for 1 s."),
     Topic("/legs/status", "golem_interfaces/msg/LegStatus", "stack", (), DEFAULT, 50, BASE_FRAME,
           "What the lower body was told, what it does, and why not more."),
     Topic("/onboard/lowcmd", "unitree_hg/msg/LowCmd", "robot", ("stack",), LOW, 500, "",
