@@ -174,6 +174,7 @@ class LiveGate:
         self._estops = News(self.bus, topics.ESTOP, EstopFrame)
         self._base_stamp = -math.inf
         self._crowded, self._unheard = "", ""
+        self._listeners: set[bytes] | None = None
         self._looks, self._reports, self._diagnoses = Every(LOOK), Every(REPORT), Every(DIAGNOSE)
         self._steps = 0
         self._ending, self._halts = False, False
@@ -198,7 +199,9 @@ class LiveGate:
         self._arrivals.poll()
         self._node.poll()
         if self._looks.due(now):
-            self._crowded, self._unheard = self._crowd(), self._silence()
+            self._crowded = self._crowd()
+            if self._real:
+                self._listen()
         self._authority.poll()
         self._judge()
         if self._diagnoses.due(now):
@@ -269,13 +272,14 @@ class LiveGate:
                 return f"{topic} is written by {len(writers)}: {self._names(writers)}"
         return ""
 
-    def _silence(self) -> str:
-        """Return that the motors do not hear; empty if somebody does who is none of ours (this gate, recorders)."""
-        ours = self._out.guid[:12]
-        for guid in self._out.readers().values():
-            if guid[:12] != ours and not self._who(guid).startswith("golem "):
-                return ""
-        return "nobody receives /lowcmd"
+    def _listen(self) -> None:
+        """Find out whether the motors hear: somebody who is none of ours (this gate, recorders)."""
+        listeners = set(self._out.readers().values())
+        if listeners == self._listeners:  # to ask who they are takes a look at the whole domain
+            return
+        self._listeners, ours = listeners, self._out.guid[:12]
+        heard = any(g[:12] != ours and not self._who(g).startswith("golem ") for g in listeners)
+        self._unheard = "" if heard else "nobody receives /lowcmd"
 
     def _names(self, writers: Iterable[bytes]) -> str:
         return ", ".join(map(self._who, writers))

@@ -128,7 +128,7 @@ def run_safety(config: SafetyConfig) -> None:
     """Guard until Ctrl-C; a robot in motion is damped first.
 
     Raises:
-        ConfigError: an option is wrong, or the motors are commanded already.
+        ConfigError: an option is wrong, or a gate is on the domain already.
         DdsError: the domain cannot be joined.
     """
     limits = SafetyLimits.from_profile(config.limits)
