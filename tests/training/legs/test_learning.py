@@ -18,11 +18,11 @@ from golem.capabilities.legs.observation import Layout
 from golem.errors import ConfigError
 from golem.evaluation.provenance import commit
 from golem.robots.model.leg_kinematics import leg_poses
-from golem.training.legs.checkpoint import CHECKPOINT, CURVE, read_curve
+from golem.training.legs.checkpoint import CHECKPOINT, CURVE, read_checkpoint, read_curve
 from golem.training.legs.curve import draw_curves
 from golem.training.legs.disturbances import GENTLE, STRAIGHT, Difficulty, Pushes, UpperBodyMotion
 from golem.training.legs.env import LAYOUT, TASKS, LegsEnv, Task
-from golem.training.legs.export import TRAINED, export, load_actor
+from golem.training.legs.export import TRAINED, command_of, export, load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.model import STANCE
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
@@ -38,18 +38,20 @@ def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(
 ) -> None:
     for name, seed in (("a", 0), ("b", 0), ("c", 1)):
         train(small(tmp_path / name, seed, updates=10, learned_from=0.0))
-    a, b, c = (load_actor(tmp_path / name / CHECKPOINT)[0].net[0].weight for name in "abc")
+    a, b, c = (load_actor(tmp_path / name / CHECKPOINT).net[0].weight for name in "abc")
     assert torch.equal(a, b) and not torch.equal(a, c)
     with (tmp_path / "a" / CURVE).open() as file:
         rows = list(csv.DictReader(file))
     assert [int(float(row["steps"])) for row in rows] == [192 * k for k in range(1, 11)]
     train(small(tmp_path / "a", updates=11, learned_from=0.0))
     assert torch.load(tmp_path / "a" / CHECKPOINT, weights_only=True)["updates"] == 11
-    assert load_actor(tmp_path / "a" / CHECKPOINT)[2].endswith(f"(commit {commit()})")
+    assert command_of(read_checkpoint(tmp_path / "a" / CHECKPOINT)).endswith(f"(commit {commit()})")
     with monkeypatch.context() as changed:
         changed.setattr("golem.training.legs.train.commit", lambda: "later")
         train(small(tmp_path / "a", updates=12, learned_from=0.0))
-    assert load_actor(tmp_path / "a" / CHECKPOINT)[2].endswith(f"(commit {commit()}, then later)")
+    assert command_of(read_checkpoint(tmp_path / "a" / CHECKPOINT)).endswith(
+        f"(commit {commit()}, then later)"
+    )
     with pytest.raises(ConfigError, match="another configuration"):
         train(small(tmp_path / "a", seed=5, updates=12))
     with monkeypatch.context() as changed, pytest.raises(ConfigError, match="other rewards"):
@@ -80,7 +82,7 @@ def test_rows_of_the_curve_that_are_learned_again_are_left_out(tmp_path: Path) -
 def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(tmp_path: Path) -> None:
     first = train(small(tmp_path / "first"))
     weights = [
-        load_actor(train(small(tmp_path / f"{seed}", seed, updates=3, start=first)))[0].net[0].weight
+        load_actor(train(small(tmp_path / f"{seed}", seed, updates=3, start=first))).net[0].weight
         for seed in (1, 2)
     ]
     assert not torch.equal(*weights)
@@ -88,7 +90,7 @@ def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(tmp_path: 
         train(small(tmp_path / "none", start=first))
 
 
-def test_files_that_are_no_checkpoint_or_curve_are_named(tmp_path: Path) -> None:
+def test_files_that_are_no_checkpoint_network_or_curve_are_named(tmp_path: Path) -> None:
     (tmp_path / "notes.pt").write_text("hello")
     torch.save({"model": 1}, tmp_path / "other.pt")
     for name, words in (
@@ -100,6 +102,10 @@ def test_files_that_are_no_checkpoint_or_curve_are_named(tmp_path: Path) -> None
             export(tmp_path / name, tmp_path)
         with pytest.raises(ConfigError, match=words):
             train(small(tmp_path / "run", start=tmp_path / name))
+    (tmp_path / "notes.onnx").write_text("hello")
+    for name, words in (("nope.onnx", "No such file"), ("notes.onnx", "is no network")):
+        with pytest.raises(ConfigError, match=words):
+            load_actor(tmp_path / name)
     with pytest.raises(ConfigError, match="name folders of runs"):
         draw_curves([tmp_path / "nope"], tmp_path / "curve.png")
     (tmp_path / CURVE).write_text("steps\n")
@@ -110,20 +116,19 @@ def test_files_that_are_no_checkpoint_or_curve_are_named(tmp_path: Path) -> None
 @pytest.mark.parametrize("task", TASKS)
 def test_the_exported_network_is_the_trained_one_and_its_description_fits(task: Task, tmp_path: Path) -> None:
     train(small(tmp_path / "run", task=task))
-    export(tmp_path / "run" / CHECKPOINT, tmp_path)
+    checkpoint = tmp_path / "run" / CHECKPOINT
+    export(checkpoint, tmp_path)
     description, path = load_description(tmp_path / f"almi_{task}.yaml")
     layout = description.layout()
-    network, (actor, learned, command) = (
-        load_network(path, layout.size),
-        load_actor(tmp_path / "run" / CHECKPOINT),
-    )
-    assert learned == task
+    network, actor, again = load_network(path, layout.size), load_actor(checkpoint), load_actor(path)
+    command = command_of(read_checkpoint(checkpoint))
     assert command.startswith(f"golem train legs run --task {task} --seed 0 ") and commit() in command
     (said,) = onnx.load(str(path)).metadata_props
     assert (said.key, said.value) == (TRAINED, command)
     for observation in np.random.default_rng(0).normal(size=(3, layout.size)).astype(np.float32):
         with torch.no_grad():
             expected = actor(torch.from_numpy(observation)).numpy()
+            np.testing.assert_array_equal(again(torch.from_numpy(observation)).numpy(), expected)
         np.testing.assert_allclose(network(observation), expected, atol=1e-6)
     np.testing.assert_allclose(description.q0()[:12], STANCE)
 

@@ -69,7 +69,7 @@ def curve(runs: tyro.conf.Positional[tuple[Path, ...]], out: Path = RUNS / "curv
 
 
 def shove(
-    checkpoint: Path = RUNS / "seed0" / CHECKPOINT,
+    network: Path = RUNS / "seed0" / CHECKPOINT,
     impulse: float = 80.0,
     n: Annotated[int, arg(aliases=("-n",))] = 20,
     seed: int = 0,
@@ -78,7 +78,7 @@ def shove(
     """Shove robots in the training's own world, eight directions: which of two networks stands more, in seconds.
 
     Args:
-        checkpoint: of `run`.
+        network: checkpoint of `run`, or a network of `export`, such as those in `golem/capabilities/legs/policies`.
         impulse: of each shove of 0.2 s on the torso [N s].
         n: robots per direction.
         seed: of the robots.
@@ -86,7 +86,7 @@ def shove(
     """
     from golem.training.legs.shoves import shove_all
 
-    rows = shove_all(checkpoint, impulse, n, seed, threads)
+    rows = shove_all(network, impulse, n, seed, threads)
     table = Table(
         "direction", "survived", "stopped by the gate", "fell", title=f"{impulse:g} N s, n = {n} each"
     )

@@ -11,13 +11,16 @@ from typing import Any
 
 import numpy as np
 import onnx
+import torch
 import yaml
+from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 from torch import nn
 
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.observation import Layout
+from golem.errors import ConfigError
 from golem.training.legs.checkpoint import read_checkpoint
 from golem.training.legs.env import LAYOUT, PERIOD, TASKS, EnvConfig, Task
 from golem.training.legs.mirror import Mirror, leg_mirror
@@ -34,13 +37,45 @@ TRAINED = "golem.trained"
 """Name of the network's metadata that say what trained it."""
 
 
-def load_actor(checkpoint: Path) -> tuple[Actor, Task, str]:
-    """Return the trained actor of a checkpoint of `train`, what it learned, and the command that trained it."""
-    layout = Layout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
-    actor = Actor(Mirror(layout.components), leg_mirror(), PpoConfig().hidden)
-    saved = read_checkpoint(checkpoint)
+def load_actor(path: Path) -> Actor:
+    """Return the trained actor of a checkpoint of `train`, or of a network that `export` wrote (`.onnx`).
+
+    Raises:
+        ConfigError: it is neither.
+    """
+    if path.suffix == ".onnx":
+        return _exported_actor(path)
+    return _trained_actor(read_checkpoint(path))
+
+
+def _trained_actor(saved: dict[str, Any]) -> Actor:
+    actor = _untrained_actor()
     actor.load_state_dict(saved["legs"]["actor"])
-    return actor.eval(), saved["config"]["task"], _command(saved)
+    return actor
+
+
+def _exported_actor(path: Path) -> Actor:
+    actor = _untrained_actor()
+    try:
+        weights = {w.name: numpy_helper.to_array(w) for w in onnx.load(str(path)).graph.initializer}
+        with torch.no_grad():
+            for k, layer in enumerate(_linear(actor)):
+                layer.weight.copy_(torch.from_numpy(weights[f"weight{k}"].T.copy()))
+                layer.bias.copy_(torch.from_numpy(weights[f"bias{k}"].copy()))
+    except OSError as error:
+        raise ConfigError(f"The network {path} cannot be read: {error.strerror or error}.") from error
+    except (KeyError, RuntimeError, DecodeError) as error:
+        raise ConfigError(f"{path} is no network of 'golem train legs export' of today.") from error
+    return actor
+
+
+def _untrained_actor() -> Actor:
+    layout = Layout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
+    return Actor(Mirror(layout.components), leg_mirror(), PpoConfig().hidden).eval()
+
+
+def _linear(actor: Actor) -> list[nn.Linear]:
+    return [layer for layer in actor.net if isinstance(layer, nn.Linear)]
 
 
 def export(checkpoint: Path, folder: Path) -> tuple[Path, Path]:
@@ -49,19 +84,20 @@ def export(checkpoint: Path, folder: Path) -> tuple[Path, Path]:
     Raises:
         ConfigError: it is no checkpoint.
     """
-    actor, task, command = load_actor(checkpoint)
+    saved = read_checkpoint(checkpoint)
+    task: Task = saved["config"]["task"]
     name = f"almi_{task}"
     folder.mkdir(parents=True, exist_ok=True)
     network = folder / f"{name}.onnx"
-    graph = _graph(actor)
-    helper.set_model_props(graph, {TRAINED: command})
+    graph = _graph(_trained_actor(saved))
+    helper.set_model_props(graph, {TRAINED: command_of(saved)})
     onnx.save(graph, str(network))
     description = folder / f"{name}.yaml"
     description.write_text(_description(network.name, TASKS[task]), encoding="utf-8")
     return network, description
 
 
-def _command(saved: dict[str, Any]) -> str:
+def command_of(saved: dict[str, Any]) -> str:
     """Return the command that made a checkpoint, and with what code."""
     config = saved["config"]
     words = ("task", "seed", "adversary", "robots")
@@ -76,7 +112,7 @@ def _graph(actor: Actor) -> onnx.ModelProto:
     weights: dict[str, NDArray[np.generic]] = {"half": np.array([0.5], np.float32)}
     for key in ("observation_order", "observation_sign", "action_order", "action_sign"):
         weights[key] = getattr(actor, key).numpy()
-    layers = [layer for layer in actor.net if isinstance(layer, nn.Linear)]
+    layers = _linear(actor)
     for k, layer in enumerate(layers):
         weights[f"weight{k}"] = layer.weight.detach().numpy().T.copy()
         weights[f"bias{k}"] = layer.bias.detach().numpy()

@@ -6,7 +6,7 @@ the figures compare networks, and say little by themselves.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -37,25 +37,25 @@ class Shoved:
     fell: int
 
 
-def shove_all(checkpoint: Path, impulse: float, n: int, seed: int, threads: int) -> list[Shoved]:
+def shove_all(network: Path, impulse: float, n: int, seed: int, threads: int) -> list[Shoved]:
     """Shove `n` standing robots in each direction once, arms at rest, without exploration.
 
     Args:
-        checkpoint: of a training run.
+        network: checkpoint of a training run, or an exported network.
         impulse: of each shove on the torso [N s].
         n: robots per direction.
         seed: of the robots.
         threads: of the physics.
 
     Raises:
-        ConfigError: it is no checkpoint, or a number is not positive.
+        ConfigError: it is neither, or a number is not positive.
     """
     if impulse <= 0.0 or n < 1 or threads < 1 or seed < 0:
         raise ConfigError(
             "Give --impulse more than 0, -n 1 or more, --threads 1 or more and --seed 0 or more."
         )
-    actor, task, _ = load_actor(checkpoint)
-    env = LegsEnv(n * len(DIRECTIONS), replace(TASKS[task], standing=1.0), seed, threads)
+    actor = load_actor(network)
+    env = LegsEnv(n * len(DIRECTIONS), TASKS["stand"], seed, threads)
     env.difficulty.amplitude = env.difficulty.speed = env.difficulty.payload = 0.0
     env.restart(np.arange(env.n))
     angle = np.repeat(np.arange(len(DIRECTIONS)) * np.pi / 4.0, n)
