@@ -26,7 +26,7 @@ from golem.training.legs.export import TRAINED, command_of, export, load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.model import STANCE
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
-from golem.training.legs.train import Adversary, TrainConfig, train
+from golem.training.legs.train import Adversary, TrainConfig, _Run, train
 
 
 def small(out: Path, seed: int = 0, updates: int = 2, **changes: object) -> TrainConfig:
@@ -86,6 +86,16 @@ def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(tmp_path: 
         for seed in (1, 2)
     ]
     assert not torch.equal(*weights)
+    network, _ = export(first, tmp_path)
+    config = small(tmp_path / "anew", updates=1, start=network)
+    run = _Run(config)
+    run.begin_with(network)
+    for mine, exported in zip(
+        run.legs.actor.net.parameters(), load_actor(network).net.parameters(), strict=True
+    ):
+        assert torch.equal(mine, exported)
+    assert run.steps == 0 and float(run.legs.actor.log_std.exp().detach().mean()) == pytest.approx(0.45)
+    assert not torch.equal(load_actor(train(config)).net[0].weight, load_actor(network).net[0].weight)
     with pytest.raises(ConfigError, match=r"has 384 steps already; --steps, which counts them, is 384\."):
         train(small(tmp_path / "none", start=first))
 

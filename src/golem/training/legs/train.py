@@ -18,6 +18,7 @@ from golem.evaluation.provenance import commit
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, cut_curve, read_checkpoint
 from golem.training.legs.disturbances import NUM_UPPER
 from golem.training.legs.env import PERIOD, TASKS, EnvConfig, LegsEnv, Task
+from golem.training.legs.export import load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror, upper_mirror
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
 from golem.training.legs.world import Rows
@@ -37,7 +38,8 @@ class TrainConfig:
         steps: actions of all robots together, e.g. 38e6.
         robots: how many are simulated at once.
         threads: of the physics and of the networks.
-        start: checkpoint of another run whose networks and steps this one begins with, and with the noise of `noise`.
+        start: what this run begins with, exploring with `noise`: networks and steps of another run's checkpoint, or a
+            network that was exported, at no steps.
         adversary: who works against the legs through the upper body: `none` (it rests at home, ready or straight, its
             hands empty), `motions` (the curriculum of motions and payloads), or `learned` (that, and a policy that
             moves half of the robots once `learned_from` steps are done).
@@ -214,11 +216,17 @@ class _Run:
         self._obs, self._known = self.env.observe()
 
     def begin_with(self, path: Path) -> None:
-        """Take over networks and steps of another run's checkpoint; configuration, draws and noise are this run's own.
+        """Take over networks and steps of another run's checkpoint, or a network that was exported.
+
+        Configuration, draws and noise are this run's own.
 
         Raises:
             ConfigError: it has as many steps as this run is to have.
         """
+        if path.suffix == ".onnx":
+            self.legs.actor.load_state_dict(load_actor(path).state_dict())
+            self.legs.set_noise(self.config.noise[0])
+            return
         saved = read_checkpoint(path)
         self.steps = saved["steps"]
         if self.steps >= self.config.steps:
