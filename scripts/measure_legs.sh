@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Measures everything that docs/results.md says of the legs, on the code that this checkout holds: hours on two cores.
+# Measures what docs/results.md says of the legs, on the code that this checkout holds: hours on two cores.
 # An interrupted run goes on where it was. Usage:
 #     scripts/measure_legs.sh OUT PROCESSES [MEASUREMENT...]
 # ALMI and RL_GYM name the weights of the public checkpoints, MJCF the vendor's model; what needs one that is not given
@@ -37,7 +37,7 @@ endurance() { legs --test endurance -n 120; }
 rough() { legs --test slope rubble -n 20; }
 # Beside others, and on another plant.
 side_standing() { push --phase standing --method almi "${peers[@]}"; }
-side_swings() { push --phase left_swing right_swing --method vendor "${peers[@]:3}"; }
+side_swings() { push --phase left_swing right_swing --method almi vendor "${peers[@]:3}"; }
 plans() { legs --test plans -n 5 --method mpc -j 1; }
 box_feet() { push --phase standing --first 60 --robot feet=box cone=elliptic; }
 vendor_model() { [ -z "$MJCF" ] || push --phase standing --first 60 --robot "mjcf=$MJCF"; }

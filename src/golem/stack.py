@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from importlib import resources
 from pathlib import Path
@@ -30,8 +30,16 @@ class Choice:
     @property
     def uses(self) -> tuple[str, ...]:
         """Every implementation that is chosen: this one, and those its options name by `{use: NAME, ...}`."""
-        inner = (v["use"] for v in self.options.values() if isinstance(v, Mapping) and "use" in v)
-        return (self.use, *inner)
+        return (self.use, *_named(self.options))
+
+
+def _named(options: Mapping[str, Any]) -> Iterator[str]:
+    """Yield every implementation that `options` choose, at any depth."""
+    for value in options.values():
+        if isinstance(value, Mapping):
+            if "use" in value:
+                yield value["use"]
+            yield from _named(value)
 
 
 @dataclass(frozen=True)

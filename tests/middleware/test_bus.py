@@ -72,6 +72,17 @@ def test_values_arrive_in_the_order_they_were_published(latencies: list[float]) 
     assert (seen[-1], bus.count("x")) == (len(latencies) - 1, len(latencies))
 
 
+def test_what_is_withdrawn_does_not_arrive_and_what_comes_next_is_prompt() -> None:
+    bus = Bus()
+    bus.publish("legs", 1, 0.0)
+    bus.publish("legs", 2, 0.0, latency=0.1)
+    bus.withdraw("legs")
+    bus.deliver(1.0)
+    assert bus.latest("legs", int) == 1
+    bus.publish("legs", 3, 1.0)
+    assert (bus.latest("legs", int), bus.count("legs")) == (3, 2)
+
+
 def test_streams_do_not_wait_for_each_other() -> None:
     bus = Bus()
     bus.publish("x", 1, t=0.0, latency=1.0)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from golem.capabilities.legs.base import LegCommand
 from golem.errors import ConfigError, ModuleFault
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
@@ -48,6 +49,12 @@ class Failing(Hold):
 
 class Chosen(Failing):
     how = "{how}"
+
+class Late(Failing):
+    how = "raises"
+    def __init__(self):
+        super().__init__()
+        self.latency = 0.1
 
 class Unmeasured(Failing):
     how = "unmeasured"
@@ -186,6 +193,20 @@ def test_after_a_fault_no_skill_runs_on_the_fallback_unawares(tmp_path: Path) ->
         first = running.execute(Drive(), None, timeout=5.0)
         second = running.execute(Drive(), None, timeout=5.0)
         assert (second.stage, second.reason) == ("fault", first.reason)
+
+
+def test_what_failed_legs_sent_late_does_not_come_any_more(tmp_path: Path) -> None:
+    use = f"{write(tmp_path, 'raises')}:Late"
+    stiff = {"kp": (400.0,) * 6}
+    with hanging(lower_body=Choice(use), fallback=Choice("hold", stiff)) as running:
+        running.executor.run(0.4)
+        while status(running).fault is None:
+            running.executor.run(running.executor.t + 0.002)
+        running.executor.run(running.executor.t + 0.05)
+        command = running.bus.latest(topics.LEG_COMMAND, LegCommand)
+        assert command is not None
+        # A third of the way from 200 to the fallback's gains; those of its own last commands would come until 0.1 s.
+        assert 240.0 < command.kp[0] < 300.0
 
 
 def test_a_fallback_that_does_not_exist_is_refused_when_the_stack_is_built() -> None:

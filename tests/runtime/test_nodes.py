@@ -156,6 +156,20 @@ def test_a_rate_or_latency_that_is_none_is_refused(
         running(slot, module(slot, "", line))
 
 
+@pytest.mark.parametrize(
+    ("line", "what"),
+    [
+        ("Legs.envelope = ((-0.4, 0.8), (0.0, 0.0), (0.0, 0.0))", "envelope is a tuple, .* Envelope"),
+        ("Legs.gait = 'trot'", "gait is a str, .* GaitConfig"),
+    ],
+)
+def test_legs_whose_envelope_or_clock_is_none_are_refused(
+    line: str, what: str, module: Callable[[str, str, str], str]
+) -> None:
+    with pytest.raises(ModuleFault, match=what):
+        running("lower_body", module("lower_body", "", line))
+
+
 def test_a_controller_faster_than_the_clock_is_refused(module: Callable[[str, str, str], str]) -> None:
     with pytest.raises(ConfigError, match="UpperBodyNode wants to run at 1000 Hz"):
         running("upper_body", module("upper_body", "", "Arms.rate = 1000.0"))

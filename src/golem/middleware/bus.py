@@ -39,6 +39,10 @@ class Bus:
         else:
             self._pending.setdefault(topic, deque()).append((t + latency, value))
 
+    def withdraw(self, topic: str) -> None:
+        """Forget what was published on `topic` and has not been delivered yet."""
+        self._pending.pop(topic, None)
+
     def deliver(self, t: float) -> None:
         """Make every value that is due at time `t` visible. The executor calls it once per tick."""
         for topic, queue in self._pending.items():

@@ -139,7 +139,7 @@ class LegStatus:
     Attributes:
         t: time [s].
         commanded: the newest twist, as it came: it may be far outside what is possible, or not finite.
-        applied: the twist the controller was given.
+        applied: the twist the robot shall move at; the controller is given a corrected one.
         clamped: whether `commanded` lies outside the controller's envelope.
         reason: why `applied` is not on its way to `commanded`; empty where it is.
         stepping: whether the gait clock runs.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 from golem.capabilities.legs.base import Envelope, LegCommand, LowerBody
+from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.locomotion import Locomotion
 from golem.errors import ModuleFault
 from golem.middleware import topics
@@ -35,9 +36,11 @@ class Legs:
         """Take `controller`, watched by `guard`.
 
         Raises:
-            ModuleFault: its rate or its latency is none.
+            ModuleFault: its rate, latency, envelope or gait is none.
         """
         self.controller, self.guard = controller, guard
+        guard.kind("envelope", controller.envelope, Envelope)
+        guard.kind("gait", controller.gait, GaitConfig)
         self.rate = guard.number("rate", controller.rate, least=MIN_RATE)
         self.check_latency()
 
@@ -112,6 +115,7 @@ class LowerBodyNode:
             self._fault = ModuleFault(fault.slot, fault.use, fault.reason)
             self._failed_at = t
             self._legs, self._overruns = self._fallback, 0
+            self._bus.withdraw(topics.LEG_COMMAND)  # what the failed one sent late shall not come any more
             try:
                 self._legs.guard.call(self._locomotion.hand_over, self._legs.controller, state, self._last)
                 command, latency = self._control(state, base, None)

@@ -208,6 +208,33 @@ def test_a_controller_that_has_started_waits_for_a_robot_that_is_calm() -> None:
     assert robot.legs.walking
 
 
+def test_a_twist_that_waited_for_the_legs_is_reached_at_the_allowed_acceleration() -> None:
+    robot = Robot()
+    robot.run(0.5)
+    calm, robot.state = robot.state, rotating(robot.state)
+    robot.run(2.0, Twist(0.8))
+    assert not robot.legs.walking and not robot.layer.moving
+    assert (robot.layer.applied, robot.layer.reason) == (Twist(), "who walks does not have the legs yet")
+    robot.state = calm
+    robot.run(0.5, Twist(0.8))
+    speeds = np.array([m.twist.vx for m in robot.walk.motions])
+    assert robot.layer.reason == "" and speeds[-1] > 0.3
+    assert speeds[0] <= DT + 1e-12
+    assert (np.diff(speeds) <= LocomotionConfig().acceleration[0] * DT + 1e-12).all()
+
+
+def test_a_hand_over_inside_another_waits_for_whoever_walks_in_the_end() -> None:
+    inner = {"walk": {"use": RECORDER}, "stand": {"use": RECORDER}}
+    outer = HandoverConfig(Part("handover", inner), Part(RECORDER))
+    legs = Handover(outer)
+    layer = Locomotion(legs, LocomotionConfig(trim=TrimConfig(gain=0.0)))
+    state, base = crouching(), still()
+    layer.reset(state)
+    for _ in range(100):
+        layer.step(state, base, Twist(0.5), DT)
+    assert legs.follows and layer.applied == Twist(0.5)
+
+
 def test_a_controller_that_starts_too_slowly_is_left_alone_again() -> None:
     robot = Robot(walk={"silent": 60})
     robot.run(0.5, Twist(0.5))

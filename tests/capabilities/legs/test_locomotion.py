@@ -210,8 +210,18 @@ def test_after_a_hand_over_the_clock_goes_on_and_the_twist_is_zero(driver: Drive
     assert first.twist == ZERO
     assert first.stepping
     assert (first.phase[0] - before) % 1.0 == pytest.approx(DT / other.gait.period)
+
+
+@pytest.mark.parametrize("how", [Twist(0.05), None], ids=["at rest", "silent"])
+def test_after_a_hand_over_whoever_commands_has_to_let_go_first(driver: Driver, how: Twist | None) -> None:
     driver.run(1.0, Twist(0.5))
-    assert other.motions[-1].twist == Twist(0.1)
+    other = Recorder(envelope=Envelope((-0.1, 0.1), (0.0, 0.0), (0.0, 0.0)))
+    driver.layer.hand_over(other, driver.state, None)
+    driver.run(3.0, Twist(0.5))
+    assert driver.layer.applied == ZERO and "has not let go" in driver.layer.reason
+    driver.run(DT if how is not None else 0.6, how)
+    driver.run(1.0, Twist(0.5))
+    assert driver.layer.applied == other.motions[-1].twist == Twist(0.1)
 
 
 def test_after_a_hand_over_the_targets_do_not_jump(driver: Driver) -> None:

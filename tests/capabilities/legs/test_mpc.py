@@ -8,7 +8,7 @@ from tests.capabilities.legs.floor_plant import FloorPlant
 
 from golem import registry
 from golem.capabilities.legs.base import STANDING, Envelope, LowerBody
-from golem.capabilities.legs.mpc.controller import MPC, MPCConfig
+from golem.capabilities.legs.mpc.controller import FAILURES, MPC, MPCConfig, PlanningError
 from golem.capabilities.legs.mpc.planner import PlannerConfig
 from golem.errors import ConfigError
 from golem.evaluation.pool import CAN_COPY, in_a_copy
@@ -35,6 +35,19 @@ def test_standing_is_its_doing() -> None:
     # The same gains at the same posture, without plans, tip over.
     never = replace(QUICK, planner=PlannerConfig(noise=(1e-9,) * 6))
     assert not FloorPlant(velocity_noise=0.03).run(MPC(never), 2.5, PUSH)
+
+
+def test_a_robot_of_which_no_rollout_is_finite_is_given_up() -> None:
+    legs, plant = MPC(QUICK), FloorPlant()
+    state, base = plant.sense()
+    legs.reset(state)
+    lost = replace(base, velocity=np.full(3, np.nan))
+    for _ in range(FAILURES - 1):
+        legs.step(state, lost, STANDING, 0.04)
+    with pytest.raises(PlanningError, match="finite for 5 plans in a row"):
+        legs.step(state, lost, STANDING, 0.04)
+    legs.reset(state)
+    legs.step(state, base, STANDING, 0.04)
 
 
 def commands(legs: MPC, ticks: int = 6) -> Array:

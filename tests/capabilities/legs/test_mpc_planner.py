@@ -55,6 +55,14 @@ def test_cem_moves_to_the_mean_of_the_elite_but_slowly_while_the_plan_is_good(
     np.testing.assert_allclose(tried.sample()[0], gain * knots[elite].mean(axis=0) + (1.0 - gain) * knots[0])
 
 
+def test_cem_averages_nothing_that_diverged() -> None:
+    tried = planner(PlannerConfig(samples=8, elite=0.5))
+    knots = tried.sample()
+    assert tried.update(knots, np.array([np.nan, np.inf, 1.0, np.nan, np.nan, 2.0, np.nan, np.nan]))
+    np.testing.assert_allclose(tried.sample()[0], knots[[2, 5]].mean(axis=0))
+    assert not tried.update(knots, np.full(8, np.inf))
+
+
 def test_some_samples_keep_the_full_noise() -> None:
     tried = planner(PlannerConfig(samples=201, narrowest=0.1, wide=0.5))
     for _ in range(20):

@@ -13,12 +13,18 @@ from golem.errors import ConfigError, MissingExtra
 
 
 def write_onnx(
-    path: Path, inputs: int, outputs: int, batch: tuple[int | str, ...] = (1,), twice: bool = False
+    path: Path,
+    inputs: int,
+    outputs: int,
+    batch: tuple[int | str, ...] = (1,),
+    twice: bool = False,
+    double: bool = False,
 ) -> Path:
     """Write a network y = x W with W = 0.01 everywhere."""
     onnx = pytest.importorskip("onnx")
-    helper, kind = onnx.helper, onnx.TensorProto.FLOAT
-    W = helper.make_tensor("W", kind, [inputs, outputs], np.full(inputs * outputs, 0.01, np.float32))
+    helper = onnx.helper
+    kind = onnx.TensorProto.DOUBLE if double else onnx.TensorProto.FLOAT
+    W = helper.make_tensor("W", kind, [inputs, outputs], np.full(inputs * outputs, 0.01))
     nodes = [helper.make_node("MatMul", ["x", "W"], ["y"])]
     x = helper.make_tensor_value_info("x", kind, [*batch, inputs])
     y = [helper.make_tensor_value_info("y", kind, [*batch, outputs])]
@@ -50,6 +56,8 @@ def test_a_network_that_does_not_fit_is_answered_with_both_sizes(tmp_path: Path)
         load_network(write_onnx(tmp_path / "b.onnx", 5, 10), 5)
     with pytest.raises(ConfigError, match="1 inputs and 2 outputs"):
         load_network(write_onnx(tmp_path / "c.onnx", 5, 12, twice=True), 5)
+    with pytest.raises(ConfigError, match=r"takes tensor\(double\) and returns tensor\(double\); a policy's"):
+        load_network(write_onnx(tmp_path / "e.onnx", 5, 12, double=True), 5)
     with pytest.raises(ConfigError, match="does not take the 5 values"):
         load_network(write_onnx(tmp_path / "d.onnx", 5, 12, (3,)), 5)
 
@@ -62,6 +70,18 @@ def test_files_that_are_no_networks_are_refused(tmp_path: Path) -> None:
     (tmp_path / "junk.onnx").write_bytes(b"junk")
     with pytest.raises(ConfigError, match="not an ONNX network"):
         load_network(tmp_path / "junk.onnx", 5)
+
+
+def test_a_torchscript_module_that_returns_more_than_an_action_is_refused(tmp_path: Path) -> None:
+    torch = pytest.importorskip("torch")
+
+    class Pair(torch.nn.Module):
+        def forward(self, x):  # noqa: ANN001, ANN202  (TorchScript reads the annotations)
+            return x, x
+
+    torch.jit.script(Pair()).save(str(tmp_path / "pair.pt"))
+    with pytest.raises(ConfigError, match="does not return one tensor"):
+        load_network(tmp_path / "pair.pt", 12)
 
 
 @pytest.mark.parametrize("own_reset", [True, False])

@@ -73,8 +73,8 @@ class Motion:
             `trim.TrimConfig.most`) of the components that the envelope has; exactly zero means stand.
         phase: (2,) gait phase of the left and the right leg, 0 to 1, a leg's stance first (see `gait.Gait`).
         stepping: whether the gait clock runs; while it does not, both feet belong on the ground.
-        commanded: whether the robot shall move; if not, `twist` corrects what the last steps of a stop, or those after
-            a push, do to its place.
+        commanded: whether the robot shall move, at once or as soon as the controller follows twists; if not, `twist`
+            corrects what the last steps of a stop, or those after a push, do to its place.
     """
 
     twist: Twist
@@ -131,3 +131,22 @@ class Starting(Protocol):
     """
 
     started: bool
+
+
+@runtime_checkable
+class Following(Protocol):
+    """A lower body that follows twists only at times, because another controller may have the legs.
+
+    The base layer keeps the twist of a robot that stands at zero until then, and `Motion.commanded` says that it waits:
+    the acceleration of a twist is bounded for who follows it.
+
+    Attributes:
+        follows: whether it would follow a twist now.
+    """
+
+    follows: bool
+
+
+def follows(controller: LowerBody) -> bool:
+    """Return whether `controller` would follow a twist now."""
+    return not isinstance(controller, Following) or controller.follows

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from golem import registry
-from golem.capabilities.legs.base import Envelope, LegCommand, LowerBody, Motion, Starting
+from golem.capabilities.legs.base import Envelope, LegCommand, LowerBody, Motion, Starting, follows
 from golem.capabilities.legs.blend import Blend
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.pacing import Paced
@@ -95,6 +95,11 @@ class Handover:
     def walking(self) -> bool:
         """Whether the walking controller is in charge."""
         return self._active is self._walk
+
+    @property
+    def follows(self) -> bool:
+        """Whether twists are followed now; see `Following`."""
+        return self.walking and follows(self._walk.controller)
 
     def reset(self, state: LowState) -> None:
         """Stand, from the measured `state` on; a robot that is found walking is first brought to a stop."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from golem.capabilities.legs.balance import balance_errors
-from golem.capabilities.legs.base import LegCommand, LowerBody, Motion
+from golem.capabilities.legs.base import LegCommand, LowerBody, Motion, follows
 from golem.capabilities.legs.blend import Blend
 from golem.capabilities.legs.gait import Gait
 from golem.capabilities.legs.pacing import Paced
@@ -110,12 +110,16 @@ class Locomotion:
     def hand_over(self, controller: LowerBody, state: LowState, last: LegCommand | None) -> None:
         """Give the legs to `controller`, at zero twist; a step that was begun is finished.
 
+        Whoever sends twists has to let go before one counts again: send one inside the dead band, or none for the
+        timeout. They were for the controller that lost the legs.
+
         Args:
             controller: the controller that is in charge from now on.
             state: measured joints and IMU.
             last: the last sound command, from which the targets lead over to those of `controller`.
         """
         self._forget()
+        self._held, self._age = True, 0.0
         self._blend.begin(last)
         self._paced = Paced(controller)
         self._paced.reset(state)
@@ -130,14 +134,19 @@ class Locomotion:
             dt: time since the previous tick [s], positive.
         """
         self._listen(twist, dt)
-        self._slew(self._wanted(), dt)
+        wanted = self._wanted()
+        waits = wanted != ZERO and self.applied == ZERO and not follows(self.controller)
+        if waits:
+            self.reason = "who walks does not have the legs yet"
+        self._slew(ZERO if waits else wanted, dt)
         self._until_gate -= dt
         self._since_gate += dt
         if self._until_gate < 1e-6:
             self._clock(state, base, self._since_gate)
             self._until_gate = max(self._until_gate + 1.0 / self.config.gate_rate, 0.0)
             self._since_gate = 0.0
-        motion = Motion(self._trimmed, self.gait.phases, bool(self.gait.stepping), self.applied != ZERO)
+        commanded = waits or self.applied != ZERO
+        motion = Motion(self._trimmed, self.gait.phases, bool(self.gait.stepping), commanded)
         return self._blend.step(self._paced.step(state, base, motion, dt), dt)
 
     def _forget(self) -> None:
@@ -145,13 +154,16 @@ class Locomotion:
         self._trim.reset()
         self.clamped = False
         self.reason = ""
+        self._held = False
         self._age = math.inf
         self._until_gate = self._since_gate = 0.0
 
     def _listen(self, twist: Twist | None, dt: float) -> None:
         self._age += dt
+        self._held = self._held and self._age <= self.config.timeout
         if twist is not None:
             self.commanded, self._age = twist, 0.0
+            self._held = self._held and not _size(twist) < self.config.dead_band
 
     def _wanted(self) -> Twist:
         """Return the commanded twist as far as it can be followed; note why it cannot."""
@@ -162,6 +174,9 @@ class Locomotion:
             return ZERO
         if asked == ZERO:
             self.reason = ""
+            return ZERO
+        if self._held:
+            self.reason = "who commands has not let go since another controller took over"
             return ZERO
         if self._age > self.config.timeout:
             self.reason = f"no twist came for {self.config.timeout:g} s"

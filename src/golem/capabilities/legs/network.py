@@ -63,6 +63,11 @@ class OnnxNetwork:
         width = inputs[0].shape[-1] if inputs[0].shape else None
         if isinstance(width, int) and width != size:
             raise _wrong_input(path, size, str(width))
+        kinds = inputs[0].type, outputs[0].type
+        if kinds != ("tensor(float)", "tensor(float)"):
+            raise ConfigError(
+                f"The network {path} takes {kinds[0]} and returns {kinds[1]}; a policy's are tensor(float)."
+            )
         self._name, self._batched = inputs[0].name, len(inputs[0].shape) == 2
         self._session = session
         try:
@@ -106,6 +111,8 @@ class TorchScriptNetwork:
             out = self(np.zeros(size, dtype=np.float32))
         except RuntimeError as error:
             raise _wrong_input(path, size, _reason(error)) from error
+        except (AttributeError, TypeError) as error:
+            raise ConfigError(f"The network {path} does not return one tensor, as a policy does.") from error
         _check_output(path, out)
         self.reset()
 

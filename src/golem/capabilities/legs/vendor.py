@@ -115,6 +115,11 @@ class Vendor:
         self._fault: VendorFault | None = None
         self._session = self._run()
 
+    @property
+    def follows(self) -> bool:
+        """Whether velocities are passed on now; see `Following`."""
+        return self.started
+
     def reset(self, state: LowState) -> None:
         """Begin a new session; answers to earlier calls are void."""
         self.started = False

@@ -12,8 +12,15 @@ from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.legs.mpc.cost import CostConfig, cost
 from golem.capabilities.legs.mpc.model import PlanningModel
 from golem.capabilities.legs.mpc.planner import Planner, PlannerConfig
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, GolemError, unknown_name
 from golem.types import LEGS, Array, BaseEstimate, LowState
+
+FAILURES = 5
+"""Plans in a row that may fail: a tenth of a second at 50 plans a second, on the plan of before."""
+
+
+class PlanningError(GolemError):
+    """The MPC has found no plan for too long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,14 +100,20 @@ class MPC:
         self._times: Array = c.timestep * np.arange(round(c.horizon / c.timestep), dtype=np.float64)
         self._committed = int(np.count_nonzero(self._times < c.latency - 1e-9))
         self._age = np.inf
+        self._failures = 0
 
     def reset(self, state: LowState) -> None:
         """Plan to stay in the posture of `state`."""
         self.planner.reset(np.clip(state.q[LEGS], self._model.lower, self._model.upper))
         self._age = np.inf
+        self._failures = 0
 
     def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
-        """Return the plan's targets for when they arrive, after planning anew if it is time; see `LowerBody.step`."""
+        """Return the plan's targets for when they arrive, after planning anew if it is time; see `LowerBody.step`.
+
+        Raises:
+            PlanningError: no rollout has been finite for `FAILURES` plans in a row.
+        """
         self._age += dt
         if self._age > 1.0 / self.config.plan_rate - 0.5 * dt:
             self.plan(state, base)
@@ -118,4 +131,6 @@ class MPC:
         targets[:, : self._committed] = targets[0, : self._committed]
         runs = self._model.rollout(targets)
         costs = cost(self.config.cost, runs, self._model.stance, self._model.torque)
-        self.planner.update(knots, costs)
+        self._failures = 0 if self.planner.update(knots, costs) else self._failures + 1
+        if self._failures >= FAILURES:
+            raise PlanningError(f"No rollout of the MPC was finite for {FAILURES} plans in a row.")

@@ -265,6 +265,8 @@ def _legs_spec(kp: Array, kd: Array, torque: Array, timestep: float) -> mujoco.M
         if geom.type != mujoco.mjtGeom.mjGEOM_SPHERE or geom.parent.name not in feet:
             spec.delete(geom)
     spec.option.timestep = timestep
+    # A rollout that diverges shall not go on from the model's first posture as if nothing had happened.
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=1, conaffinity=1)
     for side in SIDES:

@@ -37,7 +37,7 @@ class PlannerConfig:
     """
 
     method: Method = "cem"
-    samples: int = 24
+    samples: int = 12
     knots: int = 4
     elite: float = 0.17
     gain: float = 0.3
@@ -108,20 +108,23 @@ class Planner:
         varied = np.clip(self._plan + noise, self._lower, self._upper)
         return np.concatenate([self._plan[None], varied])
 
-    def update(self, knots: Array, costs: Array) -> None:
+    def update(self, knots: Array, costs: Array) -> bool:
         """Move the plan towards the cheap ones of `knots` (samples, knots, 12), which cost `costs` (samples,).
 
-        Rollouts whose cost is not finite lose against all others; where there are no others the plan stays.
+        Rollouts whose cost is not finite lose against all others; where there are no others the plan stays, and False
+        is returned.
         """
-        if not np.isfinite(costs).any():
-            return
         config = self._config
         order = np.argsort(np.where(np.isfinite(costs), costs, np.inf), kind="stable")
+        order = order[: np.count_nonzero(np.isfinite(costs))]
+        if not len(order):
+            return False
         if config.method == "predictive_sampling":
             self._plan = knots[order[0]]
-            return
+            return True
         best = order[: max(2, round(config.elite * config.samples))]
         elite = knots[best]
         gain = config.gain if 0 in best else 1.0
         self._plan = self._plan + gain * (elite.mean(axis=0) - self._plan)
         self._deviation = np.clip(elite.std(axis=0), config.narrowest * self._noise, self._noise)
+        return True
