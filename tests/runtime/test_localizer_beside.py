@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-import pytest
 
-from golem.errors import ModuleFault
 from golem.middleware import topics
 from golem.middleware.bus import Bus
-from golem.middleware.topics import LookRequest, Sightings
+from golem.middleware.topics import Broken, LookRequest, Sightings
 from golem.robots.sensors.cameras import HEAD
 from golem.runtime.cameras import LocalizerNode
 from golem.runtime.guard import Guard
@@ -69,5 +67,7 @@ def test_its_fault_arrives() -> None:
         bus.publish(topics.frames("head"), frame(1.0), 1.0)
         node.step(1.0)
         pool.submit(lambda: None).result()
-        with pytest.raises(ModuleFault, match="localizer: eyes failed: RuntimeError: gone"):
-            node.step(1.002)
+        node.step(1.002)
+        fault = bus.latest(topics.MODULE_FAULT, Broken)
+        assert fault == Broken("localizer", "Module localizer: eyes failed: RuntimeError: gone")
+        assert bus.latest(topics.sightings("head"), Sightings) is None

@@ -24,12 +24,13 @@ Written by `python -m golem.middleware.public_page docs/interfaces.md` from `gol
 processes create their endpoints from; tests compare this page with the table, and the table with what running processes
 offer. Names are those of ROS 2. On the wire the topic `/x` is `rt/x`: `/lowstate` is the vendor's `rt/lowstate`.
 
-- Time: everything from robot and stack is stamped with robot time, which is `/clock` and the tick of `/lowstate`; the
-  safety process stamps by a clock of its own, the time since boot.
+- Time: messages from robot and stack are stamped with robot time, which is `/clock` and the tick of `/lowstate`; the
+  safety process stamps by a clock of its own, the time since boot. Goals of actions are stamped by the wall clock.
 - Frames: REP-103 and REP-105. `odom` coincides with the levelled `base_link` at the start; the link `pelvis` coincides
   with `base_link`; optical frames have z forward.
 - Units: SI. Quaternions on ROS topics are xyzw, in the vendor's messages wxyz.
-- What is not transient local is sent only while somebody subscribes, so that nothing is rendered or written unasked.
+- Images, /tf, /joint_states and whatever else is volatile and costs much is made only while somebody subscribes.
+- QoS is what the writer offers; of topics from others, what is requested of them.
 - Types `golem_interfaces/...` are in `ros/golem_interfaces`, with units and frames in their comments.
 - `SafetyStatus.reason` is a value of `Reason` in `golem.hardware.safety.base`.
 - A goal that cannot be pursued is accepted and aborted at once: `SkillResult.stage` is "refused", `reason` a sentence.

@@ -9,15 +9,22 @@ from golem.middleware.dds import discovery
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.ros import names
+from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 
 DISCOVERY = 0.3
 """Time that whoever is on the domain already gets to be seen [s]."""
 SOLE = {
     "/lowstate": "a robot",
+    "/clock": "a clock",
     "/lowcmd": "a safety gate",
     "/safety/lowcmd_in": "a stack",
 }
 """Topics that one process alone may write, and what that process is."""
+
+
+def identity(name: str) -> str:
+    """Return the user data of the participant of GOLEM's process called `name`, for ROS and for `owner`."""
+    return f"{PARTICIPANT_USER_DATA}golem={name};"
 
 
 def owner(participant: CycloneParticipant, guid: bytes) -> str:
@@ -33,9 +40,9 @@ def owner(participant: CycloneParticipant, guid: bytes) -> str:
 def refuse_second(participant: CycloneParticipant, dds: DdsConfig, topic: str) -> None:
     """Take `DISCOVERY` to look whether anybody writes `topic`, one of `SOLE`, before a second one does.
 
-    For a robot in motion a second writer is a reason to stop, and so to fall. A robot may be anybody's; of gates and
-    stacks only ours count, since a robot's own controller may have a writer of the motors' command, which it does not
-    use: what to make of that is the gate's business.
+    For a robot in motion a second writer is a reason to stop, and so to fall. A robot, and a clock, may be anybody's;
+    of gates and stacks only ours count, since a robot's own controller may have a writer of the motors' command, which
+    it does not use: what to make of that is the gate's business.
 
     Raises:
         ConfigError: somebody does.
@@ -43,7 +50,7 @@ def refuse_second(participant: CycloneParticipant, dds: DdsConfig, topic: str) -
     time.sleep(DISCOVERY)
     guids = [e.guid for e in discovery.writers(participant) if e.topic == names.topic(topic)]
     for named in (owner(participant, guid) for guid in guids):
-        if topic == "/lowstate" or named.startswith("golem "):
+        if topic in ("/lowstate", "/clock") or named.startswith("golem "):
             raise ConfigError(
                 f"There is {SOLE[topic]} on {dds} already: {named}; end it, or choose another domain."
             )

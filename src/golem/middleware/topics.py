@@ -31,6 +31,8 @@ LEG_COMMAND = "leg_command"
 """`LegCommand`, from the lower-body controller."""
 TWIST = "cmd_vel"
 """`Twist` for the lower body."""
+MODULE_FAULT = "module_fault"
+"""`Broken`, of a module without which the robot can still stand."""
 LEG_STATUS = "legs/status"
 """`LegStatus`, from the base layer of the lower body."""
 ODOMETRY = "odometry"
@@ -162,6 +164,19 @@ class LegStatus:
     phase: Array
     controller: str
     fault: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """A module broke its contract; the skill that runs ends with it.
+
+    Attributes:
+        slot: its slot.
+        reason: what it did, and its name.
+    """
+
+    slot: str
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from golem.capabilities.localization.base import Localizer
+from golem.errors import ModuleFault
 from golem.middleware import topics
 from golem.middleware.bus import Bus, News
-from golem.middleware.topics import Exposure, LookRequest, Sightings
+from golem.middleware.topics import Broken, Exposure, LookRequest, Sightings
 from golem.robots.base import SLACK, Robot
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
@@ -78,7 +79,10 @@ class FrameNode:
 
 
 class LocalizerNode:
-    """Runs the localizer on every new frame of one camera; live, beside the clock, on a thread of its own."""
+    """Runs the localizer on every new frame of one camera; live, beside the clock, on a thread of its own.
+
+    A fault of it ends the skill that looks, and nothing else: no robot falls over a label that nobody knows.
+    """
 
     period = TICK
 
@@ -111,7 +115,7 @@ class LocalizerNode:
             if not self._job.done():
                 return
             job, self._job = self._job, None
-            self._bus.publish(topics.sightings(self._camera), job.result(), t)
+            self._tell(job.result, t)
         frame = self._frames.read()
         request = self._bus.latest(topics.look(self._camera), LookRequest)
         if frame is None or request is None or not request.labels:
@@ -119,8 +123,14 @@ class LocalizerNode:
         if self._beside is not None:
             self._job = self._beside.submit(self._locate, frame, request.labels)
             return
-        sightings = self._locate(frame, request.labels)
-        self._bus.publish(topics.sightings(self._camera), sightings, t, self._latency)
+        self._tell(lambda: self._locate(frame, request.labels), t)
+
+    def _tell(self, found: Callable[[], Sightings], t: float) -> None:
+        """Publish what was found, or that the localizer failed."""
+        try:
+            self._bus.publish(topics.sightings(self._camera), found(), t, self._latency)
+        except ModuleFault as fault:
+            self._bus.publish(topics.MODULE_FAULT, Broken(fault.slot, str(fault)), t)
 
     def _locate(self, frame: Frame, labels: tuple[str, ...]) -> Sightings:
         objects = self._guard.call(lambda: tuple(self._localizer.locate(frame, labels)))

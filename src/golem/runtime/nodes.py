@@ -14,7 +14,7 @@ from golem.hardware.safety.gate import Gate
 from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
 from golem.middleware.bus import Bus, News
-from golem.middleware.topics import HandGoal, LegStatus
+from golem.middleware.topics import Broken, HandGoal, LegStatus
 from golem.robots.base import Robot
 from golem.runtime.executor import TICK
 from golem.runtime.guard import Guard
@@ -282,7 +282,7 @@ class SafetyNode:
 
 
 class SkillNode:
-    """Resumes the running skill, and ends it once the lower body runs on its fallback.
+    """Resumes the running skill, and ends it for a module's fault, or once the lower body runs on its fallback.
 
     Attributes:
         run: the skill in execution, or None.
@@ -293,6 +293,7 @@ class SkillNode:
     def __init__(self, context: Context) -> None:
         """Serve `context` to the skills."""
         self._context = context
+        self._faults = News(context.bus, topics.MODULE_FAULT, Broken)
         self.run: SkillRun | None = None
 
     def step(self, t: float) -> None:
@@ -303,8 +304,11 @@ class SkillNode:
         self._context.refresh(t)
         if self.run is None or self.run.result is not None or not moving(self._context.bus):
             self._context.release_arms()
+        fault = self._faults.read()
         if self.run is None:
             return
+        if fault is not None:
+            self.run.fail(fault.slot, fault.reason)
         legs = self._context.bus.latest(topics.LEG_STATUS, LegStatus)
         if legs is not None and legs.fault is not None:
             self.run.fail("lower_body", legs.fault)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from golem.middleware.record.base import Message, Topic
 from golem.middleware.record.catalog import offered, public_topics, topic
 from golem.middleware.record.player import PlayConfig, Player
 from golem.middleware.record.reader import Bag
-from golem.middleware.record.recorder import HOLD, MANY, Recorder, clock_time
+from golem.middleware.record.recorder import GONE, HOLD, MANY, Recorder, clock_time
 from golem.middleware.record.writer import BagWriter
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.message import NANO
@@ -69,9 +70,14 @@ def say(participant: Participant, where: Topic, text: str) -> None:
     writer.write(codec.serialize(String(data=text)))
 
 
-def tick(participant: Participant, seconds: float) -> None:
+def clock(participant: Participant) -> Callable[[float], None]:
+    """Return what sets the domain's time [s]."""
     writer = participant.writer("rt/clock", codec.dds_name(CLOCK.kind), CLOCK.qos)
-    writer.write(codec.serialize(Clock(clock=Time(sec=int(seconds), nanosec=round(seconds % 1 * NANO)))))
+
+    def tick(seconds: float) -> None:
+        writer.write(codec.serialize(Clock(clock=Time(sec=int(seconds), nanosec=round(seconds % 1 * NANO)))))
+
+    return tick
 
 
 def settled(domain: LocalDomain, pile: Pile, wall: Wall, *topics: Topic) -> Recorder:
@@ -110,9 +116,10 @@ def test_recorded_by_the_time_of_the_domain() -> None:
     recorder = Recorder(domain.participant(), pile, wall)
     recorder.add([WORDS, CLOCK])
     other = domain.participant()
+    tick = clock(other)
     for at, text in ((12.5, "a"), (12.502, "b"), (0.25, "after a restart")):
         wall.now += 0.001
-        tick(other, at)
+        tick(at)
         wall.now += 0.001
         say(other, WORDS, text)
     recorder.poll()
@@ -134,7 +141,7 @@ def test_what_comes_before_the_first_clock_waits_for_it() -> None:
     say(other, WORDS, "a")
     assert recorder.poll() == 0
     wall.now += 0.5
-    tick(other, 7.25)
+    clock(other)(7.25)
     wall.now += 0.1
     say(other, WORDS, "b")
     assert recorder.poll() == 2  # /clock itself is not asked for, it tells the time all the same
@@ -172,6 +179,30 @@ def test_too_much_to_keep_is_counted_and_bounded() -> None:
     recorder.remove("/words")
     writer.write(codec.serialize(String(data="x")))
     assert recorder.poll() == 0
+
+
+def test_of_two_clocks_the_first_counts_until_it_stops() -> None:
+    wall, pile = Wall(), Pile()
+    domain = LocalDomain(wall)
+    recorder = Recorder(domain.participant(), pile, wall)
+    recorder.add([WORDS, CLOCK])
+    other = domain.participant()
+    first, second = clock(other), clock(domain.participant())
+
+    def told(*ticks: Callable[[], None]) -> float:
+        for each in ticks:
+            wall.now += 0.001
+            each()
+        say(other, WORDS, "now")
+        recorder.poll()
+        return pile.said()[-1][1]
+
+    assert (
+        told(lambda: first(12.5), lambda: second(3.0), lambda: first(12.502), lambda: second(3.002)) == 12.502
+    )
+    assert recorder.received["/clock"] == 2
+    wall.now += GONE
+    assert told(lambda: second(4.0)) == 4.0
 
 
 def test_foreign_bytes_on_clock_are_no_time() -> None:

@@ -78,10 +78,13 @@ def test_intrinsics_survive() -> None:
     assert images.to_camera(message, "head", 0.1, 3.0, 15.0) == HEAD
 
 
-def test_a_camera_without_focal_length_is_refused() -> None:
+@pytest.mark.parametrize(
+    ("where", "value", "said"), [(0, np.nan, "fx nan"), (0, np.inf, "fx inf"), (2, np.nan, "cx nan")]
+)
+def test_a_camera_whose_numbers_are_none_is_refused(where: int, value: float, said: str) -> None:
     message = images.camera_info(1.0, HEAD, "camera")
-    message.k[0] = float("nan")
-    with pytest.raises(CodecError, match="fx nan"):
+    message.k[where] = value
+    with pytest.raises(CodecError, match=said):
         images.to_camera(message, "head", 0.1, 3.0, 15.0)
 
 

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import tyro
 
 from golem.errors import ConfigError
+from golem.middleware.dds import discovery
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.sole import refuse_second
+from golem.middleware.sole import owner, refuse_second
 from golem.middleware.wire import hg
 from golem.runtime.live.launch import LaunchConfig, commands, run_launch
 from golem.runtime.live.member import company, member
@@ -91,6 +95,30 @@ def test_who_else_is_there_is_said_with_what_to_look_at() -> None:
             end = time.monotonic() + 10.0
             while (said := company(participant, here)) != "one other is there":
                 assert time.monotonic() < end, said
+                time.sleep(0.05)
+
+
+def test_who_reads_for_golem_is_known_by_name_recorders_and_viewers_too(tmp_path: Path) -> None:
+    """The gate asks whether the motors hear: a recorder is none of them."""
+    pytest.importorskip("mcap")
+    domain = 20 + (os.getpid() + 2) % 180
+    with member("looker", DdsConfig(domain)) as (participant, _):
+        for words in (
+            ["record", str(tmp_path / "bag"), "--topics", "/lowcmd"],
+            ["view", "--foxglove", "--port", "0"],
+        ):
+            process = subprocess.Popen([sys.executable, "-m", "golem", *words, "--domain", str(domain)])
+            try:
+                end = time.monotonic() + 20.0
+                while not (others := discovery.others(participant)):
+                    assert time.monotonic() < end
+                    time.sleep(0.05)
+                assert owner(participant, others[0].guid).startswith(f"golem {words[0]}, ")
+            finally:
+                process.terminate()
+                process.wait(10.0)
+            while discovery.others(participant):
+                assert time.monotonic() < end
                 time.sleep(0.05)
 
 

@@ -20,8 +20,7 @@ from golem.middleware.record.player import PlayConfig, Player
 from golem.middleware.record.reader import Bag, repair
 from golem.middleware.record.recorder import Recorder
 from golem.middleware.record.writer import BagConfig, BagWriter, Compression
-from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
-from golem.middleware.sole import refuse_second
+from golem.middleware.sole import identity, refuse_second
 
 
 @dataclass(frozen=True)
@@ -75,7 +74,7 @@ def run_record(config: RecordConfig) -> int:
     if config.repair:
         return _repair(config)
     folder = config.bag or Path("runs/bags") / time.strftime("%Y_%m_%d-%H_%M_%S")
-    with closing(connect(config.dds, PARTICIPANT_USER_DATA)) as participant, interrupted() as stop:
+    with closing(connect(config.dds, identity("record"))) as participant, interrupted() as stop:
         bag = BagWriter(folder, BagConfig(config.compression, split=config.split * 2**20))
         with closing(bag), closing(Recorder(participant, bag)) as recorder:
             recorder.add(public_topics(config.topics))
@@ -114,9 +113,10 @@ def run_replay(config: ReplayConfig) -> int:
             "The recorder of this bag was killed; it is played up to the last chunk that is whole.",
             flush=True,
         )
-    with closing(connect(config.dds, PARTICIPANT_USER_DATA)) as participant, interrupted() as stop:
-        if "/lowstate" in (play.topics or bag.topics):
-            refuse_second(participant, config.dds, "/lowstate")
+    with closing(connect(config.dds, identity("replay"))) as participant, interrupted() as stop:
+        # Whatever is played, it is played with a clock.
+        for sole in ("/lowstate",) if "/lowstate" in (play.topics or bag.topics) else ("/clock",):
+            refuse_second(participant, config.dds, sole)
         with closing(Player(bag, participant, play)) as player:
             print(f"Playing {config.bag} on {config.dds}. Ctrl-C ends it.", flush=True)
             written = player.run(stop)

@@ -35,6 +35,8 @@ FEW, MANY = 60, 2000
 HOLD = 1.0
 """How long a recording waits for a first /clock before it goes by the wall clock [s] [own]: messages wait in their
 readers meanwhile, and in 3 s those of 500 Hz were lost."""
+GONE = 1.0
+"""Silence after which another writer of /clock may tell the time [s] [own]: by two at once it would jump to and fro."""
 SKEW = 2.0
 """Difference between two machines' clocks beyond which the writer's time of a message is not relied on [s] [own]."""
 
@@ -67,6 +69,7 @@ class Recorder:
         self._ticks = participant.reader(names.topic(CLOCK), dds_name(CLOCK_KIND), qos)
         self._clock: int | None = None
         self._held_since: float | None = None
+        self._teller, self._told = 0, float("-inf")
         self.received: dict[str, int] = {}
         self.overruns: dict[str, int] = {}
 
@@ -104,7 +107,11 @@ class Recorder:
             OutputError: the sink cannot be written.
         """
         now = self._wall()
-        ticks = [(self._written(tick, now), tick.payload) for tick in _take_all(self._ticks, MANY)]
+        ticks = [
+            (self._written(tick, now), tick.payload)
+            for tick in _take_all(self._ticks, MANY)
+            if self._tells(tick, now)
+        ]
         if self._clock is None:
             self._clock = next((t for _, payload in ticks if (t := clock_time(payload)) is not None), None)
             if self._clock is None and not last and self._held(now):
@@ -134,6 +141,15 @@ class Recorder:
                 self.received[topic.name] = self.received.get(topic.name, 0) + 1
                 passed += 1
         return passed
+
+    def _tells(self, tick: Sample, now: float) -> bool:
+        """Return whether `tick` counts: of two clocks the first one does, until it stops."""
+        if clock_time(tick.payload) is None:
+            return True
+        if tick.writer != self._teller and now - self._told < GONE:
+            return False
+        self._teller, self._told = tick.writer, now
+        return True
 
     def run(self, stop: threading.Event, flush: Callable[[], None], limit: float = float("inf")) -> None:
         """Record until `stop` is set or `limit` [s] is over, and call `flush` every second; errors as for `poll`."""

@@ -19,7 +19,7 @@ from golem.middleware.record.base import Topic
 from golem.middleware.record.catalog import public_topics
 from golem.middleware.record.foxglove_server import FoxgloveServer, ServerConfig
 from golem.middleware.record.recorder import Recorder
-from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
+from golem.middleware.sole import identity
 
 PERIOD = 0.02
 """Time between two looks at what has come [s] [own]: half a frame of a camera at 25 Hz."""
@@ -56,7 +56,7 @@ def run_view(config: ViewConfig) -> None:
     for name in config.topics:
         if name not in {topic.name for topic in topics}:
             raise unknown_name("public topic", name, (row.name for row in public.TOPICS))
-    with closing(connect(config.dds, PARTICIPANT_USER_DATA)) as participant, interrupted() as stop:
+    with closing(connect(config.dds, identity("view"))) as participant, interrupted() as stop:
         with closing(FoxgloveServer(ServerConfig(config.host, config.port))) as server:
             print(
                 f"Serving {config.dds} at {server.url} (in Foxglove: Open connection). Ctrl-C ends it.",

@@ -100,11 +100,14 @@ def to_camera(message: CameraInfo, name: str, near: float, far: float, rate: flo
     """Return the camera that a CameraInfo describes; ROS says nothing of its name, depth range [m] and rate [Hz].
 
     Raises:
-        CodecError: a focal length is not positive.
+        CodecError: a focal length is not positive, or a number is not finite.
     """
     fx, _, cx, _, fy, cy = message.k[:6].tolist()
-    if not (fx > 0.0 and fy > 0.0 and message.width and message.height):
-        raise CodecError(f"A camera of {message.width} x {message.height} pixels with fx {fx:g}, fy {fy:g}.")
+    finite = bool(np.isfinite([fx, fy, cx, cy]).all())
+    if not (finite and fx > 0.0 and fy > 0.0 and message.width and message.height):
+        raise CodecError(
+            f"A camera of {message.width} x {message.height} pixels with fx {fx:g}, fy {fy:g}, cx {cx:g}, cy {cy:g}."
+        )
     return Camera(name, message.width, message.height, fx, fy, cx, cy, near, far, rate)
 
 

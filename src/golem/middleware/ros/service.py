@@ -88,6 +88,8 @@ class DdsClient:
         self._endpoints = endpoints
         self._type = codec.service(type)
         self._pending: dict[int, Future[Any]] = {}
+        # Who could answer each of them: a successor of a server that died has never heard of it.
+        self._servers: dict[int, frozenset[bytes]] = {}
         self._sequence = 0
         owner = f"clientid={endpoints.identity()};"
         # The reply reader first: a server then knows it when the first request arrives.
@@ -116,14 +118,18 @@ class DdsClient:
             next(iter(self._pending.values())).cancel(
                 f"'{self.name}' left {MAX_PENDING} newer requests unanswered."
             )
-        self._pending[number] = future
+        self._pending[number], self._servers[number] = future, frozenset(self._writer.readers().values())
         self._writer.write(pack(Header(self._writer.handle, number), body))
         return future
 
     def keep(self) -> None:
         """Give up on what will not be answered any more; called at every poll."""
-        if self._pending and not self.ready():
-            self._give_up(f"The server of '{self.name}' has gone.")
+        if not self._pending:
+            return
+        there = frozenset(self._writer.readers().values()) if self._inbox.matched() else frozenset()
+        gone = [number for number, servers in self._servers.items() if not servers & there]
+        for future in [self._pending[number] for number in gone]:
+            future.cancel(f"The server of '{self.name}' has gone.")
 
     def close(self) -> None:
         """Stop; what is unanswered fails."""
@@ -133,6 +139,7 @@ class DdsClient:
 
     def _forget(self, number: int) -> None:
         self._pending.pop(number, None)
+        self._servers.pop(number, None)
 
     def _give_up(self, reason: str) -> None:
         for future in list(self._pending.values()):
@@ -147,6 +154,7 @@ class DdsClient:
         except CodecError:
             self.malformed += 1
             return
+        self._servers.pop(header.sequence)
         self._pending.pop(header.sequence).complete(response)
 
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable, Container
 
+GONE = 0.2
+"""Silence after which a robot's writer is taken for gone [s]: a hundred states."""
 BACK = 0.1
 """How far back a stamp of one writer must be to mean a restart, not a sample that was overtaken [s]."""
 
@@ -52,14 +55,24 @@ class Rate:
 class RobotClock:
     """Judges the stamps of the robot's states.
 
+    States of another writer do not count while the one that is known writes: of two robots, whose clocks differ, each
+    would else be the other one started anew, at every state.
+
     Attributes:
         t: newest time [s]; -inf before the first.
     """
 
-    def __init__(self) -> None:
-        """Start before the first state."""
+    def __init__(self, now: Callable[[], float], writers: Callable[[], Container[int]]) -> None:
+        """Start before the first state.
+
+        Args:
+            now: this process's own clock [s].
+            writers: tells who writes states; one that was killed is among them for ten seconds more.
+        """
         self.t = -math.inf
+        self._now, self._writers = now, writers
         self._writer: int | None = None
+        self._heard = -math.inf
 
     def restarted(self, t: float, writer: int) -> bool:
         """Return whether a state with stamp `t` [s] from `writer` is of a robot that was started anew.
@@ -67,14 +80,19 @@ class RobotClock:
         A writer that is merely another does not mean that: one that was lost for long comes back as another.
         """
         overtaken = writer == self._writer and t >= self.t - BACK
-        return t < self.t and not overtaken
+        return t < self.t and not overtaken and not self._foreign(writer)
 
     def advances(self, t: float, writer: int) -> bool:
         """Return whether a state is new, and remember it if so; one that repeats or was overtaken is not."""
-        if not self.restarted(t, writer) and t <= self.t:
+        if self._foreign(writer) or (not self.restarted(t, writer) and t <= self.t):
             return False
-        self.t, self._writer = t, writer
+        self.t, self._writer, self._heard = t, writer, self._now()
         return True
+
+    def _foreign(self, writer: int) -> bool:
+        """Return whether `writer` writes beside the one that is known."""
+        known = self._writer
+        return writer != known and self._now() - self._heard < GONE and known in self._writers()
 
 
 class Every:

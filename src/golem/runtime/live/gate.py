@@ -64,7 +64,6 @@ class Arrivals:
     def __init__(self, bus: Bus, surface: Surface, clock: Callable[[], float]) -> None:
         """Stamp by `clock` [s]."""
         self._bus, self._clock = bus, clock
-        self._robot = RobotClock()
         self._arrived: OrderedDict[float, float] = OrderedDict()
         self.commands, self._states = WaitSet(), WaitSet()
         self.mode_machine: int | None = None
@@ -76,6 +75,7 @@ class Arrivals:
             "/lowstate": surface.receive("/lowstate", self._states, self._state),
             "/safety/lowcmd_in": surface.receive("/safety/lowcmd_in", self.commands, self._command),
         }
+        self._robot = RobotClock(clock, self.sole["/lowstate"].writers)
 
     def poll(self) -> None:
         """Take what has come; states first, since commands answer them."""

@@ -89,6 +89,7 @@ class Process:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
+            errors="replace",  # of a child's output nothing may end the reader: the child would wait for it
             start_new_session=True,
             env={**os.environ, LIFELINE: "1"},
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from queue import SimpleQueue
@@ -13,8 +14,8 @@ from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.ros.base import ActionClient, Client, Node
 from golem.middleware.ros.future import RosError
-from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import DdsNode
+from golem.middleware.sole import identity
 
 SEARCH = 5.0
 """How long is looked for whoever offers something [s]."""
@@ -30,7 +31,7 @@ def member(name: str, dds: DdsConfig) -> Iterator[tuple[CycloneParticipant, DdsN
         MissingExtra: cyclonedds is not installed.
         ConfigError, DdsError: the domain cannot be joined.
     """
-    with closing(connect(dds, f"{PARTICIPANT_USER_DATA}golem={name};")) as participant:
+    with closing(connect(dds, identity(name))) as participant:
         with closing(DdsNode(participant, name, distro=dds.distro)) as node:
             yield participant, node
 
@@ -50,9 +51,9 @@ def company(participant: CycloneParticipant, dds: DdsConfig) -> str:
 
 def until(node: Node, condition: Callable[[], bool], timeout: float) -> bool:
     """Spin `node` until `condition()` is true; return False if `timeout` [s] passed first."""
-    end = node.now() + timeout
+    end = time.monotonic() + timeout
     while not condition():
-        if node.now() > end:
+        if time.monotonic() > end:
             return False
         node.spin_once(0.02)
     return True

@@ -118,13 +118,13 @@ class Skills:
         self._pursuit: Pursuit | None = None
         surface.act({name: Handler(self, offer) for name, offer in OFFERS.items()})
 
-    def attach(self, stack: StackSide) -> None:
-        """Work with `stack` from now on; what was pursued with another has failed."""
+    def attach(self, stack: StackSide, t: float) -> None:
+        """Work with `stack` from `t` [s] of its robot on; what was pursued with another has failed."""
         if self._pursuit is not None:
             anew = SkillResult(False, "robot", "robot", "The robot was started anew.")
             self._pursuit.run.fail("robot", anew.reason)
             self._give_up(anew)
-        self._stack = stack
+        self._stack, self._t = stack, t
 
     def hear(self, silent: bool) -> None:
         """Note whether the robot is silent: its clock, by which everything here goes, then stands still."""

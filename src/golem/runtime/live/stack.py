@@ -83,7 +83,7 @@ class LiveStack:
             )
         self._stack, self._node, self._real = stack, node, real
         self._bus = Bus()
-        self._robot, self._clock = RobotClock(), clock
+        self._clock = clock
         self._heard = clock()
         self._calibration: dict[str, Array] = {name: np.eye(4) for name in public.CAMERAS}
         self._surface = surface = Surface("stack", participant, node)
@@ -106,7 +106,7 @@ class LiveStack:
         if self._drivers is not None:
             describe(self._drivers, {})
         self.states = WaitSet()
-        surface.receive("/lowstate", self.states, self._state)
+        self._robot = RobotClock(clock, surface.receive("/lowstate", self.states, self._state).writers)
 
     def step(self) -> None:
         """Take the states that have come, and tick for each of them."""
@@ -144,7 +144,7 @@ class LiveStack:
             self._band.renew()
         side = self.side = StackSide(bus, self._stack, self._calibration, self._band, 0.0, self._beside)
         side.legs.realtime = self._real
-        self._skills.attach(side)
+        self._skills.attach(side, t)
         service, identities = LOCO_APIS["h1"].service, Identities()
         placed: list[Placed] = [
             (Phase.RECEIVE, Poll(self._node)),
