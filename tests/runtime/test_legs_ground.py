@@ -19,7 +19,7 @@ from golem.middleware.topics import LegStatus
 from golem.runtime.assembly import Running, build
 from golem.skills.walk import Stand, StandGoal, Walk, WalkGoal
 from golem.stack import Choice, load_stack
-from golem.types import Twist
+from golem.types import LowCommand, Twist
 
 DYING = """
 from golem.capabilities.legs.{module} import {name}
@@ -32,13 +32,26 @@ class Dying({name}):
 """
 
 
+LOST = """
+from dataclasses import replace
+from golem.hardware.estimator.random_walk_kf import RandomWalkKF
+
+class Lost(RandomWalkKF):
+    def step(self, state, dt):
+        return replace(super().step(state, dt), stale=state.t > 4.0)
+"""
+
+
 @contextmanager
-def on_open_ground(legs: Choice, fallback: str) -> Iterator[tuple[Running, Any]]:
-    """A stack on open ground with certain legs."""
+def on_open_ground(
+    legs: Choice, fallback: str, estimator: Choice | None = None
+) -> Iterator[tuple[Running, Any]]:
+    """A stack on open ground with certain legs, and a certain estimator."""
     stack = replace(
         load_stack("stand", profile="ideal"),
         robot=Choice("mujoco", {"support": "ground", "world": "open"}),
         lower_body=legs,
+        estimator=estimator,
         fallback=Choice(fallback),
     )
     running, robot = build(stack, seed=0)
@@ -86,6 +99,20 @@ def test_legs_that_die_in_the_middle_of_a_step(tmp_path: Path) -> None:
         assert (result.stage, result.slot) == ("fault", "lower_body")
         assert robot.data.qpos[0] > 0.2
         assert_it_stands_on(running, robot, "almi")
+
+
+@pytest.mark.slow
+def test_a_robot_whose_estimate_goes_stale_while_it_walks_is_damped_and_says_why(tmp_path: Path) -> None:
+    path = tmp_path / "lost.py"
+    path.write_text(LOST)
+    with on_open_ground(Choice("almi"), "almi", Choice(f"{path}:Lost")) as (running, _):
+        assert running.execute(Stand(), StandGoal(2.5), timeout=5.0).success
+        result = running.execute(Walk(GoTo()), WalkGoal(2.0, 0.0, frame="base", timeout=30.0), timeout=35.0)
+        assert (result.success, result.stage, result.slot) == (False, "safety", "safety")
+        assert "base_estimate_stale" in result.reason and 4.0 < running.executor.t < 4.6
+        assert running.safety is not None and running.safety.state is GateState.STOP1
+        command = running.bus.latest(topics.LOW_CMD, LowCommand)
+        assert command is not None and not command.kp.any() and (command.kd > 0.0).all()
 
 
 @pytest.mark.slow
