@@ -79,7 +79,9 @@ def test_rows_of_the_curve_that_are_learned_again_are_left_out(tmp_path: Path) -
     assert read_curve(tmp_path)["steps"].tolist() == pytest.approx([192 * k for k in range(1, 31)], rel=1e-4)
 
 
-def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(tmp_path: Path) -> None:
+def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     first = train(small(tmp_path / "first"))
     weights = [
         load_actor(train(small(tmp_path / f"{seed}", seed, updates=3, start=first))).net[0].weight
@@ -95,7 +97,15 @@ def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(tmp_path: 
     ):
         assert torch.equal(mine, exported)
     assert run.steps == 0 and float(run.legs.actor.log_std.exp().detach().mean()) == pytest.approx(0.45)
-    assert not torch.equal(load_actor(train(config)).net[0].weight, load_actor(network).net[0].weight)
+    assert run.env.difficulty.push == run.env.difficulty.strictness == run.env.difficulty.amplitude == 1.0
+    before = [w.detach().clone() for w in run.legs.critic.parameters()]
+    run.update()  # it has no critic yet: at first the critic learns alone
+    for mine, exported in zip(run.legs.actor.parameters(), load_actor(network).parameters(), strict=True):
+        assert torch.equal(mine, exported) or mine is run.legs.actor.log_std
+    assert not any(torch.equal(w, v) for w, v in zip(run.legs.critic.parameters(), before, strict=True))
+    monkeypatch.setattr("golem.training.legs.train.VALUES_FIRST", 0)
+    run.update()
+    assert not torch.equal(run.legs.actor.net[0].weight, load_actor(network).net[0].weight)
     with pytest.raises(ConfigError, match=r"has 384 steps already; --steps, which counts them, is 384\."):
         train(small(tmp_path / "none", start=first))
 

@@ -40,8 +40,8 @@ def run(
             (motions, then a policy as well).
         robots: how many are simulated at once.
         threads: of physics and networks.
-        start: checkpoint of another run to go on from, under this command's options; or an exported network, from no
-            steps on.
+        start: checkpoint of another run to go on from, under this command's options; or an exported network, at
+            full difficulty from its first step on.
     """
     config = TrainConfig(out, seed, task, steps, robots, threads, adversary, start=start)
     print(run_training(config))

@@ -129,8 +129,14 @@ class Ppo:
         self._cut[k] = cut.float()
         self._k += 1
 
-    def update(self, observation: Array, known: Array) -> dict[str, float]:
-        """Improve the policy on what was remembered; the arguments are what follows the last step."""
+    def update(self, observation: Array, known: Array, policy: bool = True) -> dict[str, float]:
+        """Improve critic and `policy`, or the critic alone, on what was remembered.
+
+        Args:
+            observation: what the policy sees after the last step.
+            known: what only the critic knows then.
+            policy: whether the policy learns, too.
+        """
         c = self.config
         with torch.no_grad():
             value = self._evaluate(torch.from_numpy(observation).float(), torch.from_numpy(known).float())
@@ -152,8 +158,9 @@ class Ppo:
         for _ in range(c.epochs):
             order = torch.randperm(total, generator=self._generator)
             for part in order.chunk(c.batches):
-                loss, value_loss, kl = self._loss([x[part] for x in flat], old_std)
-                self._adapt(kl)
+                loss, value_loss, kl = self._loss([x[part] for x in flat], old_std, policy)
+                if policy:
+                    self._adapt(kl)
                 self._optimiser.zero_grad(set_to_none=True)
                 loss.backward()
                 nn.utils.clip_grad_norm_(self._parameters, 1.0)
@@ -198,15 +205,17 @@ class Ppo:
     def _evaluate(self, observation: Tensor, known: Tensor) -> Tensor:
         return self.critic(torch.cat([observation, known], dim=-1)).squeeze(-1)
 
-    def _loss(self, rows: list[Tensor], old_std: Tensor) -> tuple[Tensor, float, float]:
+    def _loss(self, rows: list[Tensor], old_std: Tensor, policy: bool) -> tuple[Tensor, float, float]:
         """Return the loss of a batch (in the order of `flat` in `update`), its value part, and the KL divergence."""
         obs, known, act, logp, advantage, target, old_mean = rows
         c = self.config
+        value_loss = (self._evaluate(obs, known) - target).square().mean()
+        if not policy:
+            return value_loss, float(value_loss.detach()), 0.0
         mean, log_std = self.actor(obs), self.actor.log_std
         ratio = (_log_prob(act, mean, log_std) - logp).exp()
         clipped = ratio.clamp(1.0 - c.clip, 1.0 + c.clip)
         surrogate = torch.minimum(ratio * advantage, clipped * advantage).mean()
-        value_loss = (self._evaluate(obs, known) - target).square().mean()
         entropy = log_std.sum()
         with torch.no_grad():
             std = log_std.exp()

@@ -25,6 +25,8 @@ from golem.training.legs.world import Rows
 from golem.types import Array
 
 Adversary = Literal["none", "motions", "learned"]
+VALUES_FIRST = 5e5
+"""Steps in which a critic that begins from nothing learns what an exported network is worth: 40 updates [own]."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ class TrainConfig:
         robots: how many are simulated at once.
         threads: of the physics and of the networks.
         start: what this run begins with, exploring with `noise`: networks and steps of another run's checkpoint, or a
-            network that was exported, at no steps.
+            network that was exported. Its run begins with no steps, but at full difficulty, as does the learned
+            adversary, and for the first `VALUES_FIRST` steps it is not changed: it has no critic yet.
         adversary: who works against the legs through the upper body: `none` (it rests at home, ready or straight, its
             hands empty), `motions` (the curriculum of motions and payloads), or `learned` (that, and a policy that
             moves half of the robots once `learned_from` steps are done).
@@ -104,6 +107,7 @@ class _Run:
 
     def __init__(self, config: TrainConfig) -> None:
         self.config = config
+        self._exported = config.start is not None and config.start.suffix == ".onnx"
         self._codes = [commit()]
         self.steps = 0
         self.updates = 0
@@ -128,7 +132,7 @@ class _Run:
     def update(self) -> None:
         """Let every robot act `ppo.steps` times, then improve both players."""
         began, config, env = time.process_time(), self.config, self.env
-        learned = config.adversary == "learned" and self.steps >= config.learned_from
+        learned = config.adversary == "learned" and self._progress >= config.learned_from
         steered: Rows = self._steered if learned else self._steered[:0]
         begins, ends = config.noise_ramp
         if (left := config.steps - self.steps) <= begins:
@@ -147,7 +151,8 @@ class _Run:
                 self.upper.learn_of(-step.reward[steered], *cut)
             env.restart(np.flatnonzero(step.ended | step.truncated))
             self._obs, self._known = env.observe()
-        stats = self.legs.update(self._obs, self._known)
+        sound = not self._exported or self.steps >= VALUES_FIRST
+        stats = self.legs.update(self._obs, self._known, sound)
         if learned:
             self.upper.update(self._obs[steered], self._known[steered])
         self.steps += config.ppo.steps * config.robots
@@ -223,7 +228,7 @@ class _Run:
         Raises:
             ConfigError: it has as many steps as this run is to have.
         """
-        if path.suffix == ".onnx":
+        if self._exported:
             self.legs.actor.load_state_dict(load_actor(path).state_dict())
             self.legs.set_noise(self.config.noise[0])
             return
@@ -238,12 +243,17 @@ class _Run:
         self.legs.set_noise(self.config.noise[0])
         self._harden()
 
+    @property
+    def _progress(self) -> float:
+        """Steps by which the difficulty goes; who was trained before meets it in full."""
+        return np.inf if self._exported else self.steps
+
     def _harden(self) -> None:
         """Set the difficulty of the disturbances by the steps that were done."""
         config, difficulty = self.config, self.env.difficulty
-        difficulty.push = float(np.interp(self.steps, config.push_ramp, (0.05, 1.0)))
-        difficulty.strictness = float(np.interp(self.steps, config.strict_ramp, (0.0, 1.0)))
-        motion = float(np.interp(self.steps, config.motion_ramp, (0.05, 1.0)))
+        difficulty.push = float(np.interp(self._progress, config.push_ramp, (0.05, 1.0)))
+        difficulty.strictness = float(np.interp(self._progress, config.strict_ramp, (0.0, 1.0)))
+        motion = float(np.interp(self._progress, config.motion_ramp, (0.05, 1.0)))
         motion = 0.0 if config.adversary == "none" else motion
         difficulty.amplitude = difficulty.speed = difficulty.payload = motion
 
