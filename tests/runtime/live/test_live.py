@@ -9,6 +9,7 @@ from tests.runtime.live.conftest import Live
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
 from golem.middleware.dds.base import Qos
+from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import encode_low_command
 from golem.runtime.executor import TICK
@@ -38,7 +39,7 @@ def test_commands_pass_once_the_gate_is_activated(live: Live) -> None:
     live.run(0.5)
     assert live.state is GateState.ACTIVE and stiff(live) and torque(live) > 1.0
     assert live.twin is not None and live.up is not None
-    assert live.twin.commands.ignored == 0 and live.up.ignored == 0
+    assert live.twin.commands.refused.count == 0 and live.up.refused.count == 0
 
 
 def test_a_stack_that_dies_is_noticed_and_the_robot_damped_then_it_comes_back(live: Live) -> None:
@@ -99,6 +100,24 @@ def test_another_writer_of_the_motors_command_is_named_and_stops_the_robot(live:
     intruder.close()
     live.run(0.1)
     assert live.ask("reset")[0]
+
+
+def test_states_that_are_refused_are_said_and_keep_nobody_waiting(
+    live: Live, capsys: pytest.CaptureFixture[str]
+) -> None:
+    live.activate()
+    live.leave("twin")
+    stranger, node = live.member("stranger")
+    writer = stranger.writer("rt/lowstate", hg.LOW_STATE.type_name, VENDOR)
+    answer = node.client("/left/gripper/open", "std_srvs/srv/Trigger").call(Trigger_Request())
+    for _ in range(50):
+        writer.write(hg.LOW_STATE.blank())
+        live.run(TICK)
+        node.poll()
+    assert answer.done
+    assert live.up is not None and live.up.refused.count == 50
+    said = capsys.readouterr().out
+    assert said.count("states of the robot refused so far, the last one because: The checksum") == 1
 
 
 def test_a_command_with_a_wrong_checksum_stops_the_robot(live: Live) -> None:

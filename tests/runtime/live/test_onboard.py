@@ -127,7 +127,7 @@ def test_targets_of_the_legs_cross_over(tau: Array | None) -> None:
     assert got is not None
     for name in ("q", "kp", "kd", "tau"):
         np.testing.assert_array_equal(getattr(got, name), getattr(legs(tau), name))
-    assert incoming.ignored == 1 and "checksum" in incoming.why
+    assert incoming.refused.count == 1 and "checksum" in incoming.refused.why
 
 
 def test_the_other_motors_get_nothing() -> None:

@@ -13,6 +13,7 @@ from golem.middleware.wire.convert import answered, decode_low_command, encode_l
 from golem.middleware.wire.layout import WireError
 from golem.runtime.executor import TICK
 from golem.runtime.live.pace import LAG, PATIENCE
+from golem.runtime.live.refused import Refused
 from golem.runtime.live.surface import Surface
 from golem.types import LowCommand, LowState
 
@@ -39,8 +40,7 @@ class CommandIn:
     The robot's time stands still while an active stack is more than `LAG` behind it: see `golem.runtime.live.pace`.
 
     Attributes:
-        ignored: how many commands were.
-        why: the reason of the last one.
+        refused: those.
     """
 
     period = TICK
@@ -50,7 +50,7 @@ class CommandIn:
         self._bus, self._patience = bus, patience
         self._t = 0.0
         self._answered = self._given_up = 0.0
-        self.ignored, self.why = 0, ""
+        self.refused = Refused("motor commands")
         self._waitset = WaitSet()
         self._inbox = surface.receive("/lowcmd", self._waitset, self._take)
 
@@ -77,7 +77,7 @@ class CommandIn:
             command = decode_low_command(sample.payload, self._t)
             self._answered = answered(sample.payload)
         except WireError as error:
-            self.ignored, self.why = self.ignored + 1, str(error)
+            self.refused.add(error)
             return
         self._bus.publish(topics.LOW_CMD, command, self._t)
 

@@ -20,6 +20,7 @@ from golem.middleware.wire.convert import decode_low_command, encode_low_command
 from golem.middleware.wire.layout import WireError
 from golem.middleware.wire.rpc import RpcClient, RpcServer
 from golem.runtime.executor import TICK
+from golem.runtime.live.refused import Refused
 from golem.runtime.onboard import ONBOARD_LEGS
 from golem.types import LEGS, NUM_JOINTS, LowCommand
 
@@ -141,8 +142,7 @@ class LegsIn:
     """Brings the on-board controller's targets to the bus.
 
     Attributes:
-        ignored: how many messages were not well-formed.
-        why: the reason of the last one.
+        refused: messages that were not well-formed.
     """
 
     period = TICK
@@ -150,7 +150,7 @@ class LegsIn:
     def __init__(self, bus: Bus, reader: Reader) -> None:
         """Take them from `reader`, of `LowCmd_`."""
         self._bus, self._reader = bus, reader
-        self.ignored, self.why = 0, ""
+        self.refused = Refused("targets of the on-board legs")
 
     def step(self, t: float) -> None:
         """Take the newest targets."""
@@ -159,7 +159,7 @@ class LegsIn:
                 try:
                     self._bus.publish(ONBOARD_LEGS, decode_legs(sample.payload), t)
                 except WireError as error:
-                    self.ignored, self.why = self.ignored + 1, str(error)
+                    self.refused.add(error)
 
 
 def encode_legs(command: LegCommand) -> bytes:

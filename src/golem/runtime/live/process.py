@@ -199,8 +199,6 @@ def run_up(config: UpConfig) -> None:
                         else f" Start one with: {config.dds.command('twin ' + config.stack)}"
                     )
                     say(f"No robot on {config.dds} yet; {company(participant, config.dds)}.{start}")
-                    if live.ignored:
-                        say(f"{live.ignored} states were refused, the last one because: {live.why}")
                 continue
             if live.restarts != restarts:
                 restarts = live.restarts

@@ -28,6 +28,7 @@ from golem.runtime.live.clock import RobotClock
 from golem.runtime.live.motors import RequestOut
 from golem.runtime.live.onboard import AnswersIn, CallsOut, Identities, LegsIn
 from golem.runtime.live.pace import CATCH_UP, SILENCE
+from golem.runtime.live.refused import Refused
 from golem.runtime.live.robot_out import ClockOut, FramesOut, JointsOut, describe
 from golem.runtime.live.skills import Skills
 from golem.runtime.live.stack_in import CameraIn, GateIn, RemoteBand, listen
@@ -47,8 +48,7 @@ class LiveStack:
         states: what to wait on between two steps.
         side: the stack, once a robot has reported.
         restarts: how often the robot was started anew since.
-        ignored: how many states were damaged.
-        why: the reason of the last one.
+        refused: states that were damaged.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class LiveStack:
         self._calibration: dict[str, Array] = {name: np.eye(4) for name in public.CAMERAS}
         self._surface = surface = Surface("stack", participant, node)
         self.side: StackSide | None = None
-        self.restarts, self.ignored, self.why = 0, 0, ""
+        self.restarts, self.refused = 0, Refused("states of the robot")
         self._executor: Executor | None = None
         self._mode_machine = 0
         self._beside = beside
@@ -109,8 +109,10 @@ class LiveStack:
         self._robot = RobotClock(clock, surface.receive("/lowstate", self.states, self._state).writers)
 
     def step(self) -> None:
-        """Take the states that have come, and tick for each of them."""
-        if not self.states.poll():
+        """Take the states that have come, and tick for each of them; where none did, answer whoever asks."""
+        before = self._robot.t
+        self.states.poll()
+        if self._robot.t == before:
             self._node.poll()
         self._skills.hear(silent=self._clock() - self._heard > SILENCE)
 
@@ -122,7 +124,7 @@ class LiveStack:
             state = convert.decode_low_state(sample.payload)
             self._mode_machine = convert.mode_machine(sample.payload)
         except WireError as error:
-            self.ignored, self.why = self.ignored + 1, str(error)
+            self.refused.add(error)
             return
         anew = self._robot.restarted(state.t, sample.writer)
         if not self._robot.advances(state.t, sample.writer):
