@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,12 @@ from golem.middleware.public import Role
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import action, dds_name, service
 from golem.middleware.topics import LookRequest
+from golem.runtime.executor import TICK
 from golem.runtime.live.stack import SHOWN
 from golem.stack import Choice, Stack
 
+PATIENT = Qos(reliable=False, depth=1000)
+"""Takes whatever is offered, and loses nothing of a second."""
 Ends = set[tuple[str, str, str]]
 """Way (`w` or `r`), topic and type on the wire."""
 
@@ -28,13 +32,17 @@ class Spy(LocalParticipant):
     def __init__(self, domain: LocalDomain) -> None:
         super().__init__(domain)
         self.seen: Ends = set()
+        self.offered: dict[str, Qos] = {}
+        self.requested: dict[str, Qos] = {}
 
     def writer(self, topic: str, type_name: str, qos: Qos, user_data: str = "") -> Any:
         self.seen.add(("w", topic, type_name))
+        self.offered[topic] = qos
         return super().writer(topic, type_name, qos, user_data)
 
     def reader(self, topic: str, type_name: str, qos: Qos, user_data: str = "", on_data: Any = None) -> Any:
         self.seen.add(("r", topic, type_name))
+        self.requested[topic] = qos
         return super().reader(topic, type_name, qos, user_data, on_data)
 
 
@@ -100,6 +108,77 @@ def test_processes_offer_what_the_table_says(support: str, tmp_path: Path) -> No
     assert seen["twin"] - own == of_role("robot")
     assert seen["safety"] - own == of_role("safety")
     assert seen["up"] - own == of_role("stack") | (band if support == "ground" else set())
+
+
+SILENT = ("/livox/", "/onboard/")
+"""Begin of topics whose publishers are silent here: a sensor that the twin lacks, legs that nobody switched on."""
+
+
+@pytest.fixture(scope="module")
+def standing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Live, dict[str, list[Any]]]]:
+    """A robot on its feet, and what somebody hears of it in a second: every topic but images."""
+    folder = tmp_path_factory.mktemp("surface")
+    (folder / "blind.py").write_text(BLIND)
+    robot = Choice("mujoco", {"world": "open", "support": "ground"})
+    eyes = Choice(f"{folder / 'blind.py'}:Blind")
+    live = Live(Stack(robot, localizer=eyes, fallback=Choice("hold"), profile="ideal"), SpyDomain())
+    live.start_twin()
+    live.start_gate()
+    live.start_up()
+    listener, node = live.member("listener")
+    heard: dict[str, list[Any]] = {}
+    readers = {}
+    for row in public.TOPICS:
+        if row.by == "user" or row.name.startswith("/realsense/") or row.name in heard:
+            continue
+        if row.vendor:
+            readers[row.name] = listener.reader(names.topic(row.name), dds_name(row.type), PATIENT)
+        else:
+            node.subscription(row.name, row.type, heard.setdefault(row.name, []).append, PATIENT)
+    live.activate()
+    live.run(0.5)
+    node.poll()
+    for messages in heard.values():
+        messages.clear()
+    for reader in readers.values():
+        reader.take(1 << 16)
+    for _ in range(500):
+        live.run(TICK)
+        node.poll()
+    heard |= {name: reader.take(1 << 16) for name, reader in readers.items()}
+    yield live, heard
+    live.close()
+
+
+def test_topics_come_at_the_rate_and_in_the_frame_that_the_table_says(
+    standing: tuple[Live, dict[str, list[Any]]],
+) -> None:
+    rows = [row for row in public.TOPICS if row.rate is not None and row.name in standing[1]]
+    assert len(rows) > 10
+    for row in rows:
+        messages = standing[1][row.name]
+        if row.name.startswith(SILENT):
+            assert not messages
+            continue
+        rate = sum(other.rate or 0.0 for other in rows if other.name == row.name)  # of /tf there are two
+        assert len(messages) == pytest.approx(rate, rel=0.03, abs=1), row.name
+        if hasattr(messages[-1], "header"):
+            assert messages[-1].header.frame_id == row.frame, row.name
+
+
+def test_endpoints_have_the_qos_that_the_table_says(standing: tuple[Live, dict[str, list[Any]]]) -> None:
+    members = {node.name: member for member, node in standing[0].members if isinstance(member, Spy)}
+    roles: dict[str, Role] = {"twin": "robot", "safety": "safety", "up": "stack"}
+    for process, role in roles.items():
+        member = members[process]
+        for row in public.TOPICS:
+            topic = names.topic(row.name)
+            if row.by == role:
+                assert member.offered[topic] == row.qos, row.name
+            if role in row.to and topic in member.requested:  # images are read while a skill looks
+                asked = member.requested[topic]
+                assert not asked.reliable or row.qos.reliable, row.name
+                assert asked.transient_local == row.qos.transient_local, row.name
 
 
 def test_beside_the_real_robot_the_stack_shows_what_follows_from_its_state(tmp_path: Path) -> None:
