@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import time
 from contextlib import closing
 from dataclasses import replace
@@ -23,6 +24,7 @@ from golem.middleware.wire import hg
 from golem.runtime.live.launch import LaunchConfig, commands, run_launch
 from golem.runtime.live.member import company, member
 from golem.runtime.live.process import TwinConfig, run_twin
+from golem.runtime.live.survey import survey
 
 ROBOT = DdsConfig(domain=0, interface="eth7", robot=True)
 
@@ -120,6 +122,30 @@ def test_who_reads_for_golem_is_known_by_name_recorders_and_viewers_too(tmp_path
             while discovery.others(participant):
                 assert time.monotonic() < end
                 time.sleep(0.05)
+
+
+def test_rates_and_bytes_of_a_topic_are_measured() -> None:
+    domain = DdsConfig(20 + (os.getpid() + 3) % 180)
+    stop, sent = threading.Event(), 0
+    with member("talker", domain) as (talker, _), member("listener", domain) as (listener, _):
+        writer = talker.writer("rt/lowcmd", hg.LOW_CMD.type_name, Qos(depth=1))
+
+        def talk() -> None:
+            nonlocal sent
+            while not stop.wait(0.01):
+                writer.write(hg.LOW_CMD.blank())
+                sent += 1
+
+        thread = threading.Thread(target=talk)
+        thread.start()
+        try:
+            (row,) = survey(listener, 1.0)
+        finally:
+            stop.set()
+            thread.join()
+        assert (row.name, row.type_name, row.readers) == ("/lowcmd", hg.LOW_CMD.type_name, 0)
+        assert row.writers[0].startswith("golem talker, ")
+        assert 0.5 * sent < row.rate <= sent and row.size == pytest.approx(row.rate * hg.LOW_CMD.size)
 
 
 def test_a_second_gate_is_refused_before_it_joins_and_a_robots_own_writer_is_left_to_the_first() -> None:

@@ -92,19 +92,21 @@ def survey(participant: CycloneParticipant, seconds: float, everything: bool = F
             known.add(topic)
             ears[topic, type_name] = participant.reader(topic, type_name, EAR)
     counts: dict[tuple[str, str], tuple[int, int]] = {key: (0, 0) for key in ears}
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
+    began = time.monotonic()
+    took = 0.0
+    while took < seconds:
         time.sleep(0.05)
         for key, ear in ears.items():
             samples = [s for s in ear.take(1024) if s.alive]
             n, size = counts[key]
             counts[key] = n + len(samples), size + sum(len(s.payload) for s in samples)
+        took = time.monotonic() - began
     rows: list[Row] = []
     for key in sorted(topics):
         n, size = counts.get(key, (0, 0))
         by = sorted({owner(participant, e.guid) for e in writers if (e.topic, e.type_name) == key})
         to = sum((e.topic, e.type_name) == key for e in readers)
-        rows.append(Row(names.from_wire(key[0])[1], key[1], by, to, n / seconds, size / seconds))
+        rows.append(Row(names.from_wire(key[0])[1], key[1], by, to, n / took, size / took))
     return rows
 
 
