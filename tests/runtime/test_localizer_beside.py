@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import pytest
 
+from golem.errors import MissingExtra
 from golem.middleware import topics
 from golem.middleware.bus import Bus
 from golem.middleware.topics import Broken, LookRequest, Sightings
@@ -58,7 +60,8 @@ def test_the_clock_goes_on_while_it_looks() -> None:
     assert eyes.calls == 2  # of what came meanwhile, the newest frame only
 
 
-def test_its_fault_arrives() -> None:
+@pytest.mark.parametrize("still", [True, False], ids=["looked for", "given up"])
+def test_its_fault_arrives_while_a_skill_looks(still: bool) -> None:
     bus, eyes = Bus(), Eyes()
     eyes.let.set()
     bus.publish(topics.look("head"), LookRequest(("trouble",)), 0.0)
@@ -66,8 +69,27 @@ def test_its_fault_arrives() -> None:
         node = LocalizerNode(bus, eyes, "head", Guard("localizer", "eyes"), pool)
         bus.publish(topics.frames("head"), frame(1.0), 1.0)
         node.step(1.0)
+        if not still:
+            bus.publish(topics.look("head"), LookRequest(()), 1.001)
         pool.submit(lambda: None).result()
         node.step(1.002)
-        fault = bus.latest(topics.MODULE_FAULT, Broken)
-        assert fault == Broken("localizer", "Module localizer: eyes failed: RuntimeError: gone")
+        fault = Broken("localizer", "Module localizer: eyes failed: RuntimeError: gone")
+        assert bus.latest(topics.MODULE_FAULT, Broken) == (fault if still else None)
         assert bus.latest(topics.sightings("head"), Sightings) is None
+
+
+def test_what_this_machine_lacks_ends_the_look_and_not_the_process() -> None:
+    class Lacking(Eyes):
+        def locate(self, frame: Frame, labels: Sequence[str]) -> list[LocalizedObject]:
+            raise MissingExtra("torch", "train")
+
+    bus = Bus()
+    bus.publish(topics.look("head"), LookRequest(("screw",)), 0.0)
+    with ThreadPoolExecutor(1) as pool:
+        node = LocalizerNode(bus, Lacking(), "head", Guard("localizer", "eyes"), pool)
+        bus.publish(topics.frames("head"), frame(1.0), 1.0)
+        node.step(1.0)
+        pool.submit(lambda: None).result()
+        node.step(1.002)
+    fault = bus.latest(topics.MODULE_FAULT, Broken)
+    assert fault is not None and fault.slot == "localizer" and "torch" in fault.reason

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import struct
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -24,6 +26,10 @@ GOLEM = (sys.executable, "-m", "golem.evaluation.dds_loop")
 SDK_SCRIPT = Path(__file__).with_name("sdk_loop.py")
 PERIOD = 0.002
 TARGETS = "0 lost, median latency 150 us, robot 20 % of a core without images, 3 ms per image"
+
+
+PM_QOS = "/dev/cpu_dma_latency"
+"""While this is held open, no processor sleeps deeper than takes as many microseconds to wake from as are written."""
 
 
 class BenchFailed(GolemError):
@@ -44,6 +50,8 @@ class DdsBenchConfig:
     """Checkout of unitree_sdk2_python, to run the same loop with the vendor's classes."""
     sdk_python: Path = Path(sys.executable)
     """Python that has what the SDK needs (cyclonedds 0.10.2 by its own word, this one's works too)."""
+    awake: bool = False
+    """Keep idle processors awake meanwhile, which takes the right to write /dev/cpu_dma_latency (Linux)."""
     json: bool = False
     """Print the results as a last line of JSON."""
 
@@ -83,7 +91,7 @@ def run_dds_bench(config: DdsBenchConfig) -> list[Loop]:
 
     Raises:
         MissingExtra: cyclonedds is not installed.
-        ConfigError: the duration is not positive, or there is no SDK at the path.
+        ConfigError: the duration is not positive, there is no SDK at the path, or processors cannot be kept awake.
         BenchFailed: a process failed; its own message says why.
     """
     cyclone()
@@ -92,16 +100,28 @@ def run_dds_bench(config: DdsBenchConfig) -> list[Loop]:
         raise ConfigError(f"--seconds is {config.seconds:g}; it must be more than 0.")
     if config.sdk is not None and not (config.sdk / "unitree_sdk2py").is_dir():
         raise ConfigError(f"There is no checkout of unitree_sdk2_python at {config.sdk}.")
-    loops = [_loop(config, "GOLEM - GOLEM", GOLEM, GOLEM)]
-    loops.append(_loop(config, "GOLEM - GOLEM, images", GOLEM, GOLEM, cameras=True))
-    if config.sdk is not None:
-        sdk = (str(config.sdk_python), str(SDK_SCRIPT))
-        loops.append(_loop(config, "GOLEM - SDK", GOLEM, sdk))
-        loops.append(_loop(config, "SDK - SDK", sdk, sdk))
+    with _awake() if config.awake else nullcontext():
+        loops = [_loop(config, "GOLEM - GOLEM", GOLEM, GOLEM)]
+        loops.append(_loop(config, "GOLEM - GOLEM, images", GOLEM, GOLEM, cameras=True))
+        if config.sdk is not None:
+            sdk = (str(config.sdk_python), str(SDK_SCRIPT))
+            loops.append(_loop(config, "GOLEM - SDK", GOLEM, sdk))
+            loops.append(_loop(config, "SDK - SDK", sdk, sdk))
     _print(loops)
     if config.json:
         print(json.dumps([asdict(loop) for loop in loops]))
     return loops
+
+
+@contextmanager
+def _awake() -> Iterator[None]:
+    try:
+        held = open(PM_QOS, "wb", buffering=0)
+    except OSError as error:
+        raise ConfigError(f"--awake needs the right to write {PM_QOS}: {error.strerror}.") from error
+    with held:
+        held.write(struct.pack("i", 0))
+        yield
 
 
 def _loop(

@@ -20,8 +20,6 @@ CAMERAS = ("head", "left_hand", "right_hand")
 BASE_FRAME = "base_link"
 """Root of the robot in /tf; the link `pelvis` coincides with it."""
 NEWEST = Qos(depth=1)
-ANY = Qos(reliable=False, depth=10)
-"""For what others send: a best effort reader takes what is offered reliably, too."""
 CLOUD = Qos(depth=20)
 LOW = Qos(depth=8)
 """Reliable, so that ROS subscriptions of either kind match; short, so that nobody who is slow holds the writer up."""
@@ -191,7 +189,7 @@ TOPICS: tuple[Topic, ...] = (
           "`stale`."),
     Topic("/odom", "nav_msgs/msg/Odometry", "stack", (), DEFAULT, 50, "odom",
           "Pose of base_link in odom and its velocity in base_link."),
-    Topic("/cmd_vel", "geometry_msgs/msg/Twist", "user", ("stack",), ANY, None, BASE_FRAME,
+    Topic("/cmd_vel", "geometry_msgs/msg/Twist", "user", ("stack",), DEFAULT, None, BASE_FRAME,
           "Velocity for the legs [m/s], [rad/s]; to be repeated at least every 0.5 s, or the robot stands. Ignored "
           "while a skill runs or the gate is shut; who sent any then lets go first: zero, or nothing for 1 s."),
     Topic("/legs/status", "golem_interfaces/msg/LegStatus", "stack", (), DEFAULT, 50, BASE_FRAME,

@@ -30,7 +30,7 @@ offer. Names are those of ROS 2. On the wire the topic `/x` is `rt/x`: `/lowstat
   with `base_link`; optical frames have z forward.
 - Units: SI. Quaternions on ROS topics are xyzw, in the vendor's messages wxyz.
 - Images, /tf, /joint_states and whatever else is volatile and costs much is made only while somebody subscribes.
-- QoS is what the writer offers; of topics from others, what is requested of them.
+- QoS is what the writer offers. What you send is read best effort, so that you may offer either.
 - Types `golem_interfaces/...` are in `ros/golem_interfaces`, with units and frames in their comments.
 - `SafetyStatus.reason` is a value of `Reason` in `golem.hardware.safety.base`.
 - A goal that cannot be pursued is accepted and aborted at once: `SkillResult.stage` is "refused", `reason` a sentence.

@@ -20,6 +20,8 @@ SOLE = {
     "/safety/lowcmd_in": "a stack",
 }
 """Topics that one process alone may write, and what that process is."""
+ANYBODYS = ("/lowstate", "/clock")
+"""Those of them that others' programs may write, too."""
 
 
 def identity(name: str) -> str:
@@ -37,8 +39,8 @@ def owner(participant: CycloneParticipant, guid: bytes) -> str:
     return guid.hex()
 
 
-def refuse_second(participant: CycloneParticipant, dds: DdsConfig, topic: str) -> None:
-    """Take `DISCOVERY` to look whether anybody writes `topic`, one of `SOLE`, before a second one does.
+def refuse_second(participant: CycloneParticipant, dds: DdsConfig, *topics: str) -> None:
+    """Take `DISCOVERY` to look whether anybody writes one of `topics`, of `SOLE`, before a second one does.
 
     For a robot in motion a second writer is a reason to stop, and so to fall. A robot, and a clock, may be anybody's;
     of gates and stacks only ours count, since a robot's own controller may have a writer of the motors' command, which
@@ -48,9 +50,13 @@ def refuse_second(participant: CycloneParticipant, dds: DdsConfig, topic: str) -
         ConfigError: somebody does.
     """
     time.sleep(DISCOVERY)
-    guids = [e.guid for e in discovery.writers(participant) if e.topic == names.topic(topic)]
-    for named in (owner(participant, guid) for guid in guids):
-        if topic in ("/lowstate", "/clock") or named.startswith("golem "):
+    wire = {names.topic(topic): topic for topic in topics}
+    for writer in discovery.writers(participant):
+        topic = wire.get(writer.topic)
+        if topic is None:
+            continue
+        named = owner(participant, writer.guid)
+        if topic in ANYBODYS or named.startswith("golem "):
             raise ConfigError(
                 f"There is {SOLE[topic]} on {dds} already: {named}; end it, or choose another domain."
             )

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from golem.capabilities.localization.base import Localizer
-from golem.errors import ModuleFault
+from golem.errors import MissingExtra, MissingSystemLibrary, ModuleFault
 from golem.middleware import topics
 from golem.middleware.bus import Bus, News
 from golem.middleware.topics import Broken, Exposure, LookRequest, Sightings
@@ -107,30 +107,40 @@ class LocalizerNode:
         self._latency = guard.number("latency", localizer.latency, least=0.0) if beside is None else 0.0
         self._frames = News(bus, topics.frames(camera), Frame)
         self._beside = beside
-        self._job: Future[Sightings] | None = None
+        self._job: tuple[Future[Sightings], tuple[str, ...]] | None = None
 
     def step(self, t: float) -> None:
         """Publish what is in the newest frame, if it is new, or what the thread has found."""
         if self._job is not None:
-            if not self._job.done():
+            job, labels = self._job
+            if not job.done():
                 return
-            job, self._job = self._job, None
-            self._tell(job.result, t)
-        frame = self._frames.read()
-        request = self._bus.latest(topics.look(self._camera), LookRequest)
-        if frame is None or request is None or not request.labels:
+            self._job = None
+            self._tell(job.result, labels, t)
+        frame, labels = self._frames.read(), self._wanted()
+        if frame is None or not labels:
             return
         if self._beside is not None:
-            self._job = self._beside.submit(self._locate, frame, request.labels)
+            self._job = self._beside.submit(self._locate, frame, labels), labels
             return
-        self._tell(lambda: self._locate(frame, request.labels), t)
+        self._tell(lambda: self._locate(frame, labels), labels, t)
 
-    def _tell(self, found: Callable[[], Sightings], t: float) -> None:
-        """Publish what was found, or that the localizer failed."""
+    def _wanted(self) -> tuple[str, ...]:
+        """Return the labels that a skill looks for now."""
+        request = self._bus.latest(topics.look(self._camera), LookRequest)
+        return () if request is None else request.labels
+
+    def _tell(self, found: Callable[[], Sightings], labels: tuple[str, ...], t: float) -> None:
+        """Publish what was found, or, if `labels` are still looked for, that the localizer failed."""
         try:
             self._bus.publish(topics.sightings(self._camera), found(), t, self._latency)
         except ModuleFault as fault:
-            self._bus.publish(topics.MODULE_FAULT, Broken(fault.slot, str(fault)), t)
+            if labels == self._wanted():
+                self._bus.publish(topics.MODULE_FAULT, Broken(fault.slot, str(fault)), t)
+        except (MissingExtra, MissingSystemLibrary) as lack:
+            if self._beside is None:
+                raise
+            self._bus.publish(topics.MODULE_FAULT, Broken(self._guard.slot, str(lack)), t)
 
     def _locate(self, frame: Frame, labels: tuple[str, ...]) -> Sightings:
         objects = self._guard.call(lambda: tuple(self._localizer.locate(frame, labels)))

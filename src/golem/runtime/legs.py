@@ -85,7 +85,6 @@ class LowerBodyNode:
         self._twists = News(bus, topics.TWIST, Twist)
         self._fault: ModuleFault | None = None
         self._failed_at = -RECOVERY
-        self._last: LegCommand | None = None
         self._overruns = 0
         self.realtime = False
         self.period = 1.0 / max(legs.rate, fallback.rate)
@@ -117,11 +116,12 @@ class LowerBodyNode:
             self._legs, self._overruns = self._fallback, 0
             self._bus.withdraw(topics.LEG_COMMAND)  # what the failed one sent late shall not come any more
             try:
-                self._legs.guard.call(self._locomotion.hand_over, self._legs.controller, state, self._last)
+                # What the motors are at now, which is not what was computed last if that was on its way.
+                last = self._bus.latest(topics.LEG_COMMAND, LegCommand)
+                self._legs.guard.call(self._locomotion.hand_over, self._legs.controller, state, last)
                 command, latency = self._control(state, base, None)
             except ModuleFault as second:
                 raise self._both(second) from second
-        self._last = command
         self._bus.publish(topics.LEG_COMMAND, command, t, latency)
         self._report(t)
 

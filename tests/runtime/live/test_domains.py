@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import subprocess
 import sys
@@ -27,6 +28,14 @@ from golem.runtime.live.process import TwinConfig, run_twin
 from golem.runtime.live.survey import survey
 
 ROBOT = DdsConfig(domain=0, interface="eth7", robot=True)
+_used = itertools.count()
+
+
+@pytest.fixture
+def here() -> DdsConfig:
+    """A domain that no other test of this run uses."""
+    pytest.importorskip("cyclonedds")
+    return DdsConfig(domain=20 + (os.getpid() * 7 + next(_used)) % 180)
 
 
 def test_domain_0_is_refused_unless_the_robot_is_meant() -> None:
@@ -86,9 +95,7 @@ def test_every_process_is_told_what_concerns_it() -> None:
     assert strict["safety"] == ["safety", "--limits", "urdf", "--strict", *where]
 
 
-def test_who_else_is_there_is_said_with_what_to_look_at() -> None:
-    pytest.importorskip("cyclonedds")
-    here = DdsConfig(domain=20 + os.getpid() % 180)
+def test_who_else_is_there_is_said_with_what_to_look_at(here: DdsConfig) -> None:
     with member("one", here) as (participant, _):
         assert company(participant, here) == "nobody else is there"
         elsewhere = replace(here, interface="eth0")
@@ -100,41 +107,38 @@ def test_who_else_is_there_is_said_with_what_to_look_at() -> None:
                 time.sleep(0.05)
 
 
-def test_who_reads_for_golem_is_known_by_name_recorders_and_viewers_too(tmp_path: Path) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words", [["record", "BAG", "--topics", "/lowcmd"], ["view", "--foxglove", "--port", "0"]]
+)
+def test_who_reads_for_golem_is_known_by_name_recorders_and_viewers_too(
+    words: list[str], here: DdsConfig, tmp_path: Path
+) -> None:
     """The gate asks whether the motors hear: a recorder is none of them."""
-    pytest.importorskip("mcap")
-    domain = 20 + (os.getpid() + 2) % 180
-    with member("looker", DdsConfig(domain)) as (participant, _):
-        for words in (
-            ["record", str(tmp_path / "bag"), "--topics", "/lowcmd"],
-            ["view", "--foxglove", "--port", "0"],
-        ):
-            process = subprocess.Popen([sys.executable, "-m", "golem", *words, "--domain", str(domain)])
+    for module in ("mcap", "rosbags", "foxglove"):
+        pytest.importorskip(module)
+    words = [word.replace("BAG", str(tmp_path / "bag")) for word in words]
+    with member("looker", here) as (participant, _):
+        command = [sys.executable, "-m", "golem", *words, "--domain", str(here.domain)]
+        with subprocess.Popen(command) as process:
             try:
-                end = time.monotonic() + 20.0
+                end = time.monotonic() + 30.0
                 while not (others := discovery.others(participant)):
                     assert time.monotonic() < end
                     time.sleep(0.05)
                 assert owner(participant, others[0].guid).startswith(f"golem {words[0]}, ")
             finally:
-                process.terminate()
-                process.wait(10.0)
-            while discovery.others(participant):
-                assert time.monotonic() < end
-                time.sleep(0.05)
+                process.kill()
 
 
-def test_rates_and_bytes_of_a_topic_are_measured() -> None:
-    domain = DdsConfig(20 + (os.getpid() + 3) % 180)
-    stop, sent = threading.Event(), 0
-    with member("talker", domain) as (talker, _), member("listener", domain) as (listener, _):
+def test_rates_and_bytes_of_a_topic_are_measured(here: DdsConfig) -> None:
+    stop = threading.Event()
+    with member("talker", here) as (talker, _), member("listener", here) as (listener, _):
         writer = talker.writer("rt/lowcmd", hg.LOW_CMD.type_name, Qos(depth=1))
 
         def talk() -> None:
-            nonlocal sent
             while not stop.wait(0.01):
                 writer.write(hg.LOW_CMD.blank())
-                sent += 1
 
         thread = threading.Thread(target=talk)
         thread.start()
@@ -143,14 +147,14 @@ def test_rates_and_bytes_of_a_topic_are_measured() -> None:
         finally:
             stop.set()
             thread.join()
-        assert (row.name, row.type_name, row.readers) == ("/lowcmd", hg.LOW_CMD.type_name, 0)
-        assert row.writers[0].startswith("golem talker, ")
-        assert 0.5 * sent < row.rate <= sent and row.size == pytest.approx(row.rate * hg.LOW_CMD.size)
+    assert (row.name, row.type_name, row.readers) == ("/lowcmd", hg.LOW_CMD.type_name, 0)
+    assert row.writers[0].startswith("golem talker, ")
+    assert 10.0 < row.rate < 110.0 and row.size == pytest.approx(row.rate * hg.LOW_CMD.size)
 
 
-def test_a_second_gate_is_refused_before_it_joins_and_a_robots_own_writer_is_left_to_the_first() -> None:
-    pytest.importorskip("cyclonedds")
-    here = DdsConfig(domain=20 + (os.getpid() + 1) % 180)
+def test_a_second_gate_is_refused_before_it_joins_and_a_robots_own_writer_is_left_to_the_first(
+    here: DdsConfig,
+) -> None:
     kind, qos = hg.LOW_CMD.type_name, Qos(depth=1)
     with member("looker", here) as (participant, _):
         with closing(connect(here, "another make")) as stranger:

@@ -118,7 +118,7 @@ def test_targets_of_the_legs_cross_over(tau: Array | None) -> None:
     domain, bus, there = LocalDomain(), Bus(), Bus()
     writer = domain.participant().writer("rt/onboard/lowcmd", hg.LOW_CMD.type_name, DEFAULT)
     reader = domain.participant().reader("rt/onboard/lowcmd", hg.LOW_CMD.type_name, CALLS)
-    out, incoming = LegsOut(bus, writer), LegsIn(there, reader)
+    out, incoming = LegsOut(bus, writer), LegsIn(there, reader, print)
     bus.publish(ONBOARD_LEGS, legs(tau), 0.0)
     out.step(0.0)
     writer.write(hg.LOW_CMD.blank())

@@ -34,7 +34,7 @@ class Drives:
         domain = LocalDomain()
         robot, safety = domain.participant(), domain.participant()
         self.bus = Bus()
-        self.commands = CommandIn(self.bus, Surface("robot", robot, DdsNode(robot, "twin")), patience)
+        self.commands = CommandIn(self.bus, Surface("robot", robot, DdsNode(robot, "twin")), print, patience)
         self._writer: Writer = Surface("safety", safety, DdsNode(safety, "safety")).writer("/lowcmd")
 
     def send(self, answers: float, kp: float = 0.0) -> None:

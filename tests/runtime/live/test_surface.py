@@ -179,6 +179,7 @@ def test_endpoints_have_the_qos_that_the_table_says(standing: tuple[Live, dict[s
                 asked = member.requested[topic]
                 assert not asked.reliable or row.qos.reliable, row.name
                 assert asked.transient_local == row.qos.transient_local, row.name
+    assert not members["up"].requested["rt/cmd_vel"].reliable  # a joystick may offer no more
 
 
 def test_beside_the_real_robot_the_stack_shows_what_follows_from_its_state(tmp_path: Path) -> None:

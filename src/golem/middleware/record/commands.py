@@ -20,7 +20,7 @@ from golem.middleware.record.player import PlayConfig, Player
 from golem.middleware.record.reader import Bag, repair
 from golem.middleware.record.recorder import Recorder
 from golem.middleware.record.writer import BagConfig, BagWriter, Compression
-from golem.middleware.sole import identity, refuse_second
+from golem.middleware.sole import SOLE, identity, refuse_second
 
 
 @dataclass(frozen=True)
@@ -115,8 +115,8 @@ def run_replay(config: ReplayConfig) -> int:
         )
     with closing(connect(config.dds, identity("replay"))) as participant, interrupted() as stop:
         # Whatever is played, it is played with a clock.
-        for sole in ("/lowstate",) if "/lowstate" in (play.topics or bag.topics) else ("/clock",):
-            refuse_second(participant, config.dds, sole)
+        played = play.topics or tuple(bag.topics)
+        refuse_second(participant, config.dds, "/clock", *(t for t in SOLE if t in played and t != "/clock"))
         with closing(Player(bag, participant, play)) as player:
             print(f"Playing {config.bag} on {config.dds}. Ctrl-C ends it.", flush=True)
             written = player.run(stop)

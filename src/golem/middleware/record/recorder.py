@@ -107,11 +107,8 @@ class Recorder:
             OutputError: the sink cannot be written.
         """
         now = self._wall()
-        ticks = [
-            (self._written(tick, now), tick.payload)
-            for tick in _take_all(self._ticks, MANY)
-            if self._tells(tick, now)
-        ]
+        every = [(self._written(tick, now), tick) for tick in _take_all(self._ticks, MANY)]
+        ticks = [(written, tick.payload) for written, tick in every if self._tells(tick, written)]
         if self._clock is None:
             self._clock = next((t for _, payload in ticks if (t := clock_time(payload)) is not None), None)
             if self._clock is None and not last and self._held(now):
@@ -142,13 +139,13 @@ class Recorder:
                 passed += 1
         return passed
 
-    def _tells(self, tick: Sample, now: float) -> bool:
-        """Return whether `tick` counts: of two clocks the first one does, until it stops."""
+    def _tells(self, tick: Sample, written: float) -> bool:
+        """Return whether `tick` counts, `written` at a wall time [s]: of two clocks the first does, until it stops."""
         if clock_time(tick.payload) is None:
             return True
-        if tick.writer != self._teller and now - self._told < GONE:
+        if tick.writer != self._teller and abs(written - self._told) < GONE:
             return False
-        self._teller, self._told = tick.writer, now
+        self._teller, self._told = tick.writer, written
         return True
 
     def run(self, stop: threading.Event, flush: Callable[[], None], limit: float = float("inf")) -> None:

@@ -60,6 +60,7 @@ class RobotClock:
 
     Attributes:
         t: newest time [s]; -inf before the first.
+        anew: whether the state that was judged last is the first of a robot that was started anew.
     """
 
     def __init__(self, now: Callable[[], float], writers: Callable[[], Container[int]]) -> None:
@@ -69,30 +70,25 @@ class RobotClock:
             now: this process's own clock [s].
             writers: tells who writes states; one that was killed is among them for ten seconds more.
         """
-        self.t = -math.inf
+        self.t, self.anew = -math.inf, False
         self._now, self._writers = now, writers
         self._writer: int | None = None
         self._heard = -math.inf
 
-    def restarted(self, t: float, writer: int) -> bool:
-        """Return whether a state with stamp `t` [s] from `writer` is of a robot that was started anew.
-
-        A writer that is merely another does not mean that: one that was lost for long comes back as another.
-        """
-        overtaken = writer == self._writer and t >= self.t - BACK
-        return t < self.t and not overtaken and not self._foreign(writer)
-
     def advances(self, t: float, writer: int) -> bool:
-        """Return whether a state is new, and remember it if so; one that repeats or was overtaken is not."""
-        if self._foreign(writer) or (not self.restarted(t, writer) and t <= self.t):
-            return False
-        self.t, self._writer, self._heard = t, writer, self._now()
-        return True
+        """Return whether a state with stamp `t` [s] from `writer` is new, and remember it if so.
 
-    def _foreign(self, writer: int) -> bool:
-        """Return whether `writer` writes beside the one that is known."""
-        known = self._writer
-        return writer != known and self._now() - self._heard < GONE and known in self._writers()
+        One that repeats or was overtaken is not, nor is a second robot's. A writer that is merely another does not mean
+        that the robot was started anew: one that was lost for long comes back as another.
+        """
+        known, now = self._writer, self._now()
+        foreign = writer != known and now - self._heard < GONE and known in self._writers()
+        overtaken = writer == known and t >= self.t - BACK
+        self.anew = t < self.t and not overtaken and not foreign
+        if foreign or not (self.anew or t > self.t):
+            return False
+        self.t, self._writer, self._heard = t, writer, now
+        return True
 
 
 class Every:

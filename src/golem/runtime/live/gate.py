@@ -86,18 +86,19 @@ class Arrivals:
         now = self._clock()
         try:
             state = convert.decode_low_state(sample.payload)
-            self.mode_machine = convert.mode_machine(sample.payload)
         except WireError as error:
             self._refuse(Reason.STATE_DAMAGED, error, now)
             return
-        if self._robot.restarted(state.t, sample.writer):
+        if not self._robot.advances(state.t, sample.writer):
+            return
+        self.mode_machine = convert.mode_machine(sample.payload)
+        if self._robot.anew:
             self._arrived.clear()
-        if self._robot.advances(state.t, sample.writer):
-            self._arrived[state.t] = now
-            self.rate.add(state.t, now)
-            if len(self._arrived) > REMEMBERED:
-                self._arrived.popitem(last=False)
-            self._bus.publish(topics.LOW_STATE, replace(state, t=now), now)
+        self._arrived[state.t] = now
+        self.rate.add(state.t, now)
+        if len(self._arrived) > REMEMBERED:
+            self._arrived.popitem(last=False)
+        self._bus.publish(topics.LOW_STATE, replace(state, t=now), now)
         errors = convert.motor_errors(sample.payload)
         self._faulty = self._faulty + 1 if errors else 0
         if self._faulty >= PERSISTENT:

@@ -13,7 +13,7 @@ from golem.middleware.wire.convert import answered, decode_low_command, encode_l
 from golem.middleware.wire.layout import WireError
 from golem.runtime.executor import TICK
 from golem.runtime.live.pace import LAG, PATIENCE
-from golem.runtime.live.refused import Refused
+from golem.runtime.live.refusals import Refusals
 from golem.runtime.live.surface import Surface
 from golem.types import LowCommand, LowState
 
@@ -45,12 +45,14 @@ class CommandIn:
 
     period = TICK
 
-    def __init__(self, bus: Bus, surface: Surface, patience: float = PATIENCE) -> None:
-        """Bring commands to `bus`; wait for one up to `patience` [s] by the wall clock."""
+    def __init__(
+        self, bus: Bus, surface: Surface, tell: Callable[[str], None], patience: float = PATIENCE
+    ) -> None:
+        """Bring commands to `bus`; `tell` what is refused; wait for one up to `patience` [s] by the wall clock."""
         self._bus, self._patience = bus, patience
         self._t = 0.0
         self._answered = self._given_up = 0.0
-        self.refused = Refused("motor commands")
+        self.refused = Refusals("motor commands", tell)
         self._waitset = WaitSet()
         self._inbox = surface.receive("/lowcmd", self._waitset, self._take)
 

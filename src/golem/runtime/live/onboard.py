@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import random
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from golem.middleware.wire.convert import decode_low_command, encode_low_command
 from golem.middleware.wire.layout import WireError
 from golem.middleware.wire.rpc import RpcClient, RpcServer
 from golem.runtime.executor import TICK
-from golem.runtime.live.refused import Refused
+from golem.runtime.live.refusals import Refusals
 from golem.runtime.onboard import ONBOARD_LEGS
 from golem.types import LEGS, NUM_JOINTS, LowCommand
 
@@ -147,10 +148,10 @@ class LegsIn:
 
     period = TICK
 
-    def __init__(self, bus: Bus, reader: Reader) -> None:
-        """Take them from `reader`, of `LowCmd_`."""
+    def __init__(self, bus: Bus, reader: Reader, tell: Callable[[str], None]) -> None:
+        """Take them from `reader`, of `LowCmd_`; `tell` a person what is refused."""
         self._bus, self._reader = bus, reader
-        self.refused = Refused("targets of the on-board legs")
+        self.refused = Refusals("targets of the on-board legs", tell)
 
     def step(self, t: float) -> None:
         """Take the newest targets."""

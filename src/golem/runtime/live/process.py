@@ -24,7 +24,7 @@ from golem.runtime.assembly import build_robot
 from golem.runtime.executor import TICK
 from golem.runtime.live.darkroom import Darkroom
 from golem.runtime.live.gate import LiveGate
-from golem.runtime.live.member import Teller, company, member, say
+from golem.runtime.live.member import Teller, company, member
 from golem.runtime.live.stack import LiveStack
 from golem.runtime.live.twin import Twin
 from golem.runtime.live.verdict import told
@@ -108,18 +108,22 @@ def run_twin(config: TwinConfig) -> None:
             f"A twin never joins domain {ROBOT_DOMAIN}, which is the real robot's; choose another."
         )
     stack = twin_stack(config)
-    with interrupted() as stop, member("twin", config.dds) as (participant, node):
-        refuse_second(participant, config.dds, "/lowstate")
+    with (
+        interrupted() as stop,
+        closing(Teller()) as tell,
+        member("twin", config.dds) as (participant, node),
+    ):
+        refuse_second(participant, config.dds, "/lowstate", "/clock")
         with closing(build_robot(stack, config.seed)) as robot, ExitStack() as closing_time:
             darkroom = None
             if isinstance(robot, Recallable):
                 darkroom = closing_time.enter_context(
                     closing(Darkroom(stack, config.seed, robot, config.dds))
                 )
-            twin = Twin(stack, robot, participant, node, darkroom)
+            twin = Twin(stack, robot, participant, node, darkroom, tell=tell)
             if darkroom is not None:
                 darkroom.wait(stop.is_set)
-            say(f"The twin of '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
+            tell(f"The twin of '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
             settle()
             twin.run(stop.is_set)
 
@@ -178,12 +182,13 @@ def run_up(config: UpConfig) -> None:
     stack = load_stack(config.stack, profile=config.profile)
     with (
         interrupted() as stop,
+        closing(Teller()) as tell,
         ThreadPoolExecutor(1, "localizer") as beside,
         member("up", config.dds) as (participant, node),
     ):
         refuse_second(participant, config.dds, "/safety/lowcmd_in")
-        live = LiveStack(stack, participant, node, real=config.dds.robot, beside=beside)
-        say(f"The stack '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
+        live = LiveStack(stack, participant, node, real=config.dds.robot, beside=beside, tell=tell)
+        tell(f"The stack '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
         waiting_since: float | None = time.monotonic()
         said, restarts = GateStatus(0.0, GateState.INIT), 0
         settle()
@@ -198,12 +203,12 @@ def run_up(config: UpConfig) -> None:
                         if config.dds.robot
                         else f" Start one with: {config.dds.command('twin ' + config.stack)}"
                     )
-                    say(f"No robot on {config.dds} yet; {company(participant, config.dds)}.{start}")
+                    tell(f"No robot on {config.dds} yet; {company(participant, config.dds)}.{start}")
                 continue
             if live.restarts != restarts:
                 restarts = live.restarts
-                say("The robot was started anew, and so was the stack.")
-            said = report(said, live.side.safety or said, say)
+                tell("The robot was started anew, and so was the stack.")
+            said = report(said, live.side.safety or said, tell)
 
 
 def report(before: GateStatus, now: GateStatus, tell: Callable[[str], None]) -> GateStatus:

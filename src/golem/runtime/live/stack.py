@@ -25,10 +25,11 @@ from golem.middleware.wire.rpc import RpcClient
 from golem.runtime.executor import Executor, Phase, Placed, in_order
 from golem.runtime.live import stack_out as out
 from golem.runtime.live.clock import RobotClock
+from golem.runtime.live.member import say
 from golem.runtime.live.motors import RequestOut
 from golem.runtime.live.onboard import AnswersIn, CallsOut, Identities, LegsIn
 from golem.runtime.live.pace import CATCH_UP, SILENCE
-from golem.runtime.live.refused import Refused
+from golem.runtime.live.refusals import Refusals
 from golem.runtime.live.robot_out import ClockOut, FramesOut, JointsOut, describe
 from golem.runtime.live.skills import Skills
 from golem.runtime.live.stack_in import CameraIn, GateIn, RemoteBand, listen
@@ -60,6 +61,7 @@ class LiveStack:
         real: bool = False,
         beside: ThreadPoolExecutor | None = None,
         clock: Callable[[], float] = time.monotonic,
+        tell: Callable[[str], None] = say,
     ) -> None:
         """Join the domain; the modules are built when the robot reports.
 
@@ -72,6 +74,7 @@ class LiveStack:
                 robot's does.
             beside: where the localizer runs; see `LocalizerNode`.
             clock: this process's own [s].
+            tell: says a line to a person; beside a real robot one that is never held up.
 
         Raises:
             ConfigError: the legs of a real robot would be its own controller's, which commands the motors itself.
@@ -81,14 +84,14 @@ class LiveStack:
                 "With lower_body 'vendor' the real robot moves its legs itself, and nobody else may command its motors "
                 "meanwhile: run it on a twin, or choose another lower_body."
             )
-        self._stack, self._node, self._real = stack, node, real
+        self._stack, self._node, self._real, self._tell = stack, node, real, tell
         self._bus = Bus()
         self._clock = clock
         self._heard = clock()
         self._calibration: dict[str, Array] = {name: np.eye(4) for name in public.CAMERAS}
         self._surface = surface = Surface("stack", participant, node)
         self.side: StackSide | None = None
-        self.restarts, self.refused = 0, Refused("states of the robot")
+        self.restarts, self.refused = 0, Refusals("states of the robot", tell)
         self._executor: Executor | None = None
         self._mode_machine = 0
         self._beside = beside
@@ -122,15 +125,14 @@ class LiveStack:
     def _state(self, sample: Sample) -> None:
         try:
             state = convert.decode_low_state(sample.payload)
-            self._mode_machine = convert.mode_machine(sample.payload)
         except WireError as error:
             self.refused.add(error)
             return
-        anew = self._robot.restarted(state.t, sample.writer)
         if not self._robot.advances(state.t, sample.writer):
             return
-        if anew or self._executor is None:
-            self.restarts += anew
+        self._mode_machine = convert.mode_machine(sample.payload)
+        if self._robot.anew or self._executor is None:
+            self.restarts += self._robot.anew
             self._executor = self._build(state.t)
         self._bus.publish(topics.LOW_STATE, state, state.t)
         self._executor.advance(state.t, CATCH_UP)
@@ -152,7 +154,7 @@ class LiveStack:
             (Phase.RECEIVE, Poll(self._node)),
             (Phase.RECEIVE, self._gate),
             (Phase.RECEIVE, AnswersIn(bus, service, self._calls, identities)),
-            (Phase.RECEIVE, LegsIn(bus, self._onboard)),
+            (Phase.RECEIVE, LegsIn(bus, self._onboard, self._tell)),
             *side.nodes,
             # Before anything else is sent: it is what the robot waits for.
             (Phase.PROTECT, RequestOut(bus, surface, lambda: self._mode_machine)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 from golem.middleware import public
@@ -62,14 +63,18 @@ class Surface:
         return any((self._writers.get(topic) or self._publishers[topic]).matched() > 0 for topic in topics)
 
     def subscribe(self, topic: str, callback: Callable[[Any], None]) -> Subscription:
-        """Give the messages of a topic to `callback`, when the node is polled; one that it cannot read is dropped."""
+        """Give the messages of a topic to `callback`, when the node is polled; one that it cannot read is dropped.
+
+        What users send is read best effort: a joystick may offer no more.
+        """
         row = self._read(topic)
+        qos = replace(row.qos, reliable=False) if row.by == "user" else row.qos
 
         def take(message: Any) -> None:
             with suppress(CodecError):
                 callback(message)
 
-        return self.node.subscription(row.name, row.type, take, row.qos)
+        return self.node.subscription(row.name, row.type, take, qos)
 
     def reader(self, topic: str, qos: Qos | None = None) -> Reader:
         """Return a reader of one of the vendor's topics, with another `qos` than the table's if one is given."""

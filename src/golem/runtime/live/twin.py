@@ -17,6 +17,7 @@ from golem.robots.onboard import motion_switcher
 from golem.runtime import nodes
 from golem.runtime.executor import Executor, Phase, Placed, in_order
 from golem.runtime.live.darkroom import Darkroom, image_topics
+from golem.runtime.live.member import say
 from golem.runtime.live.motors import CommandIn, StateOut
 from golem.runtime.live.onboard import AnswersOut, CallsIn, LegsOut
 from golem.runtime.live.pace import PATIENCE
@@ -54,6 +55,7 @@ class Twin:
         node: Node,
         darkroom: Darkroom | None = None,
         patience: float = PATIENCE,
+        tell: Callable[[str], None] = say,
     ) -> None:
         """Put a robot on the domain.
 
@@ -64,6 +66,7 @@ class Twin:
             node: its ROS node.
             darkroom: where its images are made; None is here, which holds everything else up for as long as it takes.
             patience: how long its time stands still at most for a stack that is behind [s].
+            tell: says a line to a person.
 
         Raises:
             ConfigError, ModuleFault: about the on-board legs.
@@ -74,7 +77,7 @@ class Twin:
         surface = Surface("robot", participant, node, only)
         self._robot = robot
         cameras = {name: CameraOut(bus, surface, name) for name in robot.cameras} if darkroom is None else {}
-        self.commands = CommandIn(bus, surface, patience)
+        self.commands = CommandIn(bus, surface, tell, patience)
         side = RobotSide(bus, stack, robot, (lambda c: cameras[c].wanted) if darkroom is None else None)
         placed: list[Placed] = [
             (Phase.RECEIVE, Poll(node)),

@@ -102,7 +102,7 @@ def command_of(saved: dict[str, Any]) -> str:
     config = saved["config"]
     words = ("task", "seed", "adversary", "robots")
     options = " ".join(f"--{word} {config[word]}" for word in words)
-    start = " --start CHECKPOINT" if config["start"] is not None else ""
+    start = "" if config["start"] is None else f" --start {Path(config['start']).name}"
     codes = ", then ".join(saved.get("codes", ["unknown"]))
     return f"golem train legs run {options} --steps {config['steps']:g}{start} (commit {codes})"
 

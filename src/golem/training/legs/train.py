@@ -41,8 +41,9 @@ class TrainConfig:
         robots: how many are simulated at once.
         threads: of the physics and of the networks.
         start: what this run begins with, exploring with `noise`: networks and steps of another run's checkpoint, or a
-            network that was exported. Its run begins with no steps, but at full difficulty, as does the learned
-            adversary, and for the first `VALUES_FIRST` steps it is not changed: it has no critic yet.
+            network that was exported. A run from an exported network counts its steps from none, is at full difficulty
+            at once, learned adversary included, and changes the network after `VALUES_FIRST` steps only: until then it
+            has no critic worth the name.
         adversary: who works against the legs through the upper body: `none` (it rests at home, ready or straight, its
             hands empty), `motions` (the curriculum of motions and payloads), or `learned` (that, and a policy that
             moves half of the robots once `learned_from` steps are done).
@@ -226,9 +227,13 @@ class _Run:
         Configuration, draws and noise are this run's own.
 
         Raises:
-            ConfigError: it has as many steps as this run is to have.
+            ConfigError: it has as many steps as this run is to have, or this run is too short to change anything.
         """
         if self._exported:
+            if self.config.steps <= VALUES_FIRST:
+                raise ConfigError(
+                    f"From an exported network --steps is more than {VALUES_FIRST:g}: until then only a critic learns."
+                )
             self.legs.actor.load_state_dict(load_actor(path).state_dict())
             self.legs.set_noise(self.config.noise[0])
             return

@@ -6,13 +6,11 @@ import math
 import time
 from collections.abc import Callable
 
-from golem.runtime.live.member import say
-
 QUIET = 5.0
 """Time between two complaints of one kind [s]."""
 
 
-class Refused:
+class Refusals:
     """Messages of one kind that were refused; the first is said at once.
 
     Attributes:
@@ -21,9 +19,9 @@ class Refused:
     """
 
     def __init__(
-        self, what: str, tell: Callable[[str], None] = say, clock: Callable[[], float] = time.monotonic
+        self, what: str, tell: Callable[[str], None], clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """Call a message `what`; `tell` a person, on this process's own `clock` [s]."""
+        """Call a message `what`; `tell` a person, without being held up, on this process's own `clock` [s]."""
         self._what, self._tell, self._clock = what, tell, clock
         self.count, self.why = 0, ""
         self._said = -math.inf
