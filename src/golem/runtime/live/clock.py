@@ -82,7 +82,8 @@ class RobotClock:
         that the robot was started anew: one that was lost for long comes back as another.
         """
         known, now = self._writer, self._now()
-        foreign = writer != known and now - self._heard < GONE and known in self._writers()
+        lives = known is not None and now - self._heard < GONE
+        foreign = lives and writer != known and known in self._writers()
         overtaken = writer == known and t >= self.t - BACK
         self.anew = t < self.t and not overtaken and not foreign
         if foreign or not (self.anew or t > self.t):
