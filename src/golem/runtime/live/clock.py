@@ -82,8 +82,9 @@ class RobotClock:
         that the robot was started anew: one that was lost for long comes back as another.
         """
         known, now = self._writer, self._now()
-        lives = known is not None and now - self._heard < GONE
-        foreign = lives and writer != known and known in self._writers()
+        foreign = (
+            known is not None and known != writer and now - self._heard < GONE and known in self._writers()
+        )
         overtaken = writer == known and t >= self.t - BACK
         self.anew = t < self.t and not overtaken and not foreign
         if foreign or not (self.anew or t > self.t):
