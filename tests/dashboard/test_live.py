@@ -150,7 +150,7 @@ def test_the_sliders_drive_until_nobody_looks(
     most = running.envelope.vx[1]
     assert legs._sliders["vx"].max == most > 0.0
     legs.twist = Twist(vx=9.0)
-    run(walk, running, 0.2)
+    run(walk, running, 0.4)  # the legs change hands first
     heard = running.bus.latest(topics.LEG_STATUS, LegStatus)
     assert heard is not None and heard.commanded == Twist(vx=most) and heard.applied.vx > 0.1
     assert "ahead" in walk.panel._status.content

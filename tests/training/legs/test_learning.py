@@ -20,7 +20,7 @@ from golem.evaluation.provenance import commit
 from golem.robots.model.leg_kinematics import leg_poses
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, read_checkpoint, read_curve
 from golem.training.legs.curve import draw_curves
-from golem.training.legs.disturbances import GENTLE, STRAIGHT, Difficulty, Pushes, UpperBodyMotion
+from golem.training.legs.disturbances import GENTLE, QUARTERS, STRAIGHT, Difficulty, Pushes, UpperBodyMotion
 from golem.training.legs.env import LAYOUT, TASKS, LegsEnv, Task
 from golem.training.legs.export import TRAINED, command_of, export, load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror
@@ -261,10 +261,10 @@ def test_pushes_go_straight_more_often_than_not_whichever_way_the_robot_looks() 
         force = np.linalg.norm(pushes.force, axis=1)
         ahead = np.where(force > 1.0, pushes.force[:, 1] / np.maximum(force, 1.0), ahead)
     # Besides the straight ones, 0.3 / pi of the others are within 0.3 rad of each of the four directions.
-    each = 0.25 * STRAIGHT + (1.0 - STRAIGHT) * 0.3 / np.pi
-    assert abs((np.abs(ahead) < np.sin(0.3)).mean() - 2.0 * each) < 0.05
-    assert abs((ahead < -np.cos(0.3)).mean() - each) < 0.05
-    assert abs((ahead > np.cos(0.3)).mean() - each) < 0.05
+    front, left, back, right = STRAIGHT * np.array(QUARTERS) + (1.0 - STRAIGHT) * 0.3 / np.pi
+    assert abs((np.abs(ahead) < np.sin(0.3)).mean() - left - right) < 0.05
+    assert abs((ahead < -np.cos(0.3)).mean() - back) < 0.05
+    assert abs((ahead > np.cos(0.3)).mean() - front) < 0.05
 
 
 def test_pushes_have_the_impulse_they_were_drawn_with_at_most() -> None:
