@@ -89,7 +89,9 @@ def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(
     ]
     assert not torch.equal(*weights)
     network, _ = export(first, tmp_path)
-    config = small(tmp_path / "anew", updates=1, start=network)
+    with pytest.raises(ConfigError, match="--steps is more than 500000"):
+        train(small(tmp_path / "short", start=network))
+    config = small(tmp_path / "anew", updates=2700, start=network)
     run = _Run(config)
     run.begin_with(network)
     for mine, exported in zip(
