@@ -50,13 +50,11 @@ def refuse_second(participant: CycloneParticipant, dds: DdsConfig, *topics: str)
         ConfigError: somebody does.
     """
     time.sleep(DISCOVERY)
-    wire = {names.topic(topic): topic for topic in topics}
-    for writer in discovery.writers(participant):
-        topic = wire.get(writer.topic)
-        if topic is None:
-            continue
-        named = owner(participant, writer.guid)
-        if topic in ANYBODYS or named.startswith("golem "):
-            raise ConfigError(
-                f"There is {SOLE[topic]} on {dds} already: {named}; end it, or choose another domain."
-            )
+    writers = discovery.writers(participant)
+    for topic in topics:
+        for guid in (writer.guid for writer in writers if writer.topic == names.topic(topic)):
+            named = owner(participant, guid)
+            if topic in ANYBODYS or named.startswith("golem "):
+                raise ConfigError(
+                    f"There is {SOLE[topic]} on {dds} already: {named}; end it, or choose another domain."
+                )

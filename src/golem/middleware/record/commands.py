@@ -116,7 +116,7 @@ def run_replay(config: ReplayConfig) -> int:
     with closing(connect(config.dds, identity("replay"))) as participant, interrupted() as stop:
         # Whatever is played, it is played with a clock.
         played = play.topics or tuple(bag.topics)
-        refuse_second(participant, config.dds, "/clock", *(t for t in SOLE if t in played and t != "/clock"))
+        refuse_second(participant, config.dds, *(topic for topic in SOLE if topic in (*played, "/clock")))
         with closing(Player(bag, participant, play)) as player:
             print(f"Playing {config.bag} on {config.dds}. Ctrl-C ends it.", flush=True)
             written = player.run(stop)
