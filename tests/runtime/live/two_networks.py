@@ -28,6 +28,8 @@ from tests.cable import End, cable
 DOMAIN = "7"
 ATTEMPTS = 6
 """How often an errand is begun anew that the gate ended because this machine was too slow for its load."""
+LATE = ("state_stale", "command_stale", "gate_stalled")
+"""Why the gate ends an errand when a processor comes too late."""
 HERE = f"{sys.executable} -m golem"
 DESK = """
 import contextlib, json, sys, time
@@ -290,7 +292,7 @@ def prove(config: Config, say: Callable[[str], None] = lambda _: None) -> Proof:
                 say(f"errand {'succeeded' if answer['success'] else 'failed'}: {answer['message']}")
                 if answer["success"]:
                     return
-                late = "state_stale" in answer["message"] or "command_stale" in answer["message"]
+                late = any(reason in answer["message"] for reason in LATE)
                 assert late and attempt < ATTEMPTS - 1, answer["message"]
 
         scene.free()
