@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from golem import registry
 from golem.errors import ConfigError
+from golem.middleware.unitree_api import LOCO_APIS
 from golem.stack import Choice, Stack, load_stack, parse_stack, shipped
 
 
@@ -175,3 +176,12 @@ def test_the_twin_runs_legs_on_board_where_something_speaks_to_them() -> None:
     assert parse_stack(both, "x").legs_on_board == Choice("almi")
     chosen = parse_stack("lower_body: vendor\nonboard: {use: policy, file: x.yaml}", "x")
     assert chosen.legs_on_board == Choice("policy", {"file": "x.yaml"})
+
+
+def test_the_twin_answers_the_calls_that_the_stack_makes() -> None:
+    assert parse_stack("lower_body: almi", "x").loco_api == LOCO_APIS["h1"]
+    both = "lower_body: {use: handover, walk: {use: vendor, robot: h2}, stand: {use: almi}}"
+    assert parse_stack(both, "x").loco_api == LOCO_APIS["h2"]
+    for wrong in ("h3", "[1]"):
+        with pytest.raises(ConfigError, match="loco service .*h1"):
+            _ = parse_stack(f"lower_body: {{use: vendor, robot: {wrong}}}", "x").loco_api

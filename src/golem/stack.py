@@ -12,6 +12,7 @@ from typing import Any
 
 from golem import registry
 from golem.errors import ConfigError, unknown_name
+from golem.middleware.unitree_api import LOCO_API, LocoApi, loco_api
 from golem.options import check_values, read_yaml
 
 
@@ -28,18 +29,18 @@ class Choice:
     options: dict[str, Any] = field(default_factory=dict)
 
     @property
-    def uses(self) -> tuple[str, ...]:
-        """Every implementation that is chosen: this one, and those its options name by `{use: NAME, ...}`."""
-        return (self.use, *_named(self.options))
+    def all(self) -> tuple[Choice, ...]:
+        """Everything that is chosen: this, and what its options choose by `{use: NAME, ...}`."""
+        return (self, *_chosen(self.options))
 
 
-def _named(options: Mapping[str, Any]) -> Iterator[str]:
-    """Yield every implementation that `options` choose, at any depth."""
+def _chosen(options: Mapping[str, Any]) -> Iterator[Choice]:
+    """Yield every choice among `options`, at any depth."""
     for value in options.values():
         if isinstance(value, Mapping):
             if "use" in value:
-                yield value["use"]
-            yield from _named(value)
+                yield Choice(value["use"], {name: v for name, v in value.items() if name != "use"})
+            yield from _chosen(value)
 
 
 @dataclass(frozen=True)
@@ -94,8 +95,22 @@ class Stack:
     @property
     def legs_on_board(self) -> Choice | None:
         """The lower body of the twin's on-board controller; None where nothing speaks to that."""
-        spoken_to = "vendor" in (*self.lower_body.uses, *self.legs_in_reserve.uses)
-        return self.onboard or Choice("almi") if spoken_to else None
+        return self.onboard or Choice("almi") if self._vendor else None
+
+    @property
+    def loco_api(self) -> LocoApi:
+        """The calls by which `vendor` speaks to the on-board controller, and which the twin's answers.
+
+        Raises:
+            ConfigError: there are none of that name.
+        """
+        robot = self._vendor.options.get("robot", LOCO_API) if self._vendor else LOCO_API
+        return loco_api(robot)
+
+    @property
+    def _vendor(self) -> Choice | None:
+        choices = (*self.lower_body.all, *self.legs_in_reserve.all)
+        return next((choice for choice in choices if choice.use == "vendor"), None)
 
     @property
     def on_ground(self) -> bool:

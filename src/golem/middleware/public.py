@@ -128,6 +128,16 @@ def _camera(camera: str) -> tuple[Topic, ...]:
 
 
 # fmt: off
+def _loco(service: str, robots: str) -> tuple[Topic, ...]:
+    return (
+        Topic(f"/api/{service}/request", "unitree_api/msg/Request", "stack", ("robot",), CALLS, None, "",
+              f"Calls of the on-board leg controller, state and velocity, as {robots} has them. "
+              "One of the two services is spoken to: see the option `robot` of `vendor`."),
+        Topic(f"/api/{service}/response", "unitree_api/msg/Response", "robot", ("stack",), CALLS, None, "",
+              "The answers."),
+    )
+
+
 def _hand(side: str) -> tuple[Topic, ...]:
     own, frame = "golem_interfaces/msg/", f"{side}_gripper"
     return (
@@ -171,10 +181,7 @@ TOPICS: tuple[Topic, ...] = (
           "Calls 1001 check, 1002 select, 1003 release: which on-board controller runs."),
     Topic("/api/motion_switcher/response", "unitree_api/msg/Response", "robot", ("safety",), CALLS, None, "",
           "The answers."),
-    Topic("/api/loco/request", "unitree_api/msg/Request", "stack", ("robot",), CALLS, None, "",
-          "Calls of the on-board leg controller: state, velocity."),
-    Topic("/api/loco/response", "unitree_api/msg/Response", "robot", ("stack",), CALLS, None, "",
-          "The answers."),
+    *(row for service, robots in (("loco", "an H1"), ("sport", "a G1 or an H2")) for row in _loco(service, robots)),
     Topic("/safety/lowcmd_in", "unitree_hg/msg/LowCmd", "stack", ("safety",), LOW, 500, "",
           "What the stack wants of the motors, for the gate to judge. reserve[0] repeats the tick of the state "
           "it answers, 0 where unknown; the gate takes a command to be as old as that state."),

@@ -11,6 +11,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from golem.errors import unknown_name
+
 OK = 0
 SEND_FAILED = 3102
 TIMEOUT = 3104
@@ -121,6 +123,19 @@ LOCO_APIS = {
     "h2": LocoApi("sport", "1.0.0.0", 7001, 7101, 7105, 0, 1, 4, 601, 7301, 7302),
 }
 """Loco services by robot. The SDK has no client for the H1-2; which of them its firmware answers is unverified."""
+LOCO_API = "h1"
+"""The one that is assumed."""
+
+
+def loco_api(robot: object) -> LocoApi:
+    """Return the loco service of `robot`, a name in `LOCO_APIS`.
+
+    Raises:
+        ConfigError: there is none of that name.
+    """
+    if not isinstance(robot, str) or robot not in LOCO_APIS:
+        raise unknown_name("robot with a loco service", str(robot), LOCO_APIS)
+    return LOCO_APIS[robot]
 
 
 def request_topic(service: str) -> str:

@@ -23,7 +23,6 @@ from golem.hardware.safety.base import GateStatus, Request, SafetyLimits
 from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
 from golem.middleware.bus import Bus
-from golem.middleware.unitree_api import LOCO_APIS
 from golem.robots.base import Banded, Robot
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.onboard import motion_switcher
@@ -108,7 +107,7 @@ class RobotSide:
         loco: LocoServiceNode | None = None
         if stack.legs_on_board is not None:
             legs = Legs(*Workshop(stack).make("lower_body", stack.legs_on_board))
-            loco = LocoServiceNode(bus, LOCO_APIS["h1"], legs)
+            loco = LocoServiceNode(bus, stack.loco_api, legs)
             self.nodes.append((Phase.SERVE, loco))
         switcher = MotionSwitcher(None if loco is None else loco.service)
         self.nodes.append((Phase.SERVE, ServiceNode(bus, motion_switcher.SERVICE, switcher.answer)))

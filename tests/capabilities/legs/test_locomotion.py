@@ -100,6 +100,23 @@ def test_a_stream_that_ends_stops_the_robot_after_half_a_second(driver: Driver) 
     assert "no twist came for 0.5 s" in driver.layer.reason
 
 
+def test_nobody_walks_before_the_estimate_has_found_the_floor(driver: Driver) -> None:
+    found = driver.base
+    driver.base = replace(found, stale=True)
+    driver.run(1.0, Twist(0.5))
+    assert driver.applied == ZERO
+    assert driver.layer.reason == "the base estimate has not found the floor yet"
+    driver.base = found
+    driver.run(1.0, Twist(0.5))
+    assert driver.applied == Twist(0.5)
+    driver.base = replace(found, stale=True)  # lost for a moment, as in a shove: how long is the gate's business
+    driver.run(0.1, Twist(0.5))
+    assert driver.applied == Twist(0.5)
+    driver.layer.reset(driver.state)
+    driver.run(1.0, Twist(0.5))
+    assert driver.applied == ZERO
+
+
 def test_a_twist_from_before_a_reset_is_void(driver: Driver) -> None:
     driver.run(1.0, Twist(0.5))
     driver.layer.reset(driver.state)

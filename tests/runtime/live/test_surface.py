@@ -85,12 +85,19 @@ def of_role(role: Role) -> Ends:
     return ends
 
 
-@pytest.mark.parametrize("support", ["hoist", "ground"])
-def test_processes_offer_what_the_table_says(support: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("support", "vendor", "unread"), [("hoist", "h1", "sport"), ("ground", "g1", "loco")]
+)
+def test_processes_offer_what_the_table_says(support: str, vendor: str, unread: str, tmp_path: Path) -> None:
     (tmp_path / "blind.py").write_text(BLIND)
     robot = Choice("mujoco", {"world": "open", "support": support})
     stack = Stack(
-        robot, localizer=Choice(f"{tmp_path / 'blind.py'}:Blind"), fallback=Choice("hold"), profile="ideal"
+        robot,
+        lower_body=Choice("vendor", {"robot": vendor}),
+        localizer=Choice(f"{tmp_path / 'blind.py'}:Blind"),
+        fallback=Choice("hold"),
+        onboard=Choice("hold"),
+        profile="ideal",
     )
     live = Live(stack, SpyDomain())
     live.start_twin()
@@ -105,9 +112,11 @@ def test_processes_offer_what_the_table_says(support: str, tmp_path: Path) -> No
     own = {("w", names.DISCOVERY_INFO, "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_")}
     band = of_service("/elastic_band/release", service(public.TRIGGER), served=False)
     live.close()
-    assert seen["twin"] - own == of_role("robot")
+    calls = ("r", f"rt/api/{unread}/request", dds_name("unitree_api/msg/Request"))
+    answers = ("r", f"rt/api/{unread}/response", dds_name("unitree_api/msg/Response"))
+    assert seen["twin"] - own == of_role("robot") - {calls}
     assert seen["safety"] - own == of_role("safety")
-    assert seen["up"] - own == of_role("stack") | (band if support == "ground" else set())
+    assert seen["up"] - own == of_role("stack") - {answers} | (band if support == "ground" else set())
 
 
 SILENT = ("/livox/", "/onboard/")

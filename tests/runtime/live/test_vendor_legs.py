@@ -27,11 +27,12 @@ def legs(live: Live) -> LegStatus:
 
 
 @pytest.mark.slow
-def test_the_onboard_controller_moves_the_legs_until_its_mode_is_released(live: Live) -> None:
+@pytest.mark.parametrize("robot", ["h1", "g1"])
+def test_the_onboard_controller_moves_the_legs_until_its_mode_is_released(live: Live, robot: str) -> None:
     for node in ("up", "safety", "twin"):
         live.leave(node)
     onboard = Choice("hold", {"stance": "straight", "speed": 2.0})
-    live.stack = replace(live.stack, lower_body=Choice("vendor"), onboard=onboard)
+    live.stack = replace(live.stack, lower_body=Choice("vendor", {"robot": robot}), onboard=onboard)
     live.start_twin()
     live.start_gate()
     live.start_up()

@@ -76,6 +76,7 @@ class Locomotion:
         left, right = self._feet(np.zeros(NUM_JOINTS))[:, :3, 3]
         # With both hips straight and level the distance of the feet does not depend on how far the knees are bent.
         self._stance: Array = (left - right)[:2]
+        self._grounded = False
         self._forget()
 
     @property
@@ -102,6 +103,7 @@ class Locomotion:
     def reset(self, state: LowState) -> None:
         """Stand, from the measured `state` on; a twist from before is void."""
         self._forget()
+        self._grounded = False
         self._rest.reset()
         self.gait.reset()
         self._blend.reset()
@@ -134,6 +136,7 @@ class Locomotion:
             dt: time since the previous tick [s], positive.
         """
         self._listen(twist, dt)
+        self._grounded = self._grounded or not base.stale
         wanted = self._wanted()
         waits = wanted != ZERO and self.applied == ZERO and not follows(self.controller)
         if waits:
@@ -174,6 +177,9 @@ class Locomotion:
             return ZERO
         if asked == ZERO:
             self.reason = ""
+            return ZERO
+        if not self._grounded:
+            self.reason = "the base estimate has not found the floor yet"
             return ZERO
         if self._held:
             self.reason = "who commands has not let go since another controller took over"

@@ -17,8 +17,8 @@ import numpy as np
 
 from golem.capabilities.legs.base import Envelope, LegCommand, Motion
 from golem.capabilities.legs.gait import GaitConfig
-from golem.errors import ConfigError, GolemError, unknown_name
-from golem.middleware.unitree_api import LOCO_APIS, OK, Request, Response, decode_int, encode
+from golem.errors import ConfigError, GolemError
+from golem.middleware.unitree_api import LOCO_API, OK, Request, Response, decode_int, encode, loco_api
 from golem.options import require
 from golem.types import LEGS, Array, BaseEstimate, LowState, Twist
 
@@ -63,7 +63,7 @@ class VendorConfig:
         duration: how long the robot may follow a velocity that is not refreshed [s].
     """
 
-    robot: str = "h1"
+    robot: str = LOCO_API
     envelope: Envelope = Envelope((-0.4, 0.8), (-0.3, 0.3), (-0.6, 0.6))
     timeout: float = 1.0
     stand_up: float = 1.0
@@ -88,8 +88,6 @@ class Vendor:
             ConfigError: the robot is unknown, a time is not positive, or there is nobody to speak to.
         """
         self.config = c = config or VendorConfig()
-        if c.robot not in LOCO_APIS:
-            raise unknown_name("robot with a loco service", c.robot, LOCO_APIS)
         if onboard is None:
             raise ConfigError(
                 "lower_body: vendor needs the robot's own computer, which only a stack connects to."
@@ -107,7 +105,7 @@ class Vendor:
         self.envelope = c.envelope
         self.gait = GaitConfig(start="never")
         self.started = False
-        self._api = LOCO_APIS[c.robot]
+        self._api = loco_api(c.robot)
         self._onboard = onboard
         self._t = 0.0
         self._id = 0

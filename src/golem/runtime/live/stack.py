@@ -18,7 +18,7 @@ from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant, Sample
 from golem.middleware.ros.base import Node
 from golem.middleware.ros.waitset import WaitSet
-from golem.middleware.unitree_api import LOCO_APIS, request_topic, response_topic
+from golem.middleware.unitree_api import request_topic, response_topic
 from golem.middleware.wire import convert
 from golem.middleware.wire.layout import WireError
 from golem.middleware.wire.rpc import RpcClient
@@ -98,7 +98,7 @@ class LiveStack:
         self._band = RemoteBand(node) if stack.on_ground and not real else None
         self._gate = GateIn(self._bus, surface, clock)
         self._cameras = [CameraIn(self._bus, surface, name) for name in public.CAMERAS]
-        service = LOCO_APIS["h1"].service
+        service = stack.loco_api.service
         requests, responses = request_topic(service), response_topic(service)
         self._calls = RpcClient(surface.writer(f"/{requests}"), surface.reader(f"/{responses}"))
         self._onboard = surface.reader("/onboard/lowcmd")
@@ -149,7 +149,7 @@ class LiveStack:
         side = self.side = StackSide(bus, self._stack, self._calibration, self._band, 0.0, self._beside)
         side.legs.realtime = self._real
         self._skills.attach(side, t)
-        service, identities = LOCO_APIS["h1"].service, Identities()
+        service, identities = self._stack.loco_api.service, Identities()
         placed: list[Placed] = [
             (Phase.RECEIVE, Poll(self._node)),
             (Phase.RECEIVE, self._gate),

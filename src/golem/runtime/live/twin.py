@@ -10,7 +10,7 @@ from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant
 from golem.middleware.ros.base import Node
 from golem.middleware.ros.msgs.std_srvs import Trigger_Response
-from golem.middleware.unitree_api import LOCO_APIS, request_topic, response_topic
+from golem.middleware.unitree_api import request_topic, response_topic
 from golem.middleware.wire.rpc import RpcServer
 from golem.robots.base import Banded, Robot
 from golem.robots.onboard import motion_switcher
@@ -92,7 +92,7 @@ class Twin:
             *((Phase.SEND, camera) for camera in cameras.values()),
             *((Phase.SEND, HandOut(bus, surface, hand)) for hand in SIDES),
         ]
-        for service in (motion_switcher.SERVICE, LOCO_APIS["h1"].service):
+        for service in (motion_switcher.SERVICE, stack.loco_api.service):
             requests, responses = request_topic(service), response_topic(service)
             server = RpcServer(surface.reader(f"/{requests}"), surface.writer(f"/{responses}"))
             placed.append((Phase.RECEIVE, CallsIn(bus, service, server)))
