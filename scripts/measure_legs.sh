@@ -21,24 +21,22 @@ peers=(wbc mpc vendor)
 [ -z "$ALMI" ] || peers+=("policy:almi_open:$ALMI")
 [ -z "$RL_GYM" ] || peers+=("policy:unitree_rl_gym:$RL_GYM")
 
-# Standing.
-shoves() { push --phase standing --first 60; }
+# Standing, and walking: side by side with others.
+shoves() { push --phase standing --first 40 --method almi "${peers[@]}"; }
 rods() { push --kind rod --phase standing --first 150 --last 150; }
 quiet() { legs --test quiet; }
 arms() { legs --test arms -n 100; }
 push_rung() { ladder --rung push --method almi -n 300; }
 ramp() { ladder --rung push-ramp --method almi wbc -n 40; }
 # Walking.
-swings() { push --phase left_swing right_swing; }
+swings() { push --phase left_swing right_swing --first 30 --method almi vendor "${peers[@]:3}"; }
 tracking() { legs --test tracking -n 30; }
 stopping() { legs --test stopping -n 200 --profile field; }
 line() { ladder --rung navigate-line --method almi -n 30; }
 endurance() { legs --test endurance -n 120; }
 rough() { legs --test slope rubble -n 20; }
-# Beside others, and on another plant.
-side_standing() { push --phase standing --method almi "${peers[@]}"; }
-side_swings() { push --phase left_swing right_swing --method almi vendor "${peers[@]:3}"; }
 plans() { legs --test plans -n 5 --method mpc -j 1; }
+# On another plant.
 box_feet() { push --phase standing --first 60 --robot feet=box cone=elliptic; }
 vendor_model() { [ -z "$MJCF" ] || push --phase standing --first 60 --robot "mjcf=$MJCF"; }
 estimators() { "$GOLEM" bench estimation; }
@@ -48,7 +46,7 @@ stand() { ladder --rung stand -n 100; }
 mcnemar() { "$GOLEM" compare "$OUT/tether" "$OUT/stand"; }
 
 ALL=(shoves rods quiet tracking stopping push_rung ramp rough swings line arms endurance stand tether mcnemar
-    side_standing box_feet vendor_model plans estimators side_swings)
+    box_feet vendor_model plans estimators)
 [ $# -gt 0 ] || set -- "${ALL[@]}"
 mkdir -p "$OUT"
 for name; do
