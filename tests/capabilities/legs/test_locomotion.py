@@ -109,7 +109,9 @@ def test_nobody_walks_before_the_estimate_has_found_the_floor(driver: Driver) ->
     driver.base = found
     driver.run(1.0, Twist(0.5))
     assert driver.applied == Twist(0.5)
-    driver.base = replace(found, stale=True)  # lost for a moment, as in a shove: how long is the gate's business
+    driver.base = replace(
+        found, stale=True
+    )  # lost for a moment, as in a shove: how long is the gate's business
     driver.run(0.1, Twist(0.5))
     assert driver.applied == Twist(0.5)
     driver.layer.reset(driver.state)

@@ -1,4 +1,4 @@
-"""`golem train legs run|export|curve|shove`."""
+"""`golem train legs run|export|average|curve|shove`."""
 
 from __future__ import annotations
 
@@ -59,6 +59,24 @@ def export(checkpoint: Path = RUNS / "seed0" / CHECKPOINT, folder: Path = RUNS /
     print(*write(checkpoint, folder), sep="\n")
 
 
+def average(
+    networks: tyro.conf.Positional[tuple[Path, ...]],
+    weights: tuple[float, ...],
+    out: Path = RUNS / "export" / "average.onnx",
+) -> None:
+    """Write the weighted mean of networks that were trained on from one; often it is better than each of them.
+
+    Args:
+        networks: files of `export`, of the same task; its description fits the mean as well.
+        weights: one per network, 0 or more; only their ratios count.
+        out: the network to write.
+    """
+    from golem.training.legs.average import average as write
+
+    write(networks, weights, out)
+    print(out)
+
+
 def curve(runs: tyro.conf.Positional[tuple[Path, ...]], out: Path = RUNS / "curve.png") -> None:
     """Draw the learning curves of several runs beside each other, and tabulate every fifth update.
 
@@ -102,7 +120,7 @@ def shove(
 def main(args: list[str] | None = None) -> None:
     """Run the command line."""
     tyro.extras.subcommand_cli_from_dict(
-        {"run": run, "export": export, "curve": curve, "shove": shove},
+        {"run": run, "export": export, "average": average, "curve": curve, "shove": shove},
         prog="golem train legs",
         args=args,
         description="Train the leg policy.",

@@ -89,7 +89,7 @@ def export(checkpoint: Path, folder: Path) -> tuple[Path, Path]:
     name = f"almi_{task}"
     folder.mkdir(parents=True, exist_ok=True)
     network = folder / f"{name}.onnx"
-    graph = _graph(_trained_actor(saved))
+    graph = graph_of(_trained_actor(saved))
     helper.set_model_props(graph, {TRAINED: command_of(saved)})
     onnx.save(graph, str(network))
     description = folder / f"{name}.yaml"
@@ -107,7 +107,8 @@ def command_of(saved: dict[str, Any]) -> str:
     return f"golem train legs run {options} --steps {config['steps']:g}{start} (commit {codes})"
 
 
-def _graph(actor: Actor) -> onnx.ModelProto:
+def graph_of(actor: Actor) -> onnx.ModelProto:
+    """Return the network that the stack runs."""
     nodes: list[onnx.NodeProto] = []
     weights: dict[str, NDArray[np.generic]] = {"half": np.array([0.5], np.float32)}
     for key in ("observation_order", "observation_sign", "action_order", "action_sign"):
