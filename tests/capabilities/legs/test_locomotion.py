@@ -298,6 +298,7 @@ def test_an_envelope_without_zero_is_refused(changes: dict[str, Any]) -> None:
         {"capture_start": (-0.1, 0.15)},
         {"capture_stop": 0.0},
         {"feet_start": -1.0},
+        {"patience": -1.0},
     ],
 )
 def test_a_clock_that_cannot_be_meant_is_refused(changes: dict[str, Any]) -> None:

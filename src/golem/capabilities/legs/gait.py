@@ -7,7 +7,7 @@ While the robot stands the clock rests. It starts when a twist is commanded or, 
 when the standing robot cannot keep its balance with its feet where they are: the capture point (CoM position plus
 velocity over the pendulum's frequency; Pratt et al., Humanoids 2006) has left the middle of the feet, or the feet are
 misplaced. It stops at a double support at which the twist is zero and both errors are small again, so that nobody
-stands on one leg.
+stands on one leg; feet that are a little off do not keep it running for long, if the controller leaves them there.
 """
 
 from __future__ import annotations
@@ -39,6 +39,8 @@ class GaitConfig:
             grows by a fifth until the foot is off the ground.
         capture_stop: distance of the capture point from the middle of the feet below which it may stop [m].
         feet_start, feet_stop: how far the feet are from where they belong relative to each other, likewise [m].
+        patience: periods after the last reason for a step from which feet that are misplaced by more than `feet_stop`
+            do not keep it stepping: a controller that has not put them right by then is content with them.
     """
 
     period: float = 0.7
@@ -48,6 +50,7 @@ class GaitConfig:
     capture_stop: float = 0.07
     feet_start: float = 0.12
     feet_stop: float = 0.05
+    patience: float = 1.0
 
     def __post_init__(self) -> None:
         """Check the numbers.
@@ -61,6 +64,7 @@ class GaitConfig:
             ("period", self.period, 0.0 < self.period < inf, "a time in seconds, positive"),
             ("stance", self.stance, 0.5 < self.stance < 1.0, "a share of the period, between 0.5 and 1"),
             ("capture and gait.feet", min(lengths), min(lengths) > 0.0, "a length in metres, positive"),
+            ("patience", self.patience, self.patience >= 0.0, "a number of periods"),
         )
 
     @property
@@ -94,6 +98,7 @@ class Gait:
         self.config = config
         self.phase: Array = np.zeros(shape)
         self.stepping: Bools = np.zeros(shape, dtype=bool)
+        self._idle: Array = np.zeros(shape)  # periods since there was a reason to step
 
     @property
     def phases(self) -> Array:
@@ -129,7 +134,9 @@ class Gait:
         skipped = np.where(lost & ~commanded, config.stance - 0.5, 0.0)
         first = np.where(capture[..., 1] >= 0.0, 0.0, 0.5) + skipped
         self.phase = np.where(begins, first, self.phase)
-        settled = (error < config.capture_stop) & (misplaced < config.feet_stop)
+        self._idle = np.where(wanted, 0.0, self._idle + dt / config.period)
+        content = (misplaced < config.feet_stop) | (self._idle >= config.patience)
+        settled = (error < config.capture_stop) & content
         may_stop = ~wanted & (settled | (not config.recovers))
         after = self.phase + dt / config.period
         half = np.floor(2.0 * after) > np.floor(2.0 * self.phase)
