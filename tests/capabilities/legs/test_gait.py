@@ -13,11 +13,11 @@ from golem.types import Array
 DT = 0.01
 
 
-def periods(config: GaitConfig, capture: Array, misplaced: Array, commanded: Array | None = None) -> Array:
+def periods(config: GaitConfig, capture: Array, misplaced: Array) -> Array:
     """Return how many periods (n,) the clocks run on for after a step was begun; at most 5."""
     gait = Gait(config, misplaced.shape)
     rest = np.zeros(misplaced.shape, dtype=bool)
-    gait.step(rest if commanded is None else commanded, capture + [0.15, 0.0], misplaced, DT)
+    gait.step(rest, capture + [0.15, 0.0], misplaced, DT)
     assert gait.stepping.all()
     ticks = np.zeros(misplaced.shape)
     for _ in range(round(5.0 * config.period / DT)):
