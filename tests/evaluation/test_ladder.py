@@ -101,9 +101,10 @@ def test_a_fault_of_the_rung_itself_is_shown_with_its_trace(fake: Make) -> None:
 
 
 def test_a_worker_that_dies_ends_the_run_with_one_sentence(fake: Make) -> None:
+    before = set(multiprocessing.active_children())
     with pytest.raises(GolemError, match="A worker process died"):
         run_ladder(fake("deadly"))
-    assert not multiprocessing.active_children()
+    assert set(multiprocessing.active_children()) <= before
 
 
 @pytest.mark.parametrize(
