@@ -145,9 +145,10 @@ def exchange(command: list[str], domain: int, type_name: str, sent: list[bytes])
     reader = participant.reader("rt/back", type_name, Qos(depth=None))
     writer = participant.writer("rt/there", type_name, Qos(depth=None))
     arguments = [*command, str(domain), type_name, str(len(sent))]
-    peer = subprocess.Popen(arguments, env={**os.environ, "CYCLONEDDS_URI": URI})
+    peer = subprocess.Popen(arguments, env={**os.environ, "CYCLONEDDS_URI": URI}, stdout=subprocess.PIPE)
     back: list[bytes] = []
     try:
+        assert peer.stdout is not None and peer.stdout.readline() == b"ready\n"
         end = time.monotonic() + 20.0
         while not (writer.matched() and reader.matched()) and peer.poll() is None and time.monotonic() < end:
             time.sleep(0.01)

@@ -1,5 +1,6 @@
 #define _GNU_SOURCE
 /* A peer on Cyclone DDS 0.10 with generated types: peer DOMAIN TYPE COUNT
+   Says "ready" once it has found both ends of the other side: what is sent or written before is nobody's.
    Sends every sample it receives on rt/there back on rt/back, COUNT of them, then exits with 0. */
 #include <dlfcn.h>
 #include <stdio.h>
@@ -32,6 +33,14 @@ int main (int argc, char **argv)
   dds_entity_t writer = dds_create_writer (participant, back, qos, NULL);
   dds_entity_t reader = dds_create_reader (participant, there, qos, NULL);
   if (participant < 0 || there < 0 || back < 0 || reader < 0 || writer < 0) return 66;
+  for (int waited = 0; dds_get_matched_subscriptions (writer, NULL, 0) < 1
+                       || dds_get_matched_publications (reader, NULL, 0) < 1; waited++)
+  {
+    if (waited == 10000) return 72;
+    dds_sleepfor (DDS_MSECS (1));
+  }
+  puts ("ready");
+  fflush (stdout);
   int left = atoi (argv[3]);
   for (int waited = 0; left > 0 && waited < 10000; )
   {

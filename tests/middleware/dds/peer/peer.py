@@ -4,7 +4,7 @@ import importlib
 import sys
 import time
 
-from cyclonedds.core import Policy, Qos
+from cyclonedds.core import DDSStatus, Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
@@ -19,6 +19,13 @@ participant = DomainParticipant(domain)
 writer = DataWriter(participant, Topic(participant, "rt/back", cls), qos)
 reader = DataReader(participant, Topic(participant, "rt/there", cls), qos)
 end = time.monotonic() + 15.0
+while not (
+    writer.read_status(DDSStatus.PublicationMatched) and reader.read_status(DDSStatus.SubscriptionMatched)
+):
+    if time.monotonic() > end:
+        sys.exit(72)
+    time.sleep(0.001)
+print("ready", flush=True)
 while left and time.monotonic() < end:
     for sample in reader.take(1):
         if isinstance(sample, cls):
