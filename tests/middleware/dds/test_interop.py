@@ -140,26 +140,40 @@ def test_an_old_peer_takes_part_in_every_topic_of_ours(
 
 
 def exchange(command: list[str], domain: int, type_name: str, sent: list[bytes]) -> None:
-    """Send samples to a peer that sends them back; both must be whole, and the peer must end well."""
+    """Send samples to a peer that sends them back; all must be whole and in order, and the peer must end well.
+
+    Cyclone drops what comes before a writer's first heartbeat, and that heartbeat may come after the first sample
+    though both sides have matched. So the first sample goes ahead, again and again, until one has come back.
+    """
     participant = connect(DdsConfig(domain))
     reader = participant.reader("rt/back", type_name, Qos(depth=None))
     writer = participant.writer("rt/there", type_name, Qos(depth=None))
-    arguments = [*command, str(domain), type_name, str(len(sent))]
-    peer = subprocess.Popen(arguments, env={**os.environ, "CYCLONEDDS_URI": URI}, stdout=subprocess.PIPE)
+    peer = subprocess.Popen(
+        [*command, str(domain), type_name], env={**os.environ, "CYCLONEDDS_URI": URI}, stdin=subprocess.PIPE
+    )
     back: list[bytes] = []
+    end = time.monotonic() + 20.0
     try:
-        assert peer.stdout is not None and peer.stdout.readline() == b"ready\n"
-        end = time.monotonic() + 20.0
-        while not (writer.matched() and reader.matched()) and peer.poll() is None and time.monotonic() < end:
-            time.sleep(0.01)
+        while not back and peer.poll() is None and time.monotonic() < end:
+            writer.write(sent[0])
+            time.sleep(0.02)
+            back += [sample.payload for sample in reader.take() if sample.alive]
         for payload in sent:
             writer.write(payload)
-        while len(back) < len(sent) and time.monotonic() < end:
+        while not same(back[-len(sent) :], sent) and peer.poll() is None and time.monotonic() < end:
             back += [sample.payload for sample in reader.take() if sample.alive]
             time.sleep(0.005)
-        assert peer.wait(timeout=15.0) == 0
+        peer.communicate(timeout=15.0)
+        assert peer.returncode == 0
     finally:
         peer.kill()
         participant.close()
-    assert [got[4 : len(payload)] for got, payload in zip(back, sent, strict=True)] == [p[4:] for p in sent]
-    assert all(len(got) - len(payload) < 4 for got, payload in zip(back, sent, strict=True))
+    assert same(back[-len(sent) :], sent), f"{len(back)} samples came back"
+
+
+def same(back: list[bytes], sent: list[bytes]) -> bool:
+    """Return whether samples are what was sent, but for the options in their header and up to 3 bytes of padding."""
+    return len(back) == len(sent) and all(
+        got[4 : len(payload)] == payload[4:] and len(got) - len(payload) < 4
+        for got, payload in zip(back, sent, strict=True)
+    )

@@ -1,8 +1,8 @@
 #define _GNU_SOURCE
-/* A peer on Cyclone DDS 0.10 with generated types: peer DOMAIN TYPE COUNT
-   Says "ready" once it has found both ends of the other side: what is sent or written before is nobody's.
-   Sends every sample it receives on rt/there back on rt/back, COUNT of them, then exits with 0. */
+/* A peer on Cyclone DDS 0.10 with generated types: peer DOMAIN TYPE
+   Sends every sample it receives on rt/there back on rt/back until its input ends, then exits with 0. */
 #include <dlfcn.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +21,7 @@ static const dds_topic_descriptor_t *find (const char *type)
 
 int main (int argc, char **argv)
 {
-  if (argc != 4) return 64;
+  if (argc != 3) return 64;
   const dds_topic_descriptor_t *type = find (argv[2]);
   if (type == NULL) return 65;
   dds_qos_t *qos = dds_create_qos ();
@@ -33,27 +33,18 @@ int main (int argc, char **argv)
   dds_entity_t writer = dds_create_writer (participant, back, qos, NULL);
   dds_entity_t reader = dds_create_reader (participant, there, qos, NULL);
   if (participant < 0 || there < 0 || back < 0 || reader < 0 || writer < 0) return 66;
-  for (int waited = 0; dds_get_matched_subscriptions (writer, NULL, 0) < 1
-                       || dds_get_matched_publications (reader, NULL, 0) < 1; waited++)
-  {
-    if (waited == 10000) return 72;
-    dds_sleepfor (DDS_MSECS (1));
-  }
-  puts ("ready");
-  fflush (stdout);
-  int left = atoi (argv[3]);
-  for (int waited = 0; left > 0 && waited < 10000; )
+  struct pollfd input = { .fd = 0, .events = POLLIN };
+  while (poll (&input, 1, 0) == 0)
   {
     void *sample = NULL;
     dds_sample_info_t info;
     int n = dds_take (reader, &sample, &info, 1, 1);
     if (n < 0) return 67;
-    if (n == 0) { dds_sleepfor (DDS_MSECS (1)); waited++; continue; }
-    if (info.valid_data) { if (dds_write (writer, sample) < 0) return 68; left--; }
+    if (n == 0) { dds_sleepfor (DDS_MSECS (1)); continue; }
+    if (info.valid_data && dds_write (writer, sample) < 0) return 68;
     if (dds_return_loan (reader, &sample, n) < 0) return 69;
   }
-  if (left == 0 && dds_wait_for_acks (writer, DDS_SECS (5)) < 0) return 70;
   dds_delete (participant);
   dds_delete_qos (qos);
-  return left == 0 ? 0 : 71;
+  return 0;
 }
