@@ -163,6 +163,23 @@ def test_a_service_that_is_not_there_is_a_fault_and_stays_one_until_reset() -> N
     assert session.legs.started
 
 
+def test_the_first_question_is_asked_again_and_nothing_else_is() -> None:
+    session = Session(Link())
+    session.link.dead = True
+    session.run(SETTLE + 0.3)
+    session.link.dead = False
+    session.run(0.9)
+    assert session.legs.started
+    state, again, *rest = calls(session.link)
+    assert state == again == (API.get_fsm_id, "")
+    assert rest[:3] == [(API.set_fsm_id, f'{{"data": {s}}}') for s in (1, 2, 204)]
+    session.link.dead = True
+    asked = len(session.link.asked)
+    with pytest.raises(VendorFault, match="did not answer"):
+        session.run(2.0)
+    assert len(session.link.asked) <= asked + 1
+
+
 def test_a_service_that_dies_while_the_robot_walks_is_noticed() -> None:
     session = Session(Link())
     session.run(0.5, Twist(0.2))

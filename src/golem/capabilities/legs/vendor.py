@@ -171,7 +171,7 @@ class Vendor:
             raise VendorFault(f"The twist {values} is not finite; the robot is not sent one.") from error
 
     def _ask_state(self) -> Generator[None, None, int]:
-        data = yield from self._call(self._api.get_fsm_id)
+        data = yield from self._call(self._api.get_fsm_id, repeat=True)
         try:
             return decode_int(data)
         except ValueError as error:
@@ -182,11 +182,17 @@ class Vendor:
     def _set_state(self, state: int) -> Wait:
         yield from self._call(self._api.set_fsm_id, encode({"data": state}))
 
-    def _call(self, api_id: int, parameter: str = "") -> Generator[None, None, str]:
-        """Call a function of the loco service; return the data of the answer."""
+    def _call(self, api_id: int, parameter: str = "", repeat: bool = False) -> Generator[None, None, str]:
+        """Call a function of the loco service; return the data of the answer.
+
+        With `repeat` the call is sent once more after half of the time: DDS may lose what is written before the
+        two sides know each other, and so the first call or its answer.
+        """
         api, deadline = self._api, self._t + self.config.timeout
+        again = self._t + self.config.timeout / 2 if repeat else math.inf
         self._id += 1
-        self._onboard.send(api.service, Request(self._id, api_id, parameter))
+        request = Request(self._id, api_id, parameter)
+        self._onboard.send(api.service, request)
         call = f"{api.function(api_id)}({parameter})"
         while True:
             yield
@@ -198,6 +204,9 @@ class Vendor:
                         f"The robot's '{api.service}' service refused {call}: code {response.code}, {why}."
                     )
                 return response.data
+            if self._t >= again:
+                again = math.inf
+                self._onboard.send(api.service, request)
             if self._t >= deadline:
                 raise VendorFault(
                     f"The robot's '{api.service}' service did not answer {call} within {self.config.timeout:g} s."
