@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from tests.capabilities.legs.floor_plant import FloorPlant
 from golem import registry
 from golem.capabilities.legs.base import STANDING, Envelope, LowerBody
 from golem.capabilities.legs.mpc.controller import FAILURES, MPC, MPCConfig, PlanningError
-from golem.capabilities.legs.mpc.planner import PlannerConfig
+from golem.capabilities.legs.mpc.planner import Method, PlannerConfig
 from golem.errors import ConfigError
 from golem.evaluation.pool import CAN_COPY, in_a_copy
 from golem.types import Array
@@ -28,8 +29,10 @@ def test_is_a_lower_body_that_stands() -> None:
 PUSH = (0.2, 0.2, np.array([-40.0, 0.0, 0.0]))
 
 
-def test_stands_through_a_light_push_with_a_noisy_estimate() -> None:
-    assert FloorPlant(velocity_noise=0.03).run(MPC(QUICK), 2.5, PUSH)
+@pytest.mark.parametrize("method", get_args(Method))
+def test_stands_through_a_light_push_with_a_noisy_estimate(method: Method) -> None:
+    legs = MPC(replace(QUICK, planner=PlannerConfig(method=method)))
+    assert FloorPlant(velocity_noise=0.03).run(legs, 2.5, PUSH)
 
 
 def test_standing_is_its_doing() -> None:

@@ -1,17 +1,21 @@
 # ruff: noqa: E402 (nothing of the trainer can be imported where torch is absent)
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-pytest.importorskip("torch", reason="training needs the extra 'train'")
+torch = pytest.importorskip("torch", reason="training needs the extra 'train'")
 
+from golem.capabilities.legs.description import SHIPPED
 from golem.capabilities.legs.gait import GaitConfig
 from golem.hardware.safety.base import SafetyLimits
-from golem.training.legs.env import PERIOD, EnvConfig, LegsEnv
-from golem.training.legs.model import STANCE
+from golem.training.legs.disturbances import Difficulty
+from golem.training.legs.env import PERIOD, TASKS, EnvConfig, LegsEnv
+from golem.training.legs.export import load_actor
+from golem.training.legs.model import KP, STANCE
 from golem.training.legs.rewards import Weights
 from golem.training.legs.world import WorldConfig
 
@@ -126,6 +130,44 @@ def test_slope_turns_gravity_and_roughness_lifts_soles() -> None:
     assert 0.0 < moved.max() <= 0.021
     changed = np.unique(np.nonzero(moved)[1])
     assert set(changed) <= set(world.ids.soles)
+
+
+EVEN = WorldConfig(slope=0.0, roughness=0.0, torso_mass=(0.0, 0.0), leg_offset=0.0)
+
+
+def standing(world: WorldConfig, payload: float) -> tuple[LegsEnv, np.ndarray, np.ndarray]:
+    """Let the shipped network stand for two seconds, arms at rest.
+
+    Returns:
+        The robots, the weight on the feet of each (n,) [N], and which of them stood (m,), after the first second
+        without a step.
+    """
+    env = LegsEnv(16, replace(TASKS["stand"], world=world), 0, 1)
+    env.difficulty = Difficulty(amplitude=0.0, speed=0.0, push=0.0, payload=payload)
+    env.restart(np.arange(16))
+    actor, weight, stood = load_actor(SHIPPED / "almi_stand.onnx"), [], np.ones(16, dtype=bool)
+    for step in range(100):
+        with torch.no_grad():
+            actions = actor(torch.from_numpy(env.observe()[0]).float()).double().numpy()
+        stood &= ~env.step(actions, NOBODY, np.zeros((0, 15))).ended & ~(env.gait.stepping & (step > 50))
+        weight.append(env.world.truth.force.sum(axis=1))
+    assert stood.sum() >= 12
+    return env, np.mean(weight[50:], axis=0), np.flatnonzero(stood)
+
+
+def test_payloads_weigh_on_the_feet() -> None:
+    env, weight, stood = standing(EVEN, payload=1.0)
+    carried, weight = env.world.payload.sum(axis=1)[stood], weight[stood]
+    assert carried.min() < 0.1 and 3.0 < carried.max() <= 6.0
+    np.testing.assert_allclose((weight - weight[carried < 0.1].mean()) / 9.81, carried, atol=0.5)
+
+
+def test_weak_motors_need_a_larger_error_for_the_same_torque() -> None:
+    for strength in (0.88, 1.1):
+        env, _, stood = standing(replace(EVEN, strength=(strength, strength)), payload=0.0)
+        truth, knee = env.world.truth, 3
+        stiffness = truth.torque[:, knee] / (env.world._ctrl[:, knee] - truth.q[:, knee])
+        np.testing.assert_allclose(stiffness[stood] / KP[knee], strength, rtol=0.1)
 
 
 def test_commands_come_late_by_each_robots_delay(monkeypatch: pytest.MonkeyPatch) -> None:
