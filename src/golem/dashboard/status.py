@@ -54,15 +54,12 @@ def read_status(running: Running) -> Status:
     """Return the present status of a stack."""
     feedback = running.bus.latest(topics.FEEDBACK, Feedback)
     gate = running.safety
-    reason = ""
-    if gate is not None and gate.reason is not None:
-        reason = f"{gate.reason}: {gate.detail}" if gate.detail else str(gate.reason)
     return Status(
         running.executor.t,
         "" if feedback is None else feedback.stage,
         "" if feedback is None else feedback.text,
         GateState.INIT if gate is None else gate.state,
-        reason,
+        "" if gate is None else gate.why,
         running.bus.latest(topics.LEG_STATUS, LegStatus),
         running.bus.latest(topics.BASE, BaseEstimate),
     )

@@ -10,7 +10,6 @@ from golem.errors import ConfigError
 from golem.evaluation.balance import BalanceRecorder
 from golem.evaluation.odometry import SimulatedOdometry
 from golem.evaluation.pushes import Push, Pusher
-from golem.hardware.safety.base import GateState
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
 from golem.robots.mujoco.engine import MujocoRobot
@@ -115,8 +114,8 @@ def lost(running: Running, recorder: BalanceRecorder | None) -> Loss | None:
         return Loss(FAULT, legs.fault)
     if recorder is not None and recorder.fallen:
         return Loss("fall", f"The robot fell at {t:.1f} s.")
-    if safety is not None and safety.state in (GateState.STOP1, GateState.STOP0):
-        return Loss("safety", f"Safety stop at {t:.1f} s: {safety.reason}. {safety.detail}")
+    if safety is not None and safety.stopped:
+        return Loss("safety", f"Safety stop at {t:.1f} s: {safety.why}.")
     return None
 
 

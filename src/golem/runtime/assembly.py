@@ -137,7 +137,7 @@ class Running:
         run.cancel()
         safety = self.safety
         if safety is not None and safety.stopped:
-            return SkillResult(False, "safety", "safety", f"Safety stop: {safety.reason}. {safety.detail}")
+            return SkillResult(False, "safety", "safety", f"Safety stop: {safety.why}.")
         return SkillResult(False, "timeout", None, f"Not done after {timeout:g} s of robot time.")
 
     def halt(self) -> None:

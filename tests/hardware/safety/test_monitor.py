@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from golem.hardware.safety.base import Counters, Reason, SafetyLimits
+from golem.hardware.safety.base import Counters, GateState, GateStatus, Reason, SafetyLimits
 from golem.hardware.safety.monitor import examine, finite, tilt, whole, whole_command
 from golem.types import LowCommand, LowState
 
@@ -145,3 +145,15 @@ def test_moving_away_from_a_limit_is_no_braking_fault(
     q, dq = np.zeros(27), np.zeros(27)
     q[JOINT], dq[JOINT] = limits.state_upper[JOINT] - 0.01, -5.0
     assert persistent(state_at(0.0, q, dq=dq), limits, 5) == [None] * 5
+
+
+@pytest.mark.parametrize(
+    ("reason", "detail", "why"),
+    [
+        (Reason.TILT, "torso at 46 degrees", "tilt: torso at 46 degrees"),
+        (Reason.REQUESTED, "", "requested"),
+        (None, "", ""),
+    ],
+)
+def test_a_status_says_why_in_one_line(reason: Reason | None, detail: str, why: str) -> None:
+    assert GateStatus(0.0, GateState.STOP1, reason, detail).why == why

@@ -317,3 +317,8 @@ class GateStatus:
     def stopped(self) -> bool:
         """Whether the robot was stopped, and stays so until it is reset."""
         return self.state in (GateState.STOP1, GateState.STOP0)
+
+    @property
+    def why(self) -> str:
+        """The reason and its detail in one line, without a full stop; empty where there is none."""
+        return ": ".join(filter(None, (self.reason, self.detail)))
