@@ -167,7 +167,8 @@ def test_legs_that_take_longer_than_their_period_lose_them_where_the_wall_clock_
 
 
 def test_legs_that_are_late_are_noticed_in_the_ticks_of_a_faster_fallback(tmp_path: Path) -> None:
-    with hanging(lower_body=Choice(f"{write(tmp_path, 'sleeps')}:Chosen"), fallback=Choice("wbc")) as running:
+    use, faster = f"{write(tmp_path, 'sleeps')}:Chosen", Choice("hold", {"rate": 250.0})
+    with hanging(lower_body=Choice(use), fallback=faster) as running:
         result = running.execute(Drive(), None, timeout=0.9, realtime=True)
         assert (result.stage, result.slot) == ("fault", "lower_body")
         assert "longer than its period 5 times in a row" in result.reason

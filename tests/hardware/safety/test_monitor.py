@@ -151,7 +151,7 @@ def test_moving_away_from_a_limit_is_no_braking_fault(
     ("reason", "detail", "why"),
     [
         (Reason.TILT, "torso at 46 degrees", "tilt: torso at 46 degrees"),
-        (Reason.REQUESTED, "", "requested"),
+        (Reason.REQUESTED, "", "stop_requested"),
         (None, "", ""),
     ],
 )
