@@ -44,6 +44,7 @@ int main (int argc, char **argv)
     if (info.valid_data && dds_write (writer, sample) < 0) return 68;
     if (dds_return_loan (reader, &sample, n) < 0) return 69;
   }
+  if (dds_wait_for_acks (writer, DDS_SECS (5)) < 0) return 70;
   dds_delete (participant);
   dds_delete_qos (qos);
   return 0;
