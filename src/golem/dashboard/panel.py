@@ -126,7 +126,7 @@ class Panel:
         if html != self._html:
             self._html = html
             self._status.content = html
-        stopped = status.safety in (GateState.STOP1, GateState.STOP0)
+        stopped = status.safety.stopped
         for handle, visible in (
             (self._stop, not pressed),
             (self._release, pressed),

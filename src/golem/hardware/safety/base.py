@@ -35,6 +35,11 @@ class GateState(StrEnum):
     STOP0 = "stop0"
     """Stopped and latched: the motors are limp (kp = kd = 0)."""
 
+    @property
+    def stopped(self) -> bool:
+        """Whether the robot was stopped, and stays so until the gate is reset."""
+        return self in (GateState.STOP1, GateState.STOP0)
+
 
 class Reason(StrEnum):
     """Why the gate is not armed, or why it stopped."""
@@ -315,8 +320,8 @@ class GateStatus:
 
     @property
     def stopped(self) -> bool:
-        """Whether the robot was stopped, and stays so until it is reset."""
-        return self.state in (GateState.STOP1, GateState.STOP0)
+        """See `GateState.stopped`."""
+        return self.state.stopped
 
     @property
     def why(self) -> str:

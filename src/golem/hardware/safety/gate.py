@@ -63,7 +63,7 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
         fault = fault or command_fault or base_fault or requested
         if fault is not None:
             mode, (reason, detail), since, outgoing = GateState.STOP1, fault, t, None
-    elif mode in (GateState.STOP1, GateState.STOP0):
+    elif mode.stopped:
         if edge is Request.RESET and fault is None:
             mode, reason, detail, since = GateState.ARMED, None, "", t
         elif mode is GateState.STOP1 and t - since >= limits.damping_time:
