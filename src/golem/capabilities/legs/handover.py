@@ -1,9 +1,9 @@
 """Walks with one controller and stands with another, as the paper does: the vendor's walks, ALMI stands.
 
 The legs change hands while the robot stays in place and is healthy, and the targets are blended over a short time,
-because each controller has its own posture and gains. A controller that has to start first, such as the vendor's, gets
-them once it has started. Until then the robot stands: the standing controller steps to keep its balance, not because a
-twist was commanded that it cannot follow.
+because each controller has its own posture and gains. Meanwhile both balance the robot. A controller that has to start
+first, such as the vendor's, gets the legs once it has started. Until then the robot stands: the standing controller
+steps to keep its balance, not because a twist was commanded that it cannot follow.
 """
 
 from __future__ import annotations
@@ -49,7 +49,9 @@ class HandoverConfig:
         lean: the same for the horizontal part of the unit vector of gravity, in the torso's frame.
         speed: the same for the horizontal velocity of the base [m/s] [own].
         calm: healthy time before the legs change hands [s]: five ticks of 50 Hz.
-        blend: time over which targets and gains go from one controller's to the other's [s] [own: half a step].
+        blend: time over which targets and gains go from one controller's to the other's [s] [own: over 0.3 s, from a
+            command that stayed as it was, the shipped legs rocked when they stopped, and a light foot turned by 10
+            degrees].
     """
 
     walk: Part
@@ -59,7 +61,7 @@ class HandoverConfig:
     lean: float = 0.25
     speed: float = 0.2
     calm: float = 0.1
-    blend: float = 0.3
+    blend: float = 0.8
 
 
 class Handover:
@@ -111,7 +113,7 @@ class Handover:
         self._healthy = self._healthy + dt if self._is_healthy(state, base) else 0.0
         # Another controller failed while it walked: the walking one ends that, if it is ready.
         found = self._last is None and motion.stepping and not self._is_in_place(base)
-        may_change = found or self._is_calm(dt)
+        may_change = found or (self._is_calm(dt) and not self._blend.active)
         if not (found or self._other_wanted(motion)):
             self._coming = None
         elif self._coming is None and may_change:
@@ -124,13 +126,13 @@ class Handover:
             and may_change
             and _is_ready(self._coming.controller)
         ):
+            self._leaving = self._active
             self._take_over(self._coming)
             self._blend.begin(self._last)
         else:
-            if not self.walking:
-                motion = replace(motion, twist=ZERO, commanded=False)
-            command = self._active.step(state, base, motion, dt)
-        self._last = self._blend.step(command, dt)
+            command = self._active.step(state, base, motion if self.walking else _standing(motion), dt)
+        old = self._leaving.step(state, base, _standing(motion), dt) if self._blend.active else None
+        self._last = self._blend.step(command, dt, old)
         return self._last
 
     def _take_over(self, controller: Paced) -> None:
@@ -141,6 +143,7 @@ class Handover:
 
     def _begin(self) -> None:
         self._take_over(self._stand)
+        self._leaving = self._active
         self._healthy = 0.0
         self._last: LegCommand | None = None
         self._blend.reset()
@@ -181,6 +184,11 @@ class Handover:
         if not motion.stepping:
             return True
         return self.gait.start == "always" and bool((motion.phase < self.gait.stance).all())
+
+
+def _standing(motion: Motion) -> Motion:
+    """Return `motion` without its twist."""
+    return replace(motion, twist=ZERO, commanded=False)
 
 
 def _is_ready(controller: LowerBody) -> bool:

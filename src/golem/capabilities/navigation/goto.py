@@ -60,7 +60,7 @@ class GoToConfig:
     straight: float = 0.03
     widen: float = 1.2
     rest: float = 1.0
-    settle: float = 1.0
+    settle: float = 1.5
     coast: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
