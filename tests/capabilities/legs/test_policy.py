@@ -108,11 +108,11 @@ def test_almi_stands_with_one_shipped_policy_and_walks_with_the_other() -> None:
     assert isinstance(legs, LowerBody)
     legs.reset(state())
     for motion, name in ((STANDING, STAND), (walking(0.3), WALK)):
-        for _ in range(30):  # the other one takes over after a while
+        for _ in range(60):  # the other one takes over after a while
             q = legs.step(state(), BASE, motion, 0.02).q
         alone = Policy(PolicyConfig(name))
         alone.reset(state())
-        for _ in range(30):
+        for _ in range(60):
             expected = alone.step(state(), BASE, motion, 0.02).q
         np.testing.assert_allclose(q, expected, atol=1e-3)
     with pytest.raises(ConfigError, match="no network"):

@@ -171,7 +171,7 @@ def test_it_is_not_there_before_the_robot_stands() -> None:
         course = navigator.step(here, True, DT)
         assert not course.arrived
         assert course.twist == Twist()
-    rest = [navigator.step(here, False, DT).arrived for _ in range(200)]
+    rest = [navigator.step(here, False, DT).arrived for _ in range(300)]
     config = GoToConfig()
     assert rest.index(True) == pytest.approx((config.settle + config.rest) / DT, abs=1)
 
