@@ -163,6 +163,20 @@ def test_the_soles_friction_is_the_option() -> None:
     assert abs(slips[1]) < 0.0005
 
 
+def test_without_slip_the_soles_creep_less() -> None:
+    creep = []
+    for rounds in (0, 10):
+        robot = twin(noslip=rounds)
+        robot.release()
+        run(robot, 0.6)
+        before = robot.truth.soles()
+        run(robot, 1.0)
+        creep.append(np.abs(robot.truth.soles() - before)[:, :, :2].mean())
+    assert creep[1] < 0.5 * creep[0]
+    with pytest.raises(ConfigError, match="noslip is from 0 to 100"):
+        twin(noslip=-1)
+
+
 def test_a_payload_hangs_at_the_grasp_frame() -> None:
     bare, laden = twin(), twin(payload=[1.0, 2.5])
     assert weight(laden) - weight(bare) == pytest.approx(3.5 * 9.81)

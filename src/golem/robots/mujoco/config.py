@@ -36,6 +36,7 @@ class MujocoConfig:
         self_collision: whether limbs stop each other; by default where the robot stands on the ground.
         feet: what the soles are to the floor.
         cone: friction cone of the solver; by default the pack's bores need an elliptic one, other worlds do without.
+        noslip: rounds of MuJoCo's no-slip solver, which ends what is left of the soles' creep under side load.
         friction: sliding friction of the soles on whatever they stand on.
         payload: mass fixed in the left and the right hand, at the grasp frame [kg].
         latency: delay of motor commands on top of the profile's [s].
@@ -55,6 +56,7 @@ class MujocoConfig:
     self_collision: bool | None = None
     feet: Feet = "spheres"
     cone: Literal["pyramidal", "elliptic"] | None = None
+    noslip: int = 0
     friction: float = FOOT_FRICTION
     payload: tuple[float, float] = (0.0, 0.0)
     latency: float = 0.0
@@ -69,6 +71,7 @@ class MujocoConfig:
         for name, value, least, most in (
             ("slope", self.slope, 0.0, 0.5),
             ("rubble", self.rubble, 0.0, 0.2),
+            ("noslip", self.noslip, 0, 100),
             ("friction", self.friction, 0.01, 5.0),
             ("payload", self.payload[0], 0.0, 20.0),
             ("payload", self.payload[1], 0.0, 20.0),

@@ -80,6 +80,7 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
         spec.option.cone = mujoco.mjtCone.__members__[f"mjCONE_{config.cone.upper()}"]
     if config.support == "ground":
         spec.option.impratio = STICTION
+    spec.option.noslip_iterations = config.noslip
     spec.option.timestep = COARSE_STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     return Scene(spec.compile(), names, layout, tuple(draws))
