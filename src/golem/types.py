@@ -242,6 +242,11 @@ class PlanarPose:
         x, y = other.x - self.x, other.y - self.y
         return PlanarPose(c * x + s * y, c * y - s * x, wrap(other.yaw - self.yaw))
 
+    def toward(self, other: PlanarPose, share: float) -> PlanarPose:
+        """Return the pose that is `share` of the way to `other`, both given in one frame; they are near each other."""
+        step = self.to(other)
+        return self @ PlanarPose(share * step.x, share * step.y, share * step.yaw)
+
 
 def wrap(angle: float) -> float:
     """Return `angle` [rad] between -pi and pi."""

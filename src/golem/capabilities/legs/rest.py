@@ -52,10 +52,9 @@ class Rest:
             # The mean over a stance, because a sole rolls and the estimate trembles; at rest the newest is the best.
             self._samples[k] = self._samples[k] + 1 if planted and moving else int(planted)
             if planted:
-                step = self._prints[k].to(PlanarPose.of(foot))
-                self._prints[k] = self._prints[k] @ _share(step, 1.0 / self._samples[k])
+                self._prints[k] = self._prints[k].toward(PlanarPose.of(foot), 1.0 / self._samples[k])
         left, right = self._prints
-        middle = left @ _share(left.to(right), 0.5)
+        middle = left.toward(right, 0.5)
         here = PlanarPose.of(base)
         if not moving:
             self.pose = HERE
@@ -66,9 +65,4 @@ class Rest:
         self._stood = 0.0
         if self._stance is not None:
             expected = here.to(middle @ self._stance)
-            self.pose = self.pose @ _share(self.pose.to(expected), dt / (SMOOTHING + dt))
-
-
-def _share(step: PlanarPose, share: float) -> PlanarPose:
-    """Return that share of a small step."""
-    return PlanarPose(share * step.x, share * step.y, share * step.yaw)
+            self.pose = self.pose.toward(expected, dt / (SMOOTHING + dt))

@@ -28,7 +28,7 @@ class TrimConfig:
     """
 
     gain: float = 0.8
-    most: tuple[float, float, float] = (0.15, 0.15, 0.25)
+    most: tuple[float, float, float] = (0.15, 0.15, 0.4)
     heed: tuple[float, float, float] = (0.15, 0.15, 0.15)
     smoothing: float = 0.7
 
