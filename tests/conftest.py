@@ -13,6 +13,10 @@ from hypothesis import settings
 if sys.platform == "linux" and not os.environ.get("DISPLAY"):
     os.environ.setdefault("MUJOCO_GL", "egl")
 
+# The processes of pytest-xdist fill the cores by themselves; threads of theirs beside that wait for each other by
+# spinning, and a trainer's test took more than its two minutes. Read at the first import of torch and OpenBLAS.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 # The same examples every run: a failure is repeatable, and a loaded machine is no failure.
 settings.register_profile("golem", derandomize=True, deadline=None)
 settings.load_profile("golem")
