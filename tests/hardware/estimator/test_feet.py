@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import pytest
 from golem.hardware.estimator.attitude import Attitude
 from golem.hardware.estimator.feet import Feet, FeetConfig
 from golem.robots.model.imu import TORSO, base_rate
-from golem.types import LowState
+from golem.robots.model.legs import Legs
+from golem.types import LEGS, NUM_JOINTS, LowState
 
 DT = 0.002
 
@@ -67,3 +69,31 @@ def test_the_pressure_is_where_mujoco_has_it(world: Callable[..., Any]) -> None:
         places.append(feet.local)
     assert np.ptp(np.array(places)[100:, :, 0]) > 0.02
     assert np.abs(np.array(errors)[100:, :, :2]).max() < 0.01
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_a_foot_on_the_other_one_does_not_stand_on_the_ground(
+    world: Callable[..., Any], beside: bool
+) -> None:
+    """The right leg is raised and carries 600 N, the left one, which it pins to the ground in one case, hangs."""
+    state = world().advance()
+    q = np.zeros(NUM_JOINTS)
+    for hip_pitch in (1, 7):
+        q[hip_pitch], q[hip_pitch + 2], q[hip_pitch + 3] = -0.4, 0.8, -0.4
+    q[8] = 0.27 if beside else 0.45  # right hip roll
+    legs = Legs()
+    legs.update(q[LEGS], np.zeros(12))
+    across, rise = (legs.soles[1] - legs.soles[0])[1:].tolist()
+    assert rise > 0.02 and (abs(across) > 0.1) == beside
+    wrench = np.zeros((2, 6))
+    wrench[:, 2] = -100.0, 600.0
+    tau = np.zeros(NUM_JOINTS)
+    felt = np.einsum("kij,ki->kj", legs.jacobians, wrench)
+    tau[LEGS] = (legs.gravity(q[LEGS], np.array([0.0, 0.0, -9.81])) - felt).ravel()
+    feet = Feet(FeetConfig())
+    feet.step(
+        replace(state, q=q, dq=np.zeros(NUM_JOINTS), tau=tau), np.array([0.0, 0.0, 1.0]), np.zeros(3), DT
+    )
+    expected = (-100.0, 600.0) if beside else (500.0, 0.0)
+    np.testing.assert_allclose(feet.force, expected, atol=5.0)
+    assert feet.contact.argmax() == int(beside)

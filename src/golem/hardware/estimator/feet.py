@@ -17,6 +17,8 @@ GRAVITY = 9.81
 """[m/s^2], as in the twin."""
 _HALF_LENGTH = 0.5 * (SOLE.x[1] - SOLE.x[0])
 _HALF_WIDTH = 0.5 * (SOLE.y[1] - SOLE.y[0])
+_THICKNESS = 0.01
+"""Height above the other foot from which one may stand on it [m]: half of what it takes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +88,7 @@ class Feet:
         legs.update(state.q[LEGS], state.dq[LEGS])
         wrench = self._force.step(legs, state, -GRAVITY * up, dt)
         self.force = wrench[:, :3] @ up
+        self._stand_on_foot(up)
         self.contact, weight = self._contact.step(self.force, dt)
         turn = legs.twists[:, 3:]
         rate = (turn + omega) / config.turning
@@ -101,6 +104,22 @@ class Feet:
         apart = self.rates[0] - self.rates[1] + skew(omega) @ (self.points[0] - self.points[1])
         lesser = int(self.force[1] < self.force[0])
         self.weight[lesser] /= 1.0 + float(apart @ apart) / config.sliding**2
+
+    def _stand_on_foot(self, up: Array) -> None:
+        """Give what a foot carries that stands on the other one to that one, which it pins to the ground.
+
+        Pushed to a side, a robot that walks may cross its legs. The leg of the lower foot then feels no load.
+        """
+        legs = self._legs
+        apart = legs.soles[0] - legs.soles[1]
+        rise = float(apart @ up)
+        if abs(rise) < _THICKNESS:
+            return
+        lower = int(rise > 0.0)
+        x, y, _ = (apart @ legs.rotations[lower]).tolist()
+        if abs(x) < 2.0 * _HALF_LENGTH and abs(y) < 2.0 * _HALF_WIDTH:
+            self.force[lower] += self.force[1 - lower]
+            self.force[1 - lower] = 0.0
 
     def _pressure(self, force: list[float], moment: list[float]) -> tuple[float, float, float]:
         normal = force[2]
