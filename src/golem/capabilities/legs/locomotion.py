@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from golem.capabilities.legs.apart import Apart, ApartConfig
 from golem.capabilities.legs.balance import balance_errors
 from golem.capabilities.legs.base import LegCommand, LowerBody, Motion, follows
 from golem.capabilities.legs.blend import Blend
@@ -41,6 +42,7 @@ class LocomotionConfig:
             jump of the targets in the middle of a step drives a light foot beyond its speed limit].
         gate_rate: how often gait clock and trim run at most [Hz]; controllers may be faster.
         trim: how the twist is corrected by the estimated velocity.
+        apart: how the feet are kept from crossing.
     """
 
     dead_band: float = 0.1
@@ -50,6 +52,7 @@ class LocomotionConfig:
     blend: float = 0.15
     gate_rate: float = 100.0
     trim: TrimConfig = field(default_factory=TrimConfig)
+    apart: ApartConfig = field(default_factory=ApartConfig)
 
 
 class Locomotion:
@@ -71,6 +74,7 @@ class Locomotion:
         self._paced = Paced(controller)
         self._blend = Blend(self.config.blend)
         self._trim = Trim(self.config.trim)
+        self._apart = Apart(self.config.apart)
         self._rest = Rest()
         self._kinematics = Kinematics()
         left, right = self._feet(np.zeros(NUM_JOINTS))[:, :3, 3]
@@ -150,7 +154,9 @@ class Locomotion:
             self._since_gate = 0.0
         commanded = waits or self.applied != ZERO
         motion = Motion(self._trimmed, self.gait.phases, bool(self.gait.stepping), commanded)
-        return self._blend.step(self._paced.step(state, base, motion, dt), dt)
+        command = self._blend.step(self._paced.step(state, base, motion, dt), dt)
+        swings = self.gait.stepping & (motion.phase >= self.gait.config.stance)
+        return self._apart.step(command, state, swings)
 
     def _forget(self) -> None:
         self.commanded = self.applied = self._trimmed = ZERO

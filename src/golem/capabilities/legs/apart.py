@@ -1,0 +1,69 @@
+"""Keeps a foot that swings beside the other one.
+
+Shoved to a side, a robot that walks may set a foot down on the other one or across it, because its policy's targets say
+so or because the leg lags behind them. Seen coming, it is prevented at one joint: the hip roll of the leg that swings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from golem.capabilities.legs.base import LegCommand
+from golem.capabilities.legs.gait import Bools
+from golem.robots.model.legs import LEG, Legs
+from golem.robots.model.table import JOINT_NAMES
+from golem.types import LEGS, LowState
+
+_ROLL = JOINT_NAMES.index("left_hip_roll_joint")
+_Y = 1
+
+
+@dataclass(frozen=True, slots=True)
+class ApartConfig:
+    """Options of `Apart`.
+
+    Attributes:
+        least: distance of the soles' centres across base_link below which the leg that swings is led outward [m]: soles
+            are 0.08 m wide; 0 leads nobody.
+        lead: how far ahead it is extrapolated from how the feet move now [s]: what a leg needs to answer.
+        gain: change of the hip roll's target per angle that is missing: the leg lags behind it by most of it.
+        most: largest change [rad].
+    """
+
+    least: float = 0.15
+    lead: float = 0.1
+    gain: float = 3.0
+    most: float = 0.8
+
+
+class Apart:
+    """The correction of one robot's leg targets."""
+
+    def __init__(self, config: ApartConfig | None = None) -> None:
+        """Follow `config`."""
+        self.config = config or ApartConfig()
+        self._legs = Legs()
+
+    def step(self, command: LegCommand, state: LowState, swings: Bools) -> LegCommand:
+        """Return what the legs are told instead of `command`.
+
+        Args:
+            command: of the controller.
+            state: measured joints.
+            swings: (2,) whether the left and the right leg swing.
+        """
+        if not swings.any():
+            return command
+        config, legs = self.config, self._legs
+        legs.update(state.q[LEGS], state.dq[LEGS])
+        across = legs.soles[:, _Y] + config.lead * legs.twists[:, _Y]
+        missing = config.least - float(across[0] - across[1])
+        if missing <= 0.0:
+            return command
+        lever = legs.jacobians[:, _Y, _ROLL]
+        change = np.clip(config.gain * missing / lever, -config.most, config.most) * swings
+        q = command.q.copy()
+        q[_ROLL::LEG] += (1.0, -1.0) * change
+        return replace(command, q=q)

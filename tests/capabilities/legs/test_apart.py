@@ -1,0 +1,89 @@
+"""Feet that are about to cross: who is led outward, and when nobody is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.capabilities.legs.recorder import Recorder, crouching, still
+
+from golem.capabilities.legs.apart import Apart, ApartConfig
+from golem.capabilities.legs.base import LegCommand
+from golem.capabilities.legs.locomotion import Locomotion
+from golem.robots.model.legs import Legs
+from golem.types import LEGS, SIDES, Array, LowState, Twist
+
+ROLLS = {"left": 2, "right": 8}
+SWINGS = {"left": np.array([True, False]), "right": np.array([False, True])}
+
+
+def leaning(angle: float, rate: float = 0.0) -> LowState:
+    """A robot whose legs both lean inward by `angle` [rad], and at `rate` [rad/s]."""
+    state = crouching()
+    q, dq = state.q.copy(), state.dq.copy()
+    for roll, share in zip(ROLLS.values(), (-1.0, 1.0), strict=True):
+        q[roll] += share * angle
+        dq[roll] += share * rate
+    return replace(state, q=q, dq=dq)
+
+
+def distance(q: Array) -> float:
+    """Distance of the soles across base_link at the leg joints `q` (12,) [m]."""
+    legs = Legs()
+    legs.update(q, np.zeros(12))
+    return float(legs.soles[0, 1] - legs.soles[1, 1])
+
+
+def command() -> LegCommand:
+    return LegCommand(np.zeros(12), np.full(12, 100.0), np.full(12, 2.0), np.zeros(12))
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_only_the_hip_roll_of_the_leg_that_swings_is_led_outward(side: str) -> None:
+    state = leaning(0.15)
+    missing = ApartConfig().least - distance(state.q[LEGS])
+    assert missing > 0.04
+    change = Apart().step(command(), state, SWINGS[side]).q
+    assert np.flatnonzero(change).tolist() == [ROLLS[side]]
+    # Told to be there at once, without the gain that makes up for the leg's lag, it would stand as far off as wanted.
+    q = state.q[LEGS] + change / ApartConfig().gain
+    assert distance(q) == pytest.approx(ApartConfig().least, abs=0.005)
+
+
+@pytest.mark.parametrize(("rate", "led"), [(0.0, False), (1.0, True), (-1.0, False)])
+def test_feet_that_will_soon_be_too_near_are_seen_coming(rate: float, led: bool) -> None:
+    state = leaning(0.05, rate)
+    assert distance(state.q[LEGS]) > ApartConfig().least + 0.05
+    assert Apart().step(command(), state, SWINGS["left"]).q.any() == led
+
+
+def test_the_change_is_bounded() -> None:
+    change = Apart().step(command(), leaning(0.4, rate=3.0), SWINGS["right"]).q
+    assert change[ROLLS["right"]] == pytest.approx(-ApartConfig().most)
+
+
+def test_nothing_else_is_touched() -> None:
+    said = command()
+    assert Apart().step(said, leaning(0.15), np.array([False, False])) is said
+    assert Apart().step(said, leaning(0.0), SWINGS["left"]) is said
+    assert Apart(ApartConfig(least=0.0)).step(said, leaning(0.15), SWINGS["left"]) is said
+    led = Apart().step(said, leaning(0.15), SWINGS["left"])
+    assert not said.q.any()
+    assert led.kp is said.kp and led.kd is said.kd and led.tau is said.tau
+
+
+def test_the_base_layer_leads_whichever_foot_its_clock_swings() -> None:
+    """The robot of this test does not move, so its feet stay too near."""
+    controller = Recorder()
+    layer = Locomotion(controller)
+    state = leaning(0.15)
+    layer.reset(state)
+    led = {side: 0 for side in SIDES}
+    for _ in range(100):
+        q = layer.step(state, still(), Twist(0.3), 0.02).q
+        swings = layer.gait.phases >= layer.gait.config.stance
+        assert [bool(q[roll]) for roll in ROLLS.values()] == swings.tolist()
+        for side, swing in zip(SIDES, swings, strict=True):
+            led[side] += int(swing)
+    assert min(led.values()) > 20
