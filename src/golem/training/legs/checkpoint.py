@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 
-from golem.errors import ConfigError
+from golem.errors import ConfigError, unknown_name
 from golem.types import Array
 
 CHECKPOINT = "checkpoint.pt"
@@ -40,15 +41,36 @@ def read_curve(run: Path) -> dict[str, Array]:
     Raises:
         ConfigError: there is none, or it is empty.
     """
-    path = run / CURVE
+    return _columns(run / CURVE, _rows(run / CURVE))
+
+
+def read_table(table: Path, name: str) -> dict[str, Array]:
+    """Return the columns of the run `name` in a table that `curve.draw_curves` wrote.
+
+    Raises:
+        ConfigError: there is no such table, or no such run in it.
+    """
+    runs: dict[str, list[dict[str, str]]] = {}
+    for row in _rows(table):
+        runs.setdefault(row.pop("run", ""), []).append(row)
+    if name not in runs:
+        raise unknown_name(f"run of {table}", name, runs)
+    return _columns(table, runs[name])
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
     try:
         with path.open() as file:
-            rows = list(csv.DictReader(file))
-        return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+            return list(csv.DictReader(file))
     except OSError as error:
         raise ConfigError(
             f"The curve {path} cannot be read: {error.strerror}; name folders of runs."
         ) from error
+
+
+def _columns(path: Path, rows: Sequence[Mapping[str, str]]) -> dict[str, Array]:
+    try:
+        return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
     except (IndexError, KeyError, ValueError, TypeError) as error:
         raise ConfigError(f"{path} is no learning curve of 'golem train legs run'.") from error
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from golem.errors import ConfigError
-from golem.training.legs.checkpoint import CURVE, read_curve
+from golem.training.legs.checkpoint import CURVE, read_curve, read_table
+from golem.types import Array
 
 PANELS = (
     ("survival", "how much of its episode a robot survives", 1.0),
@@ -29,18 +31,47 @@ KEPT = (
 """Columns of the table beside the picture."""
 THIN = 5
 """Updates per row of it."""
+SMOOTH = 10
+"""Updates whose mean is drawn: few episodes end in one."""
 COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#888888", "#000000")
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One run.
+
+    Attributes:
+        name: how the picture calls it.
+        columns: what it says, one value per row.
+        thin: updates per row.
+    """
+
+    name: str
+    columns: dict[str, Array]
+    thin: int
+
+    @classmethod
+    def of(cls, run: Path) -> Curve:
+        """Return the curve of a run's folder, or of TABLE.csv:RUN, a run of a table from here.
+
+        Raises:
+            ConfigError: there is none.
+        """
+        table, colon, name = str(run).rpartition(":")
+        if colon and table.endswith(".csv"):
+            return cls(name, read_table(Path(table), name), THIN)
+        return cls(run.resolve().name, read_curve(run), 1)
 
 
 def draw_curves(runs: Sequence[Path], out: Path) -> None:
     """Draw what the run folders' curves say, one colour a run, over millions of steps, and tabulate every fifth update.
 
     Args:
-        runs: folders of training runs.
+        runs: folders of training runs, or TABLE.csv:RUN for one of an earlier table.
         out: the PNG file; the table is the CSV file beside it.
 
     Raises:
-        ConfigError: more runs than colours, two folders of one name, or the table would replace a run's own curve.
+        ConfigError: more runs than colours, two of one name, no such curve, or the table would replace a run's own.
     """
     table = out.with_suffix(".csv")
     if table.resolve() in [(run / CURVE).resolve() for run in runs]:
@@ -49,10 +80,10 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         )
     if len(runs) > len(COLOURS):
         raise ConfigError(f"One picture shows {len(COLOURS)} runs at most, not {len(runs)}; draw two.")
-    curves = {run.resolve().name: read_curve(run) for run in runs}
-    if len(curves) < len(runs):
+    curves = [Curve.of(run) for run in runs]
+    if len({curve.name for curve in curves}) < len(curves):
         raise ConfigError("The picture names the runs by their folders; give them different names.")
-    last = max(float(curve["steps"][-1]) for curve in curves.values())
+    last = max(float(curve.columns["steps"][-1]) for curve in curves)
     image = Image.new("RGB", (SIZE[0] * len(PANELS), SIZE[1] + 20 * len(curves)), "white")
     pen, font = ImageDraw.Draw(image), ImageFont.load_default(12)
     left, top, right, bottom = MARGIN
@@ -67,23 +98,24 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         for k in range(5):
             x = x0 + width * k / 4
             pen.text((x, top + height + 8), f"{last * k / 4e6:.1f}M", fill="black", font=font, anchor="ma")
-        for curve, colour in zip(curves.values(), COLOURS, strict=False):
-            # A mean over ten updates: few episodes end in one.
-            values = np.convolve(curve[column], np.full(10, 0.1), mode="valid")
-            steps = curve["steps"][-len(values) :]
+        for curve, colour in zip(curves, COLOURS, strict=False):
+            rows = SMOOTH // curve.thin
+            values = np.convolve(curve.columns[column], np.full(rows, 1.0 / rows), mode="valid")
+            steps = curve.columns["steps"][-len(values) :]
             points = [
                 (x0 + width * s / last, top + height * (1 - min(v / most, 1.0)))
                 for s, v in zip(steps, values, strict=True)
             ]
             pen.line(points, fill=colour, width=2)
-    for k, (name, colour) in enumerate(zip(curves, COLOURS, strict=False)):
+    for k, (curve, colour) in enumerate(zip(curves, COLOURS, strict=False)):
         y = SIZE[1] + 20 * k
         pen.line([(left, y + 6), (left + 24, y + 6)], fill=colour, width=3)
-        pen.text((left + 32, y), name, fill="black", font=font)
+        pen.text((left + 32, y), curve.name, fill="black", font=font)
     image.save(out)
     with table.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("run", *KEPT))
-        for name, curve in curves.items():
-            columns = (curve[column][::THIN] for column in KEPT)
-            writer.writerows((name, *(f"{value:.5g}" for value in row)) for row in zip(*columns, strict=True))
+        for curve in curves:
+            columns = (curve.columns[name][:: THIN // curve.thin] for name in KEPT)
+            rows = zip(*columns, strict=True)
+            writer.writerows((curve.name, *(f"{value:.5g}" for value in row)) for row in rows)
