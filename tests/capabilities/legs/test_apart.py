@@ -41,7 +41,7 @@ def command() -> LegCommand:
 
 @pytest.mark.parametrize("side", SIDES)
 def test_only_the_hip_roll_of_the_leg_that_swings_is_led_outward(side: str) -> None:
-    state = leaning(0.15)
+    state = leaning(0.2)
     missing = ApartConfig().least - distance(state.q[LEGS])
     assert missing > 0.04
     change = Apart().step(command(), state, SWINGS[side]).q
@@ -51,7 +51,7 @@ def test_only_the_hip_roll_of_the_leg_that_swings_is_led_outward(side: str) -> N
     assert distance(q) == pytest.approx(ApartConfig().least, abs=0.005)
 
 
-@pytest.mark.parametrize(("rate", "led"), [(0.0, False), (1.0, True), (-1.0, False)])
+@pytest.mark.parametrize(("rate", "led"), [(0.0, False), (1.5, True), (-1.5, False)])
 def test_feet_that_will_soon_be_too_near_are_seen_coming(rate: float, led: bool) -> None:
     state = leaning(0.05, rate)
     assert distance(state.q[LEGS]) > ApartConfig().least + 0.05
@@ -65,10 +65,10 @@ def test_the_change_is_bounded() -> None:
 
 def test_nothing_else_is_touched() -> None:
     said = command()
-    assert Apart().step(said, leaning(0.15), np.array([False, False])) is said
+    assert Apart().step(said, leaning(0.2), np.array([False, False])) is said
     assert Apart().step(said, leaning(0.0), SWINGS["left"]) is said
-    assert Apart(ApartConfig(least=0.0)).step(said, leaning(0.15), SWINGS["left"]) is said
-    led = Apart().step(said, leaning(0.15), SWINGS["left"])
+    assert Apart(ApartConfig(least=0.0)).step(said, leaning(0.2), SWINGS["left"]) is said
+    led = Apart().step(said, leaning(0.2), SWINGS["left"])
     assert not said.q.any()
     assert led.kp is said.kp and led.kd is said.kd and led.tau is said.tau
 
@@ -77,7 +77,7 @@ def test_the_base_layer_leads_whichever_foot_its_clock_swings() -> None:
     """The robot of this test does not move, so its feet stay too near."""
     controller = Recorder()
     layer = Locomotion(controller)
-    state = leaning(0.15)
+    state = leaning(0.2)
     layer.reset(state)
     led = {side: 0 for side in SIDES}
     for _ in range(100):
