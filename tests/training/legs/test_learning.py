@@ -57,25 +57,28 @@ def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(
     with monkeypatch.context() as changed, pytest.raises(ConfigError, match="other rewards"):
         changed.setitem(TASKS, "walk", replace(TASKS["walk"], fall=7.0))
         train(small(tmp_path / "a", updates=12, learned_from=0.0))
-    draw_curves([tmp_path / name for name in "abc"], tmp_path / "curve.png")
+    curves = tmp_path / "curves"
+    draw_curves([tmp_path / name for name in "abc"], curves / "curve.png")
+    with pytest.raises(ConfigError, match=r"ends in \.png, not"):
+        draw_curves([tmp_path / "a"], curves / "curve.jpg")
     with pytest.raises(ConfigError, match="8 runs at most, not 9"):
         draw_curves([tmp_path / "a"] * 9, tmp_path / "curve.png")
     with pytest.raises(ConfigError, match="would replace the run's own curve.csv"):
         draw_curves([tmp_path / "a"], tmp_path / "a" / "curve.png")
     with pytest.raises(ConfigError, match="different names"):
         draw_curves([tmp_path / "a"] * 2, tmp_path / "curve.png")
-    assert (tmp_path / "curve.png").stat().st_size > 1000
-    with (tmp_path / "curve.csv").open() as file:
+    assert (curves / "curve.png").stat().st_size > 1000
+    with (curves / "curve.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert {row["run"] for row in rows} == set("abc")
     assert float(rows[0]["steps"]) == read_curve(tmp_path / "a")["steps"][0]
-    draw_curves([tmp_path / "curve.csv:b", tmp_path / "a"], tmp_path / "again.png")
+    draw_curves([curves / "curve.csv:b", tmp_path / "a"], tmp_path / "again.png")
     with (tmp_path / "again.csv").open() as file:
         assert [row for row in csv.DictReader(file) if row["run"] == "b"] == [
             r for r in rows if r["run"] == "b"
         ]
     with pytest.raises(ConfigError, match="Unknown run of .*curve.csv 'd'; valid: a, b, c"):
-        draw_curves([tmp_path / "curve.csv:d"], tmp_path / "again.png")
+        draw_curves([curves / "curve.csv:d"], tmp_path / "again.png")
 
 
 def test_rows_of_the_curve_that_are_learned_again_are_left_out(tmp_path: Path) -> None:

@@ -71,8 +71,11 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         out: the PNG file; the table is the CSV file beside it.
 
     Raises:
-        ConfigError: more runs than colours, two of one name, no such curve, or the table would replace a run's own.
+        ConfigError: more runs than colours, two of one name, no such curve, `out` is no PNG file, or the table would
+            replace a run's own.
     """
+    if out.suffix != ".png":
+        raise ConfigError(f"The picture is a file that ends in .png, not {out}; the table goes beside it.")
     table = out.with_suffix(".csv")
     if table.resolve() in [(run / CURVE).resolve() for run in runs]:
         raise ConfigError(
@@ -111,6 +114,7 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         y = SIZE[1] + 20 * k
         pen.line([(left, y + 6), (left + 24, y + 6)], fill=colour, width=3)
         pen.text((left + 32, y), curve.name, fill="black", font=font)
+    out.parent.mkdir(parents=True, exist_ok=True)
     image.save(out)
     with table.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
