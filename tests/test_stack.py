@@ -174,13 +174,16 @@ def test_the_twin_runs_legs_on_board_where_something_speaks_to_them() -> None:
     assert parse_stack("fallback: vendor", "x").legs_on_board == Choice("almi")
     both = "lower_body: {use: handover, walk: {use: vendor}, stand: {use: almi}}"
     assert parse_stack(both, "x").legs_on_board == Choice("almi")
+    whole_name = "lower_body: golem.capabilities.legs.vendor:Vendor"
+    assert parse_stack(whole_name, "x").legs_on_board == Choice("almi")
+    assert parse_stack("lower_body: not_here.py:Mine", "x").legs_on_board is None
     chosen = parse_stack("lower_body: vendor\nonboard: {use: policy, file: x.yaml}", "x")
     assert chosen.legs_on_board == Choice("policy", {"file": "x.yaml"})
 
 
 def test_the_twin_answers_the_calls_that_the_stack_makes() -> None:
     assert parse_stack("lower_body: almi", "x").loco_api == LOCO_APIS["h1"]
-    both = "lower_body: {use: handover, walk: {use: vendor, robot: h2}, stand: {use: almi}}"
+    both = "lower_body: {use: handover, walk: {use: vendor, options: {robot: h2}}, stand: {use: almi}}"
     assert parse_stack(both, "x").loco_api == LOCO_APIS["h2"]
     for wrong in ("h3", "[1]"):
         with pytest.raises(ConfigError, match="loco service .*h1"):

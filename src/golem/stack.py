@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from golem import registry
-from golem.errors import ConfigError, unknown_name
+from golem.capabilities.legs.vendor import Vendor
+from golem.errors import ConfigError, GolemError, unknown_name
 from golem.middleware.unitree_api import LOCO_API, LocoApi, loco_api
 from golem.options import check_values, read_yaml
 
@@ -39,8 +41,18 @@ def _chosen(options: Mapping[str, Any]) -> Iterator[Choice]:
     for value in options.values():
         if isinstance(value, Mapping):
             if "use" in value:
-                yield Choice(value["use"], {name: v for name, v in value.items() if name != "use"})
+                # A part of `handover` has its options under a key of their own.
+                own = value.get("options") if value.keys() == {"use", "options"} else None
+                others = {name: v for name, v in value.items() if name != "use"}
+                yield Choice(value["use"], others if own is None else own)
             yield from _chosen(value)
+
+
+def _is_vendor(use: str) -> bool:
+    """Return whether the lower body `use` speaks to the on-board controller: `vendor`, or a class made of it."""
+    with suppress(GolemError):  # what cannot be loaded is refused where it is to run, which need not be here
+        return use == "vendor" or (":" in use and issubclass(registry.load("lower_body", use), Vendor))
+    return False
 
 
 @dataclass(frozen=True)
@@ -110,7 +122,7 @@ class Stack:
     @property
     def _vendor(self) -> Choice | None:
         choices = (*self.lower_body.all, *self.legs_in_reserve.all)
-        return next((choice for choice in choices if choice.use == "vendor"), None)
+        return next((choice for choice in choices if _is_vendor(choice.use)), None)
 
     @property
     def on_ground(self) -> bool:

@@ -92,6 +92,16 @@ def test_a_users_policy_is_its_description_and_its_network(tmp_path: Path) -> No
         assert before.keys() == after.keys() and before != after
 
 
+def test_a_part_that_a_class_of_a_users_file_plays_is_that_file(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text("one = 1\n")
+    legs = Choice("handover", {"walk": {"use": f"{mine}:Mine"}, "stand": {"use": "almi"}})
+    before = provenance.user_files(Stack(lower_body=legs))
+    mine.write_text("one = 2\n")
+    after = provenance.user_files(Stack(lower_body=legs))
+    assert before.keys() == after.keys() == {"lower_body/walk/use"} and before != after
+
+
 def test_a_digest_does_not_depend_on_the_order_of_keys() -> None:
     assert provenance.digest({"a": 1, "b": [2]}) == provenance.digest({"b": [2], "a": 1})
     assert provenance.digest({"a": 1}) != provenance.digest({"a": 1.5})

@@ -48,8 +48,7 @@ def user_files(stack: Stack) -> dict[str, str]:
         name: choice for name, choice in (("fallback", stack.fallback), ("onboard", stack.onboard)) if choice
     }
     for slot, choice in chosen.items():
-        named = {"use": _source(choice.use.rpartition(":")[0]), **choice.options}
-        for name, path in _named(named).items():
+        for name, path in _named({"use": choice.use, **choice.options}).items():
             found[f"{slot}/{name}"] = hashlib.sha256(path.read_bytes()).hexdigest()
     return found
 
@@ -66,14 +65,15 @@ def _source(module: str) -> str:
 
 
 def _named(options: Mapping[str, Any]) -> dict[str, Path]:
-    """Return the files that options name, whatever their depth, and the network beside a policy's description."""
+    """Return the files that options name, whatever their depth: also those of classes, and a policy's network."""
     found: dict[str, Path] = {}
     for name, value in options.items():
         if isinstance(value, Mapping):
             within = _named(cast(Mapping[str, Any], value))
             found |= {f"{name}/{inner}": path for inner, path in within.items()}
         elif isinstance(value, str):
-            found[name] = Path(value).expanduser()
+            file = _source(value.rpartition(":")[0]) if name == "use" else value
+            found[name] = Path(file).expanduser()
             if found[name].suffix in (".yaml", ".yml"):
                 with suppress(ConfigError):  # another kind of file, or absent: said elsewhere
                     found.setdefault("network", load_description(value)[1])

@@ -153,6 +153,7 @@ class StackSide:
         band: Banded | None,
         latency: float,
         beside: ThreadPoolExecutor | None = None,
+        real: bool = False,
     ) -> None:
         """Build the modules of `stack` around `bus`.
 
@@ -163,9 +164,10 @@ class StackSide:
             band: what is let go once the robot stands, or None.
             latency: what a camera's frame takes on top of its way over the bus [s].
             beside: where the localizer runs; None is on the clock, see `LocalizerNode`.
+            real: whether the robot is none of ours: no module can then call its on-board controller.
 
         Raises:
-            ConfigError: a name or an option of the stack is wrong.
+            ConfigError: a name or an option of the stack is wrong, or a module is to call a real robot's controller.
             ModuleFault: a module's constructor raised, or the module lacks a part of its contract.
         """
         self.stack, self.bus = stack, bus
@@ -177,8 +179,8 @@ class StackSide:
         self.navigator: Navigator = GuardedNavigator(*make("navigator"))
         estimator, estimator_guard = make("estimator")
         localizer, guard = make("localizer")
-        lower_body = make("lower_body", onboard=BusOnboard(bus))
-        reserve = make("lower_body", stack.legs_in_reserve, onboard=BusOnboard(bus))
+        lower_body = make("lower_body", onboard=None if real else BusOnboard(bus))
+        reserve = make("lower_body", stack.legs_in_reserve, onboard=None if real else BusOnboard(bus))
         self.legs = LowerBodyNode(bus, Legs(*lower_body), Legs(*reserve))
         self.nodes: list[Placed] = [
             (Phase.ESTIMATE, nodes.EstimatorNode(bus, estimator, estimator_guard)),

@@ -73,17 +73,19 @@ def test_nothing_else_is_touched() -> None:
     assert led.kp is said.kp and led.kd is said.kd and led.tau is said.tau
 
 
-def test_the_base_layer_leads_whichever_foot_its_clock_swings() -> None:
-    """The robot of this test does not move, so its feet stay too near."""
+@pytest.mark.parametrize("on_ground", [False, True])
+def test_the_base_layer_leads_the_foot_that_its_clock_swings_unless_it_carries_load(on_ground: bool) -> None:
+    """A controller may keep a cadence of its own. The robot of this test does not move, so its feet stay too near."""
     controller = Recorder()
     layer = Locomotion(controller)
-    state = leaning(0.2)
+    state, base = leaning(0.2), replace(still(), contact=np.full(2, float(on_ground)))
     layer.reset(state)
-    led = {side: 0 for side in SIDES}
+    swung = {side: 0 for side in SIDES}
     for _ in range(100):
-        q = layer.step(state, still(), Twist(0.3), 0.02).q
+        q = layer.step(state, base, Twist(0.3), 0.02).q
         swings = layer.gait.phases >= layer.gait.config.stance
-        assert [bool(q[roll]) for roll in ROLLS.values()] == swings.tolist()
+        led = np.array([bool(q[roll]) for roll in ROLLS.values()])
+        assert led.tolist() == (swings & (not on_ground)).tolist()
         for side, swing in zip(SIDES, swings, strict=True):
-            led[side] += int(swing)
-    assert min(led.values()) > 20
+            swung[side] += int(swing)
+    assert min(swung.values()) > 20

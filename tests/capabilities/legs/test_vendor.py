@@ -248,5 +248,5 @@ def test_wrong_options_are_named(config: VendorConfig, words: list[str]) -> None
 
 
 def test_a_client_with_nobody_to_speak_to_is_refused() -> None:
-    with pytest.raises(ConfigError, match="only a stack connects"):
+    with pytest.raises(ConfigError, match="only a stack that runs on a twin connects"):
         Vendor()

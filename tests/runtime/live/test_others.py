@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -148,10 +149,33 @@ def test_images_of_another_clock_are_refused_with_a_remedy(
     assert capsys.readouterr().out.count("use_sim_time") == 1
 
 
-def test_the_real_robots_own_leg_controller_is_not_commanded_against(live: Live) -> None:
-    live.stack = replace(live.stack, lower_body=Choice("vendor"))
-    with pytest.raises(ConfigError, match="moves its legs itself"):
-        live.start_up(real=True)
+def test_the_real_robots_own_leg_controller_is_not_commanded_against(live: Live, tmp_path: Path) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text("from golem.capabilities.legs.vendor import Vendor\n\nclass Mine(Vendor):\n    pass\n")
+    for legs in (
+        Choice("vendor"),
+        Choice("golem.capabilities.legs.vendor:Vendor"),
+        Choice(f"{mine}:Mine"),
+        Choice("handover", {"walk": {"use": f"{mine}:Mine"}, "stand": {"use": "almi"}}),
+    ):
+        live.stack = replace(live.stack, lower_body=legs)
+        with pytest.raises(ConfigError, match="moves its legs itself"):
+            live.start_up(real=True)
+
+
+def test_no_module_of_a_real_robots_stack_can_call_its_own_controller(live: Live, tmp_path: Path) -> None:
+    """Also one that hides that it does."""
+    mine = tmp_path / "hidden.py"
+    mine.write_text(
+        "from golem.capabilities.legs.vendor import Vendor\n\n"
+        "class Mine:\n    def __new__(cls, onboard): return Vendor(onboard=onboard)\n"
+    )
+    live.stack = replace(live.stack, lower_body=Choice(f"{mine}:Mine"))
+    live.start_twin()
+    live.start_gate()
+    live.start_up(real=True)
+    with pytest.raises(ConfigError, match="only a stack that runs on a twin"):
+        live.run(0.1)
 
 
 def test_a_gate_that_fails_can_still_damp(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:

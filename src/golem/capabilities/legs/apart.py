@@ -52,7 +52,7 @@ class Apart:
         Args:
             command: of the controller.
             state: measured joints.
-            swings: (2,) whether the left and the right leg swing.
+            swings: (2,) whether the left and the right leg swing, and carry no load.
         """
         if not swings.any():
             return command

@@ -156,7 +156,7 @@ class Locomotion:
         motion = Motion(self._trimmed, self.gait.phases, bool(self.gait.stepping), commanded)
         command = self._blend.step(self._paced.step(state, base, motion, dt), dt)
         swings = self.gait.stepping & (motion.phase >= self.gait.config.stance)
-        return self._apart.step(command, state, swings)
+        return self._apart.step(command, state, swings & (base.contact < 0.5))
 
     def _forget(self) -> None:
         self.commanded = self.applied = self._trimmed = ZERO

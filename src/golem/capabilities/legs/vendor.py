@@ -90,7 +90,7 @@ class Vendor:
         self.config = c = config or VendorConfig()
         if onboard is None:
             raise ConfigError(
-                "lower_body: vendor needs the robot's own computer, which only a stack connects to."
+                "lower_body: vendor needs the robot's own computer, which only a stack that runs on a twin connects to."
             )
         times = {name: getattr(c, name) for name in ("timeout", "stand_up", "refresh", "duration")}
         rows = ((n, t, 0.0 < t < math.inf, "a positive time in seconds") for n, t in times.items())

@@ -34,6 +34,7 @@ from golem.runtime.live.robot_out import ClockOut, FramesOut, JointsOut, describ
 from golem.runtime.live.skills import Skills
 from golem.runtime.live.stack_in import CameraIn, GateIn, RemoteBand, listen
 from golem.runtime.live.surface import Poll, Surface
+from golem.runtime.live.watch import LegsWatch
 from golem.runtime.sides import StackSide
 from golem.stack import Stack
 from golem.types import SIDES, Array
@@ -146,7 +147,9 @@ class LiveStack:
             camera.close()
         if self._band is not None:
             self._band.renew()
-        side = self.side = StackSide(bus, self._stack, self._calibration, self._band, 0.0, self._beside)
+        side = self.side = StackSide(
+            bus, self._stack, self._calibration, self._band, 0.0, self._beside, self._real
+        )
         side.legs.realtime = self._real
         self._skills.attach(side, t)
         service, identities = self._stack.loco_api.service, Identities()
@@ -163,6 +166,7 @@ class LiveStack:
             (Phase.SEND, out.LegsOut(bus, surface)),
             (Phase.SEND, CallsOut(bus, service, self._calls, identities)),
             (Phase.SEND, self._skills),
+            (Phase.SEND, LegsWatch(bus, self._tell)),
             *((Phase.SEND, camera) for camera in self._cameras),
             *((Phase.SEND, out.SightingsOut(bus, surface, name)) for name in public.CAMERAS),
             *((Phase.SEND, out.HandCommandOut(bus, surface, hand)) for hand in SIDES),
