@@ -29,8 +29,19 @@ from golem.training.legs.ppo import Actor, Ppo, PpoConfig
 from golem.training.legs.train import Adversary, TrainConfig, _Run, train
 
 
-def small(out: Path, seed: int = 0, updates: int = 2, **changes: object) -> TrainConfig:
-    return TrainConfig(out=out, seed=seed, robots=8, steps=8 * 24 * updates, threads=1, **changes)  # type: ignore[arg-type]
+def small(
+    out: Path, seed: int = 0, updates: int = 2, *, robots: int = 8, threads: int = 1, **changes: Any
+) -> TrainConfig:
+    return TrainConfig(
+        out=out, seed=seed, robots=robots, steps=robots * 24 * updates, threads=threads, **changes
+    )
+
+
+def test_the_number_of_threads_changes_nothing(tmp_path: Path) -> None:
+    for threads in (1, 2):
+        train(small(tmp_path / str(threads), robots=512, updates=1, threads=threads))
+    one, two = (load_actor(tmp_path / str(threads) / CHECKPOINT).net[0].weight for threads in (1, 2))
+    assert torch.equal(one, two)
 
 
 def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(

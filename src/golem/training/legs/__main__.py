@@ -39,7 +39,7 @@ def run(
         adversary: who works against the legs through arms, waist and payloads: none, motions (a curriculum), or learned
             (motions, then a policy as well).
         robots: how many are simulated at once.
-        threads: of physics and networks.
+        threads: of the physics; the result is the same with any number.
         start: checkpoint of another run to go on from, under this command's options; or an exported network, at
             full difficulty from its first step on.
     """

@@ -54,6 +54,7 @@ def shove_all(network: Path, impulse: float, n: int, seed: int, threads: int) ->
         raise ConfigError(
             "Give --impulse more than 0, -n 1 or more, --threads 1 or more and --seed 0 or more."
         )
+    torch.set_num_threads(1)
     actor = load_actor(network)
     env = LegsEnv(n * len(DIRECTIONS), TASKS["stand"], seed, threads)
     env.difficulty.amplitude = env.difficulty.speed = env.difficulty.payload = 0.0

@@ -39,7 +39,7 @@ class TrainConfig:
         task: what is learned.
         steps: actions of all robots together, e.g. 38e6.
         robots: how many are simulated at once.
-        threads: of the physics and of the networks.
+        threads: of the physics; they change nothing of the result.
         start: what this run begins with, exploring with `noise`: networks and steps of another run's checkpoint, or a
             network that was exported. A run from an exported network counts its steps from none, is at full difficulty
             at once, learned adversary included, and changes the network after `VALUES_FIRST` steps only: until then it
@@ -87,7 +87,8 @@ def train(config: TrainConfig) -> Path:
         config.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"Cannot write to --out {config.out}: {error.strerror}; choose another.") from error
-    torch.set_num_threads(config.threads)
+    # Sums of several threads differ in their last bits, and threads of a busy machine wait for each other.
+    torch.set_num_threads(1)
     torch.manual_seed(config.seed)
     run = _Run(config)
     path = config.out / CHECKPOINT
