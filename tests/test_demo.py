@@ -12,7 +12,7 @@ from golem.demo import Demo, DemoConfig, run_demo
 from golem.errors import ConfigError, GolemError, OutputError
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.run import no_display
-from golem.runtime.assembly import Running, build
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.stack import load_stack
 
 
@@ -46,7 +46,7 @@ def test_a_world_without_screws_is_named(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def upright() -> Iterator[tuple[Running, MujocoRobot]]:
+def upright() -> Iterator[tuple[LockstepRunner, MujocoRobot]]:
     """A robot that has just been let go."""
     running, robot = build(load_stack("stand"), 0)
     running.executor.run(3.0)
@@ -55,7 +55,7 @@ def upright() -> Iterator[tuple[Running, MujocoRobot]]:
 
 
 def test_the_push_at_the_end_is_survived_and_reported(
-    upright: tuple[Running, MujocoRobot], tmp_path: Path
+    upright: tuple[LockstepRunner, MujocoRobot], tmp_path: Path
 ) -> None:
     demo = Demo(DemoConfig(headless=True, out=tmp_path), *upright)
     executor = upright[0].executor
@@ -72,7 +72,7 @@ def test_the_push_at_the_end_is_survived_and_reported(
 
 
 def test_a_robot_that_fell_has_failed_and_the_report_says_so(
-    upright: tuple[Running, MujocoRobot], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    upright: tuple[LockstepRunner, MujocoRobot], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     demo = Demo(DemoConfig(screws=1, headless=True, out=tmp_path), *upright)
     demo.tick()

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from golem.middleware import topics
-from golem.runtime.assembly import Running, build
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.stack import Stack
-from golem.types import BaseEstimate, Frame, LowState
+from golem.types import BaseEstimate, LowState, RgbdImage
 
 # Sees "something" where the depth image is deepest: needs no weights and depends on every pixel.
 EYES = """
@@ -72,7 +72,7 @@ def trace(eyes: Path, seed: int, profile: str) -> Trace:
     states, frames = hashlib.sha256(), hashlib.sha256()
     counts = dict.fromkeys(robot.cameras, 0)
 
-    def record(running: Running) -> None:
+    def record(running: LockstepRunner) -> None:
         state = running.bus.latest(topics.LOW_STATE, LowState)
         base = running.bus.latest(topics.BASE, BaseEstimate)
         assert state is not None and base is not None
@@ -87,8 +87,8 @@ def trace(eyes: Path, seed: int, profile: str) -> Trace:
         ):
             states.update(np.ascontiguousarray(a).tobytes())
         for camera in counts:
-            count = running.bus.count(topics.frames(camera))
-            frame = running.bus.latest(topics.frames(camera), Frame)
+            count = running.bus.count(topics.rgbd_images(camera))
+            frame = running.bus.latest(topics.rgbd_images(camera), RgbdImage)
             if frame is not None and count != counts[camera]:
                 counts[camera] = count
                 for a in (frame.rgb, frame.depth, frame.T_odom_optical):

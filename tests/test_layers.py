@@ -17,7 +17,7 @@ LAYERS = (
     ("hardware",),
     ("capabilities",),
     ("skills",),
-    ("stack", "assembly", "runtime"),
+    ("stack", "runtime", "provenance"),
     ("evaluation", "training", "dashboard", "doctor"),
     ("run", "demo", "cli", "__main__"),
 )

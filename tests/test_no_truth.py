@@ -17,10 +17,10 @@ import pytest
 
 from golem import registry
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.robots.mujoco.push import Pushes
+from golem.robots.mujoco.external_forces import Pushes
 from golem.robots.mujoco.scene import Scene
 from golem.robots.mujoco.truth import Truth
-from golem.runtime.assembly import Running, build
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import Tick
 from golem.skills.pick import Pick, PickGoal
 from golem.skills.walk import Walk
@@ -43,7 +43,7 @@ INSIDERS = (
 # The twin's robot is built from the same table as the model that the modules use.
 BUILDERS = (*INSIDERS, "robots/model")
 # A planner rolls out a model of its own, built from that table; which one it holds is checked below.
-PLANNERS = ("capabilities/legs/mpc/model.py",)
+PLANNERS = ("capabilities/legs/mpc/planning_model.py",)
 SECRETS = {
     "mujoco": (*BUILDERS, *PLANNERS),
     "golem.robots.mujoco": INSIDERS,
@@ -99,13 +99,13 @@ def test_only_insiders_import_the_simulator(path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize(
-    "owner", ["skills/pick.py", "runtime/assembly.py", "hardware/servo/servo.py", "stack.py"]
+    "owner", ["skills/pick.py", "runtime/lockstep.py", "hardware/servo/servo.py", "stack.py"]
 )
 def test_a_secret_import_is_found(leak: str, owner: str) -> None:
     assert secrets(leak, owner) != []
 
 
-HOLDERS = (MujocoRobot, Scene, Truth, Pushes, Running)
+HOLDERS = (MujocoRobot, Scene, Truth, Pushes, LockstepRunner)
 """Who holds the truth, or drives the robot; no module may reach them."""
 TRUTH = (mujoco.MjData, mujoco.MjModel, mujoco.MjSpec, *HOLDERS)
 """The same and the simulation itself, for modules that have none of their own."""

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from golem import registry
+from golem.capabilities.grasping.centroid import Centroid
+from golem.capabilities.grasping.visual_servo import VisualServo
 from golem.errors import ConfigError, ModuleFault
-from golem.skills.grasping.centroid import Centroid
-from golem.skills.grasping.visual_servo import VisualServo
 
 USER_FILE = """
 from __future__ import annotations
@@ -64,7 +64,7 @@ def test_a_registered_name() -> None:
 
 
 def test_a_class_of_an_installed_package() -> None:
-    use = "golem.skills.grasping.centroid:Centroid"
+    use = "golem.capabilities.grasping.centroid:Centroid"
     assert isinstance(registry.create("grasp_method", use, {}), Centroid)
 
 
@@ -167,11 +167,11 @@ def test_a_constructor_that_raises_is_the_modules_fault(user: str) -> None:
 def test_a_new_name_may_be_registered_once(monkeypatch: pytest.MonkeyPatch) -> None:
     table = {slot: dict(names) for slot, names in registry._IMPLEMENTATIONS.items()}
     monkeypatch.setattr(registry, "_IMPLEMENTATIONS", table)
-    registry.register("grasp_method", "mine", "golem.skills.grasping.centroid:Centroid")
-    registry.register("grasp_method", "mine", "golem.skills.grasping.centroid:Centroid")
+    registry.register("grasp_method", "mine", "golem.capabilities.grasping.centroid:Centroid")
+    registry.register("grasp_method", "mine", "golem.capabilities.grasping.centroid:Centroid")
     assert registry.load("grasp_method", "mine") is Centroid
-    with pytest.raises(ConfigError, match="already stands for golem.skills.grasping.centroid:Centroid"):
-        registry.register("grasp_method", "mine", "golem.skills.grasping.visual_servo:VisualServo")
+    with pytest.raises(ConfigError, match="already stands for golem.capabilities.grasping.centroid:Centroid"):
+        registry.register("grasp_method", "mine", "golem.capabilities.grasping.visual_servo:VisualServo")
     with pytest.raises(ConfigError, match=r"Unknown slot 'grasp'.*Did you mean 'grasp_method'"):
         registry.register("grasp", "mine", "a:B")
 

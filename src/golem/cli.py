@@ -185,7 +185,7 @@ def _restart(words: list[str]) -> int:
 
 def _skill(words: list[str]) -> int:
     """Let the robot on a domain do something: pick, walk or stand."""
-    from golem.runtime.live.errand import read_errand, run_errand
+    from golem.runtime.live.skill_client import read_errand, run_errand
 
     errand = read_errand(words)
     return 0 if errand is None else run_errand(errand)
@@ -193,9 +193,9 @@ def _skill(words: list[str]) -> int:
 
 def _topics(words: list[str]) -> int:
     """List what is on a domain, with rates and bytes."""
-    from golem.runtime.live.survey import SurveyConfig, run_survey
+    from golem.runtime.live.topic_stats import TopicStatsConfig, run_topic_stats
 
-    run_survey(_parse(SurveyConfig, "topics", words))
+    run_topic_stats(_parse(TopicStatsConfig, "topics", words))
     return 0
 
 
@@ -208,9 +208,9 @@ def _record(words: list[str]) -> int:
 
 def _replay(words: list[str]) -> int:
     """Play a bag onto a domain."""
-    from golem.middleware.record.commands import ReplayConfig, run_replay
+    from golem.middleware.record.commands import ReplayBagConfig, run_replay
 
-    return 0 if run_replay(_parse(ReplayConfig, "replay", words)) else FAILED
+    return 0 if run_replay(_parse(ReplayBagConfig, "replay", words)) else FAILED
 
 
 def _view(words: list[str]) -> int:

@@ -14,19 +14,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.dashboard.balance import balance_figures, balance_section
+from golem.dashboard.balance_chart import balance_figures, balance_section
 from golem.dashboard.film import Film, shots
 from golem.dashboard.live import LiveView
 from golem.dashboard.page import PickRecord, render_page
-from golem.dashboard.scene import SpectatorView
 from golem.dashboard.status import Timeline
 from golem.errors import ConfigError, OutputError
-from golem.evaluation.balance import BalanceRecorder
 from golem.evaluation.oracle import Oracle
-from golem.evaluation.pushes import Pusher, shove
+from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
+from golem.robots.mujoco.shoves import Pusher, shove
+from golem.robots.mujoco.spectator import SpectatorView
 from golem.run import Narrator, no_display, on_air, shown
-from golem.runtime.assembly import Running, build
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import load_stack
@@ -94,7 +94,7 @@ class Demo:
     def __init__(
         self,
         config: DemoConfig,
-        running: Running,
+        running: LockstepRunner,
         robot: MujocoRobot,
         show: Callable[[], None] = lambda: None,
     ) -> None:
@@ -280,7 +280,7 @@ def run_demo(config: DemoConfig) -> DemoResult:
         return _shown(demo, running, view)
 
 
-def _filmed(config: DemoConfig, demo: Demo, running: Running, robot: MujocoRobot) -> DemoResult:
+def _filmed(config: DemoConfig, demo: Demo, running: LockstepRunner, robot: MujocoRobot) -> DemoResult:
     """Demonstrate into a film, as fast as the machine can."""
     film = Film(robot, fps=FPS, recorder=demo.recorder if running.stack.on_ground else None)
     narrator = Narrator(running)
@@ -305,7 +305,7 @@ def _filmed(config: DemoConfig, demo: Demo, running: Running, robot: MujocoRobot
         film.close()
 
 
-def _shown(demo: Demo, running: Running, view: LiveView) -> DemoResult:
+def _shown(demo: Demo, running: LockstepRunner, view: LiveView) -> DemoResult:
     """Demonstrate in real time in the browser; afterwards the operator may go on until Ctrl-C."""
     print(f"Watch it at {view.url} (it should open by itself).", flush=True)
     webbrowser.open(view.url)

@@ -36,7 +36,7 @@ _IMPLEMENTATIONS: dict[str, dict[str, str]] = {
     "lower_body": {
         "almi": "golem.capabilities.legs.almi:Almi",
         "handover": "golem.capabilities.legs.handover:Handover",
-        "hold": "golem.capabilities.legs.hold:Hold",
+        "hold": "golem.capabilities.legs.hold:JointHold",
         "mpc": "golem.capabilities.legs.mpc.controller:MPC",
         "policy": "golem.capabilities.legs.policy:Policy",
         "vendor": "golem.capabilities.legs.vendor:Vendor",
@@ -46,10 +46,10 @@ _IMPLEMENTATIONS: dict[str, dict[str, str]] = {
         "diff_ik": "golem.capabilities.arms.diff_ik:DiffIK",
         "pink_ik": "golem.capabilities.arms.pink_ik:PinkIK",
     },
-    "localizer": {"onnx": "golem.capabilities.localization.onnx_detector:OnnxDetector"},
+    "localizer": {"onnx": "golem.capabilities.perception.onnx_detector:OnnxDetector"},
     "grasp_method": {
-        "centroid": "golem.skills.grasping.centroid:Centroid",
-        "visual_servo": "golem.skills.grasping.visual_servo:VisualServo",
+        "centroid": "golem.capabilities.grasping.centroid:Centroid",
+        "visual_servo": "golem.capabilities.grasping.visual_servo:VisualServo",
     },
     "navigator": {"goto": "golem.capabilities.navigation.goto:GoTo"},
 }

@@ -20,7 +20,7 @@ from golem.middleware.bus import News
 from golem.robots.base import Robot
 from golem.robots.mujoco.config import World
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.assembly import Running, build
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import Feedback, SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import Stack, load_stack
@@ -124,7 +124,7 @@ def _operate(config: RunConfig, stack: Stack) -> SkillResult:
 
 
 def on_air(
-    running: Running, robot: Robot, bag: Path | None, foxglove: bool = False
+    running: LockstepRunner, robot: Robot, bag: Path | None, foxglove: bool = False
 ) -> AbstractContextManager[Callable[[], None]]:
     """Record a stack into `bag` and serve it to Foxglove; enters what is to be called after every tick.
 
@@ -138,7 +138,7 @@ def on_air(
     return broadcast(running, robot, bag, FOXGLOVE_PORT if foxglove else None)
 
 
-def shown(running: Running, robot: object) -> MujocoRobot:
+def shown(running: LockstepRunner, robot: object) -> MujocoRobot:
     """Return the `robot` of a stack as the twin, which is what a viewer shows.
 
     Raises:
@@ -152,7 +152,7 @@ def shown(running: Running, robot: object) -> MujocoRobot:
 class Narrator:
     """Prints each new stage of the running skill once."""
 
-    def __init__(self, running: Running) -> None:
+    def __init__(self, running: LockstepRunner) -> None:
         """Listen to the skill of `running`."""
         self._news = News(running.bus, topics.FEEDBACK, Feedback)
         self._stage = ""

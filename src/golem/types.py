@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
 
+TICK = 0.002
+"""Period of the clock [s]: one servo period (500 Hz)."""
 NUM_JOINTS = 27
 """Body motors of the H1-2, in the order of the vendor's SDK."""
 LEGS = slice(0, 12)
@@ -137,7 +139,7 @@ class CameraInfo:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class RgbdImage:
     """One RGB-D frame, depth aligned to colour.
 
     Attributes:

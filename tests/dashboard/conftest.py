@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from golem.runtime.assembly import Running, build
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.stack import Choice, Stack, load_stack
-from golem.types import Frame, LocalizedObject
+from golem.types import LocalizedObject, RgbdImage
 
 
 class Blind:
@@ -18,7 +18,7 @@ class Blind:
 
     latency = 0.0
 
-    def locate(self, frame: Frame, labels: tuple[str, ...]) -> list[LocalizedObject]:
+    def locate(self, frame: RgbdImage, labels: tuple[str, ...]) -> list[LocalizedObject]:
         return []
 
 
@@ -26,7 +26,7 @@ BLIND = f"{__file__}:Blind"
 
 
 @pytest.fixture
-def twin() -> Iterator[tuple[Running, Any]]:
+def twin() -> Iterator[tuple[LockstepRunner, Any]]:
     running, robot = build(Stack(profile="bench").with_choice("localizer", BLIND), 0)
     yield running, robot
     robot.close()
@@ -40,7 +40,7 @@ def standing() -> Stack:
 
 
 @pytest.fixture
-def walker(standing: Stack) -> Iterator[tuple[Running, Any]]:
+def walker(standing: Stack) -> Iterator[tuple[LockstepRunner, Any]]:
     running, robot = build(standing, 0)
     yield running, robot
     robot.close()

@@ -9,12 +9,12 @@ from PIL import Image
 
 from golem.dashboard.film import GIF_SCALE, Film
 from golem.errors import OutputError
-from golem.runtime.assembly import Running
+from golem.runtime.lockstep import LockstepRunner
 
 SIZE = (240, 136)
 
 
-def test_a_picture_is_taken_once_per_period(twin: tuple[Running, Any]) -> None:
+def test_a_picture_is_taken_once_per_period(twin: tuple[LockstepRunner, Any]) -> None:
     running, robot = twin
     film = Film(robot, SIZE, fps=25.0)
 
@@ -27,7 +27,7 @@ def test_a_picture_is_taken_once_per_period(twin: tuple[Running, Any]) -> None:
     assert len(film) == 5  # at 0.002 s, then every 0.04 s
 
 
-def test_the_film_is_a_gif_of_the_right_length(twin: tuple[Running, Any], tmp_path: Path) -> None:
+def test_the_film_is_a_gif_of_the_right_length(twin: tuple[LockstepRunner, Any], tmp_path: Path) -> None:
     running, robot = twin
     film = Film(robot, SIZE, fps=10.0)
     for i in range(4):
@@ -46,13 +46,13 @@ def test_the_film_is_a_gif_of_the_right_length(twin: tuple[Running, Any], tmp_pa
     assert np.abs(shown - film.picture(3, GIF_SCALE)).mean() < 6.0
 
 
-def test_a_film_without_pictures_is_refused(twin: tuple[Running, Any], tmp_path: Path) -> None:
+def test_a_film_without_pictures_is_refused(twin: tuple[LockstepRunner, Any], tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="No picture"):
         Film(twin[1], SIZE).save(tmp_path / "film.gif")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_is_named(twin: tuple[Running, Any], tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_is_named(twin: tuple[LockstepRunner, Any], tmp_path: Path) -> None:
     running, robot = twin
     (tmp_path / "taken").write_text("a file")
     film = Film(robot, SIZE)

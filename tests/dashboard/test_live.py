@@ -11,13 +11,13 @@ import pytest
 
 from golem.dashboard.live import LiveView
 from golem.dashboard.panel import Button
-from golem.dashboard.scene import BodyMesh, SpectatorView
 from golem.errors import ConfigError
-from golem.evaluation.balance import PERIOD
 from golem.hardware.safety.base import GateState, Reason
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
-from golem.runtime.assembly import Running, build
+from golem.robots.mujoco.balance import PERIOD
+from golem.robots.mujoco.spectator import BodyMesh, SpectatorView
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import Feedback
 from golem.stack import Stack
 from golem.types import LowCommand, Twist
@@ -39,13 +39,13 @@ def meshes_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def view(twin: tuple[Running, Any], monkeypatch: pytest.MonkeyPatch) -> Iterator[LiveView]:
+def view(twin: tuple[LockstepRunner, Any], monkeypatch: pytest.MonkeyPatch) -> Iterator[LiveView]:
     with LiveView(*twin, port=0) as view:
         monkeypatch.setattr(view._server, "get_clients", lambda: {0: None})  # somebody looks
         yield view
 
 
-def until_state(view: LiveView, running: Running, state: GateState, seconds: float = 2.0) -> None:
+def until_state(view: LiveView, running: LockstepRunner, state: GateState, seconds: float = 2.0) -> None:
     end = running.executor.t + seconds
     view.idle(
         lambda: running.executor.t > end or (running.safety is not None and running.safety.state is state)
@@ -59,13 +59,13 @@ def test_it_serves_a_page_at_the_address_it_names(view: LiveView) -> None:
         assert b"<html" in answer.read(4096).lower()
 
 
-def test_a_port_that_is_taken_is_named(twin: tuple[Running, Any], view: LiveView) -> None:
+def test_a_port_that_is_taken_is_named(twin: tuple[LockstepRunner, Any], view: LiveView) -> None:
     port = int(view.url.rsplit(":", 1)[1])
     with pytest.raises(ConfigError, match=rf"{port}.*--port"):
         LiveView(*twin, port=port)
 
 
-def test_bodies_cameras_and_target_follow(twin: tuple[Running, Any], view: LiveView) -> None:
+def test_bodies_cameras_and_target_follow(twin: tuple[LockstepRunner, Any], view: LiveView) -> None:
     running, robot = twin
     running.bus.publish(
         topics.FEEDBACK, Feedback(0.0, "pick", "servo", "<b>", {"target": [0.4, 0, -0.04]}), 0.0
@@ -82,7 +82,7 @@ def test_bodies_cameras_and_target_follow(twin: tuple[Running, Any], view: LiveV
 
 
 def test_the_button_stops_the_robot_through_the_gate_and_a_reset_revives_it(
-    twin: tuple[Running, Any], view: LiveView
+    twin: tuple[LockstepRunner, Any], view: LiveView
 ) -> None:
     running, _ = twin
     until_state(view, running, GateState.ACTIVE)
@@ -101,7 +101,7 @@ def test_the_button_stops_the_robot_through_the_gate_and_a_reset_revives_it(
     until_state(view, running, GateState.ACTIVE)
 
 
-def test_pause_lets_time_stand_still(twin: tuple[Running, Any], view: LiveView) -> None:
+def test_pause_lets_time_stand_still(twin: tuple[LockstepRunner, Any], view: LiveView) -> None:
     running, _ = twin
     view.panel.press(Button.PAUSE)
     resume = threading.Timer(0.3, view.panel.press, (Button.PAUSE,))
@@ -111,7 +111,9 @@ def test_pause_lets_time_stand_still(twin: tuple[Running, Any], view: LiveView) 
     assert time.perf_counter() - begin >= 0.3 + 0.1 - 0.05
 
 
-def test_a_pick_can_be_asked_for_only_when_none_runs(twin: tuple[Running, Any], view: LiveView) -> None:
+def test_a_pick_can_be_asked_for_only_when_none_runs(
+    twin: tuple[LockstepRunner, Any], view: LiveView
+) -> None:
     view._busy = True
     view.panel.press(Button.PICK)
     view._serve_buttons()
@@ -123,7 +125,7 @@ def test_a_pick_can_be_asked_for_only_when_none_runs(twin: tuple[Running, Any], 
 
 
 @pytest.fixture
-def walk(walker: tuple[Running, Any], monkeypatch: pytest.MonkeyPatch) -> Iterator[LiveView]:
+def walk(walker: tuple[LockstepRunner, Any], monkeypatch: pytest.MonkeyPatch) -> Iterator[LiveView]:
     with LiveView(*walker, port=0, restarts=True) as view:
         monkeypatch.setattr(view._server, "get_clients", lambda: {0: None})
         monkeypatch.setattr(view, "_show_pictures", lambda: None)  # each is rendered on the CPU
@@ -131,7 +133,7 @@ def walk(walker: tuple[Running, Any], monkeypatch: pytest.MonkeyPatch) -> Iterat
         yield view
 
 
-def run(view: LiveView, running: Running, seconds: float) -> None:
+def run(view: LiveView, running: LockstepRunner, seconds: float) -> None:
     end = running.executor.t + seconds
     view.idle(lambda: running.executor.t > end)
 
@@ -141,18 +143,18 @@ def test_a_hanging_robot_has_neither_sliders_nor_pushes(view: LiveView) -> None:
 
 
 def test_the_sliders_drive_until_nobody_looks(
-    walker: tuple[Running, Any], walk: LiveView, monkeypatch: pytest.MonkeyPatch
+    walker: tuple[LockstepRunner, Any], walk: LiveView, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     running, legs = walker[0], walk.panel.legs
     assert legs is not None
     until_state(walk, running, GateState.ACTIVE)
     run(walk, running, 0.1)
-    most = running.envelope.vx[1]
-    assert legs._sliders["vx"].max == most > 0.0
+    maximum = running.envelope.vx[1]
+    assert legs._sliders["vx"].max == maximum > 0.0
     legs.twist = Twist(vx=9.0)
     run(walk, running, 0.4)
     heard = running.bus.latest(topics.LEG_STATUS, LegStatus)
-    assert heard is not None and heard.commanded == Twist(vx=most)
+    assert heard is not None and heard.commanded == Twist(vx=maximum)
     end = running.executor.t + 3.0  # the base estimate has to find the floor, and the legs to change hands
 
     def walks() -> bool:
@@ -171,7 +173,7 @@ def test_the_sliders_drive_until_nobody_looks(
     assert legs.twist == Twist() == running.bus.latest(topics.TWIST, Twist)
 
 
-def test_an_emergency_stop_takes_the_sliders_back(walker: tuple[Running, Any], walk: LiveView) -> None:
+def test_an_emergency_stop_takes_the_sliders_back(walker: tuple[LockstepRunner, Any], walk: LiveView) -> None:
     running, legs = walker[0], walk.panel.legs
     assert legs is not None
     until_state(walk, running, GateState.ACTIVE)
@@ -182,7 +184,9 @@ def test_an_emergency_stop_takes_the_sliders_back(walker: tuple[Running, Any], w
     assert legs.twist == Twist()
 
 
-def test_the_button_pushes_with_the_impulse_that_is_set(walker: tuple[Running, Any], walk: LiveView) -> None:
+def test_the_button_pushes_with_the_impulse_that_is_set(
+    walker: tuple[LockstepRunner, Any], walk: LiveView
+) -> None:
     running, robot = walker
     legs = walk.panel.legs
     assert legs is not None
@@ -202,7 +206,7 @@ def test_the_button_pushes_with_the_impulse_that_is_set(walker: tuple[Running, A
     assert PERIOD * pushed.force[:, 1].sum() == pytest.approx(40.0, rel=0.06)
 
 
-def test_the_camera_stays_with_a_robot_that_moves(walker: tuple[Running, Any], walk: LiveView) -> None:
+def test_the_camera_stays_with_a_robot_that_moves(walker: tuple[LockstepRunner, Any], walk: LiveView) -> None:
     _, robot = walker
     robot.data.body("pelvis").xpos[:2] = (2.0, -1.0)
     walk._stage.show(10.0, None)
@@ -210,7 +214,7 @@ def test_the_camera_stays_with_a_robot_that_moves(walker: tuple[Running, Any], w
 
 
 def test_starting_over_shows_the_new_episode(
-    standing: Stack, walker: tuple[Running, Any], walk: LiveView
+    standing: Stack, walker: tuple[LockstepRunner, Any], walk: LiveView
 ) -> None:
     run(walk, walker[0], 0.3)
     walk.panel.press(Button.RESTART)

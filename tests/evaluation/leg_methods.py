@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.legs.base import Envelope, LegCommand, Motion
-from golem.capabilities.legs.hold import Hold, HoldConfig
+from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
+from golem.capabilities.legs.hold import HoldConfig, JointHold
 from golem.types import BaseEstimate, LowState
 
 
-class Stiff(Hold):
+class Stiff(JointHold):
     """Holds the crouch with stiff joints and steers with its ankles: stands unless pushed out of its soles."""
 
     def __init__(self) -> None:
         stiff = (500.0,) * 6
         super().__init__(HoldConfig(stance="crouch", kp=stiff, kd=(12.0,) * 6, rate=200.0))
 
-    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         command = super().step(state, base, motion, dt)
         x, y = base.T_odom_base[:2, 3]
         tau = np.zeros(12)
@@ -26,10 +26,10 @@ class Stiff(Hold):
         return LegCommand(command.q, command.kp, command.kd, tau)
 
 
-class Limp(Hold):
+class Limp(JointHold):
     """Lets go."""
 
-    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         zero = np.zeros(12)
         return LegCommand(state.q[:12].copy(), zero, zero, zero)
 
@@ -39,7 +39,7 @@ class Broken(Stiff):
 
     envelope = Envelope(vx=(-0.5, 0.5))
 
-    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         if state.t > 2.0:
             raise ValueError("my bug")
         return super().step(state, base, motion, dt)

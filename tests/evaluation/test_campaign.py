@@ -14,7 +14,7 @@ import pytest
 from golem.errors import ConfigError, GolemError, OutputError
 from golem.evaluation import campaign
 from golem.evaluation.campaign import Job, Result, run_campaign
-from golem.evaluation.provenance import Unchanged
+from golem.provenance import Unchanged
 
 
 @dataclass(frozen=True)

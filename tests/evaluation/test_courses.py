@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from golem.dashboard.scene import Shot
-from golem.evaluation.balance import PERIOD, BalanceTrace
-from golem.evaluation.courses import Course, margin_plot, push_start
+from golem.evaluation.courses import MarginCurve, margin_plot, push_start
 from golem.evaluation.strip import project
+from golem.robots.mujoco.balance import PERIOD, BalanceTrace
+from golem.robots.mujoco.spectator import Shot
 
 
 def trace() -> BalanceTrace:
@@ -28,7 +28,7 @@ def test_the_push_begins_where_there_is_force() -> None:
 
 
 def test_a_plot_has_force_and_margin_of_every_trial_and_marks_the_lost() -> None:
-    plot = margin_plot([Course(trace(), True, "one"), Course(trace(), False, "two")], 0)
+    plot = margin_plot([MarginCurve(trace(), True, "one"), MarginCurve(trace(), False, "two")], 0)
     assert plot.count("<polyline") == 4
     assert plot.count('class="course bold m0"') == 2
     assert plot.count("lostmark") == 2
@@ -36,7 +36,7 @@ def test_a_plot_has_force_and_margin_of_every_trial_and_marks_the_lost() -> None
 
 
 def test_a_plot_without_a_push_has_no_force() -> None:
-    plot = margin_plot([Course(replace(trace(), force=np.zeros((500, 3))), True, "")], 1)
+    plot = margin_plot([MarginCurve(replace(trace(), force=np.zeros((500, 3))), True, "")], 1)
     assert plot.count("<polyline") == 1 and "pushed" not in plot
 
 

@@ -11,9 +11,9 @@ from golem.errors import ConfigError
 from golem.evaluation import episode as episodes
 from golem.evaluation.episode import Episode, legs_stack, with_legs
 from golem.evaluation.exercise import WIDE_AREA, ArmMotion, Exercise
-from golem.evaluation.pushes import shove
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
+from golem.robots.mujoco.shoves import shove
 from golem.skills.runner import FAULT
 from golem.stack import Choice, Stack
 from golem.types import PalmTargets, Twist

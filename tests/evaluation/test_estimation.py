@@ -9,10 +9,10 @@ from golem.capabilities.legs.hold import STANCES
 from golem.errors import ConfigError
 from golem.evaluation import walks
 from golem.evaluation.estimation import EstimationConfig, _longest, _way, run_estimation
-from golem.evaluation.walks import Walk, slipping, wrong_contacts
+from golem.evaluation.walks import RecordedWalk, slipping, wrong_contacts
 from golem.hardware.estimator.feet import Feet, FeetConfig
 from golem.hardware.estimator.random_walk import base_velocity
-from golem.robots.model.legs import Legs
+from golem.robots.model.leg_dynamics import LegDynamics
 from golem.robots.model.spatial import rotation_rpy
 from golem.types import LEGS, NUM_JOINTS, Array, Imu, LowState
 
@@ -21,11 +21,11 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @pytest.fixture
-def gliding() -> Walk:
+def gliding() -> RecordedWalk:
     """A robot that leans on its left leg with 600 N and glides ahead at 0.5 m/s, its joints at rest."""
     q, n = np.zeros(NUM_JOINTS), 1500
     q[LEGS] = np.tile(STANCES["crouch"], 2)
-    legs = Legs()
+    legs = LegDynamics()
     legs.update(q[LEGS], np.zeros(12))
     tau = np.zeros(NUM_JOINTS)
     tau[LEGS] = legs.gravity(q[LEGS], -9.81 * UP).ravel()
@@ -34,7 +34,7 @@ def gliding() -> Walk:
     T = np.tile(np.eye(4), (n, 1, 1))
     velocity = np.tile([0.5, 0.0, 0.0], (n, 1))
     T[:, 0, 3] = 0.5 * DT * np.arange(n)
-    return Walk(
+    return RecordedWalk(
         states=[LowState(i * DT, q, np.zeros(NUM_JOINTS), tau, imu) for i in range(n)],
         T=T,
         velocity=velocity,
@@ -55,7 +55,7 @@ def sensed(states: list[LowState]) -> tuple[Array, Array]:
     return np.array(contact), np.array(velocity)
 
 
-def test_wrong_contacts_hide_a_foot_that_carries_and_invent_one_that_does_not(gliding: Walk) -> None:
+def test_wrong_contacts_hide_a_foot_that_carries_and_invent_one_that_does_not(gliding: RecordedWalk) -> None:
     contact, _ = sensed(wrong_contacts(gliding, np.random.default_rng(0)))
     right, wrong = contact[:, 0] > 0.9, contact[:, 0] == 0.0
     assert (right | wrong).mean() > 0.97
@@ -65,7 +65,7 @@ def test_wrong_contacts_hide_a_foot_that_carries_and_invent_one_that_does_not(gl
     assert not np.array_equal(wrong, contact[:, 1] > 0.9)
 
 
-def test_a_foot_that_slips_makes_the_base_seem_a_tenth_faster(gliding: Walk) -> None:
+def test_a_foot_that_slips_makes_the_base_seem_a_tenth_faster(gliding: RecordedWalk) -> None:
     still = sensed(gliding.states)[1]
     slipped = sensed(slipping(gliding, np.random.default_rng(0)))[1]
     # A tenth of 0.5 m/s more than joints at rest say, for the planted foot alone.

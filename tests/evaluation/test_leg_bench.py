@@ -20,7 +20,7 @@ from golem.middleware import topics
 from golem.middleware.bus import Bus
 from golem.middleware.topics import Odometry
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.assembly import start_posture
+from golem.runtime.lockstep import start_posture
 from golem.types import BaseEstimate
 
 METHODS = Path(__file__).with_name("leg_methods.py")

@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from golem.hardware.estop.base import EstopFrame
-from golem.hardware.safety.base import GateInputs, GateResult, GateState, Request, SafetyLimits
+from golem.hardware.estop.base import EstopMessage
+from golem.hardware.safety.base import GateInputs, GateResult, GateState, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
 from golem.robots.model.mjcf import robot_spec
 from golem.robots.model.table import JOINT_NAMES
@@ -53,14 +53,14 @@ class Bench:
         self.t += DT
         self.sequence += 1
         sound = GateInputs(
-            self.t, make_state(self.t), make_command(self.t), EstopFrame(self.t, self.sequence, False)
+            self.t, make_state(self.t), make_command(self.t), EstopMessage(self.t, self.sequence, False)
         )
         self.results.append(self.gate.step(replace(sound, **changes)))  # pyright: ignore[reportArgumentType]
         return self.results[-1]
 
     def activate(self) -> None:
         """Bring the gate to ACTIVE."""
-        result = self.tick(request=Request.ACTIVATE)
+        result = self.tick(request=OperatorRequest.ACTIVATE)
         assert result.state is GateState.ACTIVE, result.reason
 
 

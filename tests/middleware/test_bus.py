@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from golem.middleware.bus import Bus, News, WrongType
-from golem.runtime.executor import TICK
+from golem.types import TICK
 
 
 def test_a_stream_nobody_wrote_is_none() -> None:

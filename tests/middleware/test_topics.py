@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from golem.middleware import topics
-from golem.middleware.topics import HandGoal, LookRequest
+from golem.middleware.topics import DetectionRequest, HandGoal
 from golem.types import SIDES
 
 
 def test_no_two_streams_share_a_name() -> None:
     fixed = [value for name, value in vars(topics).items() if name.isupper() and isinstance(value, str)]
     per_side = (topics.hand_state, topics.hand_command, topics.hand_goal, topics.hand_status)
-    per_camera = (topics.frames, topics.look, topics.sightings)
+    per_camera = (topics.rgbd_images, topics.detection_request, topics.detections)
     names = (
         fixed
         + [topic(side) for topic in per_side for side in SIDES]
@@ -21,5 +21,5 @@ def test_no_two_streams_share_a_name() -> None:
 
 
 def test_the_silent_request_stops_the_stream_and_a_goal_without_gap_closes() -> None:
-    assert LookRequest().labels == ()
+    assert DetectionRequest().labels == ()
     assert HandGoal(None, 5.0).gap is None

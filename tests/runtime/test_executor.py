@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from golem.errors import ConfigError
 from golem.middleware.bus import Bus
-from golem.runtime.executor import TICK, Executor
+from golem.runtime.executor import Executor
+from golem.types import TICK
 
 
 class Recorder:
@@ -149,13 +150,13 @@ def test_lock_step_never_sleeps(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_an_outside_clock_is_followed_tick_by_tick_and_a_gap_is_left_out() -> None:
     fast, slow = Recorder(TICK), Recorder(0.010)
     executor = Executor(Bus(), [fast, slow])
-    executor.advance(53.412, most=5)
+    executor.advance(53.412, maximum=5)
     assert fast.times == pytest.approx([53.404, 53.406, 53.408, 53.410, 53.412])
     assert slow.times == pytest.approx([53.41])
-    executor.advance(53.412, most=5)
-    executor.advance(53.416, most=5)
+    executor.advance(53.412, maximum=5)
+    executor.advance(53.416, maximum=5)
     assert fast.times[5:] == pytest.approx([53.414, 53.416])
-    executor.advance(54.0, most=1)
+    executor.advance(54.0, maximum=1)
     assert fast.times[7:] == pytest.approx([54.0])
     assert slow.times[1:] == pytest.approx([54.0])
     assert executor.t == pytest.approx(54.002)

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.runtime.test_legs import Drive
+from tests.runtime.test_lower_body_node import Drive
 
 from golem.capabilities.navigation.goto import GoTo
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
-from golem.runtime.assembly import Running, build
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.walk import Stand, StandGoal, Walk, WalkGoal
 from golem.stack import Choice, load_stack
 from golem.types import LowCommand, Twist
@@ -45,7 +45,7 @@ class Lost(RandomWalkKF):
 @contextmanager
 def on_open_ground(
     legs: Choice, fallback: str, estimator: Choice | None = None
-) -> Iterator[tuple[Running, Any]]:
+) -> Iterator[tuple[LockstepRunner, Any]]:
     """A stack on open ground with certain legs, and a certain estimator."""
     stack = replace(
         load_stack("stand", profile="ideal"),
@@ -62,14 +62,14 @@ def on_open_ground(
 
 
 @contextmanager
-def standing(path: Path, text: str, fallback: str) -> Iterator[tuple[Running, Any]]:
+def standing(path: Path, text: str, fallback: str) -> Iterator[tuple[LockstepRunner, Any]]:
     """The same with legs that are the class `Dying` of `text`."""
     path.write_text(text)
     with on_open_ground(Choice(f"{path}:Dying"), fallback) as both:
         yield both
 
 
-def assert_it_stands_on(running: Running, robot: Any, fallback: str) -> None:
+def assert_it_stands_on(running: LockstepRunner, robot: Any, fallback: str) -> None:
     """Check that the robot stands by its fallback, now and two seconds later."""
     for _ in range(2):
         status = running.bus.latest(topics.LEG_STATUS, LegStatus)

@@ -12,11 +12,11 @@ import pytest
 from golem.errors import MissingExtra
 from golem.middleware import topics
 from golem.middleware.bus import Bus
-from golem.middleware.topics import Broken, LookRequest, Sightings
+from golem.middleware.topics import DetectionRequest, Detections, ModuleFaultMsg
 from golem.robots.sensors.cameras import HEAD
-from golem.runtime.cameras import LocalizerNode
-from golem.runtime.guard import Guard
-from golem.types import Detection, Frame, LocalizedObject
+from golem.runtime.contract_check import ContractCheck
+from golem.runtime.perception_nodes import LocalizerNode
+from golem.types import Detection, LocalizedObject, RgbdImage
 
 
 class Eyes:
@@ -28,7 +28,7 @@ class Eyes:
         self.let = threading.Event()
         self.calls = 0
 
-    def locate(self, frame: Frame, labels: Sequence[str]) -> list[LocalizedObject]:
+    def locate(self, frame: RgbdImage, labels: Sequence[str]) -> list[LocalizedObject]:
         self.calls += 1
         assert self.let.wait(5.0)
         if labels[0] == "trouble":
@@ -37,24 +37,24 @@ class Eyes:
         return [LocalizedObject(detection, frame.t, np.zeros(3), np.zeros((1, 3)))]
 
 
-def frame(t: float) -> Frame:
-    return Frame(t, HEAD, np.zeros((2, 2, 3), np.uint8), np.zeros((2, 2), np.float32), np.eye(4))
+def frame(t: float) -> RgbdImage:
+    return RgbdImage(t, HEAD, np.zeros((2, 2, 3), np.uint8), np.zeros((2, 2), np.float32), np.eye(4))
 
 
 def test_the_clock_goes_on_while_it_looks() -> None:
     bus, eyes = Bus(), Eyes()
-    bus.publish(topics.look("head"), LookRequest(("screw",)), 0.0)
+    bus.publish(topics.detection_request("head"), DetectionRequest(("screw",)), 0.0)
     with ThreadPoolExecutor(1) as pool:
-        node = LocalizerNode(bus, eyes, "head", Guard("localizer", "eyes"), pool)
-        bus.publish(topics.frames("head"), frame(1.0), 1.0)
+        node = LocalizerNode(bus, eyes, "head", ContractCheck("localizer", "eyes"), pool)
+        bus.publish(topics.rgbd_images("head"), frame(1.0), 1.0)
         for tick in range(20):
-            bus.publish(topics.frames("head"), frame(1.0 + 0.002 * tick), 1.0)
+            bus.publish(topics.rgbd_images("head"), frame(1.0 + 0.002 * tick), 1.0)
             node.step(1.0 + 0.002 * tick)
-        assert bus.latest(topics.sightings("head"), Sightings) is None
+        assert bus.latest(topics.detections("head"), Detections) is None
         eyes.let.set()
         pool.submit(lambda: None).result()
         node.step(1.1)
-        found = bus.latest(topics.sightings("head"), Sightings)
+        found = bus.latest(topics.detections("head"), Detections)
         assert found is not None and found.t == 1.0 and found.objects[0].label == "screw"
         pool.submit(lambda: None).result()
     assert eyes.calls == 2  # of what came meanwhile, the newest frame only
@@ -64,32 +64,32 @@ def test_the_clock_goes_on_while_it_looks() -> None:
 def test_its_fault_arrives_while_a_skill_looks(still: bool) -> None:
     bus, eyes = Bus(), Eyes()
     eyes.let.set()
-    bus.publish(topics.look("head"), LookRequest(("trouble",)), 0.0)
+    bus.publish(topics.detection_request("head"), DetectionRequest(("trouble",)), 0.0)
     with ThreadPoolExecutor(1) as pool:
-        node = LocalizerNode(bus, eyes, "head", Guard("localizer", "eyes"), pool)
-        bus.publish(topics.frames("head"), frame(1.0), 1.0)
+        node = LocalizerNode(bus, eyes, "head", ContractCheck("localizer", "eyes"), pool)
+        bus.publish(topics.rgbd_images("head"), frame(1.0), 1.0)
         node.step(1.0)
         if not still:
-            bus.publish(topics.look("head"), LookRequest(()), 1.001)
+            bus.publish(topics.detection_request("head"), DetectionRequest(()), 1.001)
         pool.submit(lambda: None).result()
         node.step(1.002)
-        fault = Broken("localizer", "Module localizer: eyes failed: RuntimeError: gone")
-        assert bus.latest(topics.MODULE_FAULT, Broken) == (fault if still else None)
-        assert bus.latest(topics.sightings("head"), Sightings) is None
+        fault = ModuleFaultMsg("localizer", "Module localizer: eyes failed: RuntimeError: gone")
+        assert bus.latest(topics.MODULE_FAULT, ModuleFaultMsg) == (fault if still else None)
+        assert bus.latest(topics.detections("head"), Detections) is None
 
 
 def test_what_this_machine_lacks_ends_the_look_and_not_the_process() -> None:
     class Lacking(Eyes):
-        def locate(self, frame: Frame, labels: Sequence[str]) -> list[LocalizedObject]:
+        def locate(self, frame: RgbdImage, labels: Sequence[str]) -> list[LocalizedObject]:
             raise MissingExtra("torch", "train")
 
     bus = Bus()
-    bus.publish(topics.look("head"), LookRequest(("screw",)), 0.0)
+    bus.publish(topics.detection_request("head"), DetectionRequest(("screw",)), 0.0)
     with ThreadPoolExecutor(1) as pool:
-        node = LocalizerNode(bus, Lacking(), "head", Guard("localizer", "eyes"), pool)
-        bus.publish(topics.frames("head"), frame(1.0), 1.0)
+        node = LocalizerNode(bus, Lacking(), "head", ContractCheck("localizer", "eyes"), pool)
+        bus.publish(topics.rgbd_images("head"), frame(1.0), 1.0)
         node.step(1.0)
         pool.submit(lambda: None).result()
         node.step(1.002)
-    fault = bus.latest(topics.MODULE_FAULT, Broken)
+    fault = bus.latest(topics.MODULE_FAULT, ModuleFaultMsg)
     assert fault is not None and fault.slot == "localizer" and "torch" in fault.reason

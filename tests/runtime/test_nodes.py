@@ -13,7 +13,7 @@ import pytest
 from golem.errors import ConfigError, GolemError, ModuleFault
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
-from golem.runtime.assembly import Running, build
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.stack import Choice, Stack
@@ -92,7 +92,7 @@ class Look:
         return SkillResult(True, "done", None, "Looked.")
 
 
-def running(slot: str, use: str, options: dict[str, Any] | None = None) -> Running:
+def running(slot: str, use: str, options: dict[str, Any] | None = None) -> LockstepRunner:
     """Return a stack with another module in one slot."""
     changes: dict[str, Any] = {slot: Choice(use, options or {})}
     return build(replace(Stack(profile="ideal"), **changes), seed=0)[0]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.hardware.estop.base import EstopFrame
-from golem.hardware.safety.base import GateState, GateStatus, Reason, Request, SafetyLimits
+from golem.hardware.estop.base import EstopMessage
+from golem.hardware.safety.base import GateState, GateStatus, OperatorRequest, Reason, SafetyLimits
 from golem.middleware import topics
 from golem.middleware.bus import Bus
 from golem.runtime.nodes import SafetyNode
@@ -17,7 +17,7 @@ DT = 0.002
 def test_an_estimate_that_stays_stale_stops_the_motors() -> None:
     bus = Bus()
     node = SafetyNode(bus, SafetyLimits.from_profile())
-    node.request = Request.ACTIVATE
+    node.request = OperatorRequest.ACTIVATE
     zero = np.zeros(NUM_JOINTS)
     imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
     results = []
@@ -25,7 +25,7 @@ def test_an_estimate_that_stays_stale_stops_the_motors() -> None:
         t = i * DT
         bus.publish(topics.LOW_STATE, LowState(t, zero, zero, zero, imu), t)
         bus.publish(topics.LOW_CMD_REQUEST, LowCommand(t, zero, zero, zero, zero, zero), t)
-        bus.publish(topics.ESTOP, EstopFrame(t, i % 256, False), t)
+        bus.publish(topics.ESTOP, EstopMessage(t, i % 256, False), t)
         bus.publish(topics.BASE, BaseEstimate(t, np.eye(4), stale=i >= 100), t)
         bus.deliver(t)
         node.step(t)

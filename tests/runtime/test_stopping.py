@@ -11,7 +11,7 @@ from golem.errors import ModuleFault
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
 from golem.middleware.topics import HandGoal
-from golem.runtime.assembly import build
+from golem.runtime.lockstep import build
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.stack import Choice, Stack

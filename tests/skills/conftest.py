@@ -11,7 +11,7 @@ import pytest
 from golem.hardware.hands.base import GripState, HandStatus
 from golem.middleware import topics
 from golem.middleware.bus import Bus
-from golem.middleware.topics import HandGoal, LookRequest, Sightings
+from golem.middleware.topics import DetectionRequest, Detections, HandGoal
 from golem.robots.model.kinematics import Kinematics
 from golem.skills.base import Feedback
 from golem.skills.context import Context
@@ -101,10 +101,10 @@ class World:
         self._tick += 1
         self.bus.deliver(self.t)
         for camera in ("head", "left_hand", "right_hand"):
-            request = self.bus.latest(topics.look(camera), LookRequest)
+            request = self.bus.latest(topics.detection_request(camera), DetectionRequest)
             if request is not None and request.labels and self._tick % FRAME == 0 and camera in self.objects:
                 objects = tuple(o for o in self.objects[camera]() if o.label in request.labels)
-                self.bus.publish(topics.sightings(camera), Sightings(self.t, camera, objects), self.t)
+                self.bus.publish(topics.detections(camera), Detections(self.t, camera, objects), self.t)
         for side in SIDES:
             self._hand(side)
         targets = self.bus.latest(topics.PALM_TARGETS, PalmTargets)

@@ -14,7 +14,7 @@ from golem.capabilities.arms.base import TargetError
 from golem.hardware.hands.base import GripState
 from golem.middleware import topics
 from golem.middleware.bus import Bus
-from golem.middleware.topics import HandGoal, LookRequest, Sightings
+from golem.middleware.topics import DetectionRequest, Detections, HandGoal
 from golem.robots.model.kinematics import Kinematics
 from golem.skills.base import Feedback, SkillResult, StageFailed
 from golem.skills.context import Context
@@ -207,18 +207,18 @@ def test_the_pose_of_a_gripper_is_base_times_kinematics() -> None:
 
 def test_an_eye_streams_only_while_it_is_open(world: Any, thing: Any) -> None:
     world.objects["head"] = lambda: [thing("screw", (0.4, 0.0, 0.0), world.t)]
-    topic, look = topics.sightings("head"), topics.look("head")
+    topic, look = topics.detections("head"), topics.detection_request("head")
 
     async def skill() -> SkillResult:
         with world.context.watch("head", "screw", "tray") as eye:
-            assert world.bus.latest(look, LookRequest) == LookRequest(("screw", "tray"))
+            assert world.bus.latest(look, DetectionRequest) == DetectionRequest(("screw", "tray"))
             got = await eye.look(1.0)
-            assert isinstance(got, Sightings) and got.objects[0].label == "screw"
+            assert isinstance(got, Detections) and got.objects[0].label == "screw"
             assert eye.fresh() is None
         return OK
 
     world.run(skill())
-    assert world.bus.latest(look, LookRequest) == LookRequest()
+    assert world.bus.latest(look, DetectionRequest) == DetectionRequest()
     count = world.bus.count(topic)
     for _ in range(50):
         world.step()
@@ -233,18 +233,18 @@ def test_an_eye_closes_when_the_skill_fails_or_is_cancelled(world: Any) -> None:
 
     run = world.run(skill(), ticks=3)
     run.cancel()
-    assert world.bus.latest(topics.look("head"), LookRequest) == LookRequest()
+    assert world.bus.latest(topics.detection_request("head"), DetectionRequest) == DetectionRequest()
 
 
 def test_an_eye_does_not_show_a_frame_from_before_it_opened() -> None:
     c = context()
-    topic = topics.sightings("head")
-    c.bus.publish(topic, Sightings(0.95, "head", ()), 0.95, latency=0.1)
+    topic = topics.detections("head")
+    c.bus.publish(topic, Detections(0.95, "head", ()), 0.95, latency=0.1)
     c.refresh(1.0)
     with c.watch("head", "screw") as eye:
         c.bus.deliver(1.05)
         assert eye.fresh() is None
-        c.bus.publish(topic, Sightings(1.02, "head", ()), 1.02)
+        c.bus.publish(topic, Detections(1.02, "head", ()), 1.02)
         fresh = eye.fresh()
         assert fresh is not None and fresh.t == 1.02
         assert eye.fresh() is None

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from golem.capabilities.grasping.base import Grasp, GraspMethod, OpenLoop
+from golem.capabilities.grasping.centroid import Centroid
+from golem.capabilities.grasping.visual_servo import VisualServo
 from golem.middleware import topics
-from golem.middleware.topics import HandGoal, LookRequest
+from golem.middleware.topics import DetectionRequest, HandGoal
 from golem.skills.base import SkillResult
-from golem.skills.grasping.base import Grasp, GraspMethod, OpenLoop
-from golem.skills.grasping.centroid import Centroid
-from golem.skills.grasping.visual_servo import VisualServo
 from golem.skills.pick import Pick, PickConfig, PickGoal
 from golem.types import Array, LocalizedObject, Side
 
@@ -52,7 +52,10 @@ def picked(
 def assert_safe(world: Any, side: Side = "right") -> None:
     """Check that every camera sleeps, the hand was told to open, and the arm was sent home."""
     for camera in world.objects:
-        assert world.bus.latest(topics.look(camera), LookRequest) in (None, LookRequest())
+        assert world.bus.latest(topics.detection_request(camera), DetectionRequest) in (
+            None,
+            DetectionRequest(),
+        )
     goal = world.bus.latest(topics.hand_goal(side), HandGoal)
     assert goal is not None and goal.gap is not None
     np.testing.assert_allclose(world.context.arms[side].commanded[:3, 3], [0.35, -0.2, 0.1], atol=1e-9)
@@ -253,5 +256,8 @@ def test_a_pick_can_be_cancelled_at_any_time(share: float, world: Any, thing: An
     assert world.holds == held or world.stages[-2:-1] == ["grasp"]
     np.testing.assert_array_equal(world.context.arms["right"].commanded, sent)
     for camera in world.objects:
-        assert world.bus.latest(topics.look(camera), LookRequest) in (None, LookRequest())
+        assert world.bus.latest(topics.detection_request(camera), DetectionRequest) in (
+            None,
+            DetectionRequest(),
+        )
     assert world.stages[-1] == "cancelled"

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from golem.dashboard.balance import SPAN, balance_chart
-from golem.dashboard.scene import Shot, SpectatorView
+from golem.dashboard.balance_chart import SPAN, balance_chart
 from golem.dashboard.status import CLASS_COLOURS, Status, camera_picture, read_status
 from golem.errors import OutputError
-from golem.evaluation.balance import BalanceRecorder
 from golem.hardware.safety.base import GateState
+from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.assembly import Running
+from golem.robots.mujoco.spectator import Shot, SpectatorView
+from golem.runtime.lockstep import LockstepRunner
 
 HANGING = {
     "wide": Shot(look_at=(0.32, 0.04, 1.18), azimuth=-148.0, elevation=-17.0, distance=2.15),
@@ -99,13 +99,13 @@ class Film:
         """Return the number of pictures taken."""
         return len(self._frames)
 
-    def tick(self, running: Running) -> None:
+    def tick(self, running: LockstepRunner) -> None:
         """Take a picture if one is due; call it at every tick of `running`."""
         if running.executor.t >= self._due - 1e-9:
             self._due = running.executor.t + 1.0 / self.fps
             self.frame(running)
 
-    def frame(self, running: Running) -> NDArray[np.uint8]:
+    def frame(self, running: LockstepRunner) -> NDArray[np.uint8]:
         """Take one picture and keep it.
 
         Returns:

@@ -9,8 +9,8 @@ import viser
 
 from golem.capabilities.legs.base import Envelope
 from golem.dashboard.status import Status
-from golem.evaluation.pushes import DIRECTIONS, Push, shove
 from golem.middleware.topics import LegStatus
+from golem.robots.mujoco.shoves import DIRECTIONS, Push, shove
 from golem.types import BaseEstimate, Twist
 
 AXES = {"vx": "forward vx [m/s]", "vy": "left vy [m/s]", "wz": "turn wz [rad/s]"}
@@ -39,8 +39,8 @@ class LegsPanel:
             self.stop_button = gui.add_button("Stop walking", color="gray", icon=viser.Icon.PLAYER_STOP)
         with gui.add_folder("Push"):
             self._direction = gui.add_dropdown("to the", list(WORDS), initial_value="left")
-            least, most, first = IMPULSES
-            self._impulse = gui.add_slider("impulse [N s]", least, most, 5.0, first)
+            minimum, maximum, first = IMPULSES
+            self._impulse = gui.add_slider("impulse [N s]", minimum, maximum, 5.0, first)
             self.push_button = gui.add_button("Push", icon=viser.Icon.HAND_FINGER)
         self._envelope = Envelope()
 

@@ -19,19 +19,19 @@ import cv2
 import numpy as np
 import viser
 
-from golem.dashboard.balance import SPAN, balance_chart
+from golem.dashboard.balance_chart import SPAN, balance_chart
 from golem.dashboard.panel import Button, Panel
-from golem.dashboard.scene import SpectatorView
 from golem.dashboard.stage import Stage
 from golem.dashboard.status import Timeline, camera_picture, read_status
 from golem.errors import ConfigError
-from golem.evaluation.balance import BalanceRecorder
-from golem.evaluation.pushes import Push, Pusher
-from golem.hardware.safety.base import GateState, Request
+from golem.hardware.safety.base import GateState, OperatorRequest
 from golem.middleware import topics
 from golem.robots.model.table import BASE_LINK
+from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.assembly import Running
+from golem.robots.mujoco.shoves import Push, Pusher
+from golem.robots.mujoco.spectator import SpectatorView
+from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import Skill, SkillResult
 from golem.skills.context import Context
 from golem.skills.pick import TIMEOUT
@@ -59,7 +59,7 @@ class LiveView:
 
     def __init__(
         self,
-        running: Running,
+        running: LockstepRunner,
         robot: MujocoRobot,
         port: int = 8080,
         host: str = "127.0.0.1",
@@ -91,14 +91,14 @@ class LiveView:
         self._factor = 1.0
         self._watch(running, robot)
 
-    def attach(self, running: Running, robot: MujocoRobot) -> None:
+    def attach(self, running: LockstepRunner, robot: MujocoRobot) -> None:
         """Show another episode of the same stack and seed from now on."""
         self._view.close()
         self._view = SpectatorView(robot)
         self._stage.look(self._view)
         self._watch(running, robot)
 
-    def _watch(self, running: Running, robot: MujocoRobot) -> None:
+    def _watch(self, running: LockstepRunner, robot: MujocoRobot) -> None:
         self._running = running
         self._recorder = BalanceRecorder(robot, memory=SPAN)
         self._recorder(running.executor.t)
@@ -124,7 +124,7 @@ class LiveView:
         timeout: float = TIMEOUT,
         watch: Callable[[], None] = lambda: None,
     ) -> SkillResult:
-        """Run a skill in real time while showing it; see `Running.execute`."""
+        """Run a skill in real time while showing it; see `LockstepRunner.execute`."""
         self._timeline = Timeline.of(self._running)
         self._busy, self._wanted = True, False
 
@@ -275,14 +275,14 @@ class LiveView:
         if self._revive_until is None or gate is None:
             return
         if gate.state is GateState.ARMED:
-            self._running.request(Request.ACTIVATE)
+            self._running.request(OperatorRequest.ACTIVATE)
             self._revive_until = None
         elif t > self._revive_until:
             self._note = f"The safety gate refuses the reset: {gate.reason}."
             self._revive_until = None
         else:
             # Only the change to a request counts; asked again, because a released button is seen a frame later.
-            self._running.request(Request.NONE if self._asking else Request.RESET)
+            self._running.request(OperatorRequest.NONE if self._asking else OperatorRequest.RESET)
             self._asking = not self._asking
 
     def close(self) -> None:

@@ -9,11 +9,11 @@ from pathlib import Path
 from PIL import Image
 
 from golem.dashboard.film import Film
-from golem.dashboard.scene import Shot, SpectatorView
 from golem.dashboard.status import Timeline
 from golem.errors import GolemError
-from golem.evaluation.balance import BalanceRecorder
-from golem.runtime.assembly import build
+from golem.robots.mujoco.balance import BalanceRecorder
+from golem.robots.mujoco.spectator import Shot, SpectatorView
+from golem.runtime.lockstep import build
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import Stack, load_stack
 

@@ -8,8 +8,8 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from golem.dashboard.scene import SpectatorView
 from golem.robots.model.table import BASE_LINK
+from golem.robots.mujoco.spectator import SpectatorView
 from golem.types import Array
 
 TARGET_COLOUR = (255, 60, 160)

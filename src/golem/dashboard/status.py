@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.dashboard.scene import SpectatorView
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
-from golem.middleware.topics import LegStatus, Sightings
-from golem.runtime.assembly import Running
+from golem.middleware.topics import Detections, LegStatus
+from golem.robots.mujoco.spectator import SpectatorView
+from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import Feedback
-from golem.types import Array, BaseEstimate, Frame
+from golem.types import Array, BaseEstimate, RgbdImage
 
 FRESH = 0.2
 """Age up to which a frame on the bus is shown [s]: three frame periods."""
@@ -50,7 +50,7 @@ class Status:
     base: BaseEstimate | None
 
 
-def read_status(running: Running) -> Status:
+def read_status(running: LockstepRunner) -> Status:
     """Return the present status of a stack."""
     feedback = running.bus.latest(topics.FEEDBACK, Feedback)
     gate = running.safety
@@ -80,13 +80,13 @@ class Timeline:
         self._seen = 0
 
     @classmethod
-    def of(cls, running: Running) -> Timeline:
+    def of(cls, running: LockstepRunner) -> Timeline:
         """Return a timeline that begins now: what was said before does not count."""
         timeline = cls()
         timeline._seen = running.bus.count(topics.FEEDBACK)
         return timeline
 
-    def update(self, running: Running) -> None:
+    def update(self, running: LockstepRunner) -> None:
         """Take in the newest feedback; call it often enough to miss no stage."""
         count = running.bus.count(topics.FEEDBACK)
         feedback = running.bus.latest(topics.FEEDBACK, Feedback)
@@ -107,17 +107,17 @@ class Timeline:
         ]
 
 
-def camera_picture(running: Running, view: SpectatorView, camera: str) -> NDArray[np.uint8]:
+def camera_picture(running: LockstepRunner, view: SpectatorView, camera: str) -> NDArray[np.uint8]:
     """Return what a camera of the robot shows: the frame the robot itself works on, with what it found, or a look now.
 
     Returns:
         (height, width, 3) RGB, half the camera's resolution.
     """
-    frame = running.bus.latest(topics.frames(camera), Frame)
+    frame = running.bus.latest(topics.rgbd_images(camera), RgbdImage)
     if frame is None or running.executor.t - frame.t > FRESH:
         return view.picture(camera)
     picture = np.ascontiguousarray(frame.rgb[::2, ::2])
-    sightings = running.bus.latest(topics.sightings(camera), Sightings)
+    sightings = running.bus.latest(topics.detections(camera), Detections)
     if sightings is not None and frame.t - sightings.t <= FRESH:
         for found in sightings.objects:
             x0, y0, x1, y1 = (round(float(v) / 2) for v in found.detection.box)

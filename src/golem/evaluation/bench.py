@@ -15,23 +15,22 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.base import UpperBody
 from golem.capabilities.arms.diff_ik import DiffIK
-from golem.capabilities.arms.kinematics import UpperKinematics
 from golem.capabilities.arms.postures import posture
 from golem.errors import ConfigError, MissingExtra
-from golem.hardware.estop.base import EstopFrame
-from golem.hardware.safety.base import GateInputs, GateMemory, Request, SafetyLimits
+from golem.hardware.estop.base import EstopMessage
+from golem.hardware.safety.base import GateInputs, GateMemory, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import check
 from golem.hardware.servo.servo import Servo
 from golem.robots.mujoco.config import MujocoConfig, World
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.assembly import build, start_posture
-from golem.runtime.cameras import CameraNode, LocalizerNode
-from golem.runtime.executor import TICK
+from golem.runtime.lockstep import build, start_posture
+from golem.runtime.perception_nodes import CameraNode, LocalizerNode
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import load_stack
-from golem.types import NUM_JOINTS, UPPER, Array, Frame, Imu, LowCommand, LowState
+from golem.types import NUM_JOINTS, TICK, UPPER, Array, Imu, LowCommand, LowState, RgbdImage
 
 
 @dataclass(frozen=True)
@@ -118,9 +117,9 @@ def _control(config: BenchConfig) -> list[Figure]:
         t = i * TICK
         state = LowState(t, q[i], np.zeros(27), np.zeros(27), imu)
         command = servo.step(state, q[0], TICK)
-        request = Request.ACTIVATE if i == 1 else Request.NONE
+        request = OperatorRequest.ACTIVATE if i == 1 else OperatorRequest.NONE
         memory = check(
-            GateInputs(t, state, command, EstopFrame(t, i % 256, False), request), limits, memory
+            GateInputs(t, state, command, EstopMessage(t, i % 256, False), request), limits, memory
         ).memory
 
     figures.append(_figure("servo + safety tick", _timed(tick, n), 1e6, "us", "2000 us available at 500 Hz"))
@@ -166,7 +165,7 @@ def _physics(config: BenchConfig) -> list[Figure]:
 
 
 def _perception(config: BenchConfig) -> list[Figure]:
-    from golem.capabilities.localization.onnx_detector import OnnxDetector
+    from golem.capabilities.perception.onnx_detector import OnnxDetector
 
     n = 5 if config.quick else 40
     _, robot = build(load_stack("tether", profile="field"), config.seed)
@@ -180,7 +179,7 @@ def _perception(config: BenchConfig) -> list[Figure]:
             times = _timed(lambda i, camera=camera: robot.capture(camera), n)
             figures.append(_figure(f"RGB-D frame {camera} {size}", times, 1e3, "ms", "with depth noise"))
             rgb, depth = robot.capture(camera)
-            frame = Frame(0.0, info, rgb, depth, np.eye(4))
+            frame = RgbdImage(0.0, info, rgb, depth, np.eye(4))
             times = _timed(lambda i, frame=frame: detector.locate(frame, detector.classes), n)
             figures.append(
                 _figure(f"detector {camera} {size}", times, 1e3, "ms", "14.3 ms: 640x480, prototype")

@@ -14,8 +14,8 @@ from tqdm import tqdm
 
 from golem.errors import ConfigError, GolemError, OutputError
 from golem.evaluation.pool import Workers
-from golem.evaluation.provenance import Unchanged, code_digest, commit, digest, versions
 from golem.evaluation.records import RunFolder, append_line, whole_lines
+from golem.provenance import Unchanged, code_digest, commit, digest, versions
 
 Result = dict[str, Any]
 """What a job found: JSON-like."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.evaluation.balance import BalanceTrace
 from golem.evaluation.svg import WIDTH, line, polyline, rect, svg, text, ticks
+from golem.robots.mujoco.balance import BalanceTrace
 from golem.types import Array
 
 LEFT, RIGHT = 64, 16
@@ -22,7 +22,7 @@ LEAD = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class MarginCurve:
     """One trial of a plot.
 
     Attributes:
@@ -42,7 +42,7 @@ def push_start(trace: BalanceTrace) -> float:
     return float(trace.t[pushed[0]] if len(pushed) else trace.t[0])
 
 
-def margin_plot(courses: Sequence[Course], color: int) -> str:
+def margin_plot(courses: Sequence[MarginCurve], color: int) -> str:
     """Return the CoM margins of one method's trials over the time since the push, its force above where there was one.
 
     The first course is drawn bold.
@@ -84,7 +84,7 @@ def margin_plot(courses: Sequence[Course], color: int) -> str:
 class _Shown:
     """A course as it is plotted: times since the push [s], margins [mm], size of the force [N]."""
 
-    def __init__(self, course: Course) -> None:
+    def __init__(self, course: MarginCurve) -> None:
         start = push_start(course.trace)
         trace = course.trace.window(start - LEAD)
         self.t: Array = trace.t - start

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from golem.errors import ConfigError
-from golem.evaluation.balance import BalanceRecorder
 from golem.evaluation.odometry import SimulatedOdometry
-from golem.evaluation.pushes import Push, Pusher
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
+from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.assembly import Running, build
+from golem.robots.mujoco.shoves import Push, Pusher
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import Skill, SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import FAULT, SkillRun
@@ -101,7 +101,7 @@ HANGS = Loss("settle", f"The robot did not carry its weight within {READY:g} s."
 """A robot whose band could not let go."""
 
 
-def lost(running: Running, recorder: BalanceRecorder | None) -> Loss | None:
+def lost(running: LockstepRunner, recorder: BalanceRecorder | None) -> Loss | None:
     """Return how the robot of a stack was lost; None while it was not.
 
     Args:
@@ -181,8 +181,8 @@ class Episode:
 
     def stand(self, seconds: float) -> None:
         """Let the robot take over its weight, then let `seconds` pass; one that never does so is lost."""
-        self.run(READY, until=lambda: not self.robot.banded)
-        self._hangs = self.robot.banded
+        self.run(READY, until=lambda: not self.robot.on_gantry)
+        self._hangs = self.robot.on_gantry
         self.run(seconds)
 
     def run(self, seconds: float, until: Callable[[], bool] = lambda: False) -> None:

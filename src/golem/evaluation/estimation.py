@@ -17,11 +17,10 @@ from tyro.conf import arg
 from golem import registry
 from golem.errors import ConfigError, GolemError
 from golem.evaluation.subject import Subject
-from golem.evaluation.walks import SPOILS, Walk, nothing, record
+from golem.evaluation.walks import SPOILS, RecordedWalk, nothing, record
 from golem.hardware.estimator.base import BaseEstimator
 from golem.robots.sensors.profiles import load_profile
-from golem.runtime.executor import TICK
-from golem.types import Array, LowState
+from golem.types import TICK, Array, LowState
 
 ESTIMATORS = ("random_walk_kf", "invariant_ekf")
 """Estimators of a robot on its feet."""
@@ -140,7 +139,7 @@ def run_estimation(config: EstimationConfig) -> list[EstimationRow]:
     return rows
 
 
-def _follow(use: str, walk: Walk, states: Sequence[LowState]) -> _Track:
+def _follow(use: str, walk: RecordedWalk, states: Sequence[LowState]) -> _Track:
     """Run a new estimator `use` on `states` and compare it with what was true."""
     estimator: BaseEstimator = registry.create("estimator", use, _impatient(use))
     estimator.reset(states[0])

@@ -15,12 +15,12 @@ from tyro.conf import arg
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.evaluation.base import TrialSpec, make_rung, rung_target
 from golem.evaluation.pool import Workers
-from golem.evaluation.provenance import Unchanged, code_digest, commit, digest, versions
 from golem.evaluation.records import Provenance, RunFolder, TrialRecord, artefacts
 from golem.evaluation.report import render
 from golem.evaluation.summary import Summary, summarise
 from golem.evaluation.trials import Finished, Refused, run_trial
 from golem.evaluation.words import replaced_modules
+from golem.provenance import Unchanged, code_digest, commit, digest, versions
 
 
 @dataclass(frozen=True)
@@ -129,9 +129,9 @@ def run_ladder(config: LadderConfig) -> LadderResult:
 
 def _check(config: LadderConfig, overrides: Mapping[str, str]) -> tuple[str, Provenance]:
     """Refuse what cannot run; return the rung's target and the provenance of its records."""
-    for option, value, least in (("-n", config.n, 1), ("-j", config.j, 1), ("--seed", config.seed, 0)):
-        if value < least:
-            raise ConfigError(f"{option} is {value}; it must be {least} or more.")
+    for option, value, minimum in (("-n", config.n, 1), ("-j", config.j, 1), ("--seed", config.seed, 0)):
+        if value < minimum:
+            raise ConfigError(f"{option} is {value}; it must be {minimum} or more.")
     target = rung_target(config.rung)
     rung = make_rung(target)
     if not config.method:

@@ -22,9 +22,9 @@ from golem.evaluation.bench import stopwatch
 from golem.evaluation.episode import Episode, episode_seed
 from golem.evaluation.exercise import WIDE_AREA, ArmMotion, Exercise
 from golem.evaluation.odometry import SimulatedOdometry
-from golem.evaluation.pushes import DIRECTIONS, shove
 from golem.evaluation.subject import Subject
 from golem.options import fill
+from golem.robots.mujoco.shoves import DIRECTIONS, shove
 from golem.skills.walk import Walk, WalkGoal
 from golem.stack import Choice
 from golem.types import PlanarPose, Twist

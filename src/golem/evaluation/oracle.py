@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from golem.robots.model import magpie
+from golem.robots.model import magpie_model
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.scene import ONLOOKER
@@ -57,11 +57,11 @@ class Oracle:
 
     def gripper(self, side: Side) -> Array:
         """Return the true (4, 4) pose of a grasp frame in odom."""
-        body = self._robot.data.body(magpie.hand_name(side))
+        body = self._robot.data.body(magpie_model.hand_name(side))
         T = np.eye(4)
         T[:3, :3] = body.xmat.reshape(3, 3)
         T[:3, 3] = body.xpos
-        return self._T_odom_world @ T @ magpie.T_HAND_GRIPPER
+        return self._T_odom_world @ T @ magpie_model.T_HAND_GRIPPER
 
     def screw_heads(self) -> Array:
         """Return the (n, 3) undersides of the loosened screws' heads in odom [m]."""

@@ -20,10 +20,10 @@ from golem.evaluation.episode import LATENCY, Episode
 from golem.evaluation.exercise import ArmMotion, Exercise
 from golem.evaluation.leg_tests import can_walk
 from golem.evaluation.pool import CAN_COPY, in_a_copy
-from golem.evaluation.provenance import commit
-from golem.evaluation.pushes import DIRECTIONS, rod, shove
 from golem.evaluation.subject import Subject, labels
 from golem.evaluation.words import replaced_modules, robot_options
+from golem.provenance import commit
+from golem.robots.mujoco.shoves import DIRECTIONS, rod, shove
 from golem.robots.sensors.profiles import load_profile
 from golem.skills.runner import FAULT
 from golem.types import Twist
@@ -312,8 +312,8 @@ def table(found: Sequence[dict[str, Any]], config: PushBenchConfig) -> str:
         for phase in config.phase:
             chosen = [by_key[method, phase, direction] for direction in config.direction]
             shown = [_cell(c) for c in chosen]
-            least = min(c["survived"] for c in chosen)
-            rows.append(f"| {names[method]} | {phase} | {' | '.join(shown)} | {least:g} |")
+            minimum = min(c["survived"] for c in chosen)
+            rows.append(f"| {names[method]} | {phase} | {' | '.join(shown)} | {minimum:g} |")
     notes = [
         "",
         f"A level is lost with {allowed(config.n) + 1} of {config.n} trials; `>=`: the highest one tried was not lost.",

@@ -9,14 +9,14 @@ from html import escape
 from importlib import resources
 from pathlib import Path
 
-from golem.evaluation.balance import TRACE, BalanceTrace
-from golem.evaluation.courses import MOST, Course, margin_plot
+from golem.evaluation.courses import MOST, MarginCurve, margin_plot
 from golem.evaluation.measures import MEASURES, Measure
 from golem.evaluation.paper import PAPER
 from golem.evaluation.records import TrialRecord, artefacts
 from golem.evaluation.statistics import spread, wilson
 from golem.evaluation.summary import NO_MODULE, MethodSummary, Summary
 from golem.evaluation.svg import Dot, interval_bar, percent_axis, stacked, strips, trial_map
+from golem.robots.mujoco.balance import TRACE, BalanceTrace
 
 HEADLINE_TIMES = {"detect_to_grasp": "detection<br>to grasp", "recovery": "recovery", "walk": "walk"}
 """The times that the success table may show, the first that the trials have, and what it calls them."""
@@ -252,7 +252,7 @@ def _margins(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> str:
     parts: list[str] = []
     for i, (method, rows) in enumerate(grouped.items()):
         kept = [(r, path) for r in rows if (path := artefacts(folder, r) / TRACE).is_file()]
-        courses = [Course(BalanceTrace.load(path), r.success, _says(r)) for r, path in kept[:MOST]]
+        courses = [MarginCurve(BalanceTrace.load(path), r.success, _says(r)) for r, path in kept[:MOST]]
         plot = margin_plot(courses, i % 6) if courses else ""
         if plot:
             parts.append(f"<h3>{escape(method)}</h3>{plot}")

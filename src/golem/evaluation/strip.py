@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from golem.dashboard.scene import Shot, SpectatorView
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.engine import MujocoRobot
+from golem.robots.mujoco.spectator import Shot, SpectatorView
 from golem.types import Array
 
 SIZE = (250, 400)

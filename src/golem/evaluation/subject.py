@@ -9,7 +9,7 @@ from typing import Any
 
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.episode import Episode, episode_seed, legs_stack
-from golem.evaluation.provenance import digest, user_files
+from golem.provenance import digest, user_files
 from golem.stack import Stack
 
 

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.exercise import ArmMotion, Exercise
-from golem.evaluation.pushes import DIRECTIONS, shove
 from golem.evaluation.subject import Subject
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
-from golem.robots.model.legs import LEG, Legs
-from golem.runtime.executor import TICK
-from golem.types import LEGS, Array, LowState, Twist
+from golem.robots.model.leg_dynamics import LEG, LegDynamics
+from golem.robots.mujoco.shoves import DIRECTIONS, shove
+from golem.types import LEGS, TICK, Array, LowState, Twist
 
 START = 5.0
 """Time the robot stands before it walks [s]: the band goes, and what estimators learn at rest is learned."""
@@ -44,7 +43,7 @@ RETURN = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Walk:
+class RecordedWalk:
     """One recorded episode, n samples.
 
     Attributes:
@@ -72,7 +71,7 @@ def twist_at(t: float) -> Twist:
     return TWISTS[segment] if 0 <= segment < len(TWISTS) else Twist()
 
 
-def record(subject: Subject, spec: TrialSpec, pushed: bool) -> Walk:
+def record(subject: Subject, spec: TrialSpec, pushed: bool) -> RecordedWalk:
     """Let the robot of trial `spec` walk, its arms moving, and record it.
 
     Args:
@@ -104,7 +103,7 @@ def record(subject: Subject, spec: TrialSpec, pushed: bool) -> Walk:
         for column, value in zip((poses, velocities, forces), now, strict=True):
             column.append(value)
         stepping.append(legs is not None and (legs.stepping or legs.moving))
-        free.append(not episode.robot.banded)
+        free.append(not episode.robot.on_gantry)
         now = look()
         return False
 
@@ -122,7 +121,7 @@ def record(subject: Subject, spec: TrialSpec, pushed: bool) -> Walk:
     judged = np.cumsum(free) * TICK > 1.0
     if loss is not None:
         judged[-round(1.0 / TICK) :] = False
-    return Walk(
+    return RecordedWalk(
         states=states,
         T=np.array(poses),
         velocity=np.array(velocities),
@@ -133,15 +132,15 @@ def record(subject: Subject, spec: TrialSpec, pushed: bool) -> Walk:
     )
 
 
-Spoil = Callable[[Walk, np.random.Generator], list[LowState]]
+Spoil = Callable[[RecordedWalk, np.random.Generator], list[LowState]]
 
 
-def nothing(walk: Walk, rng: np.random.Generator) -> list[LowState]:
+def nothing(walk: RecordedWalk, rng: np.random.Generator) -> list[LowState]:
     """Return what the sensors said."""
     return walk.states
 
 
-def wrong_contacts(walk: Walk, rng: np.random.Generator) -> list[LowState]:
+def wrong_contacts(walk: RecordedWalk, rng: np.random.Generator) -> list[LowState]:
     """Return states whose torques tell of contacts that are not there, and hide others.
 
     Each foot, `WRONG_RATE` times a second and for `WRONG_TIME`: one in the air seems to carry 400 N, one that carries
@@ -151,7 +150,7 @@ def wrong_contacts(walk: Walk, rng: np.random.Generator) -> list[LowState]:
     begins = rng.random((n, 2)) < WRONG_RATE * TICK
     length = round(WRONG_TIME / TICK)
     wrong = np.array([begins[max(0, i - length + 1) : i + 1].any(axis=0) for i in range(n)])
-    legs, out = Legs(), list(walk.states)
+    legs, out = LegDynamics(), list(walk.states)
     for i in np.flatnonzero(wrong.any(axis=1)):
         state = walk.states[i]
         legs.update(state.q[LEGS], state.dq[LEGS])
@@ -163,13 +162,13 @@ def wrong_contacts(walk: Walk, rng: np.random.Generator) -> list[LowState]:
     return out
 
 
-def slipping(walk: Walk, rng: np.random.Generator) -> list[LowState]:
+def slipping(walk: RecordedWalk, rng: np.random.Generator) -> list[LowState]:
     """Return states of a robot each of whose planted feet slides back by `SLIP` of the way the base goes.
 
     The base moves as recorded, so the joints must have moved further: each leg gets the joint motion that slides its
     sole, and loses it again while it swings.
     """
-    legs, out = Legs(), list[LowState]()
+    legs, out = LegDynamics(), list[LowState]()
     offset = np.zeros((2, LEG))
     for i, state in enumerate(walk.states):
         legs.update(state.q[LEGS], state.dq[LEGS])

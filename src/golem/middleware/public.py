@@ -28,7 +28,7 @@ VENDOR = ("unitree_hg", "unitree_api")
 
 
 @dataclass(frozen=True, slots=True)
-class Topic:
+class TopicRow:
     """A stream of messages.
 
     Attributes:
@@ -58,7 +58,7 @@ class Topic:
 
 
 @dataclass(frozen=True, slots=True)
-class Service:
+class ServiceRow:
     """A call with an answer.
 
     Attributes:
@@ -74,7 +74,7 @@ class Service:
 
 
 @dataclass(frozen=True, slots=True)
-class Action:
+class ActionRow:
     """A goal with feedback, a result, and a way to cancel it.
 
     Attributes:
@@ -111,7 +111,7 @@ IMAGES = (CAMERA_INFO, DEPTH_INFO, COLOR, COLOR_JPEG, DEPTH, DEPTH_PNG)
 """What there is of each camera; first what the others are read with."""
 
 
-def _camera(camera: str) -> tuple[Topic, ...]:
+def _camera(camera: str) -> tuple[TopicRow, ...]:
     rows: tuple[tuple[str, str, tuple[Role, ...], str], ...] = (
         (COLOR, "Image", ("stack",), "Colour, rgb8."),
         (COLOR_JPEG, "CompressedImage", (), "The same as JPEG."),
@@ -122,115 +122,115 @@ def _camera(camera: str) -> tuple[Topic, ...]:
     )
     frame = optical_frame(camera)
     return tuple(
-        Topic(image(camera, what), f"sensor_msgs/msg/{kind}", "robot", to, SENSOR, 15, frame, text)
+        TopicRow(image(camera, what), f"sensor_msgs/msg/{kind}", "robot", to, SENSOR, 15, frame, text)
         for what, kind, to, text in rows
     )
 
 
 # fmt: off
-def _loco(service: str, robots: str) -> tuple[Topic, ...]:
+def _loco(service: str, robots: str) -> tuple[TopicRow, ...]:
     return (
-        Topic(f"/api/{service}/request", "unitree_api/msg/Request", "stack", ("robot",), CALLS, None, "",
+        TopicRow(f"/api/{service}/request", "unitree_api/msg/Request", "stack", ("robot",), CALLS, None, "",
               f"Calls of the on-board leg controller, state and velocity, as {robots} has them. "
               "One of the two services is spoken to: see the option `robot` of `vendor`."),
-        Topic(f"/api/{service}/response", "unitree_api/msg/Response", "robot", ("stack",), CALLS, None, "",
+        TopicRow(f"/api/{service}/response", "unitree_api/msg/Response", "robot", ("stack",), CALLS, None, "",
               "The answers."),
     )
 
 
-def _hand(side: str) -> tuple[Topic, ...]:
+def _hand(side: str) -> tuple[TopicRow, ...]:
     own, frame = "golem_interfaces/msg/", f"{side}_gripper"
     return (
-        Topic(gripper(side, "state"), own + "HandState", "robot", ("stack",), SENSOR, 100, frame,
+        TopicRow(gripper(side, "state"), own + "HandState", "robot", ("stack",), SENSOR, 100, frame,
               "Opening, fingers and forces as the servos report them."),
-        Topic(gripper(side, "command"), own + "HandCommand", "stack", ("robot",), SENSOR, 100, frame,
+        TopicRow(gripper(side, "command"), own + "HandCommand", "stack", ("robot",), SENSOR, 100, frame,
               "Opening and force the servos are told."),
-        Topic(gripper(side, "status"), own + "HandStatus", "stack", (), DEFAULT, 10, frame,
+        TopicRow(gripper(side, "status"), own + "HandStatus", "stack", (), DEFAULT, 10, frame,
               "What the hand's controller found: open, closing, holding, slipped, ..."),
     )
 
 
-TOPICS: tuple[Topic, ...] = (
-    Topic("/lowstate", "unitree_hg/msg/LowState", "robot", ("safety", "stack"), LOW, 500, "",
+TOPICS: tuple[TopicRow, ...] = (
+    TopicRow("/lowstate", "unitree_hg/msg/LowState", "robot", ("safety", "stack"), LOW, 500, "",
           "Motors and torso IMU, with checksum; tick is robot time in ms and the clock of everything above the "
           "robot."),
-    Topic("/lowcmd", "unitree_hg/msg/LowCmd", "safety", ("robot", "safety"), LOW, 500, "",
+    TopicRow("/lowcmd", "unitree_hg/msg/LowCmd", "safety", ("robot", "safety"), LOW, 500, "",
           "What the motors are told, with checksum; from the safety gate and nobody else. The twin's drives go "
           "limp 0.1 s after the last one. reserve[0] as in /safety/lowcmd_in: a simulated robot waits for answers."),
-    Topic("/clock", "rosgraph_msgs/msg/Clock", "robot", (), NEWEST, 500, "",
+    TopicRow("/clock", "rosgraph_msgs/msg/Clock", "robot", (), NEWEST, 500, "",
           "Robot time."),
-    Topic("/joint_states", "sensor_msgs/msg/JointState", "robot", (), DEFAULT, 100, "",
+    TopicRow("/joint_states", "sensor_msgs/msg/JointState", "robot", (), DEFAULT, 100, "",
           "The 27 joints in motor order, then the joints of the fingers."),
-    Topic("/tf", "tf2_msgs/msg/TFMessage", "robot", (), DEFAULT, 50, "",
+    TopicRow("/tf", "tf2_msgs/msg/TFMessage", "robot", (), DEFAULT, 50, "",
           "Every moving link in its parent."),
-    Topic("/tf", "tf2_msgs/msg/TFMessage", "stack", (), DEFAULT, 50, "odom",
+    TopicRow("/tf", "tf2_msgs/msg/TFMessage", "stack", (), DEFAULT, 50, "odom",
           "base_link in odom, by the base estimate."),
-    Topic("/tf_static", "tf2_msgs/msg/TFMessage", "robot", ("stack",), LATCHED, None, "",
+    TopicRow("/tf_static", "tf2_msgs/msg/TFMessage", "robot", ("stack",), LATCHED, None, "",
           "Sensor frames; those of the cameras are where their calibration claims them."),
-    Topic("/robot_description", "std_msgs/msg/String", "robot", (), LATCHED, None, "",
+    TopicRow("/robot_description", "std_msgs/msg/String", "robot", (), LATCHED, None, "",
           "The robot as URDF."),
     *(row for camera in CAMERAS for row in _camera(camera)),
-    Topic("/livox/lidar", "livox_ros_driver2/msg/CustomMsg", "robot", (), CLOUD, 10, "lidar_link",
+    TopicRow("/livox/lidar", "livox_ros_driver2/msg/CustomMsg", "robot", (), CLOUD, 10, "lidar_link",
           "Points of the LiDAR in the driver's own type. The twin has none yet: the publisher is silent."),
-    Topic("/livox/pointcloud", "sensor_msgs/msg/PointCloud2", "robot", (), CLOUD, 10, "lidar_link",
+    TopicRow("/livox/pointcloud", "sensor_msgs/msg/PointCloud2", "robot", (), CLOUD, 10, "lidar_link",
           "The same points. Silent like /livox/lidar."),
-    Topic("/livox/imu", "sensor_msgs/msg/Imu", "robot", (), SENSOR, 200, "lidar_link",
+    TopicRow("/livox/imu", "sensor_msgs/msg/Imu", "robot", (), SENSOR, 200, "lidar_link",
           "IMU inside the LiDAR. Silent like /livox/lidar: it is part of that device, not of the torso's IMU."),
     *(row for side in SIDES for row in _hand(side)),
-    Topic("/api/motion_switcher/request", "unitree_api/msg/Request", "safety", ("robot",), CALLS, None, "",
+    TopicRow("/api/motion_switcher/request", "unitree_api/msg/Request", "safety", ("robot",), CALLS, None, "",
           "Calls 1001 check, 1002 select, 1003 release: which on-board controller runs."),
-    Topic("/api/motion_switcher/response", "unitree_api/msg/Response", "robot", ("safety",), CALLS, None, "",
+    TopicRow("/api/motion_switcher/response", "unitree_api/msg/Response", "robot", ("safety",), CALLS, None, "",
           "The answers."),
     *(row for service, robots in (("loco", "an H1"), ("sport", "a G1 or an H2")) for row in _loco(service, robots)),
-    Topic("/safety/lowcmd_in", "unitree_hg/msg/LowCmd", "stack", ("safety",), LOW, 500, "",
+    TopicRow("/safety/lowcmd_in", "unitree_hg/msg/LowCmd", "stack", ("safety",), LOW, 500, "",
           "What the stack wants of the motors, for the gate to judge. reserve[0] repeats the tick of the state "
           "it answers, 0 where unknown; the gate takes a command to be as old as that state."),
-    Topic("/safety/status", "golem_interfaces/msg/SafetyStatus", "safety", ("stack",), LATCHED, 20, "",
+    TopicRow("/safety/status", "golem_interfaces/msg/SafetyStatus", "safety", ("stack",), LATCHED, 20, "",
           "State of the gate, and why; at every change, and regularly."),
-    Topic("/estop", "golem_interfaces/msg/EstopFrame", "safety", (), SENSOR, 100, "",
+    TopicRow("/estop", "golem_interfaces/msg/EstopFrame", "safety", (), SENSOR, 100, "",
           "Frames of the emergency stop as the gate sees them."),
-    Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "safety", (), DEFAULT, 1, "",
+    TopicRow("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "safety", (), DEFAULT, 1, "",
           "State of the gate, ages of what it watches, rate of its loop."),
-    Topic("/base_estimate", "golem_interfaces/msg/BaseEstimate", "stack", ("safety",), LOW, 500, "odom",
+    TopicRow("/base_estimate", "golem_interfaces/msg/BaseEstimate", "stack", ("safety",), LOW, 500, "odom",
           "Pose, velocity, height and contacts of the base as the stack estimates them; the gate watches "
           "`stale`."),
-    Topic("/odom", "nav_msgs/msg/Odometry", "stack", (), DEFAULT, 50, "odom",
+    TopicRow("/odom", "nav_msgs/msg/Odometry", "stack", (), DEFAULT, 50, "odom",
           "Pose of base_link in odom and its velocity in base_link."),
-    Topic("/cmd_vel", "geometry_msgs/msg/Twist", "user", ("stack",), DEFAULT, None, BASE_FRAME,
+    TopicRow("/cmd_vel", "geometry_msgs/msg/Twist", "user", ("stack",), DEFAULT, None, BASE_FRAME,
           "Velocity for the legs [m/s], [rad/s]; to be repeated at least every 0.5 s, or the robot stands. Ignored "
           "while a skill runs or the gate is shut; who sent any then lets go first: zero, or nothing for 1 s."),
-    Topic("/legs/status", "golem_interfaces/msg/LegStatus", "stack", (), DEFAULT, 50, BASE_FRAME,
+    TopicRow("/legs/status", "golem_interfaces/msg/LegStatus", "stack", (), DEFAULT, 50, BASE_FRAME,
           "What the lower body was told, what it does, and why not more."),
-    Topic("/onboard/lowcmd", "unitree_hg/msg/LowCmd", "robot", ("stack",), LOW, 500, "",
+    TopicRow("/onboard/lowcmd", "unitree_hg/msg/LowCmd", "robot", ("stack",), LOW, 500, "",
           "What the on-board leg controller wants of the 12 leg motors while it is on, the others off. Simulation "
           "only: there it takes the way of every other command, through the gate."),
-    *(Topic(f"/objects/{camera}", "golem_interfaces/msg/Sightings", "stack", (), DEFAULT, None, "odom",
+    *(TopicRow(f"/objects/{camera}", "golem_interfaces/msg/Sightings", "stack", (), DEFAULT, None, "odom",
             "Objects located in the frames that a skill asked for.") for camera in CAMERAS),
 )
 
 TRIGGER = "std_srvs/srv/Trigger"
-SERVICES: tuple[Service, ...] = (
-    Service("/safety/activate", TRIGGER, "safety", "Let commands through, if the gate is armed."),
-    Service("/safety/stop", TRIGGER, "safety", "Stop the robot: its motors damp, then go limp."),
-    Service("/safety/reset", TRIGGER, "safety", "Arm the gate again after a stop, if all is sound."),
-    Service("/estop/press", "std_srvs/srv/SetBool", "safety",
+SERVICES: tuple[ServiceRow, ...] = (
+    ServiceRow("/safety/activate", TRIGGER, "safety", "Let commands through, if the gate is armed."),
+    ServiceRow("/safety/stop", TRIGGER, "safety", "Stop the robot: its motors damp, then go limp."),
+    ServiceRow("/safety/reset", TRIGGER, "safety", "Arm the gate again after a stop, if all is sound."),
+    ServiceRow("/estop/press", "std_srvs/srv/SetBool", "safety",
             "Press or release the virtual emergency stop; simulation only."),
-    Service("/elastic_band/release", TRIGGER, "robot", "Let the band of a standing robot go; simulation only."),
+    ServiceRow("/elastic_band/release", TRIGGER, "robot", "Let the band of a standing robot go; simulation only."),
     *(service for side in SIDES for service in (
-        Service(gripper(side, "open"), TRIGGER, "stack", "Open the hand as far as it goes."),
-        Service(gripper(side, "close"), TRIGGER, "stack", "Close the hand until its fingers press."),
-        Service(gripper(side, "set_position"), "golem_interfaces/srv/SetGap", "stack",
+        ServiceRow(gripper(side, "open"), TRIGGER, "stack", "Open the hand as far as it goes."),
+        ServiceRow(gripper(side, "close"), TRIGGER, "stack", "Close the hand until its fingers press."),
+        ServiceRow(gripper(side, "set_position"), "golem_interfaces/srv/SetGap", "stack",
                 "Open or close the hand to a gap."),
-        Service(gripper(side, "set_force"), "golem_interfaces/srv/SetForce", "stack",
+        ServiceRow(gripper(side, "set_force"), "golem_interfaces/srv/SetForce", "stack",
                 "Close the hand with a force."),
     )),
 )
 
-ACTIONS: tuple[Action, ...] = (
-    Action("/skill/pick", "golem_interfaces/action/Pick", "stack",
+ACTIONS: tuple[ActionRow, ...] = (
+    ActionRow("/skill/pick", "golem_interfaces/action/Pick", "stack",
            "Find an object, grasp it, pull it straight out and drop it in a container."),
-    Action("/skill/walk", "golem_interfaces/action/Walk", "stack", "Walk to a pose and stand there."),
-    Action("/skill/stand", "golem_interfaces/action/Stand", "stack", "Stand for a while."),
+    ActionRow("/skill/walk", "golem_interfaces/action/Walk", "stack", "Walk to a pose and stand there."),
+    ActionRow("/skill/stand", "golem_interfaces/action/Stand", "stack", "Stand for a while."),
 )
 
 ABSENT: dict[str, str] = {
@@ -245,6 +245,6 @@ ABSENT: dict[str, str] = {
 # fmt: on
 
 
-def topic(name: str, by: Role | None = None) -> Topic:
+def topic(name: str, by: Role | None = None) -> TopicRow:
     """Return the row of the topic called `name`, of the publisher `by` where there are several."""
     return next(row for row in TOPICS if row.name == name and by in (None, row.by))

@@ -18,7 +18,7 @@ LOW_CMD = "lowcmd"
 BASE = "base_estimate"
 """`BaseEstimate` at 500 Hz."""
 ESTOP = "estop"
-"""`EstopFrame` at 100 Hz."""
+"""`EstopMessage` at 100 Hz."""
 SAFETY = "safety/status"
 """`GateStatus` whenever the safety gate ran."""
 TRANSPORT_FAULT = "safety/transport"
@@ -32,7 +32,7 @@ LEG_COMMAND = "leg_command"
 TWIST = "cmd_vel"
 """`Twist` for the lower body."""
 MODULE_FAULT = "module_fault"
-"""`Broken`, of a module without which the robot can still stand."""
+"""`ModuleFaultMsg`, of a module without which the robot can still stand."""
 LEG_STATUS = "legs/status"
 """`LegStatus`, from the base layer of the lower body."""
 ODOMETRY = "odometry"
@@ -66,27 +66,27 @@ def exposures(camera: str) -> str:
     return f"exposures/{camera}"
 
 
-def frames(camera: str) -> str:
-    """Return the topic of `Frame` of one camera."""
+def rgbd_images(camera: str) -> str:
+    """Return the topic of `RgbdImage` of one camera."""
     return f"realsense/{camera}"
 
 
-def look(camera: str) -> str:
-    """Return the topic of `LookRequest` for one camera."""
+def detection_request(camera: str) -> str:
+    """Return the topic of `DetectionRequest` for one camera."""
     return f"look/{camera}"
 
 
-def sightings(camera: str) -> str:
-    """Return the topic of `Sightings` from one camera."""
+def detections(camera: str) -> str:
+    """Return the topic of `Detections` from one camera."""
     return f"objects/{camera}"
 
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """What a camera saw, before anybody says from where: a `Frame` without its pose.
+    """What a camera saw, before anybody says from where: a `RgbdImage` without its pose.
 
     Attributes:
-        t, info, rgb, depth: as in `Frame`.
+        t, info, rgb, depth: as in `RgbdImage`.
     """
 
     t: float
@@ -96,7 +96,7 @@ class Exposure:
 
 
 @dataclass(frozen=True, slots=True)
-class LookRequest:
+class DetectionRequest:
     """Ask a camera and the localizer behind it to stream.
 
     Attributes:
@@ -107,7 +107,7 @@ class LookRequest:
 
 
 @dataclass(frozen=True, slots=True)
-class Sightings:
+class Detections:
     """What a localizer found in one frame.
 
     Attributes:
@@ -167,7 +167,7 @@ class LegStatus:
 
 
 @dataclass(frozen=True, slots=True)
-class Broken:
+class ModuleFaultMsg:
     """A module broke its contract; the skill that runs ends with it.
 
     Attributes:

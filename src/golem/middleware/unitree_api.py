@@ -30,7 +30,7 @@ MEANING = {
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class ApiRequest:
     """A call.
 
     Attributes:
@@ -139,7 +139,7 @@ def loco_api(robot: object) -> LocoApi:
 
 
 def request_topic(service: str) -> str:
-    """Return the topic of `Request` to a service."""
+    """Return the topic of `ApiRequest` to a service."""
     return f"api/{service}/request"
 
 

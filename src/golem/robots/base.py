@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from golem.types import Array, CameraInfo, HandCommand, HandState, Imu, LowCommand, Side
 
-SLACK = 5e-4
+STAMP_TOLERANCE = 5e-4
 """Tolerance of a stamp [s]: half of the resolution in which the robot tells its time."""
 
 
@@ -64,14 +64,14 @@ class Robot(Protocol):
 
 
 @runtime_checkable
-class Banded(Protocol):
+class HasGantry(Protocol):
     """A robot that is brought up standing, with a band that keeps it upright until its legs do.
 
     Attributes:
-        banded: whether there is a band that is still to be let go; false for a robot that hangs and shall hang.
+        on_gantry: whether there is a band that is still to be let go; false for a robot that hangs and shall hang.
     """
 
-    banded: bool
+    on_gantry: bool
 
     def release(self) -> None:
         """Let the band go, smoothly; an operator's act. Without a band it does nothing."""
@@ -79,13 +79,13 @@ class Banded(Protocol):
 
 
 @runtime_checkable
-class Recallable(Robot, Protocol):
+class Restorable(Robot, Protocol):
     """A simulated robot whose moment can be shown by another that was built alike, in another process."""
 
-    def snapshot(self) -> bytes:
+    def save_state(self) -> bytes:
         """Return the present moment."""
         ...
 
-    def recall(self, snapshot: bytes) -> None:
+    def restore_state(self, save_state: bytes) -> None:
         """Be in the moment of a snapshot: `capture` then shows what it showed there."""
         ...

@@ -13,9 +13,7 @@ from typing import Protocol
 
 from golem.errors import ConfigError
 from golem.middleware.bus import Bus
-
-TICK = 0.002
-"""Period of the clock [s]: one servo period (500 Hz)."""
+from golem.types import TICK
 
 
 class Node(Protocol):
@@ -69,9 +67,9 @@ class _Entry:
 
     def __init__(self, node: Node) -> None:
         if node.period < TICK - 1e-9:
-            rate, most = 1.0 / node.period, 1.0 / TICK
+            rate, maximum = 1.0 / node.period, 1.0 / TICK
             raise ConfigError(
-                f"{type(node).__name__} wants to run at {rate:g} Hz; the clock allows up to {most:g} Hz."
+                f"{type(node).__name__} wants to run at {rate:g} Hz; the clock allows up to {maximum:g} Hz."
             )
         self.step = node.step
         self.period = node.period / TICK
@@ -124,11 +122,11 @@ class Executor:
                 entry.advance()
         self._tick += 1
 
-    def advance(self, t: float, most: int) -> None:
+    def advance(self, t: float, maximum: int) -> None:
         """Follow a clock from outside up to time `t` [s]; ticks further back than the last `most` are left out."""
         target = round((t - self._offset) / TICK)
-        if target - self._tick >= most:
-            self._tick = target - most + 1
+        if target - self._tick >= maximum:
+            self._tick = target - maximum + 1
             for entry in self._schedule:
                 entry.skip(self._tick)
         while self._tick <= target:

@@ -7,23 +7,23 @@ import numpy as np
 from golem.capabilities.arms.base import ArmCommand, UpperBody
 from golem.capabilities.legs.base import LegCommand
 from golem.hardware.estimator.base import BaseEstimator
-from golem.hardware.estop.base import EmergencyStop, EstopFrame
+from golem.hardware.estop.base import EmergencyStop, EstopMessage
 from golem.hardware.hands.base import HandController, HandStatus
-from golem.hardware.safety.base import Fault, GateInputs, GateState, GateStatus, Request, SafetyLimits
+from golem.hardware.safety.base import Fault, GateInputs, GateState, GateStatus, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
 from golem.hardware.servo.base import MotorServo
 from golem.middleware import topics
 from golem.middleware.bus import Bus, News
-from golem.middleware.topics import Broken, HandGoal, LegStatus
+from golem.middleware.topics import HandGoal, LegStatus, ModuleFaultMsg
 from golem.robots.base import Robot
-from golem.runtime.executor import TICK
-from golem.runtime.guard import Guard
+from golem.runtime.contract_check import ContractCheck
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
 from golem.types import (
     LEGS,
     NUM_JOINTS,
     SIDES,
+    TICK,
     UPPER,
     BaseEstimate,
     HandCommand,
@@ -48,13 +48,13 @@ class SenseNode:
 
     period = TICK
 
-    def __init__(self, bus: Bus, robot: Robot, guard: Guard) -> None:
+    def __init__(self, bus: Bus, robot: Robot, contract: ContractCheck) -> None:
         """Read `robot`."""
-        self._bus, self._robot, self._guard = bus, robot, guard
+        self._bus, self._robot, self._contract = bus, robot, contract
 
     def step(self, t: float) -> None:
         """Publish one sample of everything."""
-        call = self._guard.call
+        call = self._contract.call
         q, dq, tau = call(self._robot.joints)
         self._bus.publish(topics.LOW_STATE, LowState(t, q, dq, tau, call(self._robot.imu)), t)
         for side in SIDES:
@@ -66,9 +66,9 @@ class ActNode:
 
     period = TICK
 
-    def __init__(self, bus: Bus, robot: Robot, guard: Guard) -> None:
+    def __init__(self, bus: Bus, robot: Robot, contract: ContractCheck) -> None:
         """Drive `robot`."""
-        self._bus, self._robot, self._guard = bus, robot, guard
+        self._bus, self._robot, self._contract = bus, robot, contract
 
     def step(self, t: float) -> None:
         """Advance the robot by one tick; motors without a command of late are limp."""
@@ -80,7 +80,7 @@ class ActNode:
             hand = self._bus.latest(topics.hand_command(side), HandCommand)
             if hand is not None:
                 hands[side] = hand
-        self._guard.call(self._robot.advance, command, hands, TICK)
+        self._contract.call(self._robot.advance, command, hands, TICK)
 
 
 class EstimatorNode:
@@ -88,9 +88,9 @@ class EstimatorNode:
 
     period = TICK
 
-    def __init__(self, bus: Bus, estimator: BaseEstimator, guard: Guard) -> None:
+    def __init__(self, bus: Bus, estimator: BaseEstimator, contract: ContractCheck) -> None:
         """Run `estimator`."""
-        self._bus, self._estimator, self._guard = bus, estimator, guard
+        self._bus, self._estimator, self._contract = bus, estimator, contract
         self._started = False
 
     def step(self, t: float) -> None:
@@ -100,28 +100,28 @@ class EstimatorNode:
             return
         if not self._started:
             self._started = True
-            self._guard.call(self._estimator.reset, state)
-        estimate = self._guard.call(self._estimator.step, state, TICK)
-        self._guard.kind("the estimate", estimate, BaseEstimate)
-        T = self._guard.array("T_odom_base", estimate.T_odom_base, 4, 4)
+            self._contract.call(self._estimator.reset, state)
+        estimate = self._contract.call(self._estimator.step, state, TICK)
+        self._contract.kind("the estimate", estimate, BaseEstimate)
+        T = self._contract.array("T_odom_base", estimate.T_odom_base, 4, 4)
         # A rotation to 1e-3: `check_pose` at 500 Hz would cost more than the estimate.
         if np.abs(T[:3, :3] @ T[:3, :3].T - IDENTITY).max() > 1e-3:
-            raise self._guard.fault("T_odom_base is not a rigid transform")
-        self._guard.array("velocity", estimate.velocity, 3)
-        self._guard.array("contact", estimate.contact, 2)
-        self._guard.number("height", estimate.height)
-        self._guard.number("t", estimate.t)
+            raise self._contract.fault("T_odom_base is not a rigid transform")
+        self._contract.array("velocity", estimate.velocity, 3)
+        self._contract.array("contact", estimate.contact, 2)
+        self._contract.number("height", estimate.height)
+        self._contract.number("t", estimate.t)
         self._bus.publish(topics.BASE, estimate, t)
 
 
 class UpperBodyNode:
     """Runs the upper-body controller at its rate, its targets brought from odom into base_link."""
 
-    def __init__(self, bus: Bus, arms: UpperBody, guard: Guard) -> None:
+    def __init__(self, bus: Bus, arms: UpperBody, contract: ContractCheck) -> None:
         """Run `arms`."""
-        self._bus, self._arms, self._guard = bus, arms, guard
-        self._latency = guard.number("latency", arms.latency, least=0.0)
-        self.period = 1.0 / guard.number("rate", arms.rate, least=MIN_RATE)
+        self._bus, self._arms, self._contract = bus, arms, contract
+        self._latency = contract.number("latency", arms.latency, minimum=0.0)
+        self.period = 1.0 / contract.number("rate", arms.rate, minimum=MIN_RATE)
         self._stopped_at = 0.0
 
     def step(self, t: float) -> None:
@@ -132,16 +132,16 @@ class UpperBodyNode:
             return
         if not moving(self._bus):
             self._stopped_at = t
-            self._guard.call(self._arms.reset, state.q)
+            self._contract.call(self._arms.reset, state.q)
         targets = self._bus.latest(topics.PALM_TARGETS, PalmTargets)
         if targets is None or targets.t <= self._stopped_at:
             # A target from before a stop must not set the arms in motion when the robot is released.
             targets = PalmTargets(t)
         T_base_odom = np.linalg.inv(base.T_odom_base)
         left, right = (None if T is None else T_base_odom @ T for T in (targets.left, targets.right))
-        command = self._guard.call(self._arms.step, left, right, state.q, self.period)
-        self._guard.kind("the arm command", command, ArmCommand)
-        self._guard.array("q", command.q, UPPER.stop - UPPER.start)
+        command = self._contract.call(self._arms.step, left, right, state.q, self.period)
+        self._contract.kind("the arm command", command, ArmCommand)
+        self._contract.array("q", command.q, UPPER.stop - UPPER.start)
         self._bus.publish(topics.ARM_COMMAND, command, t, self._latency)
 
 
@@ -150,9 +150,9 @@ class HandNode:
 
     period = 0.01
 
-    def __init__(self, bus: Bus, hand: HandController, side: Side, guard: Guard) -> None:
+    def __init__(self, bus: Bus, hand: HandController, side: Side, contract: ContractCheck) -> None:
         """Run `hand` on `side`."""
-        self._bus, self._hand, self._guard = bus, hand, guard
+        self._bus, self._hand, self._contract = bus, hand, contract
         self._side: Side = side
         self._goals = 0
         self._frozen = False
@@ -167,12 +167,12 @@ class HandNode:
             self._pass_goal()
         else:
             self._freeze(state)
-        command = self._guard.call(self._hand.step, state, t)
-        self._guard.kind("the hand command", command, HandCommand)
-        self._guard.number("gap", command.gap, least=0.0)
-        self._guard.number("force", command.force, least=0.0)
-        status = self._guard.call(self._hand.status)
-        self._guard.kind("the status", status, HandStatus)
+        command = self._contract.call(self._hand.step, state, t)
+        self._contract.kind("the hand command", command, HandCommand)
+        self._contract.number("gap", command.gap, minimum=0.0)
+        self._contract.number("force", command.force, minimum=0.0)
+        status = self._contract.call(self._hand.status)
+        self._contract.kind("the status", status, HandStatus)
         self._bus.publish(topics.hand_command(self._side), command, t)
         self._bus.publish(topics.hand_status(self._side), status, t)
 
@@ -183,17 +183,17 @@ class HandNode:
             return
         self._goals = count
         if goal.gap is None:
-            self._guard.call(self._hand.close, goal.force)
+            self._contract.call(self._hand.close, goal.force)
         else:
-            self._guard.call(self._hand.open, goal.gap)
+            self._contract.call(self._hand.open, goal.gap)
 
     def _freeze(self, state: HandState) -> None:
         """While the safety gate is shut: keep what is held, else stay as it is; goals given meanwhile are void."""
         self._goals = self._bus.count(topics.hand_goal(self._side))
         if not self._frozen:
             self._frozen = True
-            if not self._guard.call(self._hand.status).holding:
-                self._guard.call(self._hand.open, state.gap)
+            if not self._contract.call(self._hand.status).holding:
+                self._contract.call(self._hand.open, state.gap)
 
 
 class ServoNode:
@@ -201,9 +201,9 @@ class ServoNode:
 
     period = TICK
 
-    def __init__(self, bus: Bus, servo: MotorServo, guard: Guard) -> None:
+    def __init__(self, bus: Bus, servo: MotorServo, contract: ContractCheck) -> None:
         """Run `servo`."""
-        self._bus, self._servo, self._guard = bus, servo, guard
+        self._bus, self._servo, self._contract = bus, servo, contract
 
     def step(self, t: float) -> None:
         """Publish the command that the safety gate shall judge."""
@@ -211,7 +211,7 @@ class ServoNode:
         if state is None:
             return
         if not moving(self._bus):
-            self._guard.call(self._servo.reset, state)
+            self._contract.call(self._servo.reset, state)
         legs = self._bus.latest(topics.LEG_COMMAND, LegCommand)
         arms = self._bus.latest(topics.ARM_COMMAND, ArmCommand)
         # A half that has not spoken yet stays where it is.
@@ -221,10 +221,10 @@ class ServoNode:
         if arms is not None:
             q[UPPER] = arms.q
         gains, tau = (None, None) if legs is None else ((legs.kp, legs.kd), legs.tau)
-        command = self._guard.call(self._servo.step, state, q, TICK, gains, tau)
-        self._guard.kind("the motor command", command, LowCommand)
+        command = self._contract.call(self._servo.step, state, q, TICK, gains, tau)
+        self._contract.kind("the motor command", command, LowCommand)
         for name in ("q", "dq", "tau", "kp", "kd"):
-            self._guard.array(name, getattr(command, name), NUM_JOINTS)
+            self._contract.array(name, getattr(command, name), NUM_JOINTS)
         self._bus.publish(topics.LOW_CMD_REQUEST, command, t)
 
 
@@ -257,22 +257,22 @@ class SafetyNode:
         """Enforce `limits`."""
         self._bus, self._gate = bus, Gate(limits)
         self._faults = News(bus, topics.TRANSPORT_FAULT, Fault)
-        self.request = Request.NONE
+        self.request = OperatorRequest.NONE
 
     def step(self, t: float) -> None:
         """Let the newest command through, limited, or stop the robot."""
-        estop = self._bus.latest(topics.ESTOP, EstopFrame)
+        estop = self._bus.latest(topics.ESTOP, EstopMessage)
         # The gate acts on the edge of a request, and an activation before it is armed would be spent for nothing.
-        waiting = self.request is Request.ACTIVATE and self._gate.memory.mode is GateState.INIT
+        waiting = self.request is OperatorRequest.ACTIVATE and self._gate.memory.mode is GateState.INIT
         if waiting and estop is not None and estop.pressed:
             # Released later, the button must not set free what was asked for before it was pressed.
-            self.request = Request.NONE
+            self.request = OperatorRequest.NONE
         inputs = GateInputs(
             t,
             self._bus.latest(topics.LOW_STATE, LowState),
             self._bus.latest(topics.LOW_CMD_REQUEST, LowCommand),
             estop,
-            Request.NONE if waiting else self.request,
+            OperatorRequest.NONE if waiting else self.request,
             self._bus.latest(topics.BASE, BaseEstimate),
             self._faults.read(),
         )
@@ -293,7 +293,7 @@ class SkillNode:
     def __init__(self, context: Context) -> None:
         """Serve `context` to the skills."""
         self._context = context
-        self._faults = News(context.bus, topics.MODULE_FAULT, Broken)
+        self._faults = News(context.bus, topics.MODULE_FAULT, ModuleFaultMsg)
         self.run: SkillRun | None = None
 
     def step(self, t: float) -> None:

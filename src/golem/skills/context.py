@@ -11,12 +11,12 @@ from golem.capabilities.arms.line import Line
 from golem.hardware.hands.base import HandStatus
 from golem.middleware import topics
 from golem.middleware.bus import Bus
-from golem.middleware.topics import HandGoal, LegStatus, LookRequest, Odometry, Sightings
+from golem.middleware.topics import DetectionRequest, Detections, HandGoal, LegStatus, Odometry
 from golem.robots.model.kinematics import Kinematics
 from golem.skills.base import Feedback, StageFailed, Tick
 from golem.types import Array, BaseEstimate, LowState, PalmTargets, Side, Twist
 
-SILENT = 0.5
+ODOMETRY_TIMEOUT = 0.5
 """Age of the newest odometry from which on it says nothing about where the robot is [s]."""
 
 
@@ -139,7 +139,7 @@ class Arm:
         self._context.send_palms()
 
 
-class Legs:
+class LegsInterface:
     """The lower body, as a skill commands and reads it."""
 
     def __init__(self, context: Context) -> None:
@@ -166,7 +166,7 @@ class Legs:
             StageFailed: the odometry has fallen silent.
         """
         odometry = self._context.bus.latest(topics.ODOMETRY, Odometry)
-        if odometry is not None and self._context.t - odometry.t > SILENT:
+        if odometry is not None and self._context.t - odometry.t > ODOMETRY_TIMEOUT:
             age = self._context.t - odometry.t
             raise StageFailed("walk", "odometry", f"The odometry has been silent for {age:.1f} s.")
         return self._context.T_odom_base if odometry is None else odometry.T_odom_base
@@ -196,7 +196,7 @@ class Context:
         self.period = period
         self.t = 0.0
         self.skill = ""
-        self.legs = Legs(self)
+        self.legs = LegsInterface(self)
         self.arms: dict[Side, Arm] = {"left": Arm(self, "left"), "right": Arm(self, "right")}
         self.hands: dict[Side, Hand] = {"left": Hand(self, "left"), "right": Hand(self, "right")}
 
@@ -252,12 +252,12 @@ class Context:
             await self.tick()
         return True
 
-    def watch(self, camera: str, *labels: str) -> Eye:
-        """Let a camera stream what it sees of `labels`, for as long as the returned `Eye` is open."""
-        return Eye(self, camera, labels)
+    def watch(self, camera: str, *labels: str) -> DetectionStream:
+        """Let a camera stream what it sees of `labels`, for as long as the returned `DetectionStream` is open."""
+        return DetectionStream(self, camera, labels)
 
 
-class Eye:
+class DetectionStream:
     """A camera that streams sightings while it is open (a context manager)."""
 
     def __init__(self, context: Context, camera: str, labels: tuple[str, ...]) -> None:
@@ -268,28 +268,28 @@ class Eye:
         self._seen = 0
         self._since = 0.0
 
-    def __enter__(self) -> Eye:
+    def __enter__(self) -> DetectionStream:
         """Start the stream."""
-        self._seen = self._context.bus.count(topics.sightings(self._camera))
+        self._seen = self._context.bus.count(topics.detections(self._camera))
         self._since = self._context.t
-        self._context.publish(topics.look(self._camera), LookRequest(self._labels))
+        self._context.publish(topics.detection_request(self._camera), DetectionRequest(self._labels))
         return self
 
     def __exit__(self, *_: object) -> None:
         """Stop the stream, so that nothing is rendered or inferred unasked."""
-        self._context.publish(topics.look(self._camera), LookRequest())
+        self._context.publish(topics.detection_request(self._camera), DetectionRequest())
 
-    def fresh(self) -> Sightings | None:
+    def fresh(self) -> Detections | None:
         """Return the sightings of a frame exposed since the eye opened that was not returned before, or None."""
-        topic = topics.sightings(self._camera)
+        topic = topics.detections(self._camera)
         count = self._context.bus.count(topic)
         if count == self._seen:
             return None
         self._seen = count
-        newest = self._context.bus.latest(topic, Sightings)
+        newest = self._context.bus.latest(topic, Detections)
         return newest if newest is not None and newest.t >= self._since else None
 
-    async def look(self, timeout: float) -> Sightings | None:
+    async def look(self, timeout: float) -> Detections | None:
         """Wait for the next fresh sightings, at most `timeout` [s]; None when no frame came."""
         end = self._context.t + timeout
         while True:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from golem.capabilities.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus
 from golem.hardware.hands.base import GripState
-from golem.middleware.topics import Sightings
+from golem.middleware.topics import Detections
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
-from golem.skills.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus
 from golem.types import Array, LocalizedObject, Side
 
 TIMEOUT = 90.0
@@ -146,7 +146,7 @@ class Pick:
         return target, container
 
     def _reachable(
-        self, context: Context, goal: PickGoal, sightings: Sightings, container: LocalizedObject | None
+        self, context: Context, goal: PickGoal, sightings: Detections, container: LocalizedObject | None
     ) -> list[LocalizedObject]:
         """Return the objects within the workspace, without those that lie in the container already."""
         x0, x1, y0, y1, z0, z1 = self._config.workspace

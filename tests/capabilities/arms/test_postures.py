@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.base import TargetError
-from golem.capabilities.arms.kinematics import UpperKinematics
 from golem.capabilities.arms.postures import POSTURES, posture
 from golem.capabilities.arms.solve import downward, random_starts, solve_posture
 from golem.errors import ConfigError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.legs.base import Envelope, LegCommand, Motion
+from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.hold import STANCES
 from golem.types import LEGS, NUM_JOINTS, BaseEstimate, Imu, LowState
@@ -27,7 +27,7 @@ class Recorder:
         self.envelope = envelope or Envelope((-0.4, 0.8), (-0.3, 0.3), (-0.6, 0.6))
         self.gait = gait or GaitConfig()
         self.target, self.stiffness, self.silent = target, stiffness, silent
-        self.motions: list[Motion] = []
+        self.motions: list[LocomotionCommand] = []
         self.steps: list[float] = []
         self.resets = 0
 
@@ -38,7 +38,7 @@ class Recorder:
     def reset(self, state: LowState) -> None:
         self.resets += 1
 
-    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         self.motions.append(motion)
         self.steps.append(dt)
         stiffness = self.stiffness if self.started else 0.0

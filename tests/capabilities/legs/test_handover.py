@@ -11,15 +11,15 @@ from tests.capabilities.legs.recorder import Recorder, crouching, still
 
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import GaitConfig
-from golem.capabilities.legs.handover import Handover, HandoverConfig, Part
+from golem.capabilities.legs.handover import Handover, HandoverConfig, HandoverPart
 from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
-from golem.capabilities.legs.trim import TrimConfig
+from golem.capabilities.legs.velocity_integrator import VelocityIntegratorConfig
 from golem.errors import ConfigError
 from golem.types import BaseEstimate, LowState, Twist
 
 DT = 0.02
 RECORDER = "tests.capabilities.legs.recorder:Recorder"
-BLENDING = HandoverConfig(Part(RECORDER), Part(RECORDER)).blend
+BLENDING = HandoverConfig(HandoverPart(RECORDER), HandoverPart(RECORDER)).blend
 BLEND = round(BLENDING / DT)
 """For how long both controllers have the legs [s], and in ticks."""
 
@@ -33,10 +33,10 @@ class Robot:
         stand: dict[str, object] | None = None,
         trim: float = 0.0,  # the plant stands still
     ) -> None:
-        walker = Part(RECORDER, {"target": 1.0} | (walk or {}))
-        stander = Part(RECORDER, {"target": 0.0} | (stand or {}))
+        walker = HandoverPart(RECORDER, {"target": 1.0} | (walk or {}))
+        stander = HandoverPart(RECORDER, {"target": 0.0} | (stand or {}))
         self.legs = Handover(HandoverConfig(walker, stander))
-        self.layer = Locomotion(self.legs, LocomotionConfig(trim=TrimConfig(gain=trim)))
+        self.layer = Locomotion(self.legs, LocomotionConfig(trim=VelocityIntegratorConfig(gain=trim)))
         self.state, self.base = crouching(), still()
         self.layer.reset(self.state)
         self.targets: list[float] = []
@@ -251,9 +251,9 @@ def test_a_twist_that_waited_for_the_legs_is_reached_at_the_allowed_acceleration
 
 def test_a_hand_over_inside_another_waits_for_whoever_walks_in_the_end() -> None:
     inner = {"walk": {"use": RECORDER}, "stand": {"use": RECORDER}}
-    outer = HandoverConfig(Part("handover", inner), Part(RECORDER))
+    outer = HandoverConfig(HandoverPart("handover", inner), HandoverPart(RECORDER))
     legs = Handover(outer)
-    layer = Locomotion(legs, LocomotionConfig(trim=TrimConfig(gain=0.0)))
+    layer = Locomotion(legs, LocomotionConfig(trim=VelocityIntegratorConfig(gain=0.0)))
     state, base = crouching(), still()
     layer.reset(state)
     for _ in range(100):
@@ -291,7 +291,7 @@ def test_who_stands_does_not_step_for_a_twist_while_it_waits_for_the_one_that_wa
 @pytest.mark.parametrize("speed", [0.5, 0.1])
 def test_a_walk_that_is_found_is_ended_by_the_one_that_walks_and_a_step_in_place_is_not(speed: float) -> None:
     robot = Robot()
-    former = Locomotion(Recorder(), LocomotionConfig(trim=TrimConfig(gain=0.0)))
+    former = Locomotion(Recorder(), LocomotionConfig(trim=VelocityIntegratorConfig(gain=0.0)))
     former.reset(robot.state)
     for _ in range(15):
         former.step(robot.state, robot.base, Twist(0.5), DT)
@@ -308,4 +308,4 @@ def test_a_walk_that_is_found_is_ended_by_the_one_that_walks_and_a_step_in_place
 
 def test_an_unknown_controller_is_named() -> None:
     with pytest.raises(ConfigError, match="Unknown lower_body implementation 'walkk'"):
-        Handover(HandoverConfig(Part("walkk"), Part("hold")))
+        Handover(HandoverConfig(HandoverPart("walkk"), HandoverPart("hold")))

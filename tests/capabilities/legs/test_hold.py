@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.base import LowerBody, Motion
-from golem.capabilities.legs.hold import STANCES, Hold, HoldConfig
+from golem.capabilities.legs.base import LocomotionCommand, LowerBody
+from golem.capabilities.legs.hold import STANCES, HoldConfig, JointHold
 from golem.errors import ConfigError
 from golem.robots.model.limits import load_limits
 from golem.types import LEGS, NUM_JOINTS, BaseEstimate, Imu, LowState, Twist
@@ -19,12 +19,14 @@ def state(q: float) -> LowState:
 
 
 def test_moves_to_the_stance_without_a_step_and_stays() -> None:
-    hold = Hold(HoldConfig(speed=0.5))
+    hold = JointHold(HoldConfig(speed=0.5))
     assert isinstance(hold, LowerBody)
     hold.reset(state(0.1))
     previous = np.full(12, 0.1)
     for _ in range(100):
-        command = hold.step(state(0.1), BASE, Motion(Twist(1.0, 0.0, 0.0), np.zeros(2), True, True), 0.02)
+        command = hold.step(
+            state(0.1), BASE, LocomotionCommand(Twist(1.0, 0.0, 0.0), np.zeros(2), True, True), 0.02
+        )
         assert np.abs(command.q - previous).max() <= 0.5 * 0.02 + 1e-12
         previous = command.q
     np.testing.assert_allclose(previous, np.tile(STANCES["stand"], 2))
@@ -39,8 +41,8 @@ def test_stances_lie_within_the_limits(name: str) -> None:
 
 def test_wrong_options_are_named() -> None:
     with pytest.raises(ConfigError, match="crouch"):
-        Hold(HoldConfig(stance="crouhc"))
+        JointHold(HoldConfig(stance="crouhc"))
     with pytest.raises(ConfigError, match="six"):
-        Hold(HoldConfig(kp=(1.0, 2.0)))
+        JointHold(HoldConfig(kp=(1.0, 2.0)))
     with pytest.raises(ConfigError, match="speed"):
-        Hold(HoldConfig(speed=0.0))
+        JointHold(HoldConfig(speed=0.0))

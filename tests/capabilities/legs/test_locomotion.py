@@ -15,7 +15,7 @@ from tests.capabilities.legs.recorder import Recorder, crouching, still
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
-from golem.capabilities.legs.trim import TrimConfig
+from golem.capabilities.legs.velocity_integrator import VelocityIntegratorConfig
 from golem.errors import ConfigError
 from golem.types import Array, Twist
 
@@ -28,7 +28,7 @@ class Driver:
 
     def __init__(self, controller: Recorder, trim: float = 0.0) -> None:
         self.controller, self.state, self.base = controller, crouching(), still()
-        self.layer = Locomotion(controller, LocomotionConfig(trim=TrimConfig(gain=trim)))
+        self.layer = Locomotion(controller, LocomotionConfig(trim=VelocityIntegratorConfig(gain=trim)))
         self.layer.reset(self.state)
 
     def run(self, seconds: float, twist: Twist | None = None, dt: float = DT) -> None:
@@ -256,13 +256,13 @@ def test_after_a_hand_over_the_targets_do_not_jump(driver: Driver) -> None:
 def test_a_robot_that_lags_is_asked_for_more_within_bounds_and_for_nothing_when_it_shall_stand() -> None:
     driver = Driver(Recorder(), trim=0.5)
     driver.run(6.0, Twist(0.5, 0.0, 0.0))
-    most = TrimConfig().most[0]
-    assert driver.applied == Twist(0.5 + most, 0.0, 0.0)
+    maximum = VelocityIntegratorConfig().maximum[0]
+    assert driver.applied == Twist(0.5 + maximum, 0.0, 0.0)
     assert driver.layer.applied == Twist(0.5, 0.0, 0.0)
     driver.run(1.0, ZERO)
     assert driver.applied == ZERO
     driver.run(0.6, Twist(0.5, 0.0, 0.0))
-    assert driver.applied.vx < 0.5 + most  # begun anew
+    assert driver.applied.vx < 0.5 + maximum  # begun anew
 
 
 def test_a_component_that_the_controller_does_not_have_is_not_asked_for() -> None:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.base import STANDING, Motion
-from golem.capabilities.legs.observation import TERMS, Layout, Signals, Term, measure
+from golem.capabilities.legs.base import STANDING, LocomotionCommand
+from golem.capabilities.legs.observation import TERMS, ObservationLayout, Signals, Term, measure
 from golem.errors import ConfigError
 from golem.robots.model.spatial import rotation_rpy, transform
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
@@ -46,7 +46,7 @@ def test_every_term_is_what_its_name_says() -> None:
     }
     assert set(expected) == set(TERMS)
     for name, values in expected.items():
-        np.testing.assert_allclose(Layout([Term(name)], POSTURE).observe(s), values)
+        np.testing.assert_allclose(ObservationLayout([Term(name)], POSTURE).observe(s), values)
 
 
 def test_terms_follow_in_their_order_with_scale_and_choice() -> None:
@@ -56,7 +56,7 @@ def test_terms_follow_in_their_order_with_scale_and_choice() -> None:
         Term("twist", 0.5),
         Term("joint_position", 1.0, ("legs",)),
     ]
-    layout = Layout(terms, POSTURE)
+    layout = ObservationLayout(terms, POSTURE)
     expected = np.concatenate(
         [
             [2.0 * s.dq[JOINT_INDEX["left_knee_joint"]], 3.0 * s.dq[JOINT_INDEX["torso_joint"]]],
@@ -77,7 +77,7 @@ def test_terms_follow_in_their_order_with_scale_and_choice() -> None:
 @pytest.mark.parametrize("shape", [(4,), (3, 2)])
 def test_many_robots_are_many_single_ones(shape: tuple[int, ...]) -> None:
     s = signals(shape)
-    layout = Layout(everything(), POSTURE)
+    layout = ObservationLayout(everything(), POSTURE)
     many = layout.observe(s)
     assert many.shape == (*shape, layout.size)
     for index in np.ndindex(*shape):
@@ -100,7 +100,7 @@ def test_many_robots_are_many_single_ones(shape: tuple[int, ...]) -> None:
 )
 def test_a_wrong_layout_is_answered_in_one_sentence(terms: list[Term], words: list[str]) -> None:
     with pytest.raises(ConfigError) as caught:
-        Layout(terms, POSTURE)
+        ObservationLayout(terms, POSTURE)
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
@@ -116,27 +116,27 @@ def test_one_robots_signals_are_in_base_link() -> None:
     q[JOINT_INDEX["torso_joint"]], dq[JOINT_INDEX["torso_joint"]] = turn, 2.0
     # The torso turns with the base and, by its joint, about their common z.
     gyro = rotation_rpy(0, 0, turn).T @ (rate + [0, 0, 2.0])
-    motion = Motion(Twist(0.1, 0.2, 0.3), np.array([0.25, 0.75]), True, True)
+    motion = LocomotionCommand(Twist(0.1, 0.2, 0.3), np.array([0.25, 0.75]), True, True)
     s = measure(low_state(q, dq, gyro), BaseEstimate(0.0, T, R @ velocity), motion, np.arange(12.0))
     np.testing.assert_allclose(s.velocity, velocity)
     np.testing.assert_allclose(s.gyro, rate)
     np.testing.assert_allclose(s.gravity, R.T @ [0, 0, -1])
     np.testing.assert_allclose(s.twist, [0.1, 0.2, 0.3])
     terms = (Term("phase_sin"), Term("phase_cos", 1.0, ("left",)))
-    np.testing.assert_allclose(Layout(terms, POSTURE).observe(s), [1.0, -1.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(ObservationLayout(terms, POSTURE).observe(s), [1.0, -1.0, 0.0], atol=1e-15)
 
 
 def test_the_clock_shows_zero_while_it_rests() -> None:
     zero = np.zeros(NUM_JOINTS)
     s = measure(low_state(zero, zero, np.zeros(3)), BaseEstimate(0.0, np.eye(4)), STANDING, np.zeros(12))
-    layout = Layout((Term("phase_sin"), Term("phase_cos")), POSTURE)
+    layout = ObservationLayout((Term("phase_sin"), Term("phase_cos")), POSTURE)
     np.testing.assert_array_equal(layout.observe(s), 0.0)
 
 
 def test_one_robot_costs_microseconds() -> None:
     zero = np.zeros(NUM_JOINTS)
     state, base, layout = low_state(zero, zero, np.zeros(3)), BaseEstimate(0.0, np.eye(4)), None
-    layout = Layout(everything(), POSTURE)
+    layout = ObservationLayout(everything(), POSTURE)
     action = np.zeros(12)
 
     def once() -> Any:

@@ -8,7 +8,7 @@ from tests.capabilities.legs.floor_plant import STEP, FloorPlant
 from tests.capabilities.legs.test_network import write_onnx
 
 from golem.capabilities.legs.almi import STAND, WALK, Almi, AlmiConfig
-from golem.capabilities.legs.base import STANDING, LowerBody, Motion
+from golem.capabilities.legs.base import STANDING, LocomotionCommand, LowerBody
 from golem.capabilities.legs.locomotion import Locomotion
 from golem.capabilities.legs.policy import BadAction, Policy, PolicyConfig
 from golem.capabilities.legs.swing import swing_offset
@@ -44,8 +44,8 @@ def policy(folder: Path) -> Policy:
     return Policy(PolicyConfig(str(folder / "policy.yaml")))
 
 
-def walking(vx: float, phase: tuple[float, float] = (0.3, 0.8)) -> Motion:
-    return Motion(Twist(vx), np.array(phase), True, True)
+def walking(vx: float, phase: tuple[float, float] = (0.3, 0.8)) -> LocomotionCommand:
+    return LocomotionCommand(Twist(vx), np.array(phase), True, True)
 
 
 def test_targets_are_posture_and_scaled_action_and_swing(tmp_path: Path) -> None:

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.base import STANDING, LegCommand, LowerBody, Motion
+from golem.capabilities.legs.base import STANDING, LegCommand, LocomotionCommand, LowerBody
 from golem.capabilities.legs.vendor import SETTLE, Vendor, VendorConfig, VendorFault
 from golem.errors import ConfigError
-from golem.middleware.unitree_api import LOCO_APIS, Request, Response
+from golem.middleware.unitree_api import LOCO_APIS, ApiRequest, Response
 from golem.robots.onboard.loco_service import LocoService
 from golem.types import LEGS, NUM_JOINTS, BaseEstimate, Imu, LowState, Twist
 
@@ -33,12 +33,12 @@ class Link:
     def __init__(self, delay: int = 2) -> None:
         self.service = LocoService(API)
         self.delay, self.dead, self.shift = delay, False, 0
-        self.asked: list[Request] = []
+        self.asked: list[ApiRequest] = []
         self.tick = 0
         self.command: LegCommand | None = None
         self._queue: deque[tuple[int, Response]] = deque()
 
-    def send(self, service: str, request: Request) -> None:
+    def send(self, service: str, request: ApiRequest) -> None:
         self.asked.append(request)
         if service == API.service and not self.dead:
             self.service.standing = self.service.state == API.stand_up
@@ -63,7 +63,7 @@ class Session:
         self.legs.reset(state())
 
     def run(self, seconds: float, twist: Twist | None = None) -> LegCommand:
-        motion = STANDING if twist is None else Motion(twist, np.zeros(2), False, True)
+        motion = STANDING if twist is None else LocomotionCommand(twist, np.zeros(2), False, True)
         command = None
         for _ in range(round(seconds / DT)):
             command = self.legs.step(state(), BASE, motion, DT)

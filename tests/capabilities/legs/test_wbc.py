@@ -12,7 +12,7 @@ from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.legs.base import STANDING, LegCommand, LowerBody
 from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.legs.wbc import StanceError, Wbc, WbcConfig
-from golem.capabilities.legs.wbc_qp import StanceDynamics, StanceProgram, Tasks, Weights
+from golem.capabilities.legs.wbc_qp import QpWeights, StanceDynamics, StanceProgram, Tasks
 from golem.errors import ConfigError
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
@@ -21,7 +21,7 @@ from golem.robots.model.leg_kinematics import SOLE_CENTER
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import DOF
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.assembly import build
+from golem.runtime.lockstep import build
 from golem.stack import Choice, load_stack
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, BaseEstimate, Imu, LowState
 
@@ -76,7 +76,7 @@ def test_solutions_obey_physics_whatever_is_asked(seed: int) -> None:
     d = dynamics()
     d.update(R, velocity, rate, q, dq)
     wild = Tasks(*(rng.normal(0.0, 30.0, n) for n in (3, 3, 12, 12)))
-    program = StanceProgram(BOUND, FRICTION, 0.005, Weights())
+    program = StanceProgram(BOUND, FRICTION, 0.005, QpWeights())
     solution = program.solve(d, wild)
     assert solution is not None
     # Equations of motion by another road: recursive Newton-Euler with the forces on the ankle links.
@@ -202,7 +202,7 @@ def test_stands_in_the_whole_stack_on_estimates_alone() -> None:
     running, twin = build(replace(stack, lower_body=Choice("wbc"), fallback=Choice("hold"), robot=robot), 3)
     assert isinstance(twin, MujocoRobot)
     running.executor.run(3.5)
-    assert not twin.banded
+    assert not twin.on_gantry
     start = twin.truth.base()
     running.executor.run(5.5)
     end = twin.truth.base()

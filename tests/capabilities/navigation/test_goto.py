@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.capabilities.navigation.base import Course, Navigator
+from golem.capabilities.navigation.base import Navigator, NavStep
 from golem.capabilities.navigation.goto import GoTo, GoToConfig
 from golem.errors import ConfigError
 from golem.types import PlanarPose, Twist
@@ -54,7 +54,7 @@ class Walker:
         self.pose = self.pose @ PlanarPose(*(DT * self.velocity).tolist())
 
 
-def go(navigator: Navigator, walker: Walker, goal: PlanarPose, seconds: float = 40.0) -> Course:
+def go(navigator: Navigator, walker: Walker, goal: PlanarPose, seconds: float = 40.0) -> NavStep:
     """Walk until the navigator is content, at most for `seconds`."""
     navigator.start(goal)
     for _ in range(round(seconds / DT)):

@@ -12,9 +12,9 @@ from golem.evaluation.base import TrialSpec
 from golem.evaluation.episode import Loss, episode_seed
 from golem.evaluation.oracle import GraspTruth, Oracle
 from golem.evaluation.rungs import pick
-from golem.evaluation.rungs.pick import PAD_REACH, STRAIGHT, Stand, Tether, blame
+from golem.evaluation.rungs.pick import PAD_REACH, STRAIGHT, StandRung, TetherRung, blame
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.assembly import build
+from golem.runtime.lockstep import build
 from golem.stack import load_stack
 
 LIMP = f"{Path(__file__).parents[1] / 'leg_methods.py'}:Limp"
@@ -45,12 +45,12 @@ def spec(method: str = "visual_servo", profile: str = "ideal", index: int = 0, *
 
 
 @pytest.fixture(scope="module")
-def rung() -> Tether:
-    return Tether()
+def rung() -> TetherRung:
+    return TetherRung()
 
 
 @pytest.mark.parametrize("method", ["centroid", "visual_servo"])
-def test_a_perfect_robot_puts_the_screw_in_the_tray(method: str, rung: Tether) -> None:
+def test_a_perfect_robot_puts_the_screw_in_the_tray(method: str, rung: TetherRung) -> None:
     outcome = rung.run(spec(method), None)
     assert outcome.success, outcome.detail
     assert 1.0 < outcome.timings["detect_to_grasp"] < 15.0
@@ -59,14 +59,14 @@ def test_a_perfect_robot_puts_the_screw_in_the_tray(method: str, rung: Tether) -
 
 
 def test_a_robot_whose_legs_carry_nothing_does_not_pick_in_its_band() -> None:
-    outcome = Stand().run(TrialSpec("stand", "visual_servo", "ideal", 0, 0, {"lower_body": LIMP}), None)
+    outcome = StandRung().run(TrialSpec("stand", "visual_servo", "ideal", 0, 0, {"lower_body": LIMP}), None)
     assert (outcome.success, outcome.stage, outcome.module) == (False, "settle", f"lower_body: {LIMP}")
 
 
-def test_a_trial_depends_on_its_spec_alone(rung: Tether) -> None:
+def test_a_trial_depends_on_its_spec_alone(rung: TetherRung) -> None:
     first = rung.run(spec(profile="field"), None)
     rung.run(spec(profile="field", index=1), None)
-    again = Tether().run(spec(profile="field"), None)
+    again = TetherRung().run(spec(profile="field"), None)
     assert first == again
 
 
@@ -76,7 +76,7 @@ def test_a_trial_depends_on_its_spec_alone(rung: Tether) -> None:
     ids=["raises", "nan", "shape"],
 )
 def test_a_module_that_breaks_its_contract_is_named(
-    name: str, reason: str, tmp_path: Path, rung: Tether
+    name: str, reason: str, tmp_path: Path, rung: TetherRung
 ) -> None:
     from golem.errors import ModuleFault
 
@@ -88,7 +88,7 @@ def test_a_module_that_breaks_its_contract_is_named(
     assert reason in fault.value.reason
 
 
-def test_the_configuration_changes_with_a_users_file(tmp_path: Path, rung: Tether) -> None:
+def test_the_configuration_changes_with_a_users_file(tmp_path: Path, rung: TetherRung) -> None:
     file = tmp_path / "mine.py"
     file.write_text(BAD_MODULES)
     before = rung.config("centroid", "field", {"upper_body": f"{file}:Nan"})
@@ -98,7 +98,7 @@ def test_the_configuration_changes_with_a_users_file(tmp_path: Path, rung: Tethe
     assert before["stack"] == after["stack"]
 
 
-def test_an_unknown_slot_is_refused(rung: Tether) -> None:
+def test_an_unknown_slot_is_refused(rung: TetherRung) -> None:
     with pytest.raises(ConfigError, match="upper_body"):
         rung.config("centroid", "field", {"upperbody": "diff_ik"})
 
@@ -125,7 +125,7 @@ def test_the_larger_error_takes_the_blame(
     assert blame(stage, slot, seen) == culprit
 
 
-def test_a_robot_without_a_truth_to_judge_on_is_refused(rung: Tether, tmp_path: Path) -> None:
+def test_a_robot_without_a_truth_to_judge_on_is_refused(rung: TetherRung, tmp_path: Path) -> None:
     mine = tmp_path / "mine.py"
     mine.write_text("class Robot:\n    pass\n")
     with pytest.raises(ConfigError, match=r"mine\.py:Robot is not the twin, 'mujoco'"):
@@ -133,7 +133,7 @@ def test_a_robot_without_a_truth_to_judge_on_is_refused(rung: Tether, tmp_path: 
 
 
 def test_a_file_in_the_home_folder_may_be_named_by_the_tilde(
-    rung: Tether, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    rung: TetherRung, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
     (tmp_path / "mine.py").write_text("class Arms:\n    pass\n")
@@ -145,13 +145,13 @@ def test_a_file_in_the_home_folder_may_be_named_by_the_tilde(
 @pytest.mark.parametrize("slot, use", [("grasp_method", "centroid"), ("robot", "mujoco")])
 def test_what_the_rung_brings_is_not_replaced(slot: str, use: str) -> None:
     with pytest.raises(ConfigError, match=f"--use {slot}"):
-        Stand().config("visual_servo", "field", {slot: use})
+        StandRung().config("visual_servo", "field", {slot: use})
 
 
 def test_a_robot_that_falls_after_its_errand_has_lost_it(monkeypatch: pytest.MonkeyPatch) -> None:
     loss = Loss("fall", "The robot fell at 9.0 s.")
     monkeypatch.setattr(pick, "lost", lambda running, recorder: loss)
-    outcome = Stand().run(TrialSpec("stand", "visual_servo", "ideal", 0, 0, {"localizer": "onnx"}), None)
+    outcome = StandRung().run(TrialSpec("stand", "visual_servo", "ideal", 0, 0, {"localizer": "onnx"}), None)
     assert (outcome.success, outcome.stage, outcome.module) == (False, "fall", "lower_body: almi")
     assert "fell" in outcome.detail and "in the tray" in outcome.detail
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from golem.evaluation.balance import TRACE, BalanceTrace
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.episode import Loss
-from golem.evaluation.pushes import DIRECTIONS, ROD_TIME, rod
 from golem.evaluation.rungs.push import LEAST_PEAK, PEAK, PushRung, judge
 from golem.evaluation.rungs.push_ramp import MOST, RATE, PushRampRung
+from golem.robots.mujoco.balance import TRACE, BalanceTrace
+from golem.robots.mujoco.shoves import DIRECTIONS, ROD_TIME, rod
 
 METHODS = Path(__file__).parents[1] / "leg_methods.py"
 STIFF = f"{METHODS}:Stiff"

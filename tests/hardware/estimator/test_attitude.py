@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from golem.hardware.estimator.attitude import Attitude, GyroBias
 from golem.hardware.estimator.feet import Feet, FeetConfig
 from golem.hardware.estimator.random_walk import base_velocity
-from golem.robots.model.imu import TORSO, base_rate
+from golem.robots.model.imu_mount import TORSO, base_rate
 from golem.robots.model.spatial import rotation_rpy
 from golem.robots.model.table import FRAMES
 from golem.types import NUM_JOINTS, Array, Imu, LowState

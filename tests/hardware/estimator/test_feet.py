@@ -11,8 +11,8 @@ import pytest
 
 from golem.hardware.estimator.attitude import Attitude
 from golem.hardware.estimator.feet import Feet, FeetConfig
-from golem.robots.model.imu import TORSO, base_rate
-from golem.robots.model.legs import Legs
+from golem.robots.model.imu_mount import TORSO, base_rate
+from golem.robots.model.leg_dynamics import LegDynamics
 from golem.types import LEGS, NUM_JOINTS, LowState
 
 DT = 0.002
@@ -81,7 +81,7 @@ def test_a_foot_on_the_other_one_does_not_stand_on_the_ground(
     for hip_pitch in (1, 7):
         q[hip_pitch], q[hip_pitch + 2], q[hip_pitch + 3] = -0.4, 0.8, -0.4
     q[8] = 0.27 if beside else 0.45  # right hip roll
-    legs = Legs()
+    legs = LegDynamics()
     legs.update(q[LEGS], np.zeros(12))
     across, rise = (legs.soles[1] - legs.soles[0])[1:].tolist()
     assert rise > 0.02 and (abs(across) > 0.1) == beside

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import pytest
 
-from golem.hardware.estop.base import EmergencyStop, EstopFrame
+from golem.hardware.estop.base import EmergencyStop, EstopMessage
 from golem.hardware.estop.virtual import VirtualEstop
 
 
-def frames(estop: VirtualEstop, start: float, ticks: int, dt: float = 0.002) -> list[EstopFrame]:
+def frames(estop: VirtualEstop, start: float, ticks: int, dt: float = 0.002) -> list[EstopMessage]:
     return [frame for i in range(ticks) if (frame := estop.step(start + i * dt)) is not None]
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from golem.hardware.hands.base import GripState, HandController
 from golem.hardware.hands.magpie import FORCE_STEP, MagpieHand, clamp_force
-from golem.robots.model.magpie import MAX_FORCE, MAX_GAP, MIN_FORCE
+from golem.robots.model.magpie_model import MAX_FORCE, MAX_GAP, MIN_FORCE
 from golem.types import HandCommand, HandState
 
 DT = 0.01

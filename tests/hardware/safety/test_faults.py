@@ -11,8 +11,15 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from golem.hardware.estop.base import EstopFrame
-from golem.hardware.safety.base import GateInputs, GateMemory, GateResult, GateState, Request, SafetyLimits
+from golem.hardware.estop.base import EstopMessage
+from golem.hardware.safety.base import (
+    GateInputs,
+    GateMemory,
+    GateResult,
+    GateState,
+    OperatorRequest,
+    SafetyLimits,
+)
 from golem.hardware.safety.gate import check
 from golem.types import Array, Imu, LowCommand, LowState
 
@@ -52,7 +59,7 @@ class World:
         self.sequence = 0
         self.q = np.zeros(27)
         self.target = np.zeros(27)
-        self.request = Request.NONE
+        self.request = OperatorRequest.NONE
         self.past: deque[GateInputs] = deque(maxlen=100)
 
     def tick(self, kind: str, rng: np.random.Generator) -> GateInputs:
@@ -65,10 +72,12 @@ class World:
         state = LowState(self.t, self.q, rng.normal(0.0, 0.5, 27), rng.normal(0.0, 1.0, 27), imu)
         gains = (rng.uniform(0.0, 300.0, 27), rng.uniform(0.0, 10.0, 27))
         command = LowCommand(self.t, self.target, np.zeros(27), rng.normal(0.0, 5.0, 27), *gains)
-        estop = EstopFrame(self.t, self.sequence % 256, kind == "pressed")
-        self.request = {"stop": Request.STOP, "reset": Request.RESET, "activate": Request.ACTIVATE}.get(
-            kind, Request.NONE
-        )
+        estop = EstopMessage(self.t, self.sequence % 256, kind == "pressed")
+        self.request = {
+            "stop": OperatorRequest.STOP,
+            "reset": OperatorRequest.RESET,
+            "activate": OperatorRequest.ACTIVATE,
+        }.get(kind, OperatorRequest.NONE)
         sound = GateInputs(self.t, state, command, estop, self.request)
         self.past.append(sound)
         spoil: Callable[[GateInputs, np.random.Generator], GateInputs] = getattr(self, f"_{kind}", _keep)
@@ -187,7 +196,7 @@ def test_no_sequence_of_faults_lets_a_dangerous_command_out(events: list[Event])
             result = check(inputs, LIMITS, memory)
             assert_safe(result, memory)
             if stopped and result.state is GateState.ARMED:
-                assert inputs.request is Request.RESET
+                assert inputs.request is OperatorRequest.RESET
                 stopped = False
             assert not (stopped and not result.state.stopped)
             stopped = result.state.stopped

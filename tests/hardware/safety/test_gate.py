@@ -7,8 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.hardware.estop.base import EstopFrame
-from golem.hardware.safety.base import GateInputs, GateMemory, GateState, Reason, Request, SafetyLimits
+from golem.hardware.estop.base import EstopMessage
+from golem.hardware.safety.base import (
+    GateInputs,
+    GateMemory,
+    GateState,
+    OperatorRequest,
+    Reason,
+    SafetyLimits,
+)
 from golem.hardware.safety.gate import check
 from golem.types import LowCommand, LowState
 
@@ -31,7 +38,7 @@ def test_a_gate_that_has_seen_nothing_is_limp_and_says_what_is_missing(limits: S
 
 def test_no_estop_frame_ever_means_no_motion(bench: Any) -> None:
     for i in range(100):
-        result = bench.tick(estop=None, request=(Request.NONE, Request.ACTIVATE)[i % 2])
+        result = bench.tick(estop=None, request=(OperatorRequest.NONE, OperatorRequest.ACTIVATE)[i % 2])
         assert (result.state, result.reason) == (GateState.INIT, Reason.ESTOP_MISSING)
 
 
@@ -40,14 +47,14 @@ def test_sound_frames_arm_and_only_a_request_activates(bench: Any) -> None:
         result = bench.tick()
     assert result.state is GateState.ARMED
     assert damps(result.command)
-    assert bench.tick(request=Request.ACTIVATE).state is GateState.ACTIVE
+    assert bench.tick(request=OperatorRequest.ACTIVATE).state is GateState.ACTIVE
 
 
 def test_activation_needs_a_command(bench: Any) -> None:
-    result = bench.tick(command=None, request=Request.ACTIVATE)
+    result = bench.tick(command=None, request=OperatorRequest.ACTIVATE)
     assert (result.state, result.reason) == (GateState.ARMED, Reason.COMMAND_MISSING)
     # The request that failed is spent: motion must not start by itself when a command appears.
-    assert bench.tick(request=Request.ACTIVATE).state is GateState.ARMED
+    assert bench.tick(request=OperatorRequest.ACTIVATE).state is GateState.ARMED
 
 
 def test_an_active_gate_passes_the_command(bench: Any) -> None:
@@ -61,17 +68,17 @@ def test_an_active_gate_passes_the_command(bench: Any) -> None:
 def test_activation_starts_from_the_measured_position_without_stiffness(bench: Any, state_at: Make) -> None:
     q = np.full(27, 0.1)
     q[[5, 11]] = 0.0
-    result = bench.tick(state=state_at(0.0, q), request=Request.ACTIVATE)
+    result = bench.tick(state=state_at(0.0, q), request=OperatorRequest.ACTIVATE)
     assert result.state is GateState.ACTIVE
     assert np.all(np.abs(result.command.q - q) <= 0.1 * 21 * 0.9)
     assert np.all(result.command.kp <= bench.gate.limits.kp_rate * bench.gate.limits.longest_tick)
 
 
 FAULTS: dict[Reason, Callable[[Any, Make, Make], dict[str, object]]] = {
-    Reason.REQUESTED: lambda b, s, c: {"request": Request.STOP},
+    Reason.REQUESTED: lambda b, s, c: {"request": OperatorRequest.STOP},
     Reason.CLOCK: lambda b, s, c: {"t": b.t - 1.0},
-    Reason.ESTOP_PRESSED: lambda b, s, c: {"estop": EstopFrame(b.t, 999, True)},
-    Reason.ESTOP_TIME: lambda b, s, c: {"estop": EstopFrame(b.t + 1.0, 999, False)},
+    Reason.ESTOP_PRESSED: lambda b, s, c: {"estop": EstopMessage(b.t, 999, True)},
+    Reason.ESTOP_TIME: lambda b, s, c: {"estop": EstopMessage(b.t + 1.0, 999, False)},
     Reason.STATE_TIME: lambda b, s, c: {"state": s(b.t + 1.0)},
     Reason.STATE_INVALID: lambda b, s, c: {"state": s(b.t + 0.002, np.full(27, np.nan))},
     Reason.POSITION: lambda b, s, c: {"state": s(b.t + 0.002, np.full(27, 9.0))},
@@ -107,7 +114,7 @@ def test_silence_stops_within_the_age_however_it_looks(
     silent: str, reason: Reason, age: str, how: str, bench: Any, state_at: Make, command_at: Make
 ) -> None:
     make = {
-        "estop": lambda t: EstopFrame(t, round(t / 0.002), False),
+        "estop": lambda t: EstopMessage(t, round(t / 0.002), False),
         "state": state_at,
         "command": command_at,
     }[silent]
@@ -132,7 +139,7 @@ def test_silence_stops_within_the_age_however_it_looks(
 def test_an_estop_board_that_repeats_its_sequence_is_dead(bench: Any) -> None:
     bench.activate()
     for _ in range(30):
-        result = bench.tick(estop=EstopFrame(bench.t + 0.002, 1, False))
+        result = bench.tick(estop=EstopMessage(bench.t + 0.002, 1, False))
     assert (result.state, result.reason) == (GateState.STOP1, Reason.ESTOP_STALE)
 
 
@@ -147,7 +154,7 @@ def test_short_gaps_and_late_duplicates_do_not_stop(bench: Any, state_at: Make, 
 
 
 def test_a_pressed_button_stays_pressed_until_a_frame_says_otherwise(bench: Any) -> None:
-    bench.tick(estop=EstopFrame(bench.t, 999, True))
+    bench.tick(estop=EstopMessage(bench.t, 999, True))
     for _ in range(5):
         result = bench.tick(estop=None)
         assert (result.state, result.reason) == (GateState.INIT, Reason.ESTOP_PRESSED)
@@ -158,13 +165,13 @@ def test_a_late_pressed_frame_counts(bench: Any) -> None:
     bench.activate()
     for _ in range(20):
         bench.tick()
-    result = bench.tick(estop=EstopFrame(bench.t - 0.02, 3, True))
+    result = bench.tick(estop=EstopMessage(bench.t - 0.02, 3, True))
     assert result.reason is Reason.ESTOP_PRESSED
 
 
 def test_damping_ends_limp(bench: Any) -> None:
     bench.activate()
-    states = [bench.tick(request=Request.STOP).state]
+    states = [bench.tick(request=OperatorRequest.STOP).state]
     start = bench.t
     while states[-1] is GateState.STOP1:
         states.append(bench.tick().state)
@@ -176,36 +183,39 @@ def test_damping_ends_limp(bench: Any) -> None:
 
 def test_reset_needs_the_button_out_and_a_request_and_does_not_restart(bench: Any) -> None:
     bench.activate()
-    bench.tick(estop=EstopFrame(bench.t, 999, True))
-    pressed = bench.tick(estop=EstopFrame(bench.t + 0.002, 1000, True), request=Request.RESET)
+    bench.tick(estop=EstopMessage(bench.t, 999, True))
+    pressed = bench.tick(estop=EstopMessage(bench.t + 0.002, 1000, True), request=OperatorRequest.RESET)
     assert pressed.state is GateState.STOP1
     # Released, and the request still held: it must be made anew.
-    assert bench.tick(request=Request.RESET).state is GateState.STOP1
-    assert bench.tick(request=Request.ACTIVATE).state is GateState.STOP1
+    assert bench.tick(request=OperatorRequest.RESET).state is GateState.STOP1
+    assert bench.tick(request=OperatorRequest.ACTIVATE).state is GateState.STOP1
     assert bench.tick().state is GateState.STOP1
-    result = bench.tick(request=Request.RESET)
+    result = bench.tick(request=OperatorRequest.RESET)
     assert (result.state, result.reason) == (GateState.ARMED, None)
     for _ in range(100):
-        assert bench.tick(request=Request.RESET).state is GateState.ARMED
-    result = bench.tick(request=Request.ACTIVATE)
+        assert bench.tick(request=OperatorRequest.RESET).state is GateState.ARMED
+    result = bench.tick(request=OperatorRequest.ACTIVATE)
     assert result.state is GateState.ACTIVE
     assert np.all(result.command.kp <= bench.gate.limits.kp_rate * 0.0021)
 
 
-@pytest.mark.parametrize("stuck", [Request.ACTIVATE, Request.RESET])
-def test_a_stuck_request_restarts_nothing(stuck: Request, bench: Any) -> None:
+@pytest.mark.parametrize("stuck", [OperatorRequest.ACTIVATE, OperatorRequest.RESET])
+def test_a_stuck_request_restarts_nothing(stuck: OperatorRequest, bench: Any) -> None:
     bench.activate()
     bench.tick(request=stuck)
-    bench.tick(estop=EstopFrame(bench.t, 999, True), request=stuck)
+    bench.tick(estop=EstopMessage(bench.t, 999, True), request=stuck)
     for _ in range(100):
         assert bench.tick(request=stuck).state is GateState.STOP1
 
 
 def test_releasing_the_button_before_activation_starts_nothing(bench: Any) -> None:
     bench.tick()
-    assert bench.tick(estop=EstopFrame(bench.t, 999, True), request=Request.ACTIVATE).state is GateState.INIT
+    assert (
+        bench.tick(estop=EstopMessage(bench.t, 999, True), request=OperatorRequest.ACTIVATE).state
+        is GateState.INIT
+    )
     for _ in range(100):
-        assert bench.tick(request=Request.ACTIVATE).state is GateState.ARMED
+        assert bench.tick(request=OperatorRequest.ACTIVATE).state is GateState.ARMED
 
 
 def test_a_short_pause_allows_no_leap(bench: Any, command_at: Make, limits: SafetyLimits) -> None:
@@ -255,7 +265,7 @@ def test_single_precision_frames_from_the_wire_are_fine(bench: Any, state_at: Ma
         result = bench.tick(
             state=single(state_at(t)),
             command=single(command_at(t)),
-            request=Request.ACTIVATE if i else Request.NONE,
+            request=OperatorRequest.ACTIVATE if i else OperatorRequest.NONE,
         )
     assert result.state is GateState.ACTIVE
     assert result.command.q.dtype == np.float64

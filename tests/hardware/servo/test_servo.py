@@ -8,7 +8,7 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.hardware.estop.virtual import VirtualEstop
-from golem.hardware.safety.base import GateInputs, GateState, Request
+from golem.hardware.safety.base import GateInputs, GateState, OperatorRequest
 from golem.hardware.safety.gate import Gate
 from golem.hardware.servo.base import MotorServo
 from golem.hardware.servo.servo import Servo, ServoConfig
@@ -201,7 +201,7 @@ def test_servo_and_gate_move_the_arms_and_the_gate_does_not_interfere(plant: Any
         if i > 250:
             q_cmd = q_cmd + np.clip(READY - q_cmd, -DT, DT)  # 1 rad/s
         wanted = servo.step(state, q_cmd, DT)
-        result = gate.step(GateInputs(state.t, state, wanted, estop.step(state.t), Request.ACTIVATE))
+        result = gate.step(GateInputs(state.t, state, wanted, estop.step(state.t), OperatorRequest.ACTIVATE))
         assert result.state is GateState.ACTIVE, result.detail
         np.testing.assert_allclose(result.command.q, wanted.q, atol=1e-12)
         np.testing.assert_allclose(result.command.tau, wanted.tau, atol=1e-12)
@@ -219,7 +219,7 @@ def test_pressing_the_button_lets_raised_arms_sink_slowly(plant: Any) -> None:
         if i == 250:
             estop.press()
         wanted = servo.step(state, READY, DT)
-        result = gate.step(GateInputs(state.t, state, wanted, estop.step(state.t), Request.ACTIVATE))
+        result = gate.step(GateInputs(state.t, state, wanted, estop.step(state.t), OperatorRequest.ACTIVATE))
         assert (result.state is GateState.ACTIVE) == (i < 250)
         robot.advance(result.command)
         fastest = max(fastest, float(np.abs(state.dq).max()))

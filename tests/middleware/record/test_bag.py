@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from golem.errors import ConfigError, MissingExtra, OutputError
 from golem.middleware.dds.base import DEFAULT, LATCHED, SENSOR, Qos
-from golem.middleware.record.base import BagError, Message, Topic
+from golem.middleware.record.base import BagError, BagMessage, BagTopic
 from golem.middleware.record.metadata import offered_qos, parse_qos
 from golem.middleware.record.reader import Bag, repair
 from golem.middleware.record.writer import BagConfig, BagWriter
@@ -24,27 +24,27 @@ from golem.middleware.record.writer import BagConfig, BagWriter
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 
 
-def topic(name: str, kind: str, qos: Qos = DEFAULT) -> Topic:
-    return Topic(name, kind, STORE.generate_msgdef(kind, ros_version=2)[0], qos, STORE.hash_rihs01(kind))
+def topic(name: str, kind: str, qos: Qos = DEFAULT) -> BagTopic:
+    return BagTopic(name, kind, STORE.generate_msgdef(kind, ros_version=2)[0], qos, STORE.hash_rihs01(kind))
 
 
 WORDS = topic("/words", "std_msgs/msg/String")
 NUMBERS = topic("/numbers", "std_msgs/msg/UInt8MultiArray", SENSOR)
 
 
-def words(i: int) -> Message:
+def words(i: int) -> BagMessage:
     text = STORE.types["std_msgs/msg/String"](f"word {i}")
-    return Message(WORDS, i * 1000, i * 1000 + 7, bytes(STORE.serialize_cdr(text, WORDS.kind)))
+    return BagMessage(WORDS, i * 1000, i * 1000 + 7, bytes(STORE.serialize_cdr(text, WORDS.kind)))
 
 
-def numbers(i: int, n: int = 300) -> Message:
+def numbers(i: int, n: int = 300) -> BagMessage:
     layout = STORE.types["std_msgs/msg/MultiArrayLayout"]([], 0)
     data = np.random.default_rng(i).integers(0, 255, n, dtype=np.uint8)
     array = STORE.types["std_msgs/msg/UInt8MultiArray"](layout, data)
-    return Message(NUMBERS, i * 1000 + 500, i * 1000, memoryview(STORE.serialize_cdr(array, NUMBERS.kind)))
+    return BagMessage(NUMBERS, i * 1000 + 500, i * 1000, memoryview(STORE.serialize_cdr(array, NUMBERS.kind)))
 
 
-def write(folder: Path, n: int, config: BagConfig | None = None) -> list[Message]:
+def write(folder: Path, n: int, config: BagConfig | None = None) -> list[BagMessage]:
     """Write n messages of either kind and finish the bag."""
     sent = [m for i in range(n) for m in (words(i), numbers(i))]
     writer = BagWriter(folder, config, {"robot": "H1-2"})
@@ -54,8 +54,8 @@ def write(folder: Path, n: int, config: BagConfig | None = None) -> list[Message
     return sent
 
 
-def same(read: list[Message], sent: list[Message]) -> bool:
-    def plain(messages: list[Message]) -> list[tuple[object, ...]]:
+def same(read: list[BagMessage], sent: list[BagMessage]) -> bool:
+    def plain(messages: list[BagMessage]) -> list[tuple[object, ...]]:
         return [(m.topic, m.log_time, m.publish_time, bytes(m.payload)) for m in messages]
 
     return plain(read) == plain(sent)

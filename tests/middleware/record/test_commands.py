@@ -154,14 +154,14 @@ def test_a_killed_recorder_leaves_what_it_had(robot: CycloneParticipant, domain:
 
 @pytest.mark.slow
 def test_a_bag_is_played_onto_a_domain(robot: CycloneParticipant, domain: int, tmp_path: Path) -> None:
-    from golem.middleware.record.base import Message
+    from golem.middleware.record.base import BagMessage
     from golem.middleware.record.catalog import public_topics
     from golem.middleware.record.writer import BagWriter
 
     (low,) = public_topics([STATE])
     bag = BagWriter(tmp_path / "bag")
     for i in range(200):
-        bag.write(Message(low, i * 2_000_000, 0, state(i * 0.002)))
+        bag.write(BagMessage(low, i * 2_000_000, 0, state(i * 0.002)))
     bag.close()
     row = topic(STATE)
     states = robot.reader("rt/lowstate", codec.dds_name(row.type), Qos(reliable=False, depth=1000))

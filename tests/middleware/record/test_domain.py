@@ -16,7 +16,7 @@ pytest.importorskip("rosbags")
 from golem.errors import ConfigError
 from golem.middleware.dds.base import DEFAULT, LATCHED, Participant, Qos, Reader
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.record.base import Message, Topic
+from golem.middleware.record.base import BagMessage, BagTopic
 from golem.middleware.record.catalog import offered, public_topics, topic
 from golem.middleware.record.player import PlayConfig, Player
 from golem.middleware.record.reader import Bag
@@ -48,9 +48,9 @@ class Pile:
     """A sink."""
 
     def __init__(self) -> None:
-        self.messages: list[Message] = []
+        self.messages: list[BagMessage] = []
 
-    def write(self, message: Message) -> None:
+    def write(self, message: BagMessage) -> None:
         self.messages.append(message)
 
     def close(self) -> None:
@@ -65,7 +65,7 @@ class Pile:
         ]
 
 
-def say(participant: Participant, where: Topic, text: str) -> None:
+def say(participant: Participant, where: BagTopic, text: str) -> None:
     writer = participant.writer(names.topic(where.name), codec.dds_name(where.kind), where.qos)
     writer.write(codec.serialize(String(data=text)))
 
@@ -80,7 +80,7 @@ def clock(participant: Participant) -> Callable[[float], None]:
     return tick
 
 
-def settled(domain: LocalDomain, pile: Pile, wall: Wall, *topics: Topic) -> Recorder:
+def settled(domain: LocalDomain, pile: Pile, wall: Wall, *topics: BagTopic) -> Recorder:
     """Return a recorder that has waited long enough for a /clock."""
     recorder = Recorder(domain.participant(), pile, wall)
     recorder.add(topics)
@@ -212,11 +212,11 @@ def test_foreign_bytes_on_clock_are_no_time() -> None:
         assert clock_time(foreign) is None
 
 
-def bag_of(folder: Path, messages: list[tuple[Topic, float, str]]) -> Bag:
+def bag_of(folder: Path, messages: list[tuple[BagTopic, float, str]]) -> Bag:
     writer = BagWriter(folder)
     for where, t, text in messages:
         at = round(t * NANO)
-        writer.write(Message(where, at, at, codec.serialize(String(data=text))))
+        writer.write(BagMessage(where, at, at, codec.serialize(String(data=text))))
     writer.close()
     return Bag(folder)
 
@@ -274,7 +274,7 @@ def test_a_recorded_clock_is_played_and_none_is_made(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "bag")
     for i in range(3):
         payload = codec.serialize(Clock(clock=Time(sec=i, nanosec=5)))
-        writer.write(Message(CLOCK, i * NANO, i * NANO, payload))
+        writer.write(BagMessage(CLOCK, i * NANO, i * NANO, payload))
     writer.close()
     assert Played(Bag(tmp_path / "bag"), FAST).ticks == [i + 5e-9 for i in range(3)]
 

@@ -17,17 +17,17 @@ from websockets.typing import Subprotocol
 
 from golem.errors import ConfigError
 from golem.middleware.dds.base import DEFAULT, LATCHED, Qos
-from golem.middleware.record.base import Message, Topic
+from golem.middleware.record.base import BagMessage, BagTopic
 from golem.middleware.record.foxglove_server import FoxgloveServer, ServerConfig
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 STRING = STORE.generate_msgdef("std_msgs/msg/String", ros_version=2)[0]
 
 
-def message(name: str, text: str, time: int, qos: Qos = DEFAULT) -> Message:
-    topic = Topic(name, "std_msgs/msg/String", STRING, qos)
+def message(name: str, text: str, time: int, qos: Qos = DEFAULT) -> BagMessage:
+    topic = BagTopic(name, "std_msgs/msg/String", STRING, qos)
     value = STORE.types[topic.kind](text)
-    return Message(topic, time, time, memoryview(STORE.serialize_cdr(value, topic.kind)))
+    return BagMessage(topic, time, time, memoryview(STORE.serialize_cdr(value, topic.kind)))
 
 
 class Viewer:
@@ -79,7 +79,7 @@ def viewer(server: FoxgloveServer) -> Iterator[Viewer]:
         yield Viewer(socket)
 
 
-def until_wanted(server: FoxgloveServer, topic: Topic) -> None:
+def until_wanted(server: FoxgloveServer, topic: BagTopic) -> None:
     while not server.wanted(topic):
         pass  # the test's time limit ends a server that never hears of it
 

@@ -10,7 +10,7 @@ pytest.importorskip("rosbags")
 
 from golem.errors import ConfigError
 from golem.middleware.dds.base import LATCHED, SENSOR, Qos
-from golem.middleware.ros.base import Client, Node
+from golem.middleware.ros.base import Client, RosNode
 from golem.middleware.ros.codec import dds_name, message, service
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.message import CodecError
@@ -30,8 +30,8 @@ def ready(world: World, client: Client) -> None:
 
 
 def test_a_message_reaches_the_callback_when_the_node_is_spun(world: World) -> None:
-    talker: Node = world.node("talker")
-    listener: Node = world.node("listener", "/robot")
+    talker: RosNode = world.node("talker")
+    listener: RosNode = world.node("listener", "/robot")
     heard: list[str] = []
     publisher = talker.publisher("/robot/chatter", STRING)
     subscription = listener.subscription("chatter", STRING, lambda m: heard.append(m.data))

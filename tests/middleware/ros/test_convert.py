@@ -12,7 +12,7 @@ from golem.middleware.ros import convert
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.diagnostic_msgs import DiagnosticStatus
 from golem.middleware.ros.msgs.geometry_msgs import Point, Pose, Quaternion
-from golem.middleware.topics import LegStatus, Sightings
+from golem.middleware.topics import Detections, LegStatus
 from golem.types import (
     BaseEstimate,
     Detection,
@@ -191,7 +191,7 @@ def test_legs_say_why_they_stand() -> None:
 def test_sightings_say_what_was_found_and_where() -> None:
     detection = Detection("screw", 0.9, np.arange(4.0), np.array([1.5, 2.5]))
     cloud = np.arange(12.0).reshape(4, 3)
-    seen = Sightings(3.0, "head", (LocalizedObject(detection, 3.0, np.array([0.4, 0.0, 0.9]), cloud),))
+    seen = Detections(3.0, "head", (LocalizedObject(detection, 3.0, np.array([0.4, 0.0, 0.9]), cloud),))
     message = convert.sightings(seen)
     assert (message.header.stamp.sec, message.header.frame_id, message.camera) == (3, "odom", "head")
     (found,) = message.objects

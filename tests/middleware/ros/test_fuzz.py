@@ -27,7 +27,7 @@ from golem.middleware.ros.convert import (
 )
 from golem.middleware.ros.message import CodecError
 from golem.robots.sensors.calibration import OPTICAL_FRAMES, calibrations
-from golem.runtime.live.verdict import to_status
+from golem.runtime.live.safety_status import to_status
 
 READ: dict[str, tuple[Callable[[Any], object], ...]] = {
     "geometry_msgs/msg/Twist": (to_twist,),

@@ -11,18 +11,18 @@ from golem.middleware.ros import (
     action_client,
     action_server,
     base,
+    pubsub,
     rclpy_actions,
     rclpy_node,
     service,
-    topics,
 )
-from golem.middleware.ros.base import Node
+from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.node import DdsNode
 from golem.middleware.ros.rclpy_node import RclpyNode
 
 from .conftest import TRANSPORTS
 
-MODULES = (action_client, action_server, rclpy_actions, rclpy_node, service, topics)
+MODULES = (action_client, action_server, rclpy_actions, rclpy_node, service, pubsub)
 CONTRACTS = (
     "ActionClient",
     "ActionServer",
@@ -54,6 +54,6 @@ def test_the_conformance_suite_runs_on_it_where_ros_is() -> None:
         pytest.skip("needs ROS 2: rclpy cannot be imported, the rclpy node is untested")
 
 
-def nodes(participant: object) -> list[Node]:
+def nodes(participant: object) -> list[RosNode]:
     """Never run: here the type checker compares the nodes' signatures with the contract's."""
     return [DdsNode(participant, "a"), RclpyNode("b")]  # type: ignore[arg-type]

@@ -14,16 +14,16 @@ from tests.middleware.ros.samples import random_message
 
 from golem.middleware.ros import codec
 from golem.middleware.ros.msgs import unitree_api
-from golem.middleware.unitree_api import Request, Response
+from golem.middleware.unitree_api import ApiRequest, Response
 from golem.middleware.wire import api, go, hg
-from golem.middleware.wire.layout import Layout
+from golem.middleware.wire.struct_layout import StructLayout
 
 IMU = ("quaternion", "gyroscope", "accelerometer", "rpy", "temperature")
 STATE = ("q", "dq", "ddq", "tau_est", "temperature", "vol", "sensor", "motorstate", "reserve")
 COMMAND = ("q", "dq", "tau", "kp", "kd", "reserve")
 
 
-def image(layout: Layout, name: str, seed: int) -> tuple[Any, Any]:
+def image(layout: StructLayout, name: str, seed: int) -> tuple[Any, Any]:
     """Return a random message of type `name`, and its image."""
     message = random_message(codec.codec(), name, random.Random(seed))
     assert layout.type_name == codec.dds_name(name)
@@ -72,8 +72,8 @@ def test_sport_mode_state() -> None:
 def test_requests() -> None:
     sent = unitree_api.Request(parameter='{"data": 1}')
     sent.header.identity = unitree_api.RequestIdentity(7, 1001)
-    assert api.decode_request(codec.serialize(sent)) == Request(7, 1001, '{"data": 1}')
-    read = codec.deserialize(api.encode_request(Request(8, 1003, "{}")), unitree_api.Request)
+    assert api.decode_request(codec.serialize(sent)) == ApiRequest(7, 1001, '{"data": 1}')
+    read = codec.deserialize(api.encode_request(ApiRequest(8, 1003, "{}")), unitree_api.Request)
     assert (read.header.identity.id, read.header.identity.api_id, read.parameter) == (8, 1003, "{}")
 
 

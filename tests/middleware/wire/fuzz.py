@@ -25,10 +25,10 @@ if __name__ == "__main__":
 from tests.middleware.wire import random_images, samples
 
 from golem.middleware import unitree_api
-from golem.middleware.unitree_api import LOCO_APIS, Request, Response
+from golem.middleware.unitree_api import LOCO_APIS, ApiRequest, Response
 from golem.middleware.wire import api, convert, go, hg
 from golem.middleware.wire.crc import Checksum
-from golem.middleware.wire.layout import WireError
+from golem.middleware.wire.struct_layout import WireError
 from golem.robots.onboard.loco_service import LocoService
 from golem.robots.onboard.motion_switcher import CHECK_MODE, RELEASE_MODE, SELECT_MODE, MotionSwitcher
 
@@ -71,11 +71,11 @@ def targets() -> dict[str, Target]:
     rng = np.random.default_rng(0)
     loco = LOCO_APIS["h1"]
     calls = [
-        Request(1, loco.set_velocity, '{"velocity": [0.3, 0.0, -0.2], "duration": 1.0}'),
-        Request(2, loco.set_fsm_id, '{"data": 1}', lease=3, priority=4, noreply=True),
-        Request(3, SELECT_MODE, '{"name": "ai"}', binary=bytes(range(40))),
-        Request(4, CHECK_MODE, "{}"),
-        Request(5, RELEASE_MODE),
+        ApiRequest(1, loco.set_velocity, '{"velocity": [0.3, 0.0, -0.2], "duration": 1.0}'),
+        ApiRequest(2, loco.set_fsm_id, '{"data": 1}', lease=3, priority=4, noreply=True),
+        ApiRequest(3, SELECT_MODE, '{"name": "ai"}', binary=bytes(range(40))),
+        ApiRequest(4, CHECK_MODE, "{}"),
+        ApiRequest(5, RELEASE_MODE),
     ]
     requests = [api.encode_request(call) for call in calls]
     responses = [
@@ -168,7 +168,7 @@ def attack(target: Target, count: int, seed: int = 0) -> tuple[int, int]:
 
 def peak(target: Target, count: int, seed: int = 1) -> int:
     """Return the most memory that decoding one of `count` mutated payloads took, beyond what was there [B]."""
-    most = 0
+    maximum = 0
     tracemalloc.start()
     try:
         for payload in payloads(target, count, seed):
@@ -178,10 +178,10 @@ def peak(target: Target, count: int, seed: int = 1) -> int:
                 target.decode(payload)
             except WireError:
                 pass
-            most = max(most, tracemalloc.get_traced_memory()[1] - before)
+            maximum = max(maximum, tracemalloc.get_traced_memory()[1] - before)
     finally:
         tracemalloc.stop()
-    return most
+    return maximum
 
 
 def main() -> None:

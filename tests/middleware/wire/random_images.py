@@ -10,7 +10,7 @@ import numpy as np
 
 from golem.middleware.wire import go, hg
 from golem.middleware.wire.crc import Checksum
-from golem.middleware.wire.layout import Layout
+from golem.middleware.wire.struct_layout import StructLayout
 
 
 def fill(image: Any, rng: np.random.Generator) -> None:
@@ -30,7 +30,7 @@ def fill(image: Any, rng: np.random.Generator) -> None:
         image["motor"]["mode"][1:] = rng.integers(0, 256, hg.MOTORS - 1, np.uint8)
 
 
-def payload(layout: Layout, rng: np.random.Generator) -> bytes:
+def payload(layout: StructLayout, rng: np.random.Generator) -> bytes:
     """Return a random message; its checksum, where it has one, is random too."""
     out = layout.blank()
     fill(layout.read(out), rng)
@@ -92,7 +92,7 @@ def sdk_sport(sdk: SimpleNamespace, image: Any) -> Any:
     )
 
 
-MESSAGES: dict[str, tuple[Layout, Callable[[SimpleNamespace, Any], Any], Checksum | None]] = {
+MESSAGES: dict[str, tuple[StructLayout, Callable[[SimpleNamespace, Any], Any], Checksum | None]] = {
     "LowState": (hg.LOW_STATE, sdk_state, hg.STATE_CHECKSUM),
     "LowCmd": (hg.LOW_CMD, sdk_command, hg.COMMAND_CHECKSUM),
     "IMUState": (hg.IMU_STATE, sdk_imu, None),

@@ -6,7 +6,7 @@ import math
 import time
 
 from golem.middleware.dds.base import CALLS, Participant
-from golem.middleware.unitree_api import Request, Response, request_topic, response_topic
+from golem.middleware.unitree_api import ApiRequest, Response, request_topic, response_topic
 from golem.middleware.wire import api
 from golem.middleware.wire.rpc import RpcClient, RpcServer
 
@@ -37,7 +37,7 @@ def call(
     due = start
     while time.monotonic() < start + timeout:
         if client.connected and time.monotonic() >= due:
-            client.send(Request(number, api_id, parameter))
+            client.send(ApiRequest(number, api_id, parameter))
             due = time.monotonic() + again
         for response in client.take():
             if (response.id, response.api_id) == (number, api_id):

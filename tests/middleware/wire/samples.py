@@ -11,8 +11,8 @@ QUARTER = 0.25
 """Values are multiples of a power of two, which single precision holds exactly."""
 
 
-def exact(rng: np.random.Generator, size: int, most: int = 40) -> Array:
-    return rng.integers(-most, most, size).astype(np.float64) * QUARTER
+def exact(rng: np.random.Generator, size: int, maximum: int = 40) -> Array:
+    return rng.integers(-maximum, maximum, size).astype(np.float64) * QUARTER
 
 
 def joints(rng: np.random.Generator) -> Array:

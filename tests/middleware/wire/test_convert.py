@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tests.middleware.wire import random_images, samples
 
 from golem.middleware.wire import convert, go, hg
-from golem.middleware.wire.layout import Layout, WireError
+from golem.middleware.wire.struct_layout import StructLayout, WireError
 from golem.types import LowCommand, LowState
 
 MACHINE = 6
@@ -20,7 +20,7 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(1)
 
 
-def edited(payload: bytes, layout: Layout, edit: Callable[[Any], None]) -> bytes:
+def edited(payload: bytes, layout: StructLayout, edit: Callable[[Any], None]) -> bytes:
     """Return `payload` with fields changed and, where it has one, the checksum right again."""
     changed = bytearray(payload)
     edit(layout.read(changed))
@@ -116,7 +116,7 @@ def test_a_motor_that_is_off_gets_nothing() -> None:
     assert command.kp[1] == hg.LOW_CMD.read(payload)["motor"]["kp"][1]
 
 
-DECODERS: dict[str, tuple[Layout, Callable[[], bytes], Callable[[bytes], object]]] = {
+DECODERS: dict[str, tuple[StructLayout, Callable[[], bytes], Callable[[bytes], object]]] = {
     "state": (
         hg.LOW_STATE,
         lambda: convert.encode_low_state(samples.state(rng())),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from tests.middleware.wire import fuzz
 
-from golem.middleware.wire.layout import WireError
+from golem.middleware.wire.struct_layout import WireError
 
 COUNT = 400
 PEAK = 256 * 1024

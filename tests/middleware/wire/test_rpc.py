@@ -11,7 +11,7 @@ from tests.middleware.wire.rpc import call, reach, serve
 
 from golem.middleware.dds.base import DEFAULT, Participant
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.unitree_api import OK, Request, Response
+from golem.middleware.unitree_api import OK, ApiRequest, Response
 from golem.middleware.wire import api
 from golem.middleware.wire.rpc import RpcServer
 
@@ -46,9 +46,9 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[], Participant]]:
 
 
 @contextmanager
-def answering(server: RpcServer, code: int = OK) -> Iterator[list[Request]]:
+def answering(server: RpcServer, code: int = OK) -> Iterator[list[ApiRequest]]:
     """Answer every call in a thread, each answer preceded by one to somebody else."""
-    heard: list[Request] = []
+    heard: list[ApiRequest] = []
     stop = threading.Event()
 
     def run() -> None:
@@ -119,10 +119,10 @@ def test_what_is_not_well_formed_is_left_out(domain: LocalDomain) -> None:
     stranger: Participant = domain.participant()
     requests = stranger.writer("rt/api/loco/request", api.REQUEST, DEFAULT)
     responses = stranger.writer("rt/api/loco/response", api.RESPONSE, DEFAULT)
-    good = api.encode_request(Request(5, 1))
+    good = api.encode_request(ApiRequest(5, 1))
     for payload in (good[:20], good, b"\0\1\0\0\1"):
         requests.write(payload)
-    assert server.take() == [Request(5, 1)]
+    assert server.take() == [ApiRequest(5, 1)]
     assert server.refused == 2 and "too short" in server.refusal
     responses.write(b"\0\1\0\0\1")
     responses.write(api.encode_response(Response(5, 1)))

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from tests.middleware.wire import random_images, samples
 
-from golem.middleware.unitree_api import Request, Response
+from golem.middleware.unitree_api import ApiRequest, Response
 from golem.middleware.wire import api, convert, hg
 
 COUNT = 1000
@@ -121,7 +121,7 @@ def test_calls_and_answers_are_the_sdks(sdk: SimpleNamespace) -> None:
         identity = a.RequestIdentity_(one, two)
         header = a.RequestHeader_(identity, a.RequestLease_(three), a.RequestPolicy_(priority, noreply))
         theirs = a.Request_(header, text, list(binary))
-        request = Request(one, two, text, three, priority, noreply, binary)
+        request = ApiRequest(one, two, text, three, priority, noreply, binary)
         assert theirs.serialize() == api.encode_request(request)
         assert api.decode_request(theirs.serialize()) == request
         assert a.Request_.deserialize(api.encode_request(request)) == theirs

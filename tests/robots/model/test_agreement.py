@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from golem.robots.model import magpie, mjcf, pinocchio_model
+from golem.robots.model import magpie_model, mjcf, pinocchio_model
 from golem.robots.model.table import JOINT_NAMES, JOINTS, LINKS
 from golem.types import SIDES, Array
 
@@ -27,9 +27,9 @@ def locked_hands() -> mujoco.MjModel:
     for actuator in list(spec.actuators)[27:]:
         spec.delete(actuator)
     for side in SIDES:
-        for finger in magpie.FINGERS:
-            crank, blade, _ = magpie.finger_names(side, finger)
-            half = magpie.MID / 2.0 * (1.0 if finger == "a" else -1.0)
+        for finger in magpie_model.FINGERS:
+            crank, blade, _ = magpie_model.finger_names(side, finger)
+            half = magpie_model.MID / 2.0 * (1.0 if finger == "a" else -1.0)
             spec.body(crank).quat = [np.cos(half), np.sin(half), 0, 0]
             spec.body(blade).quat = [np.cos(half), -np.sin(half), 0, 0]
             spec.delete(spec.joint(crank))
@@ -102,9 +102,12 @@ def test_mass_matrix_of_the_moving_hand_agrees_in_the_body_joints(
     for q in postures(5):
         twin.update(q)
         for side in SIDES:
-            for finger in magpie.FINGERS:
-                crank, blade, _ = magpie.finger_names(side, finger)
-                twin.data.joint(crank).qpos[0], twin.data.joint(blade).qpos[0] = magpie.MID, -magpie.MID
+            for finger in magpie_model.FINGERS:
+                crank, blade, _ = magpie_model.finger_names(side, finger)
+                twin.data.joint(crank).qpos[0], twin.data.joint(blade).qpos[0] = (
+                    magpie_model.MID,
+                    -magpie_model.MID,
+                )
         mujoco.mj_forward(robot, twin.data)
         M = pin.crba(model, data, q)
         M = np.triu(M) + np.triu(M, 1).T

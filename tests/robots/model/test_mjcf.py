@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from golem.robots.model import contact, looks, mjcf
+from golem.robots.model import contact_shapes, looks, mjcf
 from golem.robots.model.loft import Loft, ring
 from golem.robots.model.table import SOLE
 
@@ -27,8 +27,8 @@ def test_no_two_geoms_of_the_robot_collide_but_all_meet_the_world(robot: mujoco.
     solid = robot.geom_group == mjcf.COLLISION_GROUP
     types, affinities = robot.geom_contype[solid], robot.geom_conaffinity[solid]
     assert not (types[:, None] & affinities[None, :]).any()
-    assert np.all(affinities & contact.WORLD)
-    hands = [i for i in range(robot.ngeom) if robot.geom_contype[i] == contact.HAND]
+    assert np.all(affinities & contact_shapes.WORLD)
+    hands = [i for i in range(robot.ngeom) if robot.geom_contype[i] == contact_shapes.HAND]
     # Housing, two blades and two pads per hand.
     assert len(hands) == 10
 

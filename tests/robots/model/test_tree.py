@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from golem.robots.model import magpie, tree
+from golem.robots.model import magpie_model, tree
 from golem.robots.model.export import export_urdf
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.spatial import rotation_rpy, transform
@@ -63,8 +63,8 @@ def test_the_chain_to_each_hand_is_that_of_the_kinematics() -> None:
 
 
 def test_the_pads_are_as_far_apart_as_the_hand_reports() -> None:
-    fingers = (np.array([0.02, 0.03]), np.array([0.0, magpie.MAX_GAP / 2]))
+    fingers = (np.array([0.02, 0.03]), np.array([0.0, magpie_model.MAX_GAP / 2]))
     angle = tree.angles(np.zeros(NUM_JOINTS), fingers)
     cranks = angle[NUM_JOINTS:].reshape(4, 2)
-    np.testing.assert_allclose(magpie.pad_offset(cranks[:, 0]), np.concatenate(fingers), atol=1e-9)
+    np.testing.assert_allclose(magpie_model.pad_offset(cranks[:, 0]), np.concatenate(fingers), atol=1e-9)
     np.testing.assert_allclose(cranks[:, 1], -cranks[:, 0])

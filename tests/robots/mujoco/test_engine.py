@@ -18,7 +18,7 @@ from golem.robots.mujoco.engine import MujocoConfig, MujocoRobot
 from golem.robots.mujoco.hoist import HoistConfig
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP
 from golem.robots.sensors.profiles import RealismProfile, load_profile
-from golem.runtime.assembly import start_posture
+from golem.runtime.lockstep import start_posture
 from golem.types import NUM_JOINTS, Array, HandCommand, LowCommand
 
 TICK = 0.002

@@ -11,12 +11,12 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.options import fill
-from golem.robots.base import Banded
+from golem.robots.base import HasGantry
 from golem.robots.model.export import export_mjcf
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.hoist import RELEASE_TIME
-from golem.runtime.assembly import start_posture
+from golem.runtime.lockstep import start_posture
 from golem.types import NUM_JOINTS, LowCommand
 
 TICK = 0.002
@@ -54,7 +54,7 @@ def test_the_soles_are_on_the_floor_at_the_start() -> None:
 
 def test_the_band_carries_a_limp_robot() -> None:
     robot = twin()
-    assert isinstance(robot, Banded) and robot.banded
+    assert isinstance(robot, HasGantry) and robot.on_gantry
     run(robot, 1.0, LIMP)
     assert not robot.truth.fallen()
     assert abs(robot.truth.base().T_world_base[2, 3] - 0.965) < 0.01
@@ -67,7 +67,7 @@ def test_a_released_robot_stands_on_its_own_stiff_legs() -> None:
     before = robot.truth.base().T_world_base[:3, 3]
     assert load(robot) < 0.3 * weight(robot)
     robot.release()
-    assert not robot.banded
+    assert not robot.on_gantry
     loads = []
     for _ in range(round(RELEASE_TIME / 0.1)):
         run(robot, 0.1)
@@ -102,7 +102,7 @@ def test_a_second_release_changes_nothing() -> None:
 
 def test_the_hoist_never_lets_go() -> None:
     robot = twin(support="hoist")
-    assert not robot.banded
+    assert not robot.on_gantry
     robot.release()
     run(robot, 0.8, LIMP)
     assert robot.truth.base().T_world_base[2, 3] == pytest.approx(1.10, abs=0.01)

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from golem.robots.model import magpie
+from golem.robots.model import magpie_model
 from golem.robots.model.mjcf import robot_spec
 from golem.robots.mujoco.hand_servos import HandServos
 from golem.types import HandCommand, HandState, Side
@@ -92,11 +92,11 @@ def test_they_move_no_faster_than_the_servo_turns() -> None:
     bench = Bench(gap=0.10)
     gaps = [bench.run(0.0, 4.0, TICK).gap for _ in range(550)]
     # A pad moves by at most the arm's length per radian; both close.
-    fastest = 2 * magpie.ARM * magpie.MAX_SPEED * TICK
+    fastest = 2 * magpie_model.ARM * magpie_model.MAX_SPEED * TICK
     assert np.abs(np.diff(gaps)).max() < 1.1 * fastest
     closing = next(i for i, gap in enumerate(gaps) if gap < 0.005) * TICK
     assert closing == pytest.approx(
-        (magpie.CLOSED - float(magpie.crank_from_gap(0.1))) / magpie.MAX_SPEED, rel=0.15
+        (magpie_model.CLOSED - float(magpie_model.crank_from_gap(0.1))) / magpie_model.MAX_SPEED, rel=0.15
     )
 
 
@@ -117,7 +117,7 @@ def test_the_force_never_exceeds_its_ceiling() -> None:
     assert max(loads) <= 5.0 * (1 + 1e-9)
 
 
-@pytest.mark.parametrize(("told", "given"), [(1e3, magpie.MAX_FORCE), (0.0, magpie.MIN_FORCE)])
+@pytest.mark.parametrize(("told", "given"), [(1e3, magpie_model.MAX_FORCE), (0.0, magpie_model.MIN_FORCE)])
 def test_the_ceiling_is_one_the_servo_has(told: float, given: float) -> None:
     bench = Bench(block=0.0)
     assert bench.run(0.0, told, 2.0).force == pytest.approx([given, given], rel=0.05)

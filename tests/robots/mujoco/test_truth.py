@@ -9,7 +9,7 @@ import pytest
 from golem.robots.model.table import SOLE
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.assembly import start_posture
+from golem.runtime.lockstep import start_posture
 from golem.types import NUM_JOINTS, LowCommand
 
 TICK = 0.002

@@ -6,7 +6,7 @@ from golem.middleware.unitree_api import (
     LOCO_APIS,
     NOT_IMPLEMENTED,
     OK,
-    Request,
+    ApiRequest,
     Response,
     decode_int,
     encode,
@@ -18,7 +18,7 @@ API = LOCO_APIS["h1"]
 
 
 def call(service: LocoService, api_id: int, t: float = 0.0, **values: object) -> Response:
-    return service.answer(Request(7, api_id, encode(values) if values else ""), t)
+    return service.answer(ApiRequest(7, api_id, encode(values) if values else ""), t)
 
 
 def enter(service: LocoService, state: int) -> int:
@@ -85,7 +85,7 @@ def test_calls_that_cannot_be_followed_are_refused() -> None:
     service = LocoService(API)
     assert call(service, API.set_velocity, velocity=[0, 0, 0], duration=1.0).code == API.not_available
     assert call(service, API.set_velocity, velocity=[0, 0], duration=1.0).code == BAD_PARAMETER
-    assert service.answer(Request(1, API.set_fsm_id, "junk"), 0.0).code == BAD_PARAMETER
+    assert service.answer(ApiRequest(1, API.set_fsm_id, "junk"), 0.0).code == BAD_PARAMETER
     assert call(service, 8205).code == NOT_IMPLEMENTED
 
 
@@ -93,7 +93,7 @@ def test_nonsense_of_any_length_gets_a_short_answer() -> None:
     long = "x" * 1_000_000
     for parameter in (long, encode({"data": long}), encode({"velocity": [long]}), f'"{long}"'):
         for api_id in (API.set_fsm_id, API.set_velocity):
-            answer = LocoService(API).answer(Request(1, api_id, parameter), 0.0)
+            answer = LocoService(API).answer(ApiRequest(1, api_id, parameter), 0.0)
             assert answer.code == BAD_PARAMETER
             assert len(answer.data) < 200
 

@@ -7,7 +7,7 @@ from golem.middleware.unitree_api import (
     LOCO_APIS,
     NOT_IMPLEMENTED,
     OK,
-    Request,
+    ApiRequest,
     Response,
     decode,
     encode,
@@ -20,7 +20,7 @@ API = LOCO_APIS["h1"]
 
 
 def call(service: MotionSwitcher | LocoService, api_id: int, parameter: str = "{}") -> Response:
-    return service.answer(Request(7, api_id, parameter), 0.0)
+    return service.answer(ApiRequest(7, api_id, parameter), 0.0)
 
 
 def name(switcher: MotionSwitcher) -> object:

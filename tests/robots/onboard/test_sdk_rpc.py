@@ -10,16 +10,17 @@ from tests.middleware.wire.rpc import call, reach, serve
 from tests.robots.onboard.conftest import Started
 from tests.robots.onboard.sdk_rpc import ECHO, FAIL
 
-from golem.capabilities.legs.hold import Hold
+from golem.capabilities.legs.hold import JointHold
 from golem.middleware.bus import Bus
 from golem.middleware.unitree_api import LOCO_APIS, NOT_IMPLEMENTED, OK
 from golem.robots.onboard import motion_switcher
 from golem.robots.onboard.motion_switcher import UNKNOWN_MODE, MotionSwitcher
-from golem.runtime.executor import TICK, Executor
-from golem.runtime.guard import Guard
-from golem.runtime.legs import Legs
-from golem.runtime.live.onboard import AnswersOut, CallsIn
-from golem.runtime.onboard import LocoServiceNode, ServiceNode
+from golem.runtime.contract_check import ContractCheck
+from golem.runtime.executor import Executor
+from golem.runtime.live.onboard_bridge import AnswersOut, CallsIn
+from golem.runtime.lower_body_node import CheckedLowerBody
+from golem.runtime.onboard_nodes import LocoServiceNode, ServiceNode
+from golem.types import TICK
 
 pytestmark = pytest.mark.slow
 API = LOCO_APIS["h1"]
@@ -32,7 +33,7 @@ def test_the_vendors_clients_are_answered(sdk: Started, domain: int) -> None:
 
     participant, bus = connect(DdsConfig(domain)), Bus()
     try:
-        loco = LocoServiceNode(bus, API, Legs(Hold(), Guard("lower_body", "hold")))
+        loco = LocoServiceNode(bus, API, CheckedLowerBody(JointHold(), ContractCheck("lower_body", "hold")))
         switcher = ServiceNode(bus, motion_switcher.SERVICE, MotionSwitcher(loco.service).answer)
         servers = {name: serve(participant, name) for name in (API.service, motion_switcher.SERVICE)}
         calls = [CallsIn(bus, name, server) for name, server in servers.items()]

@@ -92,8 +92,8 @@ def test_the_twin_does_what_the_vendors_example_says(sdk: Started, domain: int) 
 
 def follows(measured: Array, wanted: Array) -> bool:
     """Return whether an angle swings like another, at most an eighth of a period later."""
-    most = max(
+    maximum = max(
         float(np.corrcoef(measured[lag:], wanted[: len(wanted) - lag])[0, 1])
         for lag in range(0, int(0.125 / PERIOD), 5)
     )
-    return most > 0.9 and float(np.ptp(measured)) > 0.5 * float(np.ptp(wanted))
+    return maximum > 0.9 and float(np.ptp(measured)) > 0.5 * float(np.ptp(wanted))

@@ -18,18 +18,18 @@ from golem.middleware import topics
 from golem.middleware.bus import News
 from golem.middleware.dds.base import LATCHED, SENSOR, Payload
 from golem.middleware.public import CAMERA_INFO, COLOR, DEPTH, gripper, image, optical_frame
-from golem.middleware.record.base import BagError, Message, Topic
+from golem.middleware.record.base import BagError, BagMessage, BagTopic
 from golem.middleware.record.catalog import topic
 from golem.middleware.record.reader import Bag
 from golem.middleware.record.writer import BagWriter
 from golem.middleware.ros import codec, convert, images
 from golem.middleware.ros.message import NANO
-from golem.middleware.topics import Exposure, Sightings
+from golem.middleware.topics import Detections, Exposure
 from golem.middleware.wire.convert import encode_low_state
-from golem.robots.replay.robot import ReplayConfig, ReplayRobot
+from golem.robots.replay.robot import ReplayRobot, ReplayRobotConfig
 from golem.robots.sensors.cameras import HEAD
-from golem.runtime.assembly import Running, build
 from golem.runtime.live.broadcast import broadcast
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import SkillResult
 from golem.skills.pick import Pick, PickGoal
 from golem.stack import Choice, Stack, load_stack
@@ -45,13 +45,13 @@ class Scribe:
 
     def __init__(self, folder: Path, origin: float) -> None:
         self._bag, self._origin = BagWriter(folder), origin
-        self._topics: dict[str, Topic] = {}
+        self._topics: dict[str, BagTopic] = {}
 
     def write(self, name: str, kind: str, payload: Payload, t: float) -> None:
         at = round((self._origin + t) * NANO)
         if name not in self._topics:
             self._topics[name] = topic(name, kind, LATCHED if name == "/tf_static" else SENSOR)
-        self._bag.write(Message(self._topics[name], at, at, payload))
+        self._bag.write(BagMessage(self._topics[name], at, at, payload))
 
     def state(self, t: float) -> None:
         state = LowState(0.0, ZERO + t, ZERO - t, ZERO, STILL)
@@ -99,7 +99,7 @@ def test_everything_comes_at_its_time(tmp_path: Path, origin: float) -> None:
         if k % 50 == 30:
             scribe.exposure(t - 0.05, t, k // 10)
     scribe.close()
-    robot = ReplayRobot(ReplayConfig(tmp_path / "bag"))
+    robot = ReplayRobot(ReplayRobotConfig(tmp_path / "bag"))
     assert robot.cameras == {"head": replace(HEAD, fx=600.0)}
     np.testing.assert_allclose(robot.calibration["head"], T, atol=1e-12)
     assert robot.hand("left", 0.0).gap == 0.0 and robot.hand("right", 0.0).t == 0.0
@@ -125,12 +125,12 @@ def test_memory_is_bounded_when_nobody_looks(tmp_path: Path) -> None:
         if k % 66 == 0:
             scribe.exposure(k * 0.002, k * 0.002, 1)
     scribe.close()
-    robot = ReplayRobot(ReplayConfig(tmp_path / "bag"))
-    most = 0
+    robot = ReplayRobot(ReplayRobotConfig(tmp_path / "bag"))
+    maximum = 0
     for _ in range(1000):
         robot.advance(COMMAND, {}, 0.002)
-        most = max(most, len(robot._log.pictures["head"]._samples))
-    assert most <= 5
+        maximum = max(maximum, len(robot._log.pictures["head"]._samples))
+    assert maximum <= 5
 
 
 def test_a_restart_in_the_log_is_its_end(tmp_path: Path) -> None:
@@ -138,7 +138,7 @@ def test_a_restart_in_the_log_is_its_end(tmp_path: Path) -> None:
     for t in (5.0, 5.1, 0.0, 0.1):
         scribe.state(t)
     scribe.close()
-    robot = ReplayRobot(ReplayConfig(tmp_path / "bag"))
+    robot = ReplayRobot(ReplayRobotConfig(tmp_path / "bag"))
     robot.advance(COMMAND, {}, 0.1)
     with pytest.raises(RobotGone, match=r"ends after 0\.10 s"):
         robot.advance(COMMAND, {}, 0.1)
@@ -149,9 +149,9 @@ def test_a_bag_without_a_robot_is_refused(tmp_path: Path) -> None:
     scribe.hand(0.0, 0.05)
     scribe.close()
     with pytest.raises(BagError, match="no messages on /lowstate.*it has /left/gripper/state"):
-        ReplayRobot(ReplayConfig(tmp_path / "bag"))
+        ReplayRobot(ReplayRobotConfig(tmp_path / "bag"))
     with pytest.raises(BagError, match="No bag at"):
-        ReplayRobot(ReplayConfig(tmp_path / "nothing"))
+        ReplayRobot(ReplayRobotConfig(tmp_path / "nothing"))
 
 
 @dataclass
@@ -159,7 +159,7 @@ class Seen:
     """What a stack took in while it picked."""
 
     exposures: dict[tuple[str, float], Exposure]
-    sightings: dict[tuple[str, float], Sightings]
+    sightings: dict[tuple[str, float], Detections]
     result: SkillResult
 
 
@@ -167,7 +167,7 @@ def pick(stack: Stack, seconds: float, bag: Path | None) -> Seen:
     """Let `stack` begin to pick, recorded into `bag`."""
     running, robot = build(stack, seed=0)
     frames = [(n, News(running.bus, topics.exposures(n), Exposure)) for n in robot.cameras]
-    found = [News(running.bus, topics.sightings(n), Sightings) for n in robot.cameras]
+    found = [News(running.bus, topics.detections(n), Detections) for n in robot.cameras]
     seen = Seen({}, {}, SkillResult(False, "", None, ""))
     with broadcast(running, robot, bag) as show:
 
@@ -262,7 +262,7 @@ def test_running_is_the_same_with_and_without_an_audience(tmp_path: Path) -> Non
 
     def q(bag: Path | None) -> np.ndarray:
         running, robot = build(load_stack("tether", profile="field"), seed=3)
-        assert isinstance(running, Running)
+        assert isinstance(running, LockstepRunner)
         with broadcast(running, robot, bag) as show:
             running.executor.run(0.1, lambda: show() is not None)
         robot.close()

@@ -13,12 +13,12 @@ from golem.hardware.safety.base import GateState, SafetyLimits
 from golem.middleware.dds.local import LocalDomain, LocalParticipant
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, Trigger_Request
 from golem.middleware.ros.node import DdsNode
-from golem.runtime.assembly import build_robot
-from golem.runtime.executor import TICK
-from golem.runtime.live.gate import LiveGate
-from golem.runtime.live.stack import LiveStack
+from golem.runtime.live.safety_process import SafetyProcess
+from golem.runtime.live.stack_process import StackProcess
 from golem.runtime.live.twin import Twin
+from golem.runtime.lockstep import build_robot
 from golem.stack import Choice, Stack
+from golem.types import TICK
 
 BLIND = """
 class Blind:
@@ -36,8 +36,8 @@ class Live:
     domain: LocalDomain = field(default_factory=LocalDomain)
     clock: float = 1000.0
     twin: Twin | None = None
-    gate: LiveGate | None = None
-    up: LiveStack | None = None
+    gate: SafetyProcess | None = None
+    up: StackProcess | None = None
     robot: Any = None
     members: list[tuple[LocalParticipant, DdsNode]] = field(default_factory=list)
 
@@ -58,13 +58,13 @@ class Live:
         """Put a new gate on the domain."""
         limits = SafetyLimits.from_profile(self.stack.limits)
         estop = VirtualEstop()
-        self.gate = LiveGate(
+        self.gate = SafetyProcess(
             *self.member("safety"), limits, estop, clock=lambda: self.clock, patient=patient, real=real
         )
 
     def start_up(self, real: bool = False) -> None:
         """Put a new stack on the domain."""
-        self.up = LiveStack(self.stack, *self.member("up"), real=real, clock=lambda: self.clock)
+        self.up = StackProcess(self.stack, *self.member("up"), real=real, clock=lambda: self.clock)
 
     def leave(self, node: str) -> None:
         """Take a process off the domain, as if it had been killed."""

@@ -16,8 +16,8 @@ from golem.middleware.ros import codec
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.wire.convert import decode_low_state
 from golem.run import RunConfig, run_stack
-from golem.runtime.assembly import build
 from golem.runtime.live.broadcast import broadcast
+from golem.runtime.lockstep import build
 from golem.stack import load_stack
 
 

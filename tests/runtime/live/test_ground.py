@@ -25,9 +25,9 @@ def test_it_stands_without_its_band(legs: str, tmp_path: Path) -> None:
     live.start_gate()
     live.start_up()
     live.activate()
-    assert live.robot.banded
+    assert live.robot.on_gantry
     live.run(4.0)
-    assert not live.robot.banded
+    assert not live.robot.on_gantry
     assert live.state is GateState.ACTIVE
     assert live.up is not None and live.up.side is not None
     status = live.up.side.bus.latest(topics.LEG_STATUS, LegStatus)

@@ -12,9 +12,8 @@ from golem.middleware.dds.base import Qos
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import encode_low_command
-from golem.runtime.executor import TICK
 from golem.runtime.nodes import WATCHDOG
-from golem.types import NUM_JOINTS, LowCommand
+from golem.types import NUM_JOINTS, TICK, LowCommand
 
 VENDOR = Qos(depth=1)
 """What the vendor's clients offer."""

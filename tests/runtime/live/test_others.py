@@ -20,17 +20,17 @@ from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros import convert, images
-from golem.middleware.topics import LookRequest
+from golem.middleware.topics import DetectionRequest
 from golem.middleware.wire import convert as wire
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import answered, encode_low_state
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.robots.sensors.cameras import CAMERAS
 from golem.runtime.executor import Executor
-from golem.runtime.live.gate import LiveGate
-from golem.runtime.live.motors import RequestOut
+from golem.runtime.live.motor_bridge import RequestOut
 from golem.runtime.live.process import SafetyConfig, run_safety
-from golem.runtime.live.surface import Surface
+from golem.runtime.live.role_endpoints import RoleEndpoints
+from golem.runtime.live.safety_process import SafetyProcess
 from golem.stack import Choice
 from golem.types import NUM_JOINTS, Imu, LowCommand, LowState
 
@@ -63,7 +63,9 @@ def test_a_best_effort_writer_is_another_writer(live: Live) -> None:
 
 
 @pytest.mark.parametrize(("topic", "kind"), [("/safety/lowcmd_in", hg.LOW_CMD), ("/lowstate", hg.LOW_STATE)])
-def test_a_second_stack_and_a_second_robot_stop_the_first(live: Live, topic: str, kind: hg.Layout) -> None:
+def test_a_second_stack_and_a_second_robot_stop_the_first(
+    live: Live, topic: str, kind: hg.StructLayout
+) -> None:
     live.activate()
     second, _ = live.member("second")
     writer = second.writer(f"rt{topic}", kind.type_name, public.topic(topic).qos)
@@ -98,7 +100,7 @@ def test_a_stack_ticks_once_for_each_state_and_answers_that_one(live: Live, firs
     participant, node = live.member("answering")
     reader = live.member("gate")[0].reader("rt/safety/lowcmd_in", hg.LOW_CMD.type_name, Qos(depth=100))
     bus = Bus()
-    executor = Executor(bus, [RequestOut(bus, Surface("stack", participant, node), lambda: 0)], first)
+    executor = Executor(bus, [RequestOut(bus, RoleEndpoints("stack", participant, node), lambda: 0)], first)
     got = []
     for k in range(50):
         t = first + 0.002 * k
@@ -131,7 +133,7 @@ def test_images_of_another_clock_are_refused_with_a_remedy(
     live.run(0.02)
     assert live.up is not None and live.up.side is not None
     bus = live.up.side.bus
-    bus.publish(topics.look("head"), LookRequest(("screw",)), 0.02)
+    bus.publish(topics.detection_request("head"), DetectionRequest(("screw",)), 0.02)
     live.run(0.02)
     _, node = live.member("driver")
     send: dict[str, Callable[..., None]] = {}
@@ -192,7 +194,7 @@ def test_a_gate_that_fails_can_still_damp(live: Live, monkeypatch: pytest.Monkey
     def fail(*_: object) -> None:
         raise RuntimeError("no")
 
-    monkeypatch.setattr(LiveGate, "_judge", fail)
+    monkeypatch.setattr(SafetyProcess, "_judge", fail)
     assert live.gate is not None
     with pytest.raises(RuntimeError):
         live.gate.stop()
@@ -206,11 +208,11 @@ def test_a_safety_process_that_fails_damps_for_as_long_as_a_stop_takes(
     pytest.importorskip("cyclonedds")
     damped: list[float] = []
 
-    def fail(gate: LiveGate) -> None:
+    def fail(gate: SafetyProcess) -> None:
         raise RuntimeError("no")
 
-    monkeypatch.setattr(LiveGate, "step", fail)
-    monkeypatch.setattr(LiveGate, "damp", lambda gate: damped.append(time.monotonic()))
+    monkeypatch.setattr(SafetyProcess, "step", fail)
+    monkeypatch.setattr(SafetyProcess, "damp", lambda gate: damped.append(time.monotonic()))
     with pytest.raises(RuntimeError):
         run_safety(SafetyConfig(dds=DdsConfig(domain=20 + os.getpid() % 180)))
     assert damped[-1] - damped[0] > 0.9 * SafetyLimits.from_profile().damping_time and len(damped) > 100

@@ -14,18 +14,18 @@ from golem.middleware.dds.base import Qos
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.local import LocalReader
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
-from golem.middleware.unitree_api import Request, encode
+from golem.middleware.unitree_api import ApiRequest, encode
 from golem.middleware.wire import convert as wire
 from golem.middleware.wire import hg
 from golem.middleware.wire.rpc import RpcServer
 from golem.robots.onboard import motion_switcher
-from golem.runtime.executor import TICK
-from golem.runtime.live import authority
-from golem.runtime.live.gate import LOOK, WARY, Arrivals, LiveGate
+from golem.runtime.live import motion_switcher_client
 from golem.runtime.live.process import SafetyConfig, run_safety
+from golem.runtime.live.safety_process import LOOK, WARY, Arrivals, SafetyProcess
+from golem.types import TICK
 
 
-def same(reader: LocalReader, gate: LiveGate | None) -> bool:
+def same(reader: LocalReader, gate: SafetyProcess | None) -> bool:
     """Return whether the gate is in the process of `reader`."""
     return gate is not None and reader.guid[:12] == gate._out.guid[:12]
 
@@ -34,7 +34,7 @@ def let_go(live: Live) -> None:
     """Replace the gate by one for a real robot whose own controller has let go of the motors."""
     live.leave("safety")
     live.start_gate(real=True)
-    reach(live.member("hand")[0], motion_switcher.SERVICE).send(Request(1, motion_switcher.RELEASE_MODE))
+    reach(live.member("hand")[0], motion_switcher.SERVICE).send(ApiRequest(1, motion_switcher.RELEASE_MODE))
     live.run(1.5)
 
 
@@ -50,12 +50,12 @@ def test_a_real_robots_motors_are_not_touched_before_its_own_controller_lets_go_
     assert not live.ask("activate")[0]
 
     switcher = reach(participant, motion_switcher.SERVICE)
-    switcher.send(Request(1, motion_switcher.RELEASE_MODE))
+    switcher.send(ApiRequest(1, motion_switcher.RELEASE_MODE))
     live.run(1.0)
     assert live.state is GateState.ARMED and motors.take(1000)
     live.activate()
 
-    switcher.send(Request(2, motion_switcher.SELECT_MODE, encode({"name": motion_switcher.MODE})))
+    switcher.send(ApiRequest(2, motion_switcher.SELECT_MODE, encode({"name": motion_switcher.MODE})))
     live.run(1.0)
     assert (live.state, live.reason) == (GateState.STOP1, "motors_held")
     *stiff, last = [wire.decode_low_command(sample.payload, 0.0) for sample in motors.take(1000)]
@@ -71,11 +71,11 @@ def test_a_motion_switcher_that_falls_silent_keeps_the_gate_shut_but_stops_nobod
     live.leave("safety")
     live.start_gate(real=True)
     participant, _ = live.member("operator")
-    reach(participant, motion_switcher.SERVICE).send(Request(1, motion_switcher.RELEASE_MODE))
+    reach(participant, motion_switcher.SERVICE).send(ApiRequest(1, motion_switcher.RELEASE_MODE))
     live.run(1.0)
     live.activate()
     monkeypatch.setattr(RpcServer, "reply", lambda server, response: None)
-    live.run(2.5 * authority.SILENCE)
+    live.run(2.5 * motion_switcher_client.SILENCE)
     assert live.state is GateState.ACTIVE
     motors = participant.reader("rt/lowcmd", hg.LOW_CMD.type_name, Qos(reliable=False, depth=1000))
     assert live.ask("stop")[0]

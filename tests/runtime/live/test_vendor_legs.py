@@ -13,7 +13,7 @@ from golem.capabilities.legs.hold import STANCES
 from golem.hardware.safety.base import GateState
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
-from golem.middleware.unitree_api import Request
+from golem.middleware.unitree_api import ApiRequest
 from golem.robots.onboard.motion_switcher import RELEASE_MODE, SERVICE
 from golem.stack import Choice
 from golem.types import LEGS
@@ -43,7 +43,7 @@ def test_the_onboard_controller_moves_the_legs_until_its_mode_is_released(live: 
     np.testing.assert_allclose(live.robot.joints()[0][LEGS], np.tile(STANCES["straight"], 2), atol=0.1)
 
     stranger, node = live.member("stranger")
-    reach(stranger, SERVICE).send(Request(1, RELEASE_MODE))
+    reach(stranger, SERVICE).send(ApiRequest(1, RELEASE_MODE))
     live.run(1.0)
     live.leave_quietly(node)
     fault = legs(live).fault

@@ -39,8 +39,8 @@ from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.wire import convert
-from golem.runtime.live.errand import propose, read_errand
-from golem.runtime.live.member import member
+from golem.runtime.live.skill_client import propose, read_errand
+from golem.runtime.live.node_setup import member
 from golem.runtime.live.operator import ask
 
 def pursue(words):

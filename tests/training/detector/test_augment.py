@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.localization.classes import CLASSES
-from golem.capabilities.localization.peaks import STRIDE, find_peaks
+from golem.capabilities.perception.classes import CLASSES
+from golem.capabilities.perception.peaks import STRIDE, find_peaks
 from golem.training.detector import augment
 
 

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.localization.classes import CLASSES
-from golem.training.detector import dataset, scene
+from golem.capabilities.perception.classes import CLASSES
+from golem.training.detector import dataset, random_scene
 from golem.training.detector.labels import COLUMNS, label_image
 
 
 def test_labelled_centres_lie_on_the_geoms_of_their_part() -> None:
     rng = np.random.default_rng(5)
-    world = scene.build_world(rng)
+    world = random_scene.build_world(rng)
     owner = np.full(world.model.ngeom, -1)
     for part in world.names.parts:
         for name in part.geoms:
             owner[world.model.geom(name).id] = CLASSES.index(part.label)
-    plain, fancy = scene.make_rigs(world)
+    plain, fancy = random_scene.make_rigs(world)
     total, right, seen = 0, 0, set()
     with plain, fancy:
         for k in range(10):
-            scene.randomise_looks(world, rng)
-            scene.randomise_objects(world, rng)
-            info = (scene.place_head if k % 2 else scene.place_palm)(world, rng)
+            random_scene.randomise_looks(world, rng)
+            random_scene.randomise_objects(world, rng)
+            info = (random_scene.place_head if k % 2 else random_scene.place_palm)(world, rng)
             segmentation = plain.segment(world.data, info.name)
             for kind, x, y, x0, y0, x1, y1, ignore in label_image(world, info, segmentation):
                 assert x0 - 1 <= x <= x1 + 1 and y0 - 1 <= y <= y1 + 1
@@ -37,21 +37,21 @@ def test_labelled_centres_lie_on_the_geoms_of_their_part() -> None:
 
 def test_a_pulled_screw_leaves_a_hole_label() -> None:
     rng = np.random.default_rng(2)
-    world = scene.build_world(rng)
-    plain, fancy = scene.make_rigs(world)
+    world = random_scene.build_world(rng)
+    plain, fancy = random_scene.make_rigs(world)
     with plain, fancy:
-        scene.randomise_objects(world, rng)
+        random_scene.randomise_objects(world, rng)
         for body in world.distractors:
-            world.model.body_pos[body] = scene.AWAY
-        info = scene.place_head(world, rng)
+            world.model.body_pos[body] = random_scene.AWAY
+        info = random_scene.place_head(world, rng)
         counts = []
         for out in (False, True):
             for draw, mouth in zip(world.draws, world.names.mouths, strict=True):
-                at = world.model.joint(scene.screw_name(draw.slot)).qposadr[0]
+                at = world.model.joint(random_scene.screw_name(draw.slot)).qposadr[0]
                 world.data.qpos[at : at + 3] = mouth + draw.protrusion * draw.axis()
                 world.data.qpos[at + 3 : at + 7] = draw.quat()
                 world.data.qpos[at + 2] -= 3.0 * out
-            scene.refresh(world)
+            random_scene.refresh(world)
             labels = label_image(world, info, plain.segment(world.data, info.name))
             counts.append(
                 [int((labels[:, 0] == CLASSES.index(name)).sum()) for name in ("screw", "screw_hole")]

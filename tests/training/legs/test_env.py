@@ -12,12 +12,12 @@ torch = pytest.importorskip("torch", reason="training needs the extra 'train'")
 from golem.capabilities.legs.description import SHIPPED
 from golem.capabilities.legs.gait import GaitConfig
 from golem.hardware.safety.base import SafetyLimits
+from golem.training.legs.batch_world import WorldConfig
 from golem.training.legs.disturbances import Difficulty
 from golem.training.legs.env import PERIOD, TASKS, EnvConfig, LegsEnv
-from golem.training.legs.export import load_actor
-from golem.training.legs.model import KP, STANCE
-from golem.training.legs.rewards import Weights
-from golem.training.legs.world import WorldConfig
+from golem.training.legs.export_policy import load_actor
+from golem.training.legs.rewards import RewardWeights
+from golem.training.legs.training_model import KP, STANCE
 
 NOBODY = np.arange(0)
 
@@ -91,7 +91,7 @@ def test_the_speed_that_stops_a_robot_has_its_price_where_nothing_is_left_to_los
     for strictness in (0.0, 0.5, 1.0):
         known = (idle, idle, still[:, :2], np.full(2, 0.5))
         reward, _ = env._rewards(truth, still, env.gait, *known, strictness, PERIOD)
-        np.testing.assert_allclose(reward, [0.0, strictness * Weights().fast * above * PERIOD])
+        np.testing.assert_allclose(reward, [0.0, strictness * RewardWeights().fast * above * PERIOD])
 
 
 def test_a_run_that_goes_on_meets_other_draws_and_the_same_ones_each_time() -> None:
@@ -107,12 +107,12 @@ def test_a_run_that_goes_on_meets_other_draws_and_the_same_ones_each_time() -> N
 
 def test_commands_stay_inside_the_trained_envelope_and_change_slowly() -> None:
     env = LegsEnv(32, EnvConfig(hold=(0.1, 0.2)), 0, 1)
-    most = np.array(env.config.accelerate) * PERIOD
+    maximum = np.array(env.config.accelerate) * PERIOD
     before = env.twist.copy()
     for _ in range(40):
         step = env.step(np.zeros((32, 12)), NOBODY, np.zeros((0, 15)))
         # On the way to a stop a command ends at the dead band of 0.1.
-        assert (np.abs(env.twist - before) <= np.maximum(most, 0.1 + most) + 1e-12).all()
+        assert (np.abs(env.twist - before) <= np.maximum(maximum, 0.1 + maximum) + 1e-12).all()
         env.restart(np.flatnonzero(step.ended | step.truncated))
         before = env.twist.copy()
     low, high = np.array([env.config.envelope.vx, env.config.envelope.vy, env.config.envelope.wz]).T

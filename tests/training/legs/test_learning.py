@@ -14,25 +14,32 @@ onnx = pytest.importorskip("onnx", reason="export needs the extra 'train'")
 
 from golem.capabilities.legs.description import load_description
 from golem.capabilities.legs.network import load_network
-from golem.capabilities.legs.observation import Layout
+from golem.capabilities.legs.observation import ObservationLayout
 from golem.errors import ConfigError
-from golem.evaluation.provenance import commit
+from golem.provenance import commit
 from golem.robots.model.leg_kinematics import leg_poses
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, read_checkpoint, read_curve
 from golem.training.legs.curve import draw_curves
-from golem.training.legs.disturbances import GENTLE, QUARTERS, STRAIGHT, Difficulty, Pushes, UpperBodyMotion
+from golem.training.legs.disturbances import (
+    GENTLE,
+    QUARTERS,
+    STRAIGHT,
+    Difficulty,
+    RandomPushes,
+    UpperBodyMotion,
+)
 from golem.training.legs.env import LAYOUT, TASKS, LegsEnv, Task
-from golem.training.legs.export import TRAINED, command_of, export, load_actor
+from golem.training.legs.export_policy import TRAINED, command_of, export, load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror
-from golem.training.legs.model import STANCE
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
-from golem.training.legs.train import Adversary, TrainConfig, _Run, train
+from golem.training.legs.train_legs import Adversary, TrainLegsConfig, _Run, train
+from golem.training.legs.training_model import STANCE
 
 
 def small(
     out: Path, seed: int = 0, updates: int = 2, *, robots: int = 8, threads: int = 1, **changes: Any
-) -> TrainConfig:
-    return TrainConfig(
+) -> TrainLegsConfig:
+    return TrainLegsConfig(
         out=out, seed=seed, robots=robots, steps=robots * 24 * updates, threads=threads, **changes
     )
 
@@ -58,7 +65,7 @@ def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(
     assert torch.load(tmp_path / "a" / CHECKPOINT, weights_only=True)["updates"] == 11
     assert command_of(read_checkpoint(tmp_path / "a" / CHECKPOINT)).endswith(f"(commit {commit()})")
     with monkeypatch.context() as changed:
-        changed.setattr("golem.training.legs.train.commit", lambda: "later")
+        changed.setattr("golem.training.legs.train_legs.commit", lambda: "later")
         train(small(tmp_path / "a", updates=12, learned_from=0.0))
     assert command_of(read_checkpoint(tmp_path / "a" / CHECKPOINT)).endswith(
         f"(commit {commit()}, then later)"
@@ -126,7 +133,7 @@ def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(
     for mine, exported in zip(run.legs.actor.parameters(), load_actor(network).parameters(), strict=True):
         assert torch.equal(mine, exported) or mine is run.legs.actor.log_std
     assert not any(torch.equal(w, v) for w, v in zip(run.legs.critic.parameters(), before, strict=True))
-    monkeypatch.setattr("golem.training.legs.train.VALUES_FIRST", 0)
+    monkeypatch.setattr("golem.training.legs.train_legs.VALUES_FIRST", 0)
     run.update()
     assert not torch.equal(run.legs.actor.net[0].weight, load_actor(network).net[0].weight)
     with pytest.raises(ConfigError, match=r"has 384 steps already; --steps, which counts them, is 384\."):
@@ -177,7 +184,7 @@ def test_the_exported_network_is_the_trained_one_and_its_description_fits(task: 
 
 
 def test_mirrors_are_involutions_and_the_policy_is_equivariant() -> None:
-    layout = Layout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
+    layout = ObservationLayout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
     seen, legs = Mirror(layout.components), leg_mirror()
     rng = np.random.default_rng(0)
     observation, action = rng.normal(size=layout.size), rng.normal(size=12)
@@ -258,7 +265,7 @@ def test_bounds_of_the_difficulty_hold_for_the_adversary() -> None:
 def test_a_calm_episode_has_no_push_and_slow_arms() -> None:
     rng, everyone = np.random.default_rng(0), np.arange(40)
     calm = everyone % 2 == 0
-    pushes, motion = Pushes(40, 50.0, rng), UpperBodyMotion(40, rng)
+    pushes, motion = RandomPushes(40, 50.0, rng), UpperBodyMotion(40, rng)
     pushes.reset(everyone, 1.0, calm)
     motion.reset(everyone, 1.0, calm)
     hard = Difficulty(amplitude=1.0, speed=1.0, push=1.0)
@@ -275,7 +282,7 @@ def test_a_calm_episode_has_no_push_and_slow_arms() -> None:
 
 
 def test_pushes_go_straight_more_often_than_not_whichever_way_the_robot_looks() -> None:
-    pushes = Pushes(2000, 50.0, np.random.default_rng(0))
+    pushes = RandomPushes(2000, 50.0, np.random.default_rng(0))
     facing = np.tile([[0.0, -1.0], [1.0, 0.0]], (2000, 1, 1))  # along the world's y
     pushes.reset(np.arange(2000), 1.0, np.zeros(2000, dtype=bool))
     ahead = np.zeros(2000)
@@ -291,7 +298,7 @@ def test_pushes_go_straight_more_often_than_not_whichever_way_the_robot_looks() 
 
 
 def test_pushes_have_the_impulse_they_were_drawn_with_at_most() -> None:
-    pushes = Pushes(200, 50.0, np.random.default_rng(0))
+    pushes = RandomPushes(200, 50.0, np.random.default_rng(0))
     facing = np.tile([[0.0, -1.0], [1.0, 0.0]], (200, 1, 1))
     pushes.reset(np.arange(200), 1.0, np.zeros(200, dtype=bool))
     impulse, largest = np.zeros((200, 2)), np.zeros(200)

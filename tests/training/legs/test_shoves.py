@@ -9,15 +9,15 @@ import pytest
 pytest.importorskip("torch", reason="training needs the extra 'train'")
 
 from golem.errors import ConfigError
-from golem.evaluation.pushes import DIRECTIONS
+from golem.robots.mujoco.shoves import DIRECTIONS
 from golem.training.legs.checkpoint import CHECKPOINT
-from golem.training.legs.disturbances import Pushes
+from golem.training.legs.disturbances import RandomPushes
 from golem.training.legs.shoves import shove_all
-from golem.training.legs.train import TrainConfig, train
+from golem.training.legs.train_legs import TrainLegsConfig, train
 
 
 def test_every_robot_that_is_shoved_too_hard_is_lost_and_counted_once(tmp_path: Path) -> None:
-    train(TrainConfig(out=tmp_path, task="stand", robots=8, steps=8 * 24, threads=1))
+    train(TrainLegsConfig(out=tmp_path, task="stand", robots=8, steps=8 * 24, threads=1))
     found = shove_all(tmp_path / CHECKPOINT, 900.0, n=2, seed=0, threads=1)
     assert [row.direction for row in found] == list(DIRECTIONS)
     assert all((row.survived, row.stopped + row.fell) == (0, 2) for row in found)
@@ -26,7 +26,7 @@ def test_every_robot_that_is_shoved_too_hard_is_lost_and_counted_once(tmp_path: 
 
 
 def test_a_push_that_is_ordered_comes_once_and_no_other() -> None:
-    pushes = Pushes(2, 50.0, np.random.default_rng(0))
+    pushes = RandomPushes(2, 50.0, np.random.default_rng(0))
     pushes.reset(np.arange(2), 1.0, np.zeros(2, dtype=bool))
     pushes.once(np.array([[100.0, 0.0], [0.0, -200.0]]), 0.2, start=0.5)
     facing = np.tile(np.eye(2), (2, 1, 1))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.base import (
     ARM_COLUMNS,
     NUM_UPPER,
@@ -17,7 +18,6 @@ from golem.capabilities.arms.base import (
     check_joints,
     check_pose,
 )
-from golem.capabilities.arms.kinematics import UpperKinematics
 from golem.capabilities.arms.postures import posture
 from golem.errors import ConfigError
 from golem.types import SIDES, UPPER, Array, Side
@@ -207,17 +207,17 @@ class TaskSpaceController(ABC):
             reaches.append(Reach(side, to_frame, residual))
         if reaches:
             # A waist that starts outside its range comes back at its speed, and the arms make up for it.
-            least, most = np.minimum, np.maximum  # np.clip takes three times as long
-            lower = least(most(self.lower - self.q, -room), room)
-            upper = least(most(self.upper - self.q, -room), room)
+            minimum, maximum = np.minimum, np.maximum  # np.clip takes three times as long
+            lower = minimum(maximum(self.lower - self.q, -room), room)
+            upper = minimum(maximum(self.upper - self.q, -room), room)
             step = self.solve(reaches, lower, upper, damping, dt)
             if step is None:
                 limited, step = True, np.zeros(NUM_UPPER)
             else:
                 held = (step <= lower + 1e-9) | (step >= upper - 1e-9)
                 limited |= bool((held & (room > 0.0)).any())
-            q = self.q + least(most(step, lower), upper)
-            self._move(least(most(q, least(self.lower, self.q)), most(self.upper, self.q)))
+            q = self.q + minimum(maximum(step, lower), upper)
+            self._move(minimum(maximum(q, minimum(self.lower, self.q)), maximum(self.upper, self.q)))
         position, rotation = self._errors(goals)
         self._left_over = float(
             np.sqrt(c.position_weight * (position @ position) + c.rotation_weight * (rotation @ rotation))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from golem.capabilities.legs.description import SHIPPED
-from golem.capabilities.legs.handover import Handover, HandoverConfig, Part
+from golem.capabilities.legs.handover import Handover, HandoverConfig, HandoverPart
 from golem.errors import ConfigError
 
 WALK, STAND = "almi_walk", "almi_stand"
@@ -40,6 +40,6 @@ class Almi(Handover):
         for name in (WALK, STAND):
             if not (SHIPPED / f"{name}.yaml").is_file():
                 raise ConfigError(f"This installation has no trained legs ({SHIPPED / name}.yaml is absent).")
-        walk = Part("policy", {"file": WALK, "network": config.walk})
-        stand = Part("policy", {"file": STAND, "network": config.stand})
+        walk = HandoverPart("policy", {"file": WALK, "network": config.walk})
+        stand = HandoverPart("policy", {"file": STAND, "network": config.stand})
         super().__init__(HandoverConfig(walk, stand))

@@ -65,7 +65,7 @@ class Envelope:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class LocomotionCommand:
     """What the base layer asks of a controller at one tick.
 
     Attributes:
@@ -83,7 +83,7 @@ class Motion:
     commanded: bool
 
 
-STANDING = Motion(Twist(), np.array([0.0, 0.5]), False, False)
+STANDING = LocomotionCommand(Twist(), np.array([0.0, 0.5]), False, False)
 """Stand still."""
 
 
@@ -110,7 +110,7 @@ class LowerBody(Protocol):
         """Start from the measured `state`; whatever the controller remembered is forgotten."""
         ...
 
-    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Advance by one tick.
 
         Args:
@@ -137,8 +137,8 @@ class Starting(Protocol):
 class Following(Protocol):
     """A lower body that follows twists only at times, because another controller may have the legs.
 
-    The base layer keeps the twist of a robot that stands at zero until then, and `Motion.commanded` says that it waits:
-    the acceleration of a twist is bounded for who follows it.
+    Until then the base layer keeps the twist of a standing robot at zero, and `LocomotionCommand.commanded` says that
+    it waits: the acceleration of a twist is bounded for the controller that follows it.
 
     Attributes:
         follows: whether it would follow a twist now.

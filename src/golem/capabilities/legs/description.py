@@ -12,7 +12,7 @@ import numpy as np
 
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import GaitConfig
-from golem.capabilities.legs.observation import Layout, Term
+from golem.capabilities.legs.observation import ObservationLayout, Term
 from golem.errors import ConfigError
 from golem.options import check_values, fill, read_yaml, require, vector
 from golem.types import LEGS, NUM_JOINTS, Array
@@ -24,7 +24,7 @@ SHIPPED = Path(__file__).parent / "policies"
 
 
 @dataclass(frozen=True, slots=True)
-class Action:
+class ActionScaling:
     """How the network's output becomes joint targets: q0 + scale * clip(action) + swing.
 
     Attributes:
@@ -61,7 +61,7 @@ class Description:
     posture: tuple[float, ...]
     kp: float | tuple[float, ...]
     kd: float | tuple[float, ...]
-    action: Action = field(default_factory=Action)
+    action: ActionScaling = field(default_factory=ActionScaling)
     gait: GaitConfig = field(default_factory=GaitConfig)
     envelope: Envelope = field(default_factory=Envelope)
     rate: float = 50.0
@@ -103,13 +103,13 @@ class Description:
         """
         return vector("action.scale", self.action.scale, JOINTS, JOINTS // 2)
 
-    def layout(self) -> Layout:
+    def layout(self) -> ObservationLayout:
         """Return the observation's layout.
 
         Raises:
-            ConfigError: see `Layout`.
+            ConfigError: see `ObservationLayout`.
         """
-        return Layout(self.observation, self.q0())
+        return ObservationLayout(self.observation, self.q0())
 
 
 def shipped() -> tuple[str, ...]:

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from golem import registry
-from golem.capabilities.legs.base import Envelope, LegCommand, LowerBody, Motion, Starting, follows
-from golem.capabilities.legs.blend import Blend
+from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand, LowerBody, Starting, follows
+from golem.capabilities.legs.command_blender import CommandBlender
 from golem.capabilities.legs.gait import GaitConfig
-from golem.capabilities.legs.pacing import Paced
+from golem.capabilities.legs.rate_divider import RateDivider
 from golem.capabilities.legs.vendor import Onboard
 from golem.types import LEGS, BaseEstimate, LowState, Twist
 
@@ -26,7 +26,7 @@ ZERO = Twist()
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class HandoverPart:
     """One of the two controllers.
 
     Attributes:
@@ -54,8 +54,8 @@ class HandoverConfig:
             degrees].
     """
 
-    walk: Part
-    stand: Part
+    walk: HandoverPart
+    stand: HandoverPart
     gyro: float = 1.0
     joint_speed: float = 6.0
     lean: float = 0.25
@@ -86,11 +86,11 @@ class Handover:
         self.config = config
         parts = (config.walk, config.stand)
         both = [registry.create("lower_body", p.use, p.options, onboard=onboard) for p in parts]
-        self._walk, self._stand = (Paced(controller) for controller in both)
+        self._walk, self._stand = (RateDivider(controller) for controller in both)
         self.rate: float = max(controller.rate for controller in both)
         self.latency: float = max(controller.latency for controller in both)
         self.envelope: Envelope = both[0].envelope
-        self._blend = Blend(config.blend)
+        self._blend = CommandBlender(config.blend)
         self._begin()
 
     @property
@@ -108,7 +108,7 @@ class Handover:
         self._begin()
         self._active.reset(state)
 
-    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Run the controller in charge, after a change of hands where one is due; see `LowerBody.step`."""
         self._healthy = self._healthy + dt if self._is_healthy(state, base) else 0.0
         # Another controller failed while it walked: the walking one ends that, if it is ready.
@@ -135,11 +135,11 @@ class Handover:
         self._last = self._blend.step(command, dt, old)
         return self._last
 
-    def _take_over(self, controller: Paced) -> None:
+    def _take_over(self, controller: RateDivider) -> None:
         self._active = controller
         gait = controller.controller.gait
         self.gait: GaitConfig = gait if self.walking else gait.without_commands()
-        self._coming: Paced | None = None
+        self._coming: RateDivider | None = None
 
     def _begin(self) -> None:
         self._take_over(self._stand)
@@ -171,7 +171,7 @@ class Handover:
             and bool(loaded[0] == loaded[1])
         )
 
-    def _other_wanted(self, motion: Motion) -> bool:
+    def _other_wanted(self, motion: LocomotionCommand) -> bool:
         """Return whether `motion` is for the controller that is not in charge.
 
         A twist is for the walking one. Without a twist it goes on until the clock has stopped; if its clock never does,
@@ -186,7 +186,7 @@ class Handover:
         return self.gait.start == "always" and bool((motion.phase < self.gait.stance).all())
 
 
-def _standing(motion: Motion) -> Motion:
+def _standing(motion: LocomotionCommand) -> LocomotionCommand:
     """Return `motion` without its twist."""
     return replace(motion, twist=ZERO, commanded=False)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.legs.base import Envelope, LegCommand, Motion
+from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.errors import ConfigError, unknown_name
 from golem.types import LEGS, Array, BaseEstimate, LowState
@@ -24,7 +24,7 @@ STANCES: dict[str, tuple[float, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class HoldConfig:
-    """Options of `Hold`.
+    """Options of `JointHold`.
 
     Attributes:
         stance: a name in `STANCES`.
@@ -42,7 +42,7 @@ class HoldConfig:
     rate: float = 50.0
 
 
-class Hold:
+class JointHold:
     """Moves the legs to a stance and keeps them there, whatever the twist.
 
     Attributes:
@@ -77,7 +77,7 @@ class Hold:
         """Start from the measured leg joints of `state`."""
         self._q = np.array(state.q[LEGS], dtype=np.float64)
 
-    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Move the targets towards the stance by at most `speed * dt`; see `LowerBody.step`."""
         reach = self.config.speed * dt
         self._q = self._q + np.clip(self._goal - self._q, -reach, reach)

@@ -1,7 +1,8 @@
 """The base layer of the lower body: what every leg controller gets done for it.
 
 It judges the twist (finite, inside the envelope, recent), limits its acceleration, runs the gait clock from the
-balance of the measured robot, and runs the controller at its own rate. The controller sees a `Motion` it can follow.
+balance of the measured robot, and runs the controller at its own rate. The controller sees a `LocomotionCommand` that
+it can follow.
 """
 
 from __future__ import annotations
@@ -11,15 +12,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from golem.capabilities.legs.apart import Apart, ApartConfig
-from golem.capabilities.legs.balance import balance_errors
-from golem.capabilities.legs.base import LegCommand, LowerBody, Motion, follows
-from golem.capabilities.legs.blend import Blend
+from golem.capabilities.legs.balance_errors import balance_errors
+from golem.capabilities.legs.base import LegCommand, LocomotionCommand, LowerBody, follows
+from golem.capabilities.legs.command_blender import CommandBlender
+from golem.capabilities.legs.foot_separation import FootSeparation, FootSeparationConfig
 from golem.capabilities.legs.gait import Gait
-from golem.capabilities.legs.pacing import Paced
-from golem.capabilities.legs.rest import Rest
-from golem.capabilities.legs.trim import Trim, TrimConfig
-from golem.robots.model.imu import sensed_base_rate
+from golem.capabilities.legs.rate_divider import RateDivider
+from golem.capabilities.legs.stop_predictor import StopPredictor
+from golem.capabilities.legs.velocity_integrator import VelocityIntegrator, VelocityIntegratorConfig
+from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.leg_kinematics import SOLE_CENTER
 from golem.types import NUM_JOINTS, SIDES, Array, BaseEstimate, LowState, PlanarPose, Twist
@@ -35,7 +36,7 @@ class LocomotionConfig:
     Attributes:
         dead_band: norm of (vx, vy, wz) below which a twist does not start a robot that stands [m/s, rad/s]: ALMI's (and
             the paper's) 0.1.
-        least: norm below which a twist counts as zero for a robot that walks: it may approach a goal slowly.
+        minimum: norm below which a twist counts as zero for a robot that walks: it may approach a goal slowly.
         acceleration: bounds on the change of vx, vy [m/s^2] and wz [rad/s^2] [own: full speed in less than a second].
         timeout: age of the newest twist from which it counts as zero [s]: whoever sent it may have died.
         blend: time over which the targets go from one controller's to the next one's after a hand-over [s] [own: a
@@ -46,13 +47,13 @@ class LocomotionConfig:
     """
 
     dead_band: float = 0.1
-    least: float = 0.02
+    minimum: float = 0.02
     acceleration: tuple[float, float, float] = (1.0, 1.0, 2.0)
     timeout: float = 0.5
     blend: float = 0.15
     gate_rate: float = 100.0
-    trim: TrimConfig = field(default_factory=TrimConfig)
-    apart: ApartConfig = field(default_factory=ApartConfig)
+    trim: VelocityIntegratorConfig = field(default_factory=VelocityIntegratorConfig)
+    apart: FootSeparationConfig = field(default_factory=FootSeparationConfig)
 
 
 class Locomotion:
@@ -71,11 +72,11 @@ class Locomotion:
         """Run `controller`."""
         self.config = config or LocomotionConfig()
         self.gait = Gait(controller.gait)
-        self._paced = Paced(controller)
-        self._blend = Blend(self.config.blend)
-        self._trim = Trim(self.config.trim)
-        self._apart = Apart(self.config.apart)
-        self._rest = Rest()
+        self._paced = RateDivider(controller)
+        self._blend = CommandBlender(self.config.blend)
+        self._trim = VelocityIntegrator(self.config.trim)
+        self._apart = FootSeparation(self.config.apart)
+        self._rest = StopPredictor()
         self._kinematics = Kinematics()
         left, right = self._feet(np.zeros(NUM_JOINTS))[:, :3, 3]
         # With both hips straight and level the distance of the feet does not depend on how far the knees are bent.
@@ -127,7 +128,7 @@ class Locomotion:
         self._forget()
         self._held, self._age = True, 0.0
         self._blend.begin(last)
-        self._paced = Paced(controller)
+        self._paced = RateDivider(controller)
         self._paced.reset(state)
 
     def step(self, state: LowState, base: BaseEstimate, twist: Twist | None, dt: float) -> LegCommand:
@@ -153,7 +154,7 @@ class Locomotion:
             self._until_gate = max(self._until_gate + 1.0 / self.config.gate_rate, 0.0)
             self._since_gate = 0.0
         commanded = waits or self.applied != ZERO
-        motion = Motion(self._trimmed, self.gait.phases, bool(self.gait.stepping), commanded)
+        motion = LocomotionCommand(self._trimmed, self.gait.phases, bool(self.gait.stepping), commanded)
         command = self._blend.step(self._paced.step(state, base, motion, dt), dt)
         swings = self.gait.stepping & (motion.phase >= self.gait.config.stance)
         return self._apart.step(command, state, swings & (base.contact < 0.5))
@@ -204,7 +205,7 @@ class Locomotion:
     @property
     def _threshold(self) -> float:
         """Norm below which a twist counts as zero now."""
-        return self.config.least if self.applied != ZERO else self.config.dead_band
+        return self.config.minimum if self.applied != ZERO else self.config.dead_band
 
     def _slew(self, wanted: Twist, dt: float) -> None:
         """Bring the applied twist towards `wanted`; on its way to a stop it ends at the dead band."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.legs.base import Motion
+from golem.capabilities.legs.base import LocomotionCommand
 from golem.errors import ConfigError, unknown_name
 from golem.options import vector
-from golem.robots.model.imu import sensed_base_rate
+from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, SIDES, UPPER, Array, BaseEstimate, LowState
 
@@ -77,7 +77,7 @@ class Term:
     of: tuple[str, ...] = ()
 
 
-class Layout:
+class ObservationLayout:
     """The order, offsets and scales of an observation.
 
     Attributes:
@@ -144,7 +144,7 @@ def _components(term: Term) -> tuple[str, ...]:
     return tuple(out)
 
 
-def measure(state: LowState, base: BaseEstimate, motion: Motion, action: Array) -> Signals:
+def measure(state: LowState, base: BaseEstimate, motion: LocomotionCommand, action: Array) -> Signals:
     """Return the signals of one robot: gravity and velocity from the base estimate, the rate from the torso IMU.
 
     Args:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.legs.base import LegCommand, Motion
+from golem.capabilities.legs.base import LegCommand, LocomotionCommand
 from golem.capabilities.legs.description import JOINTS, load_description
 from golem.capabilities.legs.network import load_network
 from golem.capabilities.legs.observation import measure
@@ -67,7 +67,7 @@ class Policy:
         self._action = np.zeros(JOINTS)
         self._network.reset()
 
-    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Run the network once; see `LowerBody.step`.
 
         Raises:

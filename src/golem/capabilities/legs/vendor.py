@@ -15,10 +15,10 @@ from typing import Protocol
 
 import numpy as np
 
-from golem.capabilities.legs.base import Envelope, LegCommand, Motion
+from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.errors import ConfigError, GolemError
-from golem.middleware.unitree_api import LOCO_API, OK, Request, Response, decode_int, encode, loco_api
+from golem.middleware.unitree_api import LOCO_API, OK, ApiRequest, Response, decode_int, encode, loco_api
 from golem.options import require
 from golem.types import LEGS, Array, BaseEstimate, LowState, Twist
 
@@ -37,7 +37,7 @@ class VendorFault(GolemError):
 class Onboard(Protocol):
     """The robot's own computer, as a client sees it."""
 
-    def send(self, service: str, request: Request) -> None:
+    def send(self, service: str, request: ApiRequest) -> None:
         """Send `request` to `service`."""
         ...
 
@@ -124,7 +124,7 @@ class Vendor:
         self._fault = None
         self._session = self._run()
 
-    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Go on with the session; return what the on-board controller tells the legs. See `LowerBody.step`.
 
         Raises:
@@ -191,7 +191,7 @@ class Vendor:
         api, deadline = self._api, self._t + self.config.timeout
         again = self._t + self.config.timeout / 2 if repeat else math.inf
         self._id += 1
-        request = Request(self._id, api_id, parameter)
+        request = ApiRequest(self._id, api_id, parameter)
         self._onboard.send(api.service, request)
         call = f"{api.function(api_id)}({parameter})"
         while True:

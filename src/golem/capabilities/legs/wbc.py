@@ -19,19 +19,19 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from golem.capabilities.legs.base import Envelope, LegCommand, Motion
+from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.legs.wbc_qp import (
     NUM_LEGS,
+    QpWeights,
     Solution,
     StanceDynamics,
     StanceProgram,
     Tasks,
-    Weights,
 )
 from golem.errors import ConfigError, GolemError, unknown_name
-from golem.robots.model.imu import sensed_base_rate
+from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
@@ -91,7 +91,7 @@ class WbcConfig:
     sole_margin: float = 0.005
     torque_profile: str = "urdf"
     torque_ratio: float = 0.85
-    weights: Weights = Weights()
+    weights: QpWeights = QpWeights()
     engage: float = 1.0
     patience: int = 5
     hands: bool = True
@@ -185,7 +185,7 @@ class Wbc:
         self._failures = 0
         self._asked = None
 
-    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Solve for this tick's torques; see `LowerBody.step`.
 
         Raises:
@@ -286,6 +286,6 @@ class Wbc:
             self._hold, self._height, self._share = q.copy(), height, float(loaded)
         reach = self.config.height_speed * dt
         self._height += min(max(self._rest_height - self._height, -reach), reach)
-        most = 1.0 if loaded else max(self._share, 0.5)
-        self._share = min(self._share + dt / self.config.engage, most)
+        maximum = 1.0 if loaded else max(self._share, 0.5)
+        self._share = min(self._share + dt / self.config.engage, maximum)
         return self._hold

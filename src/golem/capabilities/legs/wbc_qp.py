@@ -138,7 +138,7 @@ class Tasks:
 
 
 @dataclass(frozen=True, slots=True)
-class Weights:
+class QpWeights:
     """How much each task counts: weights of the squared errors.
 
     Attributes:
@@ -177,7 +177,7 @@ class StanceProgram:
         corners: (4, 3) where a sole pushes, from its centre, in the foot's axes [m].
     """
 
-    def __init__(self, torque: Array, friction: float, margin: float, weights: Weights) -> None:
+    def __init__(self, torque: Array, friction: float, margin: float, weights: QpWeights) -> None:
         """Lay the constant parts out.
 
         Args:

@@ -9,7 +9,7 @@ from golem.types import PlanarPose, Twist
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class NavStep:
     """What a navigator says at one tick.
 
     Attributes:
@@ -31,7 +31,7 @@ class Navigator(Protocol):
         """Pursue `goal`, in odom, from the next tick on; of earlier ones counts what they taught about legs."""
         ...
 
-    def step(self, pose: PlanarPose, moving: bool, dt: float) -> Course:
+    def step(self, pose: PlanarPose, moving: bool, dt: float) -> NavStep:
         """Advance by one tick.
 
         Args:

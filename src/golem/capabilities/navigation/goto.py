@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.navigation.base import Course
+from golem.capabilities.navigation.base import NavStep
 from golem.options import require
 from golem.types import Array, PlanarPose, Twist, wrap
 
@@ -101,7 +101,7 @@ class GoTo:
         self._goal = goal
         self._forget()
 
-    def step(self, pose: PlanarPose, moving: bool, dt: float) -> Course:
+    def step(self, pose: PlanarPose, moving: bool, dt: float) -> NavStep:
         """Return the twist of this tick; see `Navigator`."""
         if self._goal is None:
             self._goal = pose
@@ -128,8 +128,8 @@ class GoTo:
                 self._walking, self._near = True, 0.0
                 self._slack *= config.widen
         if self._walking:
-            return Course(self._towards(left, config.creep if moving else config.pulse), False, left)
-        return Course(ZERO, self._rested >= config.settle + config.rest, left)
+            return NavStep(self._towards(left, config.creep if moving else config.pulse), False, left)
+        return NavStep(ZERO, self._rested >= config.settle + config.rest, left)
 
     def _forget(self) -> None:
         self._pose: Array | None = None
@@ -170,7 +170,7 @@ class GoTo:
         assert self._pose is not None
         return PlanarPose(*self._pose.tolist())
 
-    def _towards(self, left: PlanarPose, least: float) -> Twist:
+    def _towards(self, left: PlanarPose, minimum: float) -> Twist:
         """Return the twist along the straight line to the goal that is `left`, within bounds, and of size `least`."""
         config = self.config
         distance = math.hypot(left.x, left.y)
@@ -180,7 +180,7 @@ class GoTo:
         line = line / max(1.0, *(np.abs(line) / config.speed[:2]))
         spin = min(max(config.gain * turn, -config.speed[2]), config.speed[2])
         size = math.hypot(*line, spin)
-        boost = least / size if 0.0 < size < least else 1.0
+        boost = minimum / size if 0.0 < size < minimum else 1.0
         return Twist(float(line[0] * boost), float(line[1] * boost), float(spin * boost))
 
 

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from golem import registry
-from golem.evaluation.balance import TRACE
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.episode import Episode, Loss, episode_seed, legs_stack
 from golem.evaluation.odometry import SimulatedOdometry
-from golem.evaluation.provenance import stack_facts
 from golem.evaluation.strip import Strip
 from golem.middleware import topics
 from golem.middleware.topics import Odometry
+from golem.provenance import stack_facts
+from golem.robots.mujoco.balance import TRACE
 from golem.robots.sensors.profiles import PROFILES
 from golem.skills.walk import Walk, WalkGoal
 from golem.types import PlanarPose

@@ -15,17 +15,17 @@ import numpy as np
 
 from golem import registry
 from golem.errors import ConfigError
-from golem.evaluation.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.episode import HANGS, READY, Loss, episode_seed, lost
 from golem.evaluation.oracle import GraspTruth, Oracle
-from golem.evaluation.provenance import stack_facts
 from golem.middleware import topics
 from golem.middleware.bus import News
+from golem.provenance import stack_facts
+from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.sensors.profiles import PROFILES
-from golem.runtime.assembly import Running, build
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import Feedback, SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickConfig, PickGoal
 from golem.skills.runner import FAULT
@@ -84,8 +84,8 @@ class PickRung:
         oracle = Oracle(robot)
         try:
             if self.balances:
-                running.executor.run(READY, lambda: not robot.banded)
-                if robot.banded:
+                running.executor.run(READY, lambda: not robot.on_gantry)
+                if robot.on_gantry:
                     return TrialOutcome(
                         False, HANGS.stage, f"lower_body: {stack.lower_body.use}", HANGS.detail
                     )
@@ -119,13 +119,13 @@ class PickRung:
         return stack
 
 
-class Tether(PickRung):
+class TetherRung(PickRung):
     """The robot hangs in its hoist: perception and manipulation without balance."""
 
     name = "tether"
 
 
-class Stand(PickRung):
+class StandRung(PickRung):
     """The robot balances while its arms work; the lower body can be replaced with `--use lower_body=...`."""
 
     name = STANDING
@@ -134,7 +134,7 @@ class Stand(PickRung):
 class _Watch:
     """Looks on after every tick and remembers the decisive moments."""
 
-    def __init__(self, running: Running, oracle: Oracle, recorder: BalanceRecorder | None) -> None:
+    def __init__(self, running: LockstepRunner, oracle: Oracle, recorder: BalanceRecorder | None) -> None:
         self._running, self._oracle = running, oracle
         self.recorder = recorder
         self._news = News(running.bus, topics.FEEDBACK, Feedback)

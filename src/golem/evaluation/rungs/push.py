@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from golem import registry
-from golem.evaluation.balance import TRACE, BalanceTrace
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.episode import LATENCY, Episode, Loss, episode_seed, legs_stack
 from golem.evaluation.exercise import ArmMotion, Exercise
-from golem.evaluation.provenance import stack_facts
-from golem.evaluation.pushes import DIRECTIONS, Push, rod
 from golem.evaluation.strip import Strip
+from golem.provenance import stack_facts
+from golem.robots.mujoco.balance import TRACE, BalanceTrace
+from golem.robots.mujoco.shoves import DIRECTIONS, Push, rod
 from golem.robots.sensors.profiles import PROFILES
 
 PEAK = (22.1, 6.9)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from golem.evaluation.episode import Episode
-from golem.evaluation.pushes import DIRECTIONS, Push, ramp
 from golem.evaluation.rungs.push import MOMENTS, SETTLE, PushRung
 from golem.evaluation.strip import Strip
+from golem.robots.mujoco.shoves import DIRECTIONS, Push, ramp
 
 RATE = 40.0
 """Growth of the force [N/s] [own: a person's; the paper does not say]."""

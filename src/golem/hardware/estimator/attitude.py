@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from golem.robots.model.imu import TORSO
+from golem.robots.model.imu_mount import TORSO
 from golem.types import Array, LowState
 
 

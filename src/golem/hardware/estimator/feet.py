@@ -8,7 +8,7 @@ import numpy as np
 
 from golem.hardware.estimator.contact import Contact, ContactConfig
 from golem.hardware.estimator.foot_force import FootForce, FootForceConfig
-from golem.robots.model.legs import Legs
+from golem.robots.model.leg_dynamics import LegDynamics
 from golem.robots.model.spatial import skew
 from golem.robots.model.table import SOLE
 from golem.types import LEGS, Array, LowState
@@ -60,7 +60,7 @@ class Feet:
     def __init__(self, config: FeetConfig) -> None:
         """Start with nothing known."""
         self.config = config
-        self._legs = Legs()
+        self._legs = LegDynamics()
         self._force, self._contact = FootForce(config.force), Contact(config.contact)
         self.force: Array = np.zeros(2)
         self.contact: Array = np.zeros(2)

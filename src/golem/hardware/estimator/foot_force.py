@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.robots.model.legs import LEG, Legs
+from golem.robots.model.leg_dynamics import LEG, LegDynamics
 from golem.types import LEGS, Array, LowState
 
 
@@ -50,7 +50,7 @@ class FootForce:
         """Forget; the next sample is taken as if nothing had moved before."""
         self._torque = None
 
-    def step(self, legs: Legs, state: LowState, field: Array, dt: float) -> Array:
+    def step(self, legs: LegDynamics, state: LowState, field: Array, dt: float) -> Array:
         """Return the (2, 6) wrench on the left and the right foot: force [N], moment about the sole's centre [N m].
 
         Args:

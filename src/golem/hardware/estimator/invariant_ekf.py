@@ -10,7 +10,7 @@ import numpy as np
 from golem.hardware.estimator.attitude import Attitude
 from golem.hardware.estimator.feet import Feet, FeetConfig, LevelFloor
 from golem.hardware.estimator.invariant import InvariantConfig, InvariantFilter
-from golem.robots.model.imu import TORSO, base_rate
+from golem.robots.model.imu_mount import TORSO, base_rate
 from golem.robots.model.spatial import skew
 from golem.robots.model.table import FRAMES
 from golem.types import Array, BaseEstimate, LowState

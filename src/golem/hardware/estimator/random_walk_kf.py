@@ -9,7 +9,7 @@ import numpy as np
 from golem.hardware.estimator.attitude import Attitude, GyroBias
 from golem.hardware.estimator.feet import Feet, FeetConfig, LevelFloor
 from golem.hardware.estimator.random_walk import RandomWalk, RandomWalkConfig, base_velocity
-from golem.robots.model.imu import TORSO, base_rate
+from golem.robots.model.imu_mount import TORSO, base_rate
 from golem.types import BaseEstimate, LowState
 
 

@@ -7,7 +7,7 @@ from typing import Protocol, runtime_checkable
 
 
 @dataclass(frozen=True, slots=True)
-class EstopFrame:
+class EstopMessage:
     """One frame of an emergency-stop board.
 
     Attributes:
@@ -25,6 +25,6 @@ class EstopFrame:
 class EmergencyStop(Protocol):
     """A source of emergency-stop frames. Its silence stops the robot just as its button does."""
 
-    def step(self, t: float) -> EstopFrame | None:
+    def step(self, t: float) -> EstopMessage | None:
         """Return the frame that arrived at `t` [s], or None when none did."""
         ...

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from golem.hardware.estop.base import EstopFrame
+from golem.hardware.estop.base import EstopMessage
 
 
 class VirtualEstop:
@@ -28,11 +28,11 @@ class VirtualEstop:
         """Pull the button out; what was stopped stays stopped until it is reset."""
         self.pressed = False
 
-    def step(self, t: float) -> EstopFrame | None:
+    def step(self, t: float) -> EstopMessage | None:
         """Return the frame due at `t` [s], or None between two frames."""
         # The tolerance keeps sums of a binary tick length from skipping every other period.
         if t < self._due - 1e-9:
             return None
         self._due = t + self.period
         self._sequence = (self._sequence + 1) % 256
-        return EstopFrame(t, self._sequence, self.pressed)
+        return EstopMessage(t, self._sequence, self.pressed)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.hardware.hands.base import GripState, HandStatus
-from golem.robots.model.magpie import MAX_FORCE, MAX_GAP, MIN_FORCE
+from golem.robots.model.magpie_model import MAX_FORCE, MAX_GAP, MIN_FORCE
 from golem.types import HandCommand, HandState
 
 FORCE_STEP = 0.04

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from golem.hardware.estop.base import EstopFrame
+from golem.hardware.estop.base import EstopMessage
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, Array, BaseEstimate, LowCommand, LowState
@@ -81,7 +81,7 @@ class Fault(NamedTuple):
     detail: str = ""
 
 
-class Request(StrEnum):
+class OperatorRequest(StrEnum):
     """What the operator asks for. Only the change to a request counts, so one that is stuck does nothing."""
 
     NONE = "none"
@@ -181,8 +181,8 @@ class SafetyLimits:
         slew[LEGS] = velocity[LEGS]
         deceleration = np.full(NUM_JOINTS, 20.0)
         deceleration[LEGS] = 40.0
-        for part, most in (("hip_yaw", 200.0), ("knee", 200.0), ("ankle", 150.0)):
-            deceleration[[k for k, name in enumerate(JOINT_NAMES) if part in name]] = most
+        for part, maximum in (("hip_yaw", 200.0), ("knee", 200.0), ("ankle", 150.0)):
+            deceleration[[k for k, name in enumerate(JOINT_NAMES) if part in name]] = maximum
         torque_command = 0.95 * torque
         new = cls(
             lower=middle - ratio * half,
@@ -221,8 +221,8 @@ class GateInputs:
     t: float
     state: LowState | None = None
     command: LowCommand | None = None
-    estop: EstopFrame | None = None
-    request: Request = Request.NONE
+    estop: EstopMessage | None = None
+    request: OperatorRequest = OperatorRequest.NONE
     base: BaseEstimate | None = None
     transport: Fault | None = None
 
@@ -278,10 +278,10 @@ class GateMemory:
     detail: str = ""
     state: LowState | None = None
     command: LowCommand | None = None
-    estop: EstopFrame | None = None
+    estop: EstopMessage | None = None
     counters: Counters = field(default_factory=Counters)
     outgoing: Outgoing | None = None
-    request: Request = Request.NONE
+    request: OperatorRequest = OperatorRequest.NONE
     grounded: float | None = None
 
 

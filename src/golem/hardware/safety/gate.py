@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from golem.hardware.estop.base import EstopFrame
+from golem.hardware.estop.base import EstopMessage
 from golem.hardware.safety.base import (
     Counters,
     Fault,
@@ -24,9 +24,9 @@ from golem.hardware.safety.base import (
     GateMemory,
     GateResult,
     GateState,
+    OperatorRequest,
     Outgoing,
     Reason,
-    Request,
     SafetyLimits,
 )
 from golem.hardware.safety.limiter import limit_command
@@ -54,24 +54,24 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     grounded, base_fault = _base(inputs.base, memory, t, limits)
     clock_fault = None if running else Fault(Reason.CLOCK)
     fault = clock_fault or _pause(memory, t, limits) or inputs.transport or estop_fault or state_fault
-    edge = inputs.request if inputs.request is not memory.request else Request.NONE
+    edge = inputs.request if inputs.request is not memory.request else OperatorRequest.NONE
 
     mode, reason, detail, since = memory.mode, memory.reason, memory.detail, memory.since
     outgoing = memory.outgoing
     if mode is GateState.ACTIVE:
-        requested = Fault(Reason.REQUESTED) if inputs.request is Request.STOP else None
+        requested = Fault(Reason.REQUESTED) if inputs.request is OperatorRequest.STOP else None
         fault = fault or command_fault or base_fault or requested
         if fault is not None:
             mode, (reason, detail), since, outgoing = GateState.STOP1, fault, t, None
     elif mode.stopped:
-        if edge is Request.RESET and fault is None:
+        if edge is OperatorRequest.RESET and fault is None:
             mode, reason, detail, since = GateState.ARMED, None, "", t
         elif mode is GateState.STOP1 and t - since >= limits.damping_time:
             mode, since = GateState.STOP0, t
     else:
         reason, detail = fault or (None, "")
         new = GateState.ARMED if fault is None else GateState.INIT
-        if new is GateState.ARMED and edge is Request.ACTIVATE:
+        if new is GateState.ARMED and edge is OperatorRequest.ACTIVATE:
             if command_fault is not None:
                 reason, detail = command_fault
             elif state is not None:
@@ -147,8 +147,8 @@ def _pause(memory: GateMemory, t: float, limits: SafetyLimits) -> Fault | None:
 
 
 def _estop(
-    new: EstopFrame | None, old: EstopFrame | None, t: float, limits: SafetyLimits
-) -> tuple[EstopFrame | None, Fault | None]:
+    new: EstopMessage | None, old: EstopMessage | None, t: float, limits: SafetyLimits
+) -> tuple[EstopMessage | None, Fault | None]:
     if new is not None:
         if new.pressed:
             return (new if _stamped(new.t, t, limits) else old), Fault(Reason.ESTOP_PRESSED)

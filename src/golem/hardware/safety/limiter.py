@@ -39,31 +39,31 @@ def limit_command(
         last: what the previous call returned.
         dt: time since then [s].
     """
-    least, most = np.minimum, np.maximum
+    minimum, maximum = np.minimum, np.maximum
     bound = limits.torque_command
     negative = -bound
 
-    kp = least(most(command.kp, _ZERO), limits.kp_max)
-    kp = least(kp, last.kp + limits.kp_rate * dt)
-    kd = least(most(command.kd, _ZERO), limits.kd_max)
-    kd = least(kd, last.kd + limits.kd_rate * dt)
+    kp = minimum(maximum(command.kp, _ZERO), limits.kp_max)
+    kp = minimum(kp, last.kp + limits.kp_rate * dt)
+    kd = minimum(maximum(command.kd, _ZERO), limits.kd_max)
+    kd = minimum(kd, last.kd + limits.kd_rate * dt)
 
     twice = limits.deceleration + limits.deceleration
-    up = least(np.sqrt(twice * most(limits.upper - last.q, _ZERO)), limits.slew) * dt
-    down = least(np.sqrt(twice * most(last.q - limits.lower, _ZERO)), limits.slew) * dt
-    q = least(most(command.q, limits.lower), limits.upper)
-    q = least(most(q, last.q - down), last.q + up)
+    up = minimum(np.sqrt(twice * maximum(limits.upper - last.q, _ZERO)), limits.slew) * dt
+    down = minimum(np.sqrt(twice * maximum(last.q - limits.lower, _ZERO)), limits.slew) * dt
+    q = minimum(maximum(command.q, limits.lower), limits.upper)
+    q = minimum(maximum(q, last.q - down), last.q + up)
 
-    dq = least(most(command.dq, -limits.velocity), limits.velocity)
+    dq = minimum(maximum(command.dq, -limits.velocity), limits.velocity)
     damp = kd * (dq - state.dq)
-    share = bound / most(np.abs(damp), bound)
+    share = bound / maximum(np.abs(damp), bound)
     damp *= share
-    tau = least(most(command.tau, negative), bound)
-    rest = least(most(tau + damp, negative), bound)
-    soft = most(kp, _LEAST_STIFFNESS)
+    tau = minimum(maximum(command.tau, negative), bound)
+    rest = minimum(maximum(tau + damp, negative), bound)
+    soft = maximum(kp, _LEAST_STIFFNESS)
     reach = bound / soft
     center = state.q - rest / soft
-    q = least(most(q, center - reach), center + reach)
+    q = minimum(maximum(q, center - reach), center + reach)
 
     # Copies: whoever receives the command must not be able to reach into the memory.
     limited = LowCommand(t=t, q=q.copy(), dq=dq, tau=rest - damp, kp=kp.copy(), kd=kd * share)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pinocchio as pin
 
-from golem.robots.model.imu import TORSO
+from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.pinocchio_model import build
 from golem.types import Array
 

@@ -141,7 +141,7 @@ class Reader(Protocol):
     guid: bytes
     handle: int
 
-    def take(self, most: int = 64) -> list[Sample]:
+    def take(self, maximum: int = 64) -> list[Sample]:
         """Remove and return up to `most` samples, oldest first; none is an empty list.
 
         Raises:

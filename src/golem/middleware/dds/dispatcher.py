@@ -25,7 +25,7 @@ class Watched(Protocol):
     entity: int
     on_data: Callable[[], None] | None
 
-    def take(self, most: int = 64) -> list[Sample]:
+    def take(self, maximum: int = 64) -> list[Sample]:
         """Remove and return up to `most` samples."""
         ...
 

@@ -176,12 +176,12 @@ class CycloneReader(_Endpoint):
         self._piece = Iovec()
         self._piece_ref = ctypes.byref(self._piece)
 
-    def take(self, most: int = _BATCH) -> list[Sample]:
+    def take(self, maximum: int = _BATCH) -> list[Sample]:
         """Remove and return up to `most` samples, oldest first."""
         samples: list[Sample] = []
         with self._lock:
-            while most > 0:
-                wanted = min(most, _BATCH)
+            while maximum > 0:
+                wanted = min(maximum, _BATCH)
                 n = self._calls.dds_takecdr(self.entity, self._serdata, wanted, self._infos, ANY_STATE)
                 if n < 0:
                     self._check(n, "take")
@@ -189,7 +189,7 @@ class CycloneReader(_Endpoint):
                     samples.append(self._sample(i))
                 if n < wanted:
                     break
-                most -= n
+                maximum -= n
         return samples
 
     def matched(self) -> int:

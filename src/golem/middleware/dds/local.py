@@ -249,12 +249,12 @@ class LocalReader:
         self._open = True
         domain.add_reader(self)
 
-    def take(self, most: int = 64) -> list[Sample]:
+    def take(self, maximum: int = 64) -> list[Sample]:
         """Remove and return up to `most` samples, oldest first."""
         if not self._open:
             raise DdsError(f"The reader of '{self.topic}' is closed; create another one.")
         with self._domain.lock:
-            return [self.queue.popleft() for _ in range(min(most, len(self.queue)))]
+            return [self.queue.popleft() for _ in range(min(maximum, len(self.queue)))]
 
     def matched(self) -> int:
         """Return how many writers match now."""

@@ -14,7 +14,7 @@ class BagError(GolemError):
 
 
 @dataclass(frozen=True, slots=True)
-class Topic:
+class BagTopic:
     """One recorded topic, with all that a reader needs to understand its messages.
 
     Attributes:
@@ -39,7 +39,7 @@ class Topic:
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class BagMessage:
     """One recorded message.
 
     Attributes:
@@ -49,7 +49,7 @@ class Message:
         payload: CDR with its encapsulation header.
     """
 
-    topic: Topic
+    topic: BagTopic
     log_time: int
     publish_time: int
     payload: Payload
@@ -58,7 +58,7 @@ class Message:
 class Sink(Protocol):
     """Takes messages: a bag, or viewers."""
 
-    def write(self, message: Message) -> None:
+    def write(self, message: BagMessage) -> None:
         """Take one message.
 
         Raises:

@@ -8,13 +8,13 @@ from typing import Protocol
 
 from golem.middleware import public
 from golem.middleware.dds.base import DEFAULT, Qos
-from golem.middleware.record.base import Topic
+from golem.middleware.record.base import BagTopic
 from golem.middleware.ros import codec, names
 
 COMPRESSED = "sensor_msgs/msg/CompressedImage"
 
 
-class Endpoint(Protocol):
+class OfferedTopic(Protocol):
     """A writer as discovery describes it: `golem.middleware.dds.discovery.Endpoint`."""
 
     @property
@@ -33,17 +33,17 @@ class Endpoint(Protocol):
         ...
 
 
-def topic(name: str, kind: str, qos: Qos = DEFAULT) -> Topic:
+def topic(name: str, kind: str, qos: Qos = DEFAULT) -> BagTopic:
     """Return the topic called `name` of messages of type `kind`, whose writers offer `qos`.
 
     Raises:
         ConfigError: there is no such type.
         MissingExtra: rosbags, which knows the types, is not installed.
     """
-    return Topic(name, kind, codec.definition(kind), qos, codec.type_hash(kind))
+    return BagTopic(name, kind, codec.definition(kind), qos, codec.type_hash(kind))
 
 
-def public_topics(chosen: Collection[str] = ()) -> list[Topic]:
+def public_topics(chosen: Collection[str] = ()) -> list[BagTopic]:
     """Return the public topics among `chosen`; default: all, but images in one form only: as they are.
 
     Raises:
@@ -54,10 +54,10 @@ def public_topics(chosen: Collection[str] = ()) -> list[Topic]:
     return [topic(name, rows[name].type, rows[name].qos) for name in dict.fromkeys(wanted) if name in rows]
 
 
-def offered(writers: Iterable[Endpoint]) -> list[Topic]:
+def offered(writers: Iterable[OfferedTopic]) -> list[BagTopic]:
     """Return the topics of `writers` that ROS could read and whose types are known here."""
     known = set(codec.codec().names())
-    found: dict[str, Topic] = {}
+    found: dict[str, BagTopic] = {}
     for writer in writers:
         sort, name = names.from_wire(writer.topic)
         kind = _kind(writer.type_name)

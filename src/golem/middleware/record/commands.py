@@ -14,13 +14,13 @@ from golem.errors import ConfigError
 from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.exclusive_writers import SOLE, identity, refuse_second
 from golem.middleware.interrupt import interrupted
 from golem.middleware.record.catalog import offered, public_topics
 from golem.middleware.record.player import PlayConfig, Player
 from golem.middleware.record.reader import Bag, repair
 from golem.middleware.record.recorder import Recorder
 from golem.middleware.record.writer import BagConfig, BagWriter, Compression
-from golem.middleware.sole import SOLE, identity, refuse_second
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class RecordConfig:
 
 
 @dataclass(frozen=True)
-class ReplayConfig:
+class ReplayBagConfig:
     """Play a bag onto a domain, with /clock."""
 
     bag: Positional[Path]
@@ -96,7 +96,7 @@ def run_record(config: RecordConfig) -> int:
     return bag.messages
 
 
-def run_replay(config: ReplayConfig) -> int:
+def run_replay(config: ReplayBagConfig) -> int:
     """Play, and say what; return how many messages were written.
 
     Raises:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from golem.errors import ConfigError, MissingExtra
-from golem.middleware.record.base import Message, Topic
+from golem.middleware.record.base import BagMessage, BagTopic
 from golem.middleware.record.recorder import Recorder
 
 try:
@@ -52,7 +52,7 @@ class FoxgloveServer:
         config = config or ServerConfig()
         self._context = foxglove.Context()
         self._channels: dict[str, foxglove.Channel] = {}
-        self._latched: dict[str, Message] = {}
+        self._latched: dict[str, BagMessage] = {}
         self._newcomers: set[str] = set()
         self._lock = threading.Lock()
         self._now = self._announced = -TIME_STEP
@@ -73,11 +73,11 @@ class FoxgloveServer:
             ) from error
         self.url = f"ws://{config.host}:{self._server.port}"
 
-    def wanted(self, topic: Topic) -> bool:
+    def wanted(self, topic: BagTopic) -> bool:
         """Offer `topic` to the viewers, and return whether one subscribes to it."""
         return self._channel(topic).has_sinks()
 
-    def write(self, message: Message) -> None:
+    def write(self, message: BagMessage) -> None:
         """Send one message; see `Sink`. What is said once and holds is repeated to viewers that come later."""
         topic = message.topic
         if topic.qos.transient_local:
@@ -98,7 +98,7 @@ class FoxgloveServer:
             if held is not None:
                 self._channel(held.topic).log(bytes(held.payload), log_time=max(self._now, held.log_time))
 
-    def choose(self, recorder: Recorder, topics: Iterable[Topic]) -> None:
+    def choose(self, recorder: Recorder, topics: Iterable[BagTopic]) -> None:
         """Let `recorder`, whose sink this is, take those of `topics` that a viewer wants."""
         for topic in topics:
             if self.wanted(topic):
@@ -119,7 +119,7 @@ class FoxgloveServer:
             channel.close()
         self._channels.clear()
 
-    def _channel(self, topic: Topic) -> foxglove.Channel:
+    def _channel(self, topic: BagTopic) -> foxglove.Channel:
         channel = self._channels.get(topic.name)
         if channel is None:
             schema = foxglove.Schema(name=topic.kind, encoding="ros2msg", data=topic.definition.encode())

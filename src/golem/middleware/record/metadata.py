@@ -14,7 +14,7 @@ from typing import Any
 import yaml
 
 from golem.middleware.dds.base import DEFAULT, Qos
-from golem.middleware.record.base import Topic
+from golem.middleware.record.base import BagTopic
 
 VERSION = 8
 FOREVER = {"sec": 9223372036, "nsec": 854775807}
@@ -37,14 +37,14 @@ class Contents:
 
     first: int = 0
     last: int = 0
-    counts: dict[Topic, int] = field(default_factory=dict)
+    counts: dict[BagTopic, int] = field(default_factory=dict)
 
     @property
     def messages(self) -> int:
         """How many messages there are."""
         return sum(self.counts.values())
 
-    def add(self, topic: Topic, log_time: int) -> None:
+    def add(self, topic: BagTopic, log_time: int) -> None:
         """Account for one message."""
         empty = not self.counts
         self.first = log_time if empty else min(self.first, log_time)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from golem.errors import ConfigError, unknown_name
 from golem.middleware.dds.base import ENCAPSULATION, Participant, Payload, Qos, Writer
-from golem.middleware.record.base import Message, Topic
+from golem.middleware.record.base import BagMessage, BagTopic
 from golem.middleware.record.catalog import topic as describe
 from golem.middleware.record.reader import Bag
 from golem.middleware.record.recorder import CLOCK, CLOCK_KIND
@@ -123,7 +123,7 @@ class Player:
             newest = now
             yield elapsed, self._writers[message.topic.name], message.payload
 
-    def _part(self) -> Iterator[tuple[int, Message]]:
+    def _part(self) -> Iterator[tuple[int, BagMessage]]:
         """Yield the messages to play with their times [ns since the beginning of the bag].
 
         Where time jumped back when they were recorded, the next follows at once. What holds at the start, i.e. the
@@ -131,7 +131,7 @@ class Player:
         """
         start, stop = self._config.start * NANO, self._config.stop * NANO
         elapsed, newest = 0, None
-        held: dict[str, Message] = {}
+        held: dict[str, BagMessage] = {}
         for message in self._bag.messages(self._writers):
             elapsed += 0 if newest is None else max(0, message.log_time - newest)
             newest = message.log_time
@@ -146,7 +146,7 @@ class Player:
             held.clear()
             yield elapsed, message
 
-    def _writer(self, topic: Topic) -> Writer:
+    def _writer(self, topic: BagTopic) -> Writer:
         wire, kind = names.topic(topic.name), codec.dds_name(topic.kind)
         return self._participant.writer(wire, kind, topic.qos, topic.user_data)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import IO, cast
 
 from golem.errors import OutputError
-from golem.middleware.record.base import BagError, Message, Topic, missing
+from golem.middleware.record.base import BagError, BagMessage, BagTopic, missing
 from golem.middleware.record.metadata import Contents, parse_qos
 from golem.middleware.record.writer import CUSTOM, BagConfig, McapFile, write_metadata
 
@@ -67,7 +67,7 @@ class Bag:
         """Whether its writer completed it; else it ends with the last chunk that is whole."""
         return all(file.finished for file in self.files)
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[Message]:
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
         """Iterate over the messages in the order of their log times.
 
         A file without an index, e.g. one that was not finished, is read in the order in which it was written.
@@ -95,7 +95,7 @@ class BagFile:
         """Look through it; errors as for `Bag`."""
         self.path = path
         self.custom: dict[str, str] = {}
-        self._channels: dict[int, Topic] = {}
+        self._channels: dict[int, BagTopic] = {}
         with self._open() as file:
             self.finished, self._end = _extent(file)
             self._indexed = self.finished and self._read_summary(file)
@@ -104,11 +104,11 @@ class BagFile:
                     pass
 
     @property
-    def topics(self) -> list[Topic]:
+    def topics(self) -> list[BagTopic]:
         """Its topics."""
         return list(self._channels.values())
 
-    def messages(self, topics: Collection[str] | None = None) -> Iterator[Message]:
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
         """Iterate over its messages; see `Bag`."""
         with self._open() as file:
             if not self._indexed:
@@ -141,7 +141,7 @@ class BagFile:
             self._take_metadata(metadata)
         return True
 
-    def _scan(self, file: IO[bytes]) -> Iterator[Message]:
+    def _scan(self, file: IO[bytes]) -> Iterator[BagMessage]:
         """Read every record from the beginning to the end of the last whole one."""
         schemas: dict[int, Schema] = {}
         for record in _records(file, self._end):
@@ -242,8 +242,8 @@ def _records(file: IO[bytes], end: int) -> Iterator[McapRecord]:
             return
 
 
-def _topic(channel: Channel, schema: Schema | None) -> Topic:
-    return Topic(
+def _topic(channel: Channel, schema: Schema | None) -> BagTopic:
+    return BagTopic(
         channel.topic,
         "" if schema is None else schema.name,
         "" if schema is None else schema.data.decode(),
@@ -252,5 +252,5 @@ def _topic(channel: Channel, schema: Schema | None) -> Topic:
     )
 
 
-def _message(topic: Topic, record: Record) -> Message:
-    return Message(topic, record.log_time, record.publish_time, record.data)
+def _message(topic: BagTopic, record: Record) -> BagMessage:
+    return BagMessage(topic, record.log_time, record.publish_time, record.data)

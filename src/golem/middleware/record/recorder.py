@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from golem.middleware.dds.base import Participant, Payload, Qos, Reader, Sample
-from golem.middleware.record.base import Message, Sink, Topic
+from golem.middleware.record.base import BagMessage, BagTopic, Sink
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import dds_name
 from golem.middleware.ros.message import NANO
@@ -43,7 +43,7 @@ SKEW = 2.0
 
 @dataclass(slots=True)
 class _Subscription:
-    topic: Topic
+    topic: BagTopic
     reader: Reader
     depth: int
 
@@ -73,7 +73,7 @@ class Recorder:
         self.received: dict[str, int] = {}
         self.overruns: dict[str, int] = {}
 
-    def add(self, topics: Iterable[Topic]) -> None:
+    def add(self, topics: Iterable[BagTopic]) -> None:
         """Record `topics` from now on; one that is recorded already stays as it is.
 
         Raises:
@@ -134,7 +134,7 @@ class Recorder:
                 topic = clock and clock.topic
             if topic is not None:
                 at = round(written * NANO)
-                self._sink.write(Message(topic, at if self._clock is None else self._clock, at, payload))
+                self._sink.write(BagMessage(topic, at if self._clock is None else self._clock, at, payload))
                 self.received[topic.name] = self.received.get(topic.name, 0) + 1
                 passed += 1
         return passed
@@ -185,11 +185,11 @@ def clock_time(payload: Payload) -> int | None:
     return max(0, seconds * NANO + nanoseconds)
 
 
-def _take_all(reader: Reader, most: int) -> list[Sample]:
+def _take_all(reader: Reader, maximum: int) -> list[Sample]:
     """Return what has come to a reader, at most as much as it keeps: a writer faster than us must not hold us up."""
     out: list[Sample] = []
-    while len(out) < most:
-        samples = reader.take(min(64, most - len(out)))
+    while len(out) < maximum:
+        samples = reader.take(min(64, maximum - len(out)))
         if not samples:
             break
         out += samples

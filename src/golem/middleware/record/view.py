@@ -14,12 +14,12 @@ from golem.middleware import public
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.exclusive_writers import identity
 from golem.middleware.interrupt import interrupted
-from golem.middleware.record.base import Topic
+from golem.middleware.record.base import BagTopic
 from golem.middleware.record.catalog import public_topics
 from golem.middleware.record.foxglove_server import FoxgloveServer, ServerConfig
 from golem.middleware.record.recorder import Recorder
-from golem.middleware.sole import identity
 
 PERIOD = 0.02
 """Time between two looks at what has come [s] [own]: half a frame of a camera at 25 Hz."""
@@ -66,7 +66,7 @@ def run_view(config: ViewConfig) -> None:
 
 
 def serve(
-    participant: Participant, topics: Sequence[Topic], server: FoxgloveServer, stop: threading.Event
+    participant: Participant, topics: Sequence[BagTopic], server: FoxgloveServer, stop: threading.Event
 ) -> None:
     """Send viewers what they subscribe to until `stop` is set; nothing else is taken off the domain but the time."""
     with closing(Recorder(participant, server)) as recorder:

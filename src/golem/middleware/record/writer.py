@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO, Literal
 
 from golem.errors import ConfigError, OutputError
-from golem.middleware.record.base import Message, Topic, missing
+from golem.middleware.record.base import BagMessage, BagTopic, missing
 from golem.middleware.record.metadata import Contents, dump, information, offered_qos
 from golem.middleware.ros.message import NANO
 
@@ -89,7 +89,7 @@ class BagWriter:
         """How many messages were written."""
         return sum(contents.messages for contents in self._files.values())
 
-    def write(self, message: Message) -> None:
+    def write(self, message: BagMessage) -> None:
         """Add one message; see `Sink`."""
         if self._closed:
             raise OutputError(f"The bag {self.folder} is closed.")
@@ -159,7 +159,7 @@ class McapFile:
         if custom:
             self._mcap.add_metadata(CUSTOM, dict(custom))
         self._out.flush()
-        self._channels: dict[Topic, int] = {}
+        self._channels: dict[BagTopic, int] = {}
         self._schemas: dict[tuple[str, str], int] = {}
 
     @property
@@ -167,7 +167,7 @@ class McapFile:
         """Bytes that were written."""
         return self._out.tell()
 
-    def write(self, message: Message) -> None:
+    def write(self, message: BagMessage) -> None:
         """Add one message."""
         topic = message.topic
         channel = self._channels.get(topic)
@@ -198,7 +198,7 @@ class McapFile:
         with suppress(OSError):
             self._out.close()
 
-    def _register(self, topic: Topic) -> int:
+    def _register(self, topic: BagTopic) -> int:
         key = (topic.kind, topic.definition)
         if key not in self._schemas:
             self._schemas[key] = self._mcap.register_schema(topic.kind, "ros2msg", topic.definition.encode())

@@ -68,7 +68,7 @@ class Client(Protocol):
         """Send a request; the future brings the response.
 
         It fails when no server is there or the server goes away; a server that does not answer is the caller's to
-        give up on, with `Node.wait` or `Future.cancel`.
+        give up on, with `RosNode.wait` or `Future.cancel`.
         """
         ...
 
@@ -258,7 +258,7 @@ class ActionServer(Protocol):
         ...
 
 
-class Node(Protocol):
+class RosNode(Protocol):
     """A named member of the ROS graph.
 
     Attributes:

@@ -28,7 +28,7 @@ DEFAULT_DISTRO = "jazzy"
 M = TypeVar("M", bound=Message)
 
 
-class Service(NamedTuple):
+class ServiceType(NamedTuple):
     """The messages of a service, and its type name."""
 
     name: str
@@ -36,7 +36,7 @@ class Service(NamedTuple):
     Response: type[Any]
 
 
-class Action(NamedTuple):
+class ActionType(NamedTuple):
     """The messages of an action, and its type name.
 
     Attributes:
@@ -49,8 +49,8 @@ class Action(NamedTuple):
     Goal: type[Any]
     Result: type[Any]
     Feedback: type[Any]
-    SendGoal: Service
-    GetResult: Service
+    SendGoal: ServiceType
+    GetResult: ServiceType
     FeedbackMessage: type[Any]
 
 
@@ -123,16 +123,16 @@ class Codec:
                     self._classes[name] = made
         return self._classes[name]
 
-    def service(self, name: str) -> Service:
+    def service(self, name: str) -> ServiceType:
         """Return the messages of a service, e.g. `"std_srvs/srv/SetBool"`.
 
         Raises:
             ConfigError: there is no such service.
         """
         self._known(f"{name}_Request", name)
-        return Service(name, self.message(f"{name}_Request"), self.message(f"{name}_Response"))
+        return ServiceType(name, self.message(f"{name}_Request"), self.message(f"{name}_Response"))
 
-    def action(self, name: str) -> Action:
+    def action(self, name: str) -> ActionType:
         """Return the messages of an action, e.g. `"golem_interfaces/action/Pick"`.
 
         Raises:
@@ -141,7 +141,7 @@ class Codec:
         self._known(f"{name}_Goal", name)
         goal, result, feedback = (self.message(f"{name}_{part}") for part in ("Goal", "Result", "Feedback"))
         services = self.service(f"{name}_SendGoal"), self.service(f"{name}_GetResult")
-        return Action(name, goal, result, feedback, *services, self.message(f"{name}_FeedbackMessage"))
+        return ActionType(name, goal, result, feedback, *services, self.message(f"{name}_FeedbackMessage"))
 
     def serialize(self, message: Message) -> bytes:
         """Return the CDR of a message, little endian, padded to a multiple of four bytes.
@@ -304,12 +304,12 @@ def message(name: str) -> type[Any]:
     return codec().message(name)
 
 
-def service(name: str) -> Service:
+def service(name: str) -> ServiceType:
     """See `Codec.service`."""
     return codec().service(name)
 
 
-def action(name: str) -> Action:
+def action(name: str) -> ActionType:
     """See `Codec.action`."""
     return codec().action(name)
 

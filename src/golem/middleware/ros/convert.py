@@ -17,7 +17,7 @@ from golem.middleware.ros.msgs.builtin_interfaces import Duration, Time
 from golem.middleware.ros.msgs.nav_msgs import Odometry
 from golem.middleware.ros.msgs.std_msgs import Header
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
-from golem.middleware.topics import LegStatus, Sightings
+from golem.middleware.topics import Detections, LegStatus
 from golem.types import Array, BaseEstimate, HandCommand, HandState, Imu, Twist
 
 POSE_COVARIANCE = np.diag(np.square([0.03, 0.03, 0.01, 0.01, 0.01, 0.03])).ravel()
@@ -268,7 +268,7 @@ def leg_status(status: LegStatus) -> golem_interfaces.LegStatus:
     )
 
 
-def sightings(seen: Sightings) -> golem_interfaces.Sightings:
+def sightings(seen: Detections) -> golem_interfaces.Sightings:
     """Return what a localizer found in one frame."""
     objects = [
         golem_interfaces.LocalizedObject(

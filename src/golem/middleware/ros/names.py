@@ -72,13 +72,13 @@ def resolve(name: str, node: str, namespace: str) -> str:
         raise error if full == name else ConfigError(f"{error} It was given as '{name}'.") from None
 
 
-def _check(kind: str, name: str, most: int) -> str:
+def _check(kind: str, name: str, maximum: int) -> str:
     if not name.startswith("/") or not all(map(_TOKEN.fullmatch, name[1:].split("/"))):
         raise ConfigError(
             f"'{name}' cannot be the name of a {kind}: {_RULE}, each after one '/', e.g. '/arm/left'."
         )
-    if len(name) > most:
-        raise ConfigError(f"'{name[:40]}...' cannot be the name of a {kind}: it is longer than {most}.")
+    if len(name) > maximum:
+        raise ConfigError(f"'{name[:40]}...' cannot be the name of a {kind}: it is longer than {maximum}.")
     return name
 
 

@@ -15,8 +15,8 @@ from golem.middleware.ros.codec import DEFAULT_DISTRO
 from golem.middleware.ros.future import LOOK, Future, spin_until
 from golem.middleware.ros.graph import DiscoveryInfo
 from golem.middleware.ros.node_endpoints import NodeEndpoints
+from golem.middleware.ros.pubsub import DdsPublisher, DdsSubscription
 from golem.middleware.ros.service import DdsClient, DdsService
-from golem.middleware.ros.topics import DdsPublisher, DdsSubscription
 
 T = TypeVar("T")
 

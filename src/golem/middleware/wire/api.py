@@ -11,8 +11,8 @@ import struct
 from typing import Final
 
 from golem.middleware.dds.base import ENCAPSULATION, Payload
-from golem.middleware.unitree_api import Request, Response
-from golem.middleware.wire.layout import WireError, check_encapsulation
+from golem.middleware.unitree_api import ApiRequest, Response
+from golem.middleware.wire.struct_layout import WireError, check_encapsulation
 
 REQUEST: Final = "unitree_api::msg::dds_::Request_"
 RESPONSE: Final = "unitree_api::msg::dds_::Response_"
@@ -26,7 +26,7 @@ _PADDING = 3
 """Bytes that may follow a message: payloads are multiples of four."""
 
 
-def encode_request(request: Request) -> bytes:
+def encode_request(request: ApiRequest) -> bytes:
     """Return `request` as a `Request_`.
 
     Raises:
@@ -37,7 +37,7 @@ def encode_request(request: Request) -> bytes:
     return _encode(header, r.parameter, r.binary, REQUEST)
 
 
-def decode_request(payload: Payload) -> Request:
+def decode_request(payload: Payload) -> ApiRequest:
     """Return the call in a `Request_`.
 
     Raises:
@@ -47,7 +47,7 @@ def decode_request(payload: Payload) -> Request:
     number, api_id, lease, priority, noreply = numbers
     if noreply not in (0, 1):
         raise WireError(f"The noreply of a {REQUEST} is {noreply}; a boolean is 0 or 1.")
-    return Request(number, api_id, text, lease, priority, bool(noreply), binary)
+    return ApiRequest(number, api_id, text, lease, priority, bool(noreply), binary)
 
 
 def encode_response(response: Response) -> bytes:

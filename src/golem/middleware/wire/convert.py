@@ -15,7 +15,7 @@ import numpy as np
 from golem.middleware.dds.base import ENCAPSULATION, Payload
 from golem.middleware.wire import hg
 from golem.middleware.wire.crc import Checksum
-from golem.middleware.wire.layout import Layout, WireError
+from golem.middleware.wire.struct_layout import StructLayout, WireError
 from golem.types import NUM_JOINTS, Array, Imu, LowCommand, LowState
 
 MODE_MACHINE = 0
@@ -165,7 +165,7 @@ def rpy(quat: Array) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def _check(payload: Payload, layout: Layout, checksum: Checksum) -> None:
+def _check(payload: Payload, layout: StructLayout, checksum: Checksum) -> None:
     layout.check(payload)
     if not checksum.holds(payload):
         raise WireError(
@@ -180,7 +180,7 @@ def _tick(t: float) -> int:
     return round(t * _TICKS) % 2**32
 
 
-def _check_motors(values: Sequence[float], names: Sequence[str], layout: Layout) -> None:
+def _check_motors(values: Sequence[float], names: Sequence[str], layout: StructLayout) -> None:
     """Refuse the values of motors, those with `names` of the first motor first, unless all are finite."""
     if not math.hypot(*values) <= _LARGEST:
         worst = max(range(len(values)), key=lambda i: math.inf if math.isnan(values[i]) else abs(values[i]))
@@ -190,7 +190,7 @@ def _check_motors(values: Sequence[float], names: Sequence[str], layout: Layout)
         )
 
 
-def _check_imu(quat: list[float], gyro: list[float], acc: list[float], layout: Layout) -> None:
+def _check_imu(quat: list[float], gyro: list[float], acc: list[float], layout: StructLayout) -> None:
     if not math.hypot(*gyro, *acc) <= _LARGEST:
         raise WireError(f"The IMU in a {layout.type_name} is not finite: {gyro}, {acc}.")
     if not abs(math.hypot(*quat) - 1.0) <= _UNIT:

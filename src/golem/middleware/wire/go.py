@@ -6,14 +6,14 @@ Members and types: unitree_sdk2_python, unitree_sdk2py/idl/unitree_go/msg/dds_.
 from __future__ import annotations
 
 from golem.middleware.wire import hg
-from golem.middleware.wire.layout import Fields, Layout, structure
+from golem.middleware.wire.struct_layout import Fields, StructLayout, structure
 
 _IMU: Fields = {**hg.IMU, "temperature": (52, "u1")}
 _PATH_POINT = structure(
     28, {name: (4 * i, "<f4") for i, name in enumerate(("t_from_start", "x", "y", "yaw", "vx", "vy", "vyaw"))}
 )
 
-SPORT_MODE_STATE = Layout(
+SPORT_MODE_STATE = StructLayout(
     "unitree_go::msg::dds_::SportModeState_",
     512,
     {

@@ -11,7 +11,7 @@ from __future__ import annotations
 from struct import Struct
 
 from golem.middleware.wire.crc import Checksum
-from golem.middleware.wire.layout import Fields, Layout, structure
+from golem.middleware.wire.struct_layout import Fields, StructLayout, structure
 from golem.types import NUM_JOINTS
 
 MOTORS = 35
@@ -56,8 +56,8 @@ _MOTOR_CMD = structure(
     },
 )
 
-IMU_STATE = Layout("unitree_hg::msg::dds_::IMUState_", 54, IMU)
-LOW_STATE = Layout(
+IMU_STATE = StructLayout("unitree_hg::msg::dds_::IMUState_", 54, IMU)
+LOW_STATE = StructLayout(
     "unitree_hg::msg::dds_::LowState_",
     2088,
     {
@@ -73,7 +73,7 @@ LOW_STATE = Layout(
         "crc": (2084, "<u4"),
     },
 )
-LOW_CMD = Layout(
+LOW_CMD = StructLayout(
     "unitree_hg::msg::dds_::LowCmd_",
     1000,
     {

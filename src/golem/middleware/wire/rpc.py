@@ -6,9 +6,9 @@ Everybody who calls a service reads the answers to everybody: an answer belongs 
 from __future__ import annotations
 
 from golem.middleware.dds.base import Reader, Sample, Writer
-from golem.middleware.unitree_api import Request, Response
+from golem.middleware.unitree_api import ApiRequest, Response
 from golem.middleware.wire import api
-from golem.middleware.wire.layout import WireError
+from golem.middleware.wire.struct_layout import WireError
 
 
 class RpcServer:
@@ -24,9 +24,9 @@ class RpcServer:
         self.refused, self.refusal = 0, ""
         self._reader, self._writer = requests, responses
 
-    def take(self) -> list[Request]:
+    def take(self) -> list[ApiRequest]:
         """Return the calls that came since the last time, oldest first."""
-        requests: list[Request] = []
+        requests: list[ApiRequest] = []
         for sample in self._reader.take():
             if sample.alive:
                 try:
@@ -62,7 +62,7 @@ class RpcClient:
         """Whether somebody offers the service now."""
         return self._writer.matched() > 0 and self._reader.matched() > 0
 
-    def send(self, request: Request) -> None:
+    def send(self, request: ApiRequest) -> None:
         """Send a call.
 
         Raises:

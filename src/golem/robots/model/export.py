@@ -12,8 +12,8 @@ import numpy as np
 from mujoco import mjtGeom
 
 from golem.errors import OutputError, unknown_name
-from golem.robots.model import contact, magpie, mjcf
-from golem.robots.model.contact import Shape
+from golem.robots.model import contact_shapes, magpie_model, mjcf
+from golem.robots.model.contact_shapes import Shape
 from golem.robots.model.spatial import Inertial, rpy_of, transform
 from golem.robots.model.table import FRAMES, JOINTS, LINKS, T_TORSO_HEAD_OPTICAL
 from golem.types import SIDES, Array
@@ -66,7 +66,7 @@ def export_urdf(hands: bool) -> str:
     """
     robot = ElementTree.Element("robot", name="golem_h12")
     shapes: dict[str, list[Shape]] = {}
-    for shape in contact.body_shapes():
+    for shape in contact_shapes.body_shapes():
         shapes.setdefault(shape.link, []).append(shape)
     for name, inertial in LINKS.items():
         _link(robot, name, inertial, shapes.get(name, []))
@@ -77,13 +77,13 @@ def export_urdf(hands: bool) -> str:
     fixed.append(("head_camera_optical", "torso_link", T_TORSO_HEAD_OPTICAL))
     if hands:
         for side in SIDES:
-            hand = magpie.hand_name(side)
-            _link(robot, hand, magpie.BASE, [contact.housing_shape(hand)])
-            _joint(robot, f"{hand}_mount", "fixed", f"{side}_wrist_yaw_link", hand, magpie.T_WRIST_HAND)
-            fixed.append((f"{side}_gripper", hand, magpie.T_HAND_GRIPPER))
-            fixed.append((f"{side}_hand_camera_optical", hand, magpie.T_HAND_CAMERA))
-            for finger in magpie.FINGERS:
-                _finger(robot, hand, *magpie.finger_names(side, finger)[:2], finger)
+            hand = magpie_model.hand_name(side)
+            _link(robot, hand, magpie_model.BASE, [contact_shapes.housing_shape(hand)])
+            _joint(robot, f"{hand}_mount", "fixed", f"{side}_wrist_yaw_link", hand, magpie_model.T_WRIST_HAND)
+            fixed.append((f"{side}_gripper", hand, magpie_model.T_HAND_GRIPPER))
+            fixed.append((f"{side}_hand_camera_optical", hand, magpie_model.T_HAND_CAMERA))
+            for finger in magpie_model.FINGERS:
+                _finger(robot, hand, *magpie_model.finger_names(side, finger)[:2], finger)
     for name, parent, T in fixed:
         ElementTree.SubElement(robot, "link", name=name)
         _joint(robot, f"{name}_mount", "fixed", parent, name, T)
@@ -94,19 +94,26 @@ def export_urdf(hands: bool) -> str:
 _FORMATS: dict[str, Callable[[bool], str]] = {"mjcf": export_mjcf, "urdf": export_urdf}
 
 
-def _finger(robot: ElementTree.Element, hand: str, crank: str, blade: str, finger: magpie.Finger) -> None:
+def _finger(
+    robot: ElementTree.Element, hand: str, crank: str, blade: str, finger: magpie_model.Finger
+) -> None:
     mirrored = finger == "b"
-    inertials = [i.mirrored() if mirrored else i for i in (magpie.CRANK, magpie.FINGER)]
-    pad = Shape(blade, mjtGeom.mjGEOM_BOX, magpie.PAD_HALF_SIZE, magpie.mirror(finger, magpie.PAD_CENTER))
+    inertials = [i.mirrored() if mirrored else i for i in (magpie_model.CRANK, magpie_model.FINGER)]
+    pad = Shape(
+        blade,
+        mjtGeom.mjGEOM_BOX,
+        magpie_model.PAD_HALF_SIZE,
+        magpie_model.mirror(finger, magpie_model.PAD_CENTER),
+    )
     _link(robot, crank, inertials[0], [])
-    _link(robot, blade, inertials[1], [contact.blade_shape(blade, finger), pad])
+    _link(robot, blade, inertials[1], [contact_shapes.blade_shape(blade, finger), pad])
     axis = np.array([-1.0 if mirrored else 1.0, 0.0, 0.0])
-    pivot = transform(magpie.mirror(finger, magpie.CRANK_PIVOT))
+    pivot = transform(magpie_model.mirror(finger, magpie_model.CRANK_PIVOT))
     element = _joint(robot, crank + "_joint", "revolute", hand, crank, pivot)
-    _hinge(element, axis, 0.0, magpie.CLOSED, magpie.MAX_TORQUE, magpie.MAX_SPEED)
-    pivot = transform(magpie.mirror(finger, magpie.FINGER_PIVOT))
+    _hinge(element, axis, 0.0, magpie_model.CLOSED, magpie_model.MAX_TORQUE, magpie_model.MAX_SPEED)
+    pivot = transform(magpie_model.mirror(finger, magpie_model.FINGER_PIVOT))
     element = _joint(robot, blade + "_joint", "revolute", crank, blade, pivot)
-    _hinge(element, axis, -magpie.CLOSED, 0.0, magpie.MAX_TORQUE, magpie.MAX_SPEED)
+    _hinge(element, axis, -magpie_model.CLOSED, 0.0, magpie_model.MAX_TORQUE, magpie_model.MAX_SPEED)
     ElementTree.SubElement(element, "mimic", joint=crank + "_joint", multiplier="-1", offset="0")
 
 

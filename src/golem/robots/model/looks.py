@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.robots.model import magpie
+from golem.robots.model import magpie_model
 from golem.robots.model.loft import Axis, Loft, ring
 from golem.robots.model.spatial import quat_of, rotation_rpy
 from golem.types import Array
@@ -59,16 +59,16 @@ class Solid:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class VisualPart:
     """Something to see on a link."""
 
     link: str
     material: Material
     shape: Loft | Solid
 
-    def mirrored(self) -> Part:
+    def mirrored(self) -> VisualPart:
         """Return the same part of the right side."""
-        return Part(self.link.replace("left_", "right_", 1), self.material, self.shape.mirrored())
+        return VisualPart(self.link.replace("left_", "right_", 1), self.material, self.shape.mirrored())
 
 
 def _disc(axis: Axis, radius: float, half: float, pos: tuple[float, float, float]) -> Solid:
@@ -87,190 +87,191 @@ def _rod(start: Sequence[float], end: Sequence[float], radius: float) -> Solid:
 # One line per part and a few sections per line: the tables below are read as shapes.
 
 
-def _trunk() -> Iterable[Part]:
-    yield Part("pelvis", "graphite", Loft("y", [
+def _trunk() -> Iterable[VisualPart]:
+    yield VisualPart("pelvis", "graphite", Loft("y", [
         (-0.153, -0.038, 0, 0.020, 0.036), (-0.142, -0.038, 0, 0.033, 0.055), (-0.10, -0.036, 0, 0.039, 0.066),
         (0.10, -0.036, 0, 0.039, 0.066), (0.142, -0.038, 0, 0.033, 0.055), (0.153, -0.038, 0, 0.020, 0.036),
     ], power=3.0))
-    yield Part("pelvis", "joint", _disc("z", 0.055, 0.014, (0, 0, 0.010)))
-    yield Part("pelvis", "glow", _disc("x", 0.010, 0.002, (0.0655, 0, -0.036)))
+    yield VisualPart("pelvis", "joint", _disc("z", 0.055, 0.014, (0, 0, 0.010)))
+    yield VisualPart("pelvis", "glow", _disc("x", 0.010, 0.002, (0.0655, 0, -0.036)))
     torso = "torso_link"
-    yield Part(torso, "shell", Loft("z", [
+    yield VisualPart(torso, "shell", Loft("z", [
         (0.028, 0, 0, 0.052, 0.074), (0.038, 0, 0, 0.064, 0.087), (0.06, 0, 0, 0.068, 0.092),
         (0.26, 0, 0, 0.071, 0.101), (0.40, 0, 0, 0.070, 0.108), (0.455, 0, 0, 0.066, 0.106),
         (0.475, 0, 0, 0.056, 0.095), (0.482, 0, 0, 0.044, 0.080),
     ], power=5.0, segments=32))
-    yield Part(torso, "joint", _disc("z", 0.062, 0.012, (0, 0, 0.020)))
+    yield VisualPart(torso, "joint", _disc("z", 0.062, 0.012, (0, 0, 0.020)))
     # Chest panel, its light, and the battery's cover on the back.
-    yield Part(torso, "graphite", Loft("x", [
+    yield VisualPart(torso, "graphite", Loft("x", [
         (0.060, 0, 0.345, 0.074, 0.098), (0.073, 0, 0.345, 0.070, 0.094), (0.0755, 0, 0.345, 0.064, 0.088),
     ], power=4.5, segments=28))
-    yield Part(torso, "glow", _rod((0.0755, -0.034, 0.395), (0.0755, 0.034, 0.395), 0.0035))
-    yield Part(torso, "accent", _rod((0.0720, -0.060, 0.150), (0.0720, 0.060, 0.150), 0.0030))
-    yield Part(torso, "graphite", Loft("x", [
+    yield VisualPart(torso, "glow", _rod((0.0755, -0.034, 0.395), (0.0755, 0.034, 0.395), 0.0035))
+    yield VisualPart(torso, "accent", _rod((0.0720, -0.060, 0.150), (0.0720, 0.060, 0.150), 0.0030))
+    yield VisualPart(torso, "graphite", Loft("x", [
         (-0.090, 0, 0.27, 0.060, 0.135), (-0.086, 0, 0.27, 0.070, 0.146), (-0.055, 0, 0.27, 0.076, 0.152),
     ], power=5.0, segments=28))
     # Neck and helmet. The lidar hangs under the brow, the depth camera sits in it.
-    yield Part(torso, "joint", _rod((-0.012, 0.036, 0.475), (0.002, 0.016, 0.585), 0.011))
-    yield Part(torso, "joint", _rod((-0.012, -0.036, 0.475), (0.002, -0.016, 0.585), 0.011))
-    yield Part(torso, "graphite", Loft("z", [
+    yield VisualPart(torso, "joint", _rod((-0.012, 0.036, 0.475), (0.002, 0.016, 0.585), 0.011))
+    yield VisualPart(torso, "joint", _rod((-0.012, -0.036, 0.475), (0.002, -0.016, 0.585), 0.011))
+    yield VisualPart(torso, "graphite", Loft("z", [
         (0.545, 0.020, 0, 0.026, 0.030), (0.565, 0.012, 0, 0.040, 0.046), (0.62, 0.004, 0, 0.054, 0.062),
         (0.665, 0.008, 0, 0.067, 0.071), (0.695, 0.016, 0, 0.078, 0.075), (0.716, 0.019, 0, 0.078, 0.072),
         (0.735, 0.020, 0, 0.069, 0.062), (0.748, 0.020, 0, 0.053, 0.047), (0.756, 0.020, 0, 0.034, 0.030),
         (0.760, 0.020, 0, 0.012, 0.010),
     ], power=2.3, segments=28))
-    yield Part(torso, "visor", Loft("z", [
+    yield VisualPart(torso, "visor", Loft("z", [
         (0.553, 0.052, 0, 0.016, 0.022), (0.570, 0.050, 0, 0.034, 0.040), (0.61, 0.045, 0, 0.050, 0.054),
         (0.65, 0.045, 0, 0.057, 0.060), (0.682, 0.050, 0, 0.055, 0.058), (0.695, 0.050, 0, 0.040, 0.045),
     ], power=2.3, segments=24))
-    yield Part(torso, "visor", Solid("box", (0.011, 0.045, 0.0125), (0.100, 0.0, 0.693)))
+    yield VisualPart(torso, "visor", Solid("box", (0.011, 0.045, 0.0125), (0.100, 0.0, 0.693)))
     for y in (-0.0325, 0.0325):
-        yield Part(torso, "visor", _disc("x", 0.007, 0.0015, (0.1105, y, 0.693)))
-    yield Part(torso, "glow", Solid("ellipsoid", (0.004, 0.030, 0.0035), (0.1005, 0, 0.628)))
+        yield VisualPart(torso, "visor", _disc("x", 0.007, 0.0015, (0.1105, y, 0.693)))
+    yield VisualPart(torso, "glow", Solid("ellipsoid", (0.004, 0.030, 0.0035), (0.1005, 0, 0.628)))
 
 
-def _leg() -> Iterable[Part]:
+def _leg() -> Iterable[VisualPart]:
     # The hip's yaw motor is in the pelvis, its pitch motor in the yaw link, and so on down.
-    yield Part("pelvis", "joint", _disc("z", 0.050, 0.028, (0, 0.0875, -0.095)))
+    yield VisualPart("pelvis", "joint", _disc("z", 0.050, 0.028, (0, 0.0875, -0.095)))
     yaw = "left_hip_yaw_link"
-    yield Part(yaw, "graphite", _disc("z", 0.046, 0.020, (0, 0, 0.055)))
-    yield Part(yaw, "graphite", _disc("y", 0.060, 0.038, (0, -0.010, 0)))
-    yield Part(yaw, "metal", _disc("y", 0.040, 0.044, (0, -0.010, 0)))
+    yield VisualPart(yaw, "graphite", _disc("z", 0.046, 0.020, (0, 0, 0.055)))
+    yield VisualPart(yaw, "graphite", _disc("y", 0.060, 0.038, (0, -0.010, 0)))
+    yield VisualPart(yaw, "metal", _disc("y", 0.040, 0.044, (0, -0.010, 0)))
     pitch = "left_hip_pitch_link"
-    yield Part(pitch, "joint", Solid("ellipsoid", (0.056, 0.058, 0.060), (0, 0.002, 0)))
-    yield Part(pitch, "graphite", _disc("x", 0.036, 0.0575, (0, 0.002, 0)))
+    yield VisualPart(pitch, "joint", Solid("ellipsoid", (0.056, 0.058, 0.060), (0, 0.002, 0)))
+    yield VisualPart(pitch, "graphite", _disc("x", 0.036, 0.0575, (0, 0.002, 0)))
     thigh = "left_hip_roll_link"
-    yield Part(thigh, "shell", Loft("z", [
+    yield VisualPart(thigh, "shell", Loft("z", [
         (-0.442, 0.003, 0.001, 0.028, 0.030), (-0.430, 0.003, 0.001, 0.043, 0.041), (-0.37, 0.002, 0, 0.050, 0.045),
         (-0.26, -0.001, 0, 0.060, 0.051), (-0.165, -0.004, 0.002, 0.066, 0.055), (-0.105, -0.003, 0.006, 0.062, 0.050),
         (-0.070, 0, 0.014, 0.050, 0.038), (-0.060, 0, 0.016, 0.030, 0.028),
     ], power=2.9, segments=24))
-    yield Part(thigh, "shell", Loft("y", [
+    yield VisualPart(thigh, "shell", Loft("y", [
         (0.022, 0, 0, 0.060, 0.060), (0.046, -0.002, 0, 0.060, 0.060), (0.056, -0.002, 0, 0.050, 0.050),
         (0.059, -0.002, 0, 0.030, 0.030),
     ], power=2.0, segments=28))
-    yield Part(thigh, "shell", Loft("z", [(-0.10, 0, 0.034, 0.055, 0.022), (0, 0, 0.040, 0.0585, 0.017)], power=3.0))
-    yield Part(thigh, "accent", _disc("y", 0.016, 0.0035, (0, 0.0575, -0.002)))
-    yield Part(thigh, "joint", _disc("y", 0.040, 0.012, (-0.002, -0.049, -0.165)))
+    sections = [(-0.10, 0, 0.034, 0.055, 0.022), (0, 0, 0.040, 0.0585, 0.017)]
+    yield VisualPart(thigh, "shell", Loft("z", sections, power=3.0))
+    yield VisualPart(thigh, "accent", _disc("y", 0.016, 0.0035, (0, 0.0575, -0.002)))
+    yield VisualPart(thigh, "joint", _disc("y", 0.040, 0.012, (-0.002, -0.049, -0.165)))
     shank = "left_knee_link"
-    yield Part(shank, "joint", _disc("y", 0.040, 0.044, (0, 0, 0)))
-    yield Part(shank, "metal", _disc("y", 0.024, 0.0465, (0, 0, 0)))
-    yield Part(shank, "shell", Loft("z", [
+    yield VisualPart(shank, "joint", _disc("y", 0.040, 0.044, (0, 0, 0)))
+    yield VisualPart(shank, "metal", _disc("y", 0.024, 0.0465, (0, 0, 0)))
+    yield VisualPart(shank, "shell", Loft("z", [
         (-0.345, -0.003, 0, 0.022, 0.025), (-0.33, -0.003, 0, 0.027, 0.028), (-0.25, -0.006, 0, 0.036, 0.035),
         (-0.15, -0.006, 0, 0.047, 0.041), (-0.08, -0.001, 0, 0.050, 0.043), (-0.042, 0.002, 0, 0.045, 0.040),
         (-0.030, 0.003, 0, 0.030, 0.030),
     ], power=3.0, segments=24))
-    yield Part(shank, "graphite", Loft("z", [
+    yield VisualPart(shank, "graphite", Loft("z", [
         (-0.408, 0, 0, 0.014, 0.020), (-0.395, 0, 0, 0.019, 0.024), (-0.335, -0.003, 0, 0.022, 0.024),
     ], power=3.0))
-    yield Part(shank, "graphite", _rod((-0.026, 0.0, -0.30), (-0.030, 0.0, -0.41), 0.008))
-    yield Part("left_ankle_pitch_link", "metal", _disc("y", 0.014, 0.027, (0, 0, 0)))
+    yield VisualPart(shank, "graphite", _rod((-0.026, 0.0, -0.30), (-0.030, 0.0, -0.41), 0.008))
+    yield VisualPart("left_ankle_pitch_link", "metal", _disc("y", 0.014, 0.027, (0, 0, 0)))
     foot = "left_ankle_roll_link"
-    yield Part(foot, "graphite", Loft("x", [
+    yield VisualPart(foot, "graphite", Loft("x", [
         (-0.084, 0, -0.026, 0.024, 0.012), (-0.072, 0, -0.018, 0.034, 0.020), (-0.025, 0, -0.006, 0.037, 0.032),
         (0.022, 0, -0.006, 0.038, 0.032), (0.075, 0, -0.018, 0.041, 0.020), (0.130, 0, -0.025, 0.040, 0.013),
         (0.162, 0, -0.028, 0.030, 0.009), (0.171, 0, -0.030, 0.018, 0.006),
     ], power=3.2, segments=24))
-    yield Part(foot, "rubber", Loft("z", [
+    yield VisualPart(foot, "rubber", Loft("z", [
         (-0.045, 0.044, 0, 0.1275, 0.0405), (-0.034, 0.044, 0, 0.130, 0.043), (-0.030, 0.044, 0, 0.127, 0.040),
     ], power=3.6, segments=28))
 
 
-def _arm() -> Iterable[Part]:
+def _arm() -> Iterable[VisualPart]:
     c, s = float(np.cos(0.2618)), float(np.sin(0.2618))
-    yield Part("torso_link", "joint", Solid("cylinder", (0.040, 0.030), (0, 0.124, 0.417), (0, c, s)))
+    yield VisualPart("torso_link", "joint", Solid("cylinder", (0.040, 0.030), (0, 0.124, 0.417), (0, c, s)))
     shoulder = "left_shoulder_pitch_link"
-    yield Part(shoulder, "graphite", _disc("y", 0.038, 0.026, (0, 0.034, -0.004)))
-    yield Part(shoulder, "joint", Solid("ellipsoid", (0.033, 0.044, 0.040), (0.0, 0.066, -0.006)))
+    yield VisualPart(shoulder, "graphite", _disc("y", 0.038, 0.026, (0, 0.034, -0.004)))
+    yield VisualPart(shoulder, "joint", Solid("ellipsoid", (0.033, 0.044, 0.040), (0.0, 0.066, -0.006)))
     upper = "left_shoulder_roll_link"
-    yield Part(upper, "shell", Loft("z", [
+    yield VisualPart(upper, "shell", Loft("z", [
         (-0.118, -0.034, 0, 0.041, 0.041), (-0.10, -0.034, 0, 0.042, 0.042), (-0.05, -0.035, 0, 0.043, 0.043),
         (0.0, -0.035, 0, 0.044, 0.045), (0.024, -0.035, 0, 0.040, 0.041), (0.038, -0.035, 0, 0.029, 0.030),
         (0.044, -0.035, 0, 0.014, 0.015),
     ], power=2.4, segments=22))
-    yield Part(upper, "graphite", _disc("x", 0.036, 0.006, (0.008, 0, 0)))
-    yield Part(upper, "accent", _disc("x", 0.013, 0.0075, (0.0085, 0, 0)))
-    yield Part(upper, "joint", _disc("z", 0.039, 0.014, (-0.0342, 0, -0.131)))
+    yield VisualPart(upper, "graphite", _disc("x", 0.036, 0.006, (0.008, 0, 0)))
+    yield VisualPart(upper, "accent", _disc("x", 0.013, 0.0075, (0.0085, 0, 0)))
+    yield VisualPart(upper, "joint", _disc("z", 0.039, 0.014, (-0.0342, 0, -0.131)))
     elbow = "left_shoulder_yaw_link"
-    yield Part(elbow, "shell", Loft("z", [
+    yield VisualPart(elbow, "shell", Loft("z", [
         (-0.180, 0.006, 0.012, 0.034, 0.020), (-0.165, 0.006, 0.010, 0.035, 0.024), (-0.12, 0.004, 0.003, 0.034, 0.033),
         (-0.06, 0.001, 0, 0.037, 0.037), (-0.014, 0, 0, 0.040, 0.040), (-0.003, 0, 0, 0.039, 0.039),
     ], power=2.4, segments=22))
-    yield Part(elbow, "graphite", _disc("y", 0.042, 0.017, (0.006, 0.020, -0.182)))
-    yield Part(elbow, "accent", _disc("y", 0.013, 0.018, (0.006, 0.021, -0.182)))
+    yield VisualPart(elbow, "graphite", _disc("y", 0.042, 0.017, (0.006, 0.020, -0.182)))
+    yield VisualPart(elbow, "accent", _disc("y", 0.013, 0.018, (0.006, 0.021, -0.182)))
     forearm = "left_elbow_link"
-    yield Part(forearm, "joint", _disc("y", 0.042, 0.018, (0, -0.022, 0)))
-    yield Part(forearm, "metal", _disc("y", 0.024, 0.018, (0, -0.026, 0)))
-    yield Part(forearm, "shell", Loft("x", [
+    yield VisualPart(forearm, "joint", _disc("y", 0.042, 0.018, (0, -0.022, 0)))
+    yield VisualPart(forearm, "metal", _disc("y", 0.024, 0.018, (0, -0.026, 0)))
+    yield VisualPart(forearm, "shell", Loft("x", [
         (-0.004, -0.034, -0.003, 0.020, 0.026), (0.012, -0.033, -0.004, 0.028, 0.034),
         (0.06, -0.033, -0.008, 0.032, 0.035), (0.108, -0.033, -0.011, 0.034, 0.034),
         (0.118, -0.033, -0.011, 0.031, 0.031),
     ], power=2.6, segments=22))
     wrist = "left_wrist_roll_link"
-    yield Part(wrist, "joint", _disc("x", 0.032, 0.005, (0.002, 0, 0)))
-    yield Part(wrist, "shell", Loft("x", [
+    yield VisualPart(wrist, "joint", _disc("x", 0.032, 0.005, (0.002, 0, 0)))
+    yield VisualPart(wrist, "shell", Loft("x", [
         (0.006, 0, 0, 0.031, 0.031), (0.016, 0, 0, 0.034, 0.033), (0.050, 0, 0, 0.033, 0.032),
         (0.066, 0, 0, 0.028, 0.026),
     ], power=2.5, segments=22))
-    yield Part(wrist, "graphite", _disc("y", 0.027, 0.034, (0.087, 0, 0)))
-    yield Part("left_wrist_pitch_link", "joint", _disc("z", 0.026, 0.030, (0.020, 0, 0)))
+    yield VisualPart(wrist, "graphite", _disc("y", 0.027, 0.034, (0.087, 0, 0)))
+    yield VisualPart("left_wrist_pitch_link", "joint", _disc("z", 0.026, 0.030, (0.020, 0, 0)))
     palm = "left_wrist_yaw_link"
-    yield Part(palm, "graphite", Loft("x", [
+    yield VisualPart(palm, "graphite", Loft("x", [
         (0.004, 0, 0, 0.026, 0.040), (0.030, 0, 0, 0.028, 0.040), (0.046, 0, 0, 0.029, 0.032),
         (0.054, 0, 0, 0.029, 0.029),
     ], power=3.0))
-    yield Part(palm, "metal", _disc("x", 0.032, 0.0125, (0.0665, 0, 0)))
+    yield VisualPart(palm, "metal", _disc("x", 0.032, 0.0125, (0.0665, 0, 0)))
 
 
-def _hand() -> Iterable[Part]:
+def _hand() -> Iterable[VisualPart]:
     hand = "left_hand"
-    yield Part(hand, "graphite", Loft("x", [
+    yield VisualPart(hand, "graphite", Loft("x", [
         (-0.016, 0, 0.029, 0.060, 0.026), (0.012, 0, 0.029, 0.060, 0.026)
     ], power=4.0))
-    yield Part(hand, "joint", Loft("z", [
+    yield VisualPart(hand, "joint", Loft("z", [
         (0.022, 0, 0, 0.0205, 0.0205), (0.044, 0, 0, 0.0205, 0.0205), (0.0455, 0, 0, 0.019, 0.019)
     ], power=5.0))
     for y in (-0.009, 0.009):
-        yield Part(hand, "visor", _disc("z", 0.005, 0.0006, (0.006, y, 0.0455)))
+        yield VisualPart(hand, "visor", _disc("z", 0.005, 0.0006, (0.006, y, 0.0455)))
     for s in (1.0, -1.0):
         for x in (-0.0175, 0.0135):
-            yield Part(hand, "shell", Loft("x", [
+            yield VisualPart(hand, "shell", Loft("x", [
                 (x - 0.0025, s * 0.046, 0.046, 0.0205, 0.039), (x + 0.0025, s * 0.046, 0.046, 0.0205, 0.039)
             ], power=3.0))
-        yield Part(hand, "joint", Loft("x", [
+        yield VisualPart(hand, "joint", Loft("x", [
             (-0.015, s * 0.045, 0.046, 0.018, 0.035), (0.011, s * 0.045, 0.046, 0.018, 0.035)
         ], power=5.0))
-        yield Part(hand, "metal", _disc("x", 0.009, 0.019, (-0.002, s * 0.038, 0.069)))
+        yield VisualPart(hand, "metal", _disc("x", 0.009, 0.019, (-0.002, s * 0.038, 0.069)))
 
 
-def _finger() -> Iterable[Part]:
-    crank, blade, _ = magpie.finger_names("left", "a")
-    pivot = magpie.FINGER_PIVOT
+def _finger() -> Iterable[VisualPart]:
+    crank, blade, _ = magpie_model.finger_names("left", "a")
+    pivot = magpie_model.FINGER_PIVOT
     for x in (-0.0045, -0.0125):
-        yield Part(crank, "accent", _rod((x, 0, 0), (x, pivot[1], pivot[2]), 0.0042))
-    yield Part(blade, "metal", _disc("x", 0.0065, 0.0085, (0, 0, 0)))
-    yield Part(blade, "graphite", _rod((0, 0, 0), (0, 0.022, -0.004), 0.006))
+        yield VisualPart(crank, "accent", _rod((x, 0, 0), (x, pivot[1], pivot[2]), 0.0042))
+    yield VisualPart(blade, "metal", _disc("x", 0.0065, 0.0085, (0, 0, 0)))
+    yield VisualPart(blade, "graphite", _rod((0, 0, 0), (0, 0.022, -0.004), 0.006))
     # The outer edge curves in to the tip; the inner edge is straight and carries the pad.
     inner = -0.0208
     outer = [(0.0, 0.003), (0.02, 0.004), (0.045, 0.0), (0.065, -0.0075), (0.0813, -0.0175)]
-    yield Part(blade, "graphite", Loft("z", [
+    yield VisualPart(blade, "graphite", Loft("z", [
         (z, 0.003, (inner + y) / 2.0, 0.008, (y - inner) / 2.0) for z, y in outer
     ], power=5.0))
-    x, y, z = magpie.PAD_CENTER.tolist()
-    yield Part(blade, "rubber", Solid("box", tuple(magpie.PAD_HALF_SIZE.tolist()), (x, y, z)))
+    x, y, z = magpie_model.PAD_CENTER.tolist()
+    yield VisualPart(blade, "rubber", Solid("box", tuple(magpie_model.PAD_HALF_SIZE.tolist()), (x, y, z)))
 
 
 # fmt: on
 
 
-def parts(hands: bool) -> list[Part]:
+def parts(hands: bool) -> list[VisualPart]:
     """Return everything to see of the robot, with or without hands."""
     left = [*_leg(), *_arm()]
     whole = [*_trunk(), *left, *(part.mirrored() for part in left)]
     if hands:
         # The two hands are the same hand twice, not mirror images: only finger b mirrors finger a.
         a = list(_finger())
-        b = [Part(p.link.replace("_a_", "_b_"), p.material, p.shape.mirrored()) for p in a]
+        b = [VisualPart(p.link.replace("_a_", "_b_"), p.material, p.shape.mirrored()) for p in a]
         hand = [*_hand(), *a, *b]
         whole += [*hand, *(replace(part, link=part.link.replace("left_", "right_", 1)) for part in hand)]
     return whole

@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from golem.robots.model import contact, looks, magpie
-from golem.robots.model.contact import Feet, Shape
+from golem.robots.model import contact_shapes, looks, magpie_model
+from golem.robots.model.contact_shapes import Feet, Shape
 from golem.robots.model.limits import load_limits
 from golem.robots.model.spatial import Inertial, quat_of
 from golem.robots.model.table import BASE_HEIGHT, BASE_LINK, DOF, FRAMES, JOINTS, LINKS, T_TORSO_HEAD_OPTICAL
@@ -63,8 +63,8 @@ def robot_spec(
         )
         bodies[joint.child] = body
         _add_motor(spec, joint.name, float(limit))
-    for shape in contact.body_shapes(feet):
-        _add_shape(bodies[shape.link], shape, contact.BODY)
+    for shape in contact_shapes.body_shapes(feet):
+        _add_shape(bodies[shape.link], shape, contact_shapes.BODY)
     add_torso_sensors(spec)
     if hands:
         for side in SIDES:
@@ -77,13 +77,13 @@ def robot_spec(
 
 def _let_touch_itself(spec: mujoco.MjSpec, hands: bool) -> None:
     """Add the pairs of shapes that may meet, and the boxes among them that meet nothing else."""
-    boxes = [contact.foot_box(side) for side in SIDES]
+    boxes = [contact_shapes.foot_box(side) for side in SIDES]
     if hands:
-        boxes += [contact.hand_box(side) for side in SIDES]
+        boxes += [contact_shapes.hand_box(side) for side in SIDES]
     for box in boxes:
         if spec.geom(box.name) is None:
             _add_shape(spec.body(box.link), box, 0, 0)
-    for one, other in contact.self_pairs(hands):
+    for one, other in contact_shapes.self_pairs(hands):
         # Without friction: how limbs slide along each other is of no interest, and one solver row does instead of four.
         spec.add_pair(name=f"{one}-{other}", geomname1=one, geomname2=other, condim=1)
 
@@ -115,7 +115,9 @@ def _add_motor(spec: mujoco.MjSpec, joint: str, limit: float) -> None:
     motor.set_to_motor()
 
 
-def _add_shape(body: mujoco.MjsBody, shape: Shape, contype: int, conaffinity: int = contact.WORLD) -> None:
+def _add_shape(
+    body: mujoco.MjsBody, shape: Shape, contype: int, conaffinity: int = contact_shapes.WORLD
+) -> None:
     body.add_geom(
         name=shape.name,
         type=shape.kind,
@@ -154,35 +156,37 @@ def add_torso_sensors(spec: mujoco.MjSpec) -> None:
 def add_hand(spec: mujoco.MjSpec, side: Side) -> None:
     """Mount a MAGPIE hand with its camera and motors to `{side}_wrist_yaw_link`."""
     wrist = spec.body(f"{side}_wrist_yaw_link")
-    T = magpie.T_WRIST_HAND
-    hand = _add_body(wrist, magpie.hand_name(side), magpie.BASE, T[:3, 3], T[:3, :3])
-    _add_shape(hand, contact.housing_shape(magpie.hand_name(side)), contact.HAND)
-    _add_camera(hand, f"{side}_hand", magpie.T_HAND_CAMERA, PALM_FOVY)
-    hand.add_site(name=f"{side}_gripper", pos=magpie.T_HAND_GRIPPER[:3, 3], size=[0.005] * 3, group=4)
-    for finger in magpie.FINGERS:
+    T = magpie_model.T_WRIST_HAND
+    hand = _add_body(wrist, magpie_model.hand_name(side), magpie_model.BASE, T[:3, 3], T[:3, :3])
+    _add_shape(hand, contact_shapes.housing_shape(magpie_model.hand_name(side)), contact_shapes.HAND)
+    _add_camera(hand, f"{side}_hand", magpie_model.T_HAND_CAMERA, PALM_FOVY)
+    hand.add_site(name=f"{side}_gripper", pos=magpie_model.T_HAND_GRIPPER[:3, 3], size=[0.005] * 3, group=4)
+    for finger in magpie_model.FINGERS:
         _add_finger(spec, hand, side, finger)
 
 
-def _add_finger(spec: mujoco.MjSpec, hand: mujoco.MjsBody, side: Side, finger: magpie.Finger) -> None:
+def _add_finger(spec: mujoco.MjSpec, hand: mujoco.MjsBody, side: Side, finger: magpie_model.Finger) -> None:
     """Add crank and finger; an equality keeps the finger's hinge opposite to the crank's, so that it only translates.
 
     The rocker is not a body of its own: it turns with the crank, whose inertia includes it.
     """
-    crank_name, finger_name, pad_name = magpie.finger_names(side, finger)
+    crank_name, finger_name, pad_name = magpie_model.finger_names(side, finger)
     sign = 1.0 if finger == "a" else -1.0
-    inertials = magpie.CRANK, magpie.FINGER
+    inertials = magpie_model.CRANK, magpie_model.FINGER
     if finger == "b":
-        inertials = magpie.CRANK.mirrored(), magpie.FINGER.mirrored()
-    crank = _add_body(hand, crank_name, inertials[0], magpie.mirror(finger, magpie.CRANK_PIVOT))
-    blade = _add_body(crank, finger_name, inertials[1], magpie.mirror(finger, magpie.FINGER_PIVOT))
+        inertials = magpie_model.CRANK.mirrored(), magpie_model.FINGER.mirrored()
+    crank = _add_body(hand, crank_name, inertials[0], magpie_model.mirror(finger, magpie_model.CRANK_PIVOT))
+    blade = _add_body(
+        crank, finger_name, inertials[1], magpie_model.mirror(finger, magpie_model.FINGER_PIVOT)
+    )
     crank.add_joint(
         name=crank_name,
         type=mujoco.mjtJoint.mjJNT_HINGE,
         axis=[sign, 0, 0],
-        range=[0.0, magpie.CLOSED],
+        range=[0.0, magpie_model.CLOSED],
         limited=mujoco.mjtLimited.mjLIMITED_TRUE,
-        damping=[magpie.SERVO_DAMPING, 0, 0],
-        armature=magpie.SERVO_ARMATURE,
+        damping=[magpie_model.SERVO_DAMPING, 0, 0],
+        armature=magpie_model.SERVO_ARMATURE,
     )
     blade.add_joint(name=finger_name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[sign, 0, 0])
     spec.add_equality(
@@ -195,18 +199,18 @@ def _add_finger(spec: mujoco.MjSpec, hand: mujoco.MjsBody, side: Side, finger: m
         solref=[0.004, 1.0],
         solimp=[0.99, 0.9999, 0.001, 0.5, 2.0],
     )
-    _add_motor(spec, crank_name, magpie.MAX_TORQUE)
-    _add_shape(blade, contact.blade_shape(finger_name, finger), contact.HAND)
+    _add_motor(spec, crank_name, magpie_model.MAX_TORQUE)
+    _add_shape(blade, contact_shapes.blade_shape(finger_name, finger), contact_shapes.HAND)
     blade.add_geom(
         name=pad_name,
         type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=magpie.PAD_HALF_SIZE,
-        pos=magpie.mirror(finger, magpie.PAD_CENTER),
-        contype=contact.HAND,
-        conaffinity=contact.WORLD,
+        size=magpie_model.PAD_HALF_SIZE,
+        pos=magpie_model.mirror(finger, magpie_model.PAD_CENTER),
+        contype=contact_shapes.HAND,
+        conaffinity=contact_shapes.WORLD,
         condim=4,
         priority=2,
-        friction=[magpie.PAD_FRICTION, 0.01, 0.0001],
+        friction=[magpie_model.PAD_FRICTION, 0.01, 0.0001],
         solref=[0.004, 1.0],
         solimp=[0.95, 0.99, 0.001, 0.5, 2.0],
         group=COLLISION_GROUP,

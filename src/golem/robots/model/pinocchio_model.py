@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from golem.robots.model import magpie
+from golem.robots.model import magpie_model
 from golem.robots.model.spatial import Inertial
 from golem.robots.model.table import BASE_LINK, FRAMES, JOINTS, LINKS, T_TORSO_HEAD_OPTICAL
 from golem.types import SIDES, Array
@@ -53,11 +53,11 @@ def build(hands: bool = True, free_base: bool = False) -> pin.Model:
     if hands:
         for side in SIDES:
             wrist = placed[f"{side}_wrist_yaw_link"]
-            T = magpie.T_WRIST_HAND
-            model.appendBodyToJoint(wrist, _inertia(magpie.lump()), pin.SE3(T))
-            _add_frame(model, magpie.hand_name(side), wrist, T, pin.FrameType.BODY)
-            _add_frame(model, f"{side}_gripper", wrist, T @ magpie.T_HAND_GRIPPER)
-            _add_frame(model, f"{side}_hand_camera_optical", wrist, T @ magpie.T_HAND_CAMERA)
+            T = magpie_model.T_WRIST_HAND
+            model.appendBodyToJoint(wrist, _inertia(magpie_model.lump()), pin.SE3(T))
+            _add_frame(model, magpie_model.hand_name(side), wrist, T, pin.FrameType.BODY)
+            _add_frame(model, f"{side}_gripper", wrist, T @ magpie_model.T_HAND_GRIPPER)
+            _add_frame(model, f"{side}_hand_camera_optical", wrist, T @ magpie_model.T_HAND_CAMERA)
     return model
 
 

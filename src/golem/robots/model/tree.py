@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.robots.model import magpie
+from golem.robots.model import magpie_model
 from golem.robots.model.spatial import skew, transform
 from golem.robots.model.table import BASE_LINK, FRAMES, JOINTS, T_TORSO_HEAD_OPTICAL
 from golem.types import NUM_JOINTS, SIDES, Array
@@ -46,11 +46,13 @@ def _fingers() -> list[Hinge]:
     """Return the cranks and fingers of both hands: by hand, by finger, the crank first."""
     out: list[Hinge] = []
     for side in SIDES:
-        for finger in magpie.FINGERS:
-            crank, blade, _ = magpie.finger_names(side, finger)
+        for finger in magpie_model.FINGERS:
+            crank, blade, _ = magpie_model.finger_names(side, finger)
             axis = np.array([1.0 if finger == "a" else -1.0, 0.0, 0.0])
-            pivot, tip = (magpie.mirror(finger, p) for p in (magpie.CRANK_PIVOT, magpie.FINGER_PIVOT))
-            out.append(Hinge(magpie.hand_name(side), crank, transform(pivot), crank + "_joint", axis))
+            pivot, tip = (
+                magpie_model.mirror(finger, p) for p in (magpie_model.CRANK_PIVOT, magpie_model.FINGER_PIVOT)
+            )
+            out.append(Hinge(magpie_model.hand_name(side), crank, transform(pivot), crank + "_joint", axis))
             out.append(Hinge(crank, blade, transform(tip), blade + "_joint", axis))
     return out
 
@@ -68,9 +70,9 @@ FIXED: tuple[Edge, ...] = (
         edge
         for side in SIDES
         for edge in (
-            Edge(f"{side}_wrist_yaw_link", magpie.hand_name(side), magpie.T_WRIST_HAND),
-            Edge(magpie.hand_name(side), f"{side}_gripper", magpie.T_HAND_GRIPPER),
-            Edge(magpie.hand_name(side), f"{side}_hand_camera_optical", magpie.T_HAND_CAMERA),
+            Edge(f"{side}_wrist_yaw_link", magpie_model.hand_name(side), magpie_model.T_WRIST_HAND),
+            Edge(magpie_model.hand_name(side), f"{side}_gripper", magpie_model.T_HAND_GRIPPER),
+            Edge(magpie_model.hand_name(side), f"{side}_hand_camera_optical", magpie_model.T_HAND_CAMERA),
         )
     ),
 )
@@ -88,7 +90,7 @@ def angles(q: Array, fingers: tuple[Array, Array]) -> Array:
         q: (27,) joint positions [rad].
         fingers: per side the (2,) distances of the pads from the hand's centre plane [m]; see `HandState`.
     """
-    cranks = magpie.crank_from_gap(2.0 * np.concatenate(fingers))
+    cranks = magpie_model.crank_from_gap(2.0 * np.concatenate(fingers))
     return np.concatenate([q[:NUM_JOINTS], np.column_stack([cranks, -cranks]).ravel()])
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from golem.errors import ConfigError
-from golem.robots.model.contact import FOOT_FRICTION, Feet
+from golem.robots.model.contact_shapes import FOOT_FRICTION, Feet
 from golem.robots.mujoco.hoist import HoistConfig
 from golem.robots.worlds.layout import PackLayout
 
@@ -68,7 +68,7 @@ class MujocoConfig:
         Raises:
             ConfigError: one of them is outside its range.
         """
-        for name, value, least, most in (
+        for name, value, minimum, maximum in (
             ("slope", self.slope, 0.0, 0.5),
             ("rubble", self.rubble, 0.0, 0.2),
             ("noslip", self.noslip, 0, 100),
@@ -77,8 +77,8 @@ class MujocoConfig:
             ("payload", self.payload[1], 0.0, 20.0),
             ("latency", self.latency, 0.0, 0.2),
         ):
-            if not least <= value <= most:
-                raise ConfigError(f"The twin's {name} is from {least:g} to {most:g}, not {value:g}.")
+            if not minimum <= value <= maximum:
+                raise ConfigError(f"The twin's {name} is from {minimum:g} to {maximum:g}, not {value:g}.")
         own = (self.feet, self.torque_profile, self.self_collision)
         if self.mjcf is not None and own != ("spheres", "urdf", None):
             raise ConfigError(

@@ -8,17 +8,17 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.robots.model import magpie
-from golem.robots.model.imu import torso_motion
+from golem.robots.model import magpie_model
+from golem.robots.model.imu_mount import torso_motion
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.config import MujocoConfig
+from golem.robots.mujoco.external_forces import Pushes
 from golem.robots.mujoco.hand_servos import HandServos
 from golem.robots.mujoco.hoist import Hoist
 from golem.robots.mujoco.motors import Motors
-from golem.robots.mujoco.push import Pushes
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP, Scene, build_scene
 from golem.robots.mujoco.truth import Truth
 from golem.robots.sensors.cameras import CAMERAS
@@ -92,7 +92,9 @@ class MujocoRobot:
         self._rig: CameraRig | None = None
 
         self._hands = {side: HandServos(model, side) for side in SIDES}
-        self._fingers = np.array([model.body(f"{s}_{f}_finger").id for s in SIDES for f in magpie.FINGERS])
+        self._fingers = np.array(
+            [model.body(f"{s}_{f}_finger").id for s in SIDES for f in magpie_model.FINGERS]
+        )
         self._screws = np.array([model.body(name).id for name in self.scene.names.screws], dtype=int)
         first = np.array([model.joint(name).dofadr[0] for name in self.scene.names.screws], dtype=int)
         self._screw_v = (first[:, None] + np.arange(6)).ravel()
@@ -109,12 +111,12 @@ class MujocoRobot:
         self.truth = Truth(model, self.data)
 
     @property
-    def banded(self) -> bool:
-        """Whether the robot stands in a band that is to be let go; see `Banded`."""
+    def on_gantry(self) -> bool:
+        """Whether the robot stands in a band that is to be let go; see `HasGantry`."""
         return self.config.support == "ground" and not self._hoist.released
 
     def release(self) -> None:
-        """Let the band go within half a second; see `Banded`. A robot in the hoist stays there."""
+        """Let the band go within half a second; see `HasGantry`. A robot in the hoist stays there."""
         if self.config.support == "ground":
             self._hoist.release(self.data.time)
 
@@ -179,15 +181,15 @@ class MujocoRobot:
         rgb, depth = self._rig.render(self.data, camera)
         return rgb, self._depth[camera].measure(depth)
 
-    def snapshot(self) -> bytes:
-        """Return the present moment; see `Recallable`."""
+    def save_state(self) -> bytes:
+        """Return the present moment; see `Restorable`."""
         state = np.empty(mujoco.mj_stateSize(self._model, _MOMENT))
         mujoco.mj_getState(self._model, self.data, state, _MOMENT)
         return state.tobytes()
 
-    def recall(self, snapshot: bytes) -> None:
-        """Be in the moment of `snapshot`; see `Recallable`."""
-        mujoco.mj_setState(self._model, self.data, np.frombuffer(snapshot), _MOMENT)
+    def restore_state(self, save_state: bytes) -> None:
+        """Be in the moment of `snapshot`; see `Restorable`."""
+        mujoco.mj_setState(self._model, self.data, np.frombuffer(save_state), _MOMENT)
 
     def close(self) -> None:
         """Release the rendering context."""

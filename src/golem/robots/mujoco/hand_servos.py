@@ -7,7 +7,7 @@ import math
 import mujoco
 import numpy as np
 
-from golem.robots.model import magpie
+from golem.robots.model import magpie_model
 from golem.types import HandCommand, HandState, Side
 
 SERVO_KP = 8.0
@@ -29,7 +29,7 @@ class HandServos:
 
     def __init__(self, model: mujoco.MjModel, side: Side) -> None:
         """Find the cranks and fingers of the hand on `side`."""
-        names = [magpie.finger_names(side, finger) for finger in magpie.FINGERS]
+        names = [magpie_model.finger_names(side, finger) for finger in magpie_model.FINGERS]
         cranks = [model.joint(crank) for crank, _, _ in names]
         self._q = [int(j.qposadr[0]) for j in cranks]
         self._v = [int(j.dofadr[0]) for j in cranks]
@@ -38,13 +38,13 @@ class HandServos:
         # The hinges may be counted in opposite senses; here both cranks count positive when closing.
         self._sign = [1.0 if j.range.sum() > 0 else -1.0 for j in cranks]
         self._reference = 0.0
-        self._force = magpie.MIN_FORCE
+        self._force = magpie_model.MIN_FORCE
         self._gap = math.nan
         self._goal = 0.0
 
     def reset(self, data: mujoco.MjData, gap: float) -> None:
         """Place both fingers at an opening of `gap` [m]."""
-        self._reference = float(magpie.crank_from_gap(gap))
+        self._reference = float(magpie_model.crank_from_gap(gap))
         for q, q_finger, sign in zip(self._q, self._q_finger, self._sign, strict=True):
             data.qpos[q] = sign * self._reference
             data.qpos[q_finger] = -sign * self._reference
@@ -54,10 +54,14 @@ class HandServos:
         if command.gap != self._gap:
             self._gap = command.gap
             closes = command.gap <= 0.0
-            self._goal = magpie.CLOSED + OVERTRAVEL if closes else float(magpie.crank_from_gap(command.gap))
-        reach = magpie.MAX_SPEED * dt
+            self._goal = (
+                magpie_model.CLOSED + OVERTRAVEL
+                if closes
+                else float(magpie_model.crank_from_gap(command.gap))
+            )
+        reach = magpie_model.MAX_SPEED * dt
         self._reference += min(max(self._goal - self._reference, -reach), reach)
-        self._force = min(max(command.force, magpie.MIN_FORCE), magpie.MAX_FORCE)
+        self._force = min(max(command.force, magpie_model.MIN_FORCE), magpie_model.MAX_FORCE)
 
     # Scalars below: this runs at every physics step, where arrays of two cost more than the arithmetic.
 
@@ -66,7 +70,7 @@ class HandServos:
         qpos, qvel, ctrl = data.qpos, data.qvel, data.ctrl
         for q, v, u, sign in zip(self._q, self._v, self._u, self._sign, strict=True):
             theta = sign * qpos.item(q)
-            ceiling = self._force * magpie.ARM * math.sin(magpie.ANGLE_OPEN + theta)
+            ceiling = self._force * magpie_model.ARM * math.sin(magpie_model.ANGLE_OPEN + theta)
             torque = SERVO_KP * (self._reference - theta) - SERVO_KD * sign * qvel.item(v)
             ctrl[u] = sign * min(max(torque, -ceiling), ceiling)
 
@@ -77,6 +81,8 @@ class HandServos:
         force: list[float] = []
         for q, u, sign in zip(self._q, self._u, self._sign, strict=True):
             theta = sign * qpos.item(q)
-            fingers.append(float(magpie.pad_offset(theta)))
-            force.append(max(sign * ctrl.item(u), 0.0) / (magpie.ARM * math.sin(magpie.ANGLE_OPEN + theta)))
+            fingers.append(float(magpie_model.pad_offset(theta)))
+            force.append(
+                max(sign * ctrl.item(u), 0.0) / (magpie_model.ARM * math.sin(magpie_model.ANGLE_OPEN + theta))
+            )
         return HandState(t, sum(fingers), np.array(fingers), np.array(force))

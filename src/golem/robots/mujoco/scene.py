@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from golem.errors import ConfigError
-from golem.robots.model import contact, magpie, mjcf
+from golem.robots.model import contact_shapes, magpie_model, mjcf
 from golem.robots.model.looks import VISUAL_GROUP
 from golem.robots.model.table import BASE_LINK, JOINT_NAMES
 from golem.robots.mujoco.config import MujocoConfig
@@ -104,7 +104,7 @@ def _robot(config: MujocoConfig) -> mujoco.MjSpec:
             geom.friction[0] = config.friction
     for side, mass in zip(SIDES, config.payload, strict=True):
         if mass > 0.0:
-            _add_payload(spec.body(magpie.hand_name(side)), mass)
+            _add_payload(spec.body(magpie_model.hand_name(side)), mass)
     return spec
 
 
@@ -133,7 +133,11 @@ def foreign_robot(path: Path) -> mujoco.MjSpec:
         spec.delete(element)
     for geom in spec.geoms:
         if geom.contype:
-            geom.contype, geom.conaffinity, geom.group = contact.BODY, contact.WORLD, mjcf.COLLISION_GROUP
+            geom.contype, geom.conaffinity, geom.group = (
+                contact_shapes.BODY,
+                contact_shapes.WORLD,
+                mjcf.COLLISION_GROUP,
+            )
         else:
             geom.group = VISUAL_GROUP
     mjcf.add_torso_sensors(spec)
@@ -147,7 +151,7 @@ def _add_payload(hand: mujoco.MjsBody, mass: float) -> None:
     radius = 0.04
     body = hand.add_body(
         name=f"{hand.name}_payload",
-        pos=magpie.T_HAND_GRIPPER[:3, 3],
+        pos=magpie_model.T_HAND_GRIPPER[:3, 3],
         mass=mass,
         inertia=[0.4 * mass * radius**2] * 3,
         explicitinertial=True,

@@ -14,8 +14,8 @@ from golem.middleware.unitree_api import (
     GET_VERSION,
     NOT_IMPLEMENTED,
     OK,
+    ApiRequest,
     LocoApi,
-    Request,
     Response,
     decode_int,
     decode_velocity,
@@ -45,7 +45,7 @@ class LocoService:
         self._twist = Twist()
         self._until = -math.inf
 
-    def answer(self, request: Request, t: float) -> Response:
+    def answer(self, request: ApiRequest, t: float) -> Response:
         """Act on `request` at time `t` [s]; return the answer, whose data say why where the code is not 0."""
         try:
             code, data = self._act(request, t)
@@ -71,7 +71,7 @@ class LocoService:
         """Begin anew, limp, as after power-on; a failure remains."""
         self.released = False
 
-    def _act(self, request: Request, t: float) -> tuple[int, str]:
+    def _act(self, request: ApiRequest, t: float) -> tuple[int, str]:
         api = self.api
         if request.api_id == GET_VERSION:
             return OK, api.version

@@ -10,7 +10,15 @@ from __future__ import annotations
 
 from typing import Final
 
-from golem.middleware.unitree_api import GET_VERSION, NOT_IMPLEMENTED, OK, Request, Response, decode, encode
+from golem.middleware.unitree_api import (
+    GET_VERSION,
+    NOT_IMPLEMENTED,
+    OK,
+    ApiRequest,
+    Response,
+    decode,
+    encode,
+)
 from golem.robots.onboard.loco_service import LocoService
 
 SERVICE: Final = "motion_switcher"
@@ -42,7 +50,7 @@ class MotionSwitcher:
         self.mode = MODE
         self._loco = loco
 
-    def answer(self, request: Request, t: float) -> Response:
+    def answer(self, request: ApiRequest, t: float) -> Response:
         """Act on `request` at time `t` [s]; return the answer, whose data say why where the code is not 0."""
         try:
             code, data = self._act(request)
@@ -50,7 +58,7 @@ class MotionSwitcher:
             code, data = BAD_PARAMETER, str(error)
         return Response(request.id, request.api_id, code, data)
 
-    def _act(self, request: Request) -> tuple[int, str]:
+    def _act(self, request: ApiRequest) -> tuple[int, str]:
         if request.api_id == GET_VERSION:
             return OK, VERSION
         if request.api_id == CHECK_MODE:

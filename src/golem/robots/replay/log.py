@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.middleware import public
-from golem.middleware.record.base import BagError, Message
+from golem.middleware.record.base import BagError, BagMessage
 from golem.middleware.record.reader import Bag
 from golem.middleware.ros import codec, convert, images
 from golem.middleware.ros.goal_info import from_time
@@ -23,7 +23,7 @@ from golem.middleware.ros.msgs.sensor_msgs import CameraInfo as InfoMessage
 from golem.middleware.ros.msgs.sensor_msgs import Image
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
 from golem.middleware.wire.convert import decode_low_state
-from golem.robots.base import SLACK
+from golem.robots.base import STAMP_TOLERANCE
 from golem.robots.sensors.calibration import calibrations
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.pairing import Pairing
@@ -54,9 +54,9 @@ class Track(Generic[T]):
     def at(self, t: float) -> T | None:
         """Return the newest of up to `t` [s], and forget those before it; None where there is none yet."""
         samples = self._samples
-        while len(samples) > 1 and samples[1][0] <= t + SLACK:
+        while len(samples) > 1 and samples[1][0] <= t + STAMP_TOLERANCE:
             samples.popleft()
-        return samples[0][1] if samples and samples[0][0] <= t + SLACK else None
+        return samples[0][1] if samples and samples[0][0] <= t + STAMP_TOLERANCE else None
 
 
 class Log:
@@ -92,7 +92,7 @@ class Log:
         self.end: float | None = None
         self.cameras, self.calibration = _cameras(bag)
         self.pictures: dict[str, Track[Picture]] = {name: Track() for name in self.cameras}
-        self._take: dict[str, Callable[[Message], None]] = {STATE: self._state}
+        self._take: dict[str, Callable[[BagMessage], None]] = {STATE: self._state}
         for side in SIDES:
             self._take[public.gripper(side, "state")] = partial(self._hand, side)
         for name in self.cameras:
@@ -120,11 +120,11 @@ class Log:
     def _time(self, time: int) -> float:
         return (time - self._origin) / NANO
 
-    def _state(self, message: Message) -> None:
+    def _state(self, message: BagMessage) -> None:
         self._newest = self._time(message.log_time)
         self.states.add(self._newest, decode_low_state(message.payload))
 
-    def _hand(self, side: Side, message: Message) -> None:
+    def _hand(self, side: Side, message: BagMessage) -> None:
         state = convert.to_hand_state(codec.deserialize(message.payload, HandMessage))
         self.hands[side].add(self._time(message.log_time), state)
 
@@ -133,7 +133,7 @@ class Log:
         self.pictures[camera].add(t, (images.to_rgb(color), images.to_depth(depth)))
 
 
-def _image(take: Callable[[Image], None], message: Message) -> None:
+def _image(take: Callable[[Image], None], message: BagMessage) -> None:
     take(codec.deserialize(message.payload, Image))
 
 

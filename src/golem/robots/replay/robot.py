@@ -14,7 +14,7 @@ from golem.types import Array, HandCommand, HandState, Imu, LowCommand, LowState
 
 
 @dataclass(frozen=True)
-class ReplayConfig:
+class ReplayRobotConfig:
     """Options of the recorded robot.
 
     Attributes:
@@ -30,7 +30,7 @@ class ReplayRobot:
     Its first state is at time 0. Commands move nothing.
     """
 
-    def __init__(self, config: ReplayConfig) -> None:
+    def __init__(self, config: ReplayRobotConfig) -> None:
         """Open the bag.
 
         Raises:

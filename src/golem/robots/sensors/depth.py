@@ -152,10 +152,10 @@ class StereoDepth:
     def _seen_by_both(self, inverse: Image) -> NDArray[np.bool_]:
         """Return (height, width) True where no nearer point to the right hides the point from the right imager."""
         column = self._u - self._fB_image * inverse
-        least = np.minimum.accumulate(column[:, ::-1], axis=1)[:, ::-1]
+        minimum = np.minimum.accumulate(column[:, ::-1], axis=1)[:, ::-1]
         seen = np.ones(column.shape, np.bool_)
         # Half a pixel of slack, so that a steep surface does not hide itself.
-        np.less_equal(column[:, :-1], least[:, 1:] + np.float32(0.5), out=seen[:, :-1])
+        np.less_equal(column[:, :-1], minimum[:, 1:] + np.float32(0.5), out=seen[:, :-1])
         return seen
 
     def _faces_camera(self, inverse: Image) -> NDArray[np.bool_]:

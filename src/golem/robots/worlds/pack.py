@@ -29,7 +29,7 @@ _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class PackPart:
     """One thing a detector can be asked for.
 
     Attributes:
@@ -61,7 +61,7 @@ class PackNames:
     screws: tuple[str, ...]
     mouths: Array
     tray: str
-    parts: tuple[Part, ...]
+    parts: tuple[PackPart, ...]
 
 
 def set_contact_options(spec: mujoco.MjSpec) -> None:
@@ -113,11 +113,11 @@ def add_pack(
         reach = draw.protrusion + draw.head_height
         looks = (f"{name}_flange", f"{name}_thread") + ((f"{name}_hex",) if draw.hexagonal else ())
         size = np.array([draw.head_diameter, draw.head_diameter, reach])
-        found.append(Part("screw", name, looks, mouth + reach * draw.axis(), size))
+        found.append(PackPart("screw", name, looks, mouth + reach * draw.axis(), size))
     tray_name = tray.add_tray(spec, layout)
     tray_geoms = tuple(f"tray_part_{k}" for k in range(5)) + tuple(f"tray_rim_{k}" for k in range(4))
     top = np.array([*layout.tray_xy, layout.tray_z])
-    found.append(Part("tray", tray_name, tray_geoms, top, np.array(layout.tray_size)))
+    found.append(PackPart("tray", tray_name, tray_geoms, top, np.array(layout.tray_size)))
     return PackNames(names, mouths, tray_name, tuple(found))
 
 
@@ -171,11 +171,11 @@ def _add_rim(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, hole
     wx0, wx1 = layout.window_x
     wy0, wy1 = layout.window_y
     hy = layout.size_y / 2
-    band = 2 * 0.022
+    gantry = 2 * 0.022
     by_side: dict[str, list[tuple[float, float]]] = {"near": [], "far": [], "left": [], "right": []}
     for slot, radius in holes.items():
         x, y = spots[slot]
-        side = "near" if x < band else "far" if x > layout.size_x - band else "left" if y > 0 else "right"
+        side = "near" if x < gantry else "far" if x > layout.size_x - gantry else "left" if y > 0 else "right"
         by_side[side].append((x, y))
         plate = parts.add_mesh(spec, f"hole_plate_{slot:02d}", *parts.holed_plate(HOLE_CELL, radius, 0.022))
         parts.visual_mesh(body, plate, (x, y, 0.0), material="cover_coat", name=f"hole_{slot:02d}")
@@ -183,13 +183,13 @@ def _add_rim(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, hole
             parts.collider(body, _BOX, (HOLE_CELL, HOLE_CELL, COVER / 2), (x, y, -COVER / 2 - 0.0005))
         parts.visual(body, _CYLINDER, (radius, 0.0005), (x, y, -0.0215), material="hole_dark")
     # Four bands carry the fasteners, split at the holes; the field inside them surrounds the window.
-    _strip(body, (0.0, band), (-hy, hy), by_side["near"], along=1)
-    _strip(body, (layout.size_x - band, layout.size_x), (-hy, hy), by_side["far"], along=1)
-    _strip(body, (band, layout.size_x - band), (hy - band, hy), by_side["left"], along=0)
-    _strip(body, (band, layout.size_x - band), (-hy, -hy + band), by_side["right"], along=0)
-    x1, y1 = layout.size_x - band, hy - band
+    _strip(body, (0.0, gantry), (-hy, hy), by_side["near"], along=1)
+    _strip(body, (layout.size_x - gantry, layout.size_x), (-hy, hy), by_side["far"], along=1)
+    _strip(body, (gantry, layout.size_x - gantry), (hy - gantry, hy), by_side["left"], along=0)
+    _strip(body, (gantry, layout.size_x - gantry), (-hy, -hy + gantry), by_side["right"], along=0)
+    x1, y1 = layout.size_x - gantry, hy - gantry
     for xs, ys in (
-        ((band, wx0), (-y1, y1)),
+        ((gantry, wx0), (-y1, y1)),
         ((wx1, x1), (-y1, y1)),
         ((wx0, wx1), (-y1, wy0)),
         ((wx0, wx1), (wy1, y1)),
@@ -247,7 +247,9 @@ def _strip(
     _slab(body, *((last, ys) if along == 0 else (xs, last)))
 
 
-def _add_window(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, origin: Array) -> list[Part]:
+def _add_window(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, origin: Array
+) -> list[PackPart]:
     """Add modules, bus bars and nuts in the opened section."""
     (x0, x1), (y0, y1), depth = layout.window_x, layout.window_y, layout.window_depth
     floor = -depth
@@ -267,7 +269,7 @@ def _add_window(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, o
     start = cy - pitch * columns / 2
     nut = parts.add_mesh(spec, "nut", *parts.hexagon(0.010, 0.006))
     washer = parts.add_mesh(spec, "washer", *parts.lathe([(0.0085, 0.0), (0.0085, 0.0012)], sides=24))
-    found: list[Part] = []
+    found: list[PackPart] = []
     for row in range(2):
         mx = x0 + (0.27 + 0.46 * row) * (x1 - x0)
         for col in range(columns):
@@ -303,7 +305,7 @@ def _add_bus_bar(
     origin: Array,
     *,
     along: int,
-) -> list[Part]:
+) -> list[PackPart]:
     """Add one bar with an orange sleeve, a nut on a stud at each end, and their colliders."""
     half = STUD_PITCH / 2 + 0.016
     nut, washer = meshes
@@ -316,7 +318,7 @@ def _add_bus_bar(
     parts.collider(body, _BOX, bar, (x, y, z))
     extent = np.array([2 * bar[0], 2 * bar[1], 2 * sleeve[2]])
     centre = origin + np.array([x, y, z + 0.0055])
-    found = [Part("bus_bar", "pack", (f"{name}_bar", f"{name}_sleeve"), centre, extent)]
+    found = [PackPart("bus_bar", "pack", (f"{name}_bar", f"{name}_sleeve"), centre, extent)]
     for end in (-1, 1):
         nx, ny = (x, y + end * STUD_PITCH / 2) if along else (x + end * STUD_PITCH / 2, y)
         base = z + thick
@@ -328,29 +330,29 @@ def _add_bus_bar(
         parts.collider(body, _CYLINDER, (0.0055, 0.006), (nx, ny, base + 0.006))
         geoms = (f"{label}_washer", f"{label}_hex", f"{label}_stud")
         tip = origin + np.array([nx, ny, base + 0.0072])
-        found.append(Part("nut", "pack", geoms, tip, np.array([0.017, 0.017, 0.012])))
+        found.append(PackPart("nut", "pack", geoms, tip, np.array([0.017, 0.017, 0.012])))
     return found
 
 
 def _add_fasteners(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, loose: set[int], origin: Array
-) -> list[Part]:
+) -> list[PackPart]:
     """Add the tight fasteners and list the empty holes."""
     flats, height = FASTENER_HEAD
     head = parts.add_mesh(spec, "fastener_hex", *parts.hexagon(flats, height))
     flange = parts.add_mesh(
         spec, "fastener_flange", *parts.lathe([(0.0072, 0.0), (0.0072, 0.001), (0.0058, 0.0018)], sides=24)
     )
-    found: list[Part] = []
+    found: list[PackPart] = []
     for slot, (x, y) in enumerate(layout.fasteners()):
         at = origin + np.array([x, y, 0.0])
         if slot in layout.empty_holes:
-            found.append(Part("screw_hole", "pack", (), at, np.array([0.006, 0.006, 0.0])))
+            found.append(PackPart("screw_hole", "pack", (), at, np.array([0.006, 0.006, 0.0])))
         elif slot not in loose:
             names = (f"fastener_{slot:02d}_flange", f"fastener_{slot:02d}_hex")
             parts.visual_mesh(body, flange, (x, y, 0.0), material="zinc", name=names[0])
             parts.visual_mesh(body, head, (x, y, 0.0), material="zinc", name=names[1])
             parts.collider(body, _CYLINDER, (0.006, height / 2), (x, y, height / 2))
             size = np.array([0.0144, 0.0144, height])
-            found.append(Part("screw", "pack", names, at + [0, 0, height], size))
+            found.append(PackPart("screw", "pack", names, at + [0, 0, height], size))
     return found

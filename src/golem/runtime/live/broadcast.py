@@ -20,14 +20,14 @@ from golem.middleware.record.recorder import PERIOD, Recorder
 from golem.middleware.ros.node import DdsNode
 from golem.middleware.wire.convert import MODE_MACHINE, encode_low_command
 from golem.robots.base import Robot
-from golem.runtime.assembly import Running
-from golem.runtime.executor import TICK, Executor, Node
+from golem.runtime.executor import Executor, Node
 from golem.runtime.live import robot_out, stack_out
-from golem.runtime.live.gate import REPORT
-from golem.runtime.live.motors import RequestOut, StateOut
-from golem.runtime.live.surface import Surface
-from golem.runtime.live.verdict import status_message
-from golem.types import SIDES, LowCommand
+from golem.runtime.live.motor_bridge import RequestOut, StateOut
+from golem.runtime.live.role_endpoints import RoleEndpoints
+from golem.runtime.live.safety_process import REPORT
+from golem.runtime.live.safety_status import status_message
+from golem.runtime.lockstep import LockstepRunner
+from golem.types import SIDES, TICK, LowCommand
 
 
 class CommandOut:
@@ -35,9 +35,9 @@ class CommandOut:
 
     period = TICK
 
-    def __init__(self, bus: Bus, surface: Surface) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
         """Send what is on `bus`."""
-        self._commands, self._writer = News(bus, topics.LOW_CMD, LowCommand), surface.writer("/lowcmd")
+        self._commands, self._writer = News(bus, topics.LOW_CMD, LowCommand), endpoints.writer("/lowcmd")
 
     def step(self, t: float) -> None:
         """Send a new command."""
@@ -51,9 +51,9 @@ class StatusOut:
 
     period = TICK
 
-    def __init__(self, bus: Bus, surface: Surface) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
         """Publish on `surface` what is on `bus`."""
-        self._bus, self._surface = bus, surface
+        self._bus, self._endpoints = bus, endpoints
         self._said: tuple[object, ...] = ()
         self._due = 0.0
 
@@ -65,14 +65,14 @@ class StatusOut:
         says = (status.state, status.reason, status.detail)
         if says != self._said or t >= self._due:
             self._said, self._due = says, t + REPORT
-            self._surface.publish("/safety/status", status_message(status))
+            self._endpoints.publish("/safety/status", status_message(status))
 
 
 class Broadcast:
     """Passes what is public of a running stack to a sink; to be called after every tick."""
 
     def __init__(
-        self, running: Running, robot: Robot, sink: Sink, choose: Callable[[Recorder], None]
+        self, running: LockstepRunner, robot: Robot, sink: Sink, choose: Callable[[Recorder], None]
     ) -> None:
         """Show `running`, whose robot is `robot`, to `sink`; `choose` is asked time and again for which topics."""
         self._executor, self._choose = running.executor, choose
@@ -88,7 +88,7 @@ class Broadcast:
         if self._executor.t < TICK:
             return  # none has
         t = self._time()
-        self._follower.advance(t, most=1)
+        self._follower.advance(t, maximum=1)
         if t >= self._polled + PERIOD:
             self._polled = t
             self._choose(self._recorder)
@@ -107,11 +107,11 @@ class Broadcast:
 def _nodes(bus: Bus, robot: Robot, domain: LocalDomain) -> list[Node]:
     """Return what makes the robot, its gate and its stack public."""
 
-    def surface(role: Role) -> Surface:
+    def endpoints(role: Role) -> RoleEndpoints:
         participant = domain.participant()
-        return Surface(role, participant, DdsNode(participant, role))
+        return RoleEndpoints(role, participant, DdsNode(participant, role))
 
-    body, safety, stack = surface("robot"), surface("safety"), surface("stack")
+    body, safety, stack = endpoints("robot"), endpoints("safety"), endpoints("stack")
     robot_out.describe(body, robot.calibration)
     return [
         robot_out.ClockOut(body),
@@ -134,7 +134,7 @@ def _nodes(bus: Bus, robot: Robot, domain: LocalDomain) -> list[Node]:
 
 @contextmanager
 def broadcast(
-    running: Running, robot: Robot, bag: Path | None = None, foxglove: int | None = None
+    running: LockstepRunner, robot: Robot, bag: Path | None = None, foxglove: int | None = None
 ) -> Iterator[Callable[[], None]]:
     """Yield what is to be called after every tick, so that a stack in lock-step is recorded and shown.
 

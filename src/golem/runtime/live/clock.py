@@ -48,8 +48,10 @@ class Rate:
         """Return why the robot's time cannot be relied on; empty if it can."""
         if self.value is None:
             return f"the robot's time is compared with ours for {WINDOW:g} s first"
-        least, most = AGREEMENT
-        return "" if least <= self.value <= most else f"the robot's time runs at {self.value:.2f} of ours"
+        minimum, maximum = AGREEMENT
+        return (
+            "" if minimum <= self.value <= maximum else f"the robot's time runs at {self.value:.2f} of ours"
+        )
 
 
 class RobotClock:

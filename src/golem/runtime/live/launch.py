@@ -20,13 +20,13 @@ from golem.errors import ConfigError
 from golem.hardware.safety.base import GateState, GateStatus
 from golem.middleware import public
 from golem.middleware.interrupt import LIFELINE, interrupted
-from golem.middleware.ros.base import Node
+from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
-from golem.runtime.live.member import member, say, until
-from golem.runtime.live.pace import SILENCE
+from golem.runtime.live.node_setup import log_line, member, until
 from golem.runtime.live.process import TwinConfig
-from golem.runtime.live.verdict import to_status, told
+from golem.runtime.live.safety_status import describe_status, to_status
+from golem.runtime.live.sim_sync import SILENCE
 from golem.stack import load_stack
 
 Part = Literal["twin", "safety", "up"]
@@ -113,17 +113,17 @@ class Process:
             try:
                 self._process.wait(GRACE)
             except subprocess.TimeoutExpired:
-                say(f"{self.name} does not end; it is killed.")
+                log_line(f"{self.name} does not end; it is killed.")
                 self._process.kill()
                 self._process.wait()
             if self.code:
-                say(f"{self.name} ended with exit code {self.code}.")
+                log_line(f"{self.name} ended with exit code {self.code}.")
         self._reader.join(1.0)
 
     def _pass_on(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            say(f"[{self.name}] {line.rstrip()}")
+            log_line(f"[{self.name}] {line.rstrip()}")
 
 
 class Launcher:
@@ -134,7 +134,7 @@ class Launcher:
         gate: newest verdict of the safety gate; None before the first.
     """
 
-    def __init__(self, words: dict[Part, list[str]], node: Node, activate: bool) -> None:
+    def __init__(self, words: dict[Part, list[str]], node: RosNode, activate: bool) -> None:
         """Start the processes, `words` being their command lines; watch the gate through `node`."""
         self._words, self._node, self._activate = words, node, activate
         self._activation: Future[Any] | None = None
@@ -153,8 +153,8 @@ class Launcher:
         for name, process in self.processes.items():
             if process.code is not None and name not in self._dead:
                 self._dead.add(name)
-                say(f"{name} has died (exit code {process.code}). {self._consequence(name)}")
-                say(f"Restart it with: golem restart {name}")
+                log_line(f"{name} has died (exit code {process.code}). {self._consequence(name)}")
+                log_line(f"Restart it with: golem restart {name}")
         if self._activate and self.gate is not None and self.gate.state is GateState.ARMED:
             if self._activation is None and self._client.ready():
                 self._activation = self._client.call(Trigger_Request())
@@ -165,7 +165,7 @@ class Launcher:
         self.processes[name].end()
         self._dead.discard(name)
         self.processes[name] = Process(name, self._words[name])
-        say(f"{name} was restarted (process {self.processes[name].pid}).")
+        log_line(f"{name} was restarted (process {self.processes[name].pid}).")
 
     def close(self) -> None:
         """End all processes: what commands, then the gate, which damps, then the robot."""
@@ -181,7 +181,11 @@ class Launcher:
             lambda: self.gate is not None and self.gate.state is not GateState.ACTIVE,
             SILENCE + 1.0,
         )
-        return "The safety gate is silent." if self.gate is None else f"The safety gate is {told(self.gate)}."
+        return (
+            "The safety gate is silent."
+            if self.gate is None
+            else f"The safety gate is {describe_status(self.gate)}."
+        )
 
     def _restarter(self, name: Part) -> Callable[[Any], Trigger_Response]:
         def answer(request: Any) -> Trigger_Response:

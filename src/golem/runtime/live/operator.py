@@ -13,13 +13,13 @@ from golem.hardware.safety.base import GateState
 from golem.middleware import public
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.ros.base import Node
+from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, Trigger_Request
-from golem.runtime.live.authority import CALLS, Authority
-from golem.runtime.live.member import ANSWER, SEARCH, find, member, say, until
-from golem.runtime.live.surface import Surface
-from golem.runtime.live.verdict import to_status, told
+from golem.runtime.live.motion_switcher_client import CALLS, MotionSwitcherClient
+from golem.runtime.live.node_setup import ANSWER, SEARCH, find, log_line, member, until
+from golem.runtime.live.role_endpoints import RoleEndpoints
+from golem.runtime.live.safety_status import describe_status, to_status
 
 REQUESTS: dict[str, tuple[str, Any]] = {
     "activate": ("/safety/activate", Trigger_Request()),
@@ -69,7 +69,7 @@ def run_request(what: str, config: RequestConfig) -> bool:
             return _status(node, config.dds)
         kind = next(row.type for row in public.SERVICES if row.name == service)
         response = ask(node, service, kind, request, f"start it with: {config.dds.command('safety')}")
-        say(response.message)
+        log_line(response.message)
         return response.success
 
 
@@ -83,11 +83,11 @@ def run_restart(config: RestartConfig) -> bool:
         name = f"/launch/restart_{config.process}"
         remedy = f"only what 'golem launch' started on {config.dds} can be restarted so"
         response = ask(node, name, public.TRIGGER, Trigger_Request(), remedy)
-        say(response.message)
+        log_line(response.message)
         return response.success
 
 
-def ask(node: Node, service: str, kind: str, request: Any, remedy: str) -> Any:
+def ask(node: RosNode, service: str, kind: str, request: Any, remedy: str) -> Any:
     """Call a service and return the response.
 
     Args:
@@ -105,7 +105,7 @@ def ask(node: Node, service: str, kind: str, request: Any, remedy: str) -> Any:
     return node.wait(client.call(request), ANSWER)
 
 
-def _status(node: Node, dds: DdsConfig) -> bool:
+def _status(node: RosNode, dds: DdsConfig) -> bool:
     row = public.topic("/safety/status")
     subscription = node.subscription(row.name, row.type, None, row.qos)
     if not until(node, lambda: subscription.latest() is not None, SEARCH):
@@ -113,7 +113,7 @@ def _status(node: Node, dds: DdsConfig) -> bool:
     message = subscription.latest()
     assert message is not None
     status = to_status(message, 0.0)
-    say(told(status))
+    log_line(describe_status(status))
     return status.state is GateState.ACTIVE
 
 
@@ -128,30 +128,32 @@ def run_take(config: TakeConfig) -> bool:
         return _take(participant, node, config)
 
 
-def _take(participant: Participant, node: Node, config: TakeConfig) -> bool:
-    authority = Authority.on(Surface("safety", participant, node, only=(CALLS,)), node.now)
+def _take(participant: Participant, node: RosNode, config: TakeConfig) -> bool:
+    switcher = MotionSwitcherClient.on(RoleEndpoints("safety", participant, node, only=(CALLS,)), node.now)
 
     def answered(wanted: Callable[[], bool], timeout: float) -> bool:
         def ask() -> bool:
-            authority.poll()
+            switcher.poll()
             return wanted()
 
         return until(node, ask, timeout)
 
-    if not answered(lambda: authority.known, SEARCH):
+    if not answered(lambda: switcher.known, SEARCH):
         raise RosError(
             f"No robot on {config.dds} says which of its own controllers has the motors; is it switched on?"
         )
-    if not authority.free:
+    if not switcher.free:
         if not config.hanging:
             raise ConfigError(
-                f"'{authority.owner}' has the motors. A robot that stands falls once it lets go of them: hang it up, "
+                f"'{switcher.owner}' has the motors. A robot that stands falls once it lets go of them: hang it up, "
                 "then repeat this with --hanging."
             )
-        say(f"'{authority.owner}' has the motors and lets go of them: the robot goes limp.")
-        authority.release()
-        if not answered(lambda: authority.free, SEARCH):
-            say(f"'{authority.owner}' still has them: switch the robot to its debug mode by remote control.")
+        log_line(f"'{switcher.owner}' has the motors and lets go of them: the robot goes limp.")
+        switcher.release()
+        if not answered(lambda: switcher.free, SEARCH):
+            log_line(
+                f"'{switcher.owner}' still has them: switch the robot to its debug mode by remote control."
+            )
             return False
-    say("None of the robot's own controllers has the motors.")
+    log_line("None of the robot's own controllers has the motors.")
     return True

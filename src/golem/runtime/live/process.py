@@ -17,18 +17,18 @@ from golem.errors import ConfigError
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import GateState, GateStatus, SafetyLimits
 from golem.middleware.dds.domain import ROBOT_DOMAIN, DdsConfig
+from golem.middleware.exclusive_writers import owner, refuse_second
 from golem.middleware.interrupt import interrupted
-from golem.middleware.sole import owner, refuse_second
-from golem.robots.base import Recallable
-from golem.runtime.assembly import build_robot
-from golem.runtime.executor import TICK
-from golem.runtime.live.darkroom import Darkroom
-from golem.runtime.live.gate import LiveGate
-from golem.runtime.live.member import Teller, company, member
-from golem.runtime.live.stack import LiveStack
+from golem.robots.base import Restorable
+from golem.runtime.live.node_setup import AsyncLogger, company, member
+from golem.runtime.live.render_worker import RenderWorker
+from golem.runtime.live.safety_process import SafetyProcess
+from golem.runtime.live.safety_status import describe_status
+from golem.runtime.live.stack_process import StackProcess
 from golem.runtime.live.twin import Twin
-from golem.runtime.live.verdict import told
+from golem.runtime.lockstep import build_robot
 from golem.stack import Stack, load_stack
+from golem.types import TICK
 
 ROBOT_LIMITS = "urdf"
 """Limit profile of the real robot: the smaller torques."""
@@ -110,19 +110,19 @@ def run_twin(config: TwinConfig) -> None:
     stack = twin_stack(config)
     with (
         interrupted() as stop,
-        closing(Teller()) as tell,
+        closing(AsyncLogger()) as tell,
         member("twin", config.dds) as (participant, node),
     ):
         refuse_second(participant, config.dds, "/lowstate", "/clock")
         with closing(build_robot(stack, config.seed)) as robot, ExitStack() as closing_time:
-            darkroom = None
-            if isinstance(robot, Recallable):
-                darkroom = closing_time.enter_context(
-                    closing(Darkroom(stack, config.seed, robot, config.dds))
+            render_worker = None
+            if isinstance(robot, Restorable):
+                render_worker = closing_time.enter_context(
+                    closing(RenderWorker(stack, config.seed, robot, config.dds))
                 )
-            twin = Twin(stack, robot, participant, node, darkroom, tell=tell)
-            if darkroom is not None:
-                darkroom.wait(stop.is_set)
+            twin = Twin(stack, robot, participant, node, render_worker, tell=tell)
+            if render_worker is not None:
+                render_worker.wait(stop.is_set)
             tell(f"The twin of '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
             settle()
             twin.run(stop.is_set)
@@ -143,12 +143,14 @@ def run_safety(config: SafetyConfig) -> None:
     with (
         # Ctrl-Z or Ctrl-\ in the wrong terminal would freeze or kill the gate, and leave the motors a stiff command.
         interrupted(also=(signal.SIGTSTP, signal.SIGQUIT)) as stop,
-        closing(Teller()) as tell,
+        closing(AsyncLogger()) as tell,
         member("safety", config.dds) as (participant, node),
     ):
         refuse_second(participant, config.dds, "/lowcmd")
         who = partial(owner, participant)
-        gate = LiveGate(participant, node, limits, estop, who=who, patient=patient, real=config.dds.robot)
+        gate = SafetyProcess(
+            participant, node, limits, estop, who=who, patient=patient, real=config.dds.robot
+        )
         tell(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
         if estop is None:
             tell("No driver of an emergency stop is here: the gate stays shut.")
@@ -182,12 +184,12 @@ def run_up(config: UpConfig) -> None:
     stack = load_stack(config.stack, profile=config.profile)
     with (
         interrupted() as stop,
-        closing(Teller()) as tell,
-        ThreadPoolExecutor(1, "localizer") as beside,
+        closing(AsyncLogger()) as tell,
+        ThreadPoolExecutor(1, "localizer") as pool,
         member("up", config.dds) as (participant, node),
     ):
         refuse_second(participant, config.dds, "/safety/lowcmd_in")
-        live = LiveStack(stack, participant, node, real=config.dds.robot, beside=beside, tell=tell)
+        live = StackProcess(stack, participant, node, real=config.dds.robot, pool=pool, tell=tell)
         tell(f"The stack '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
         waiting_since: float | None = time.monotonic()
         said, restarts = GateStatus(0.0, GateState.INIT), 0
@@ -214,5 +216,5 @@ def run_up(config: UpConfig) -> None:
 def report(before: GateStatus, now: GateStatus, tell: Callable[[str], None]) -> GateStatus:
     """Tell what the gate is now if it changed; return it."""
     if (now.state, now.reason) != (before.state, before.reason):
-        tell(f"Safety gate: {told(now)}")
+        tell(f"Safety gate: {describe_status(now)}")
     return now

@@ -17,28 +17,27 @@ from golem.middleware.topics import Exposure
 from golem.robots.model import tree
 from golem.robots.model.export import export_urdf
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
-from golem.runtime.executor import TICK
-from golem.runtime.live.surface import Surface
-from golem.types import SIDES, Array, HandState, LowState, Side
+from golem.runtime.live.role_endpoints import RoleEndpoints
+from golem.types import SIDES, TICK, Array, HandState, LowState, Side
 
 JOINTS = tuple(hinge.joint for hinge in tree.HINGES)
 LINKS = tuple((hinge.parent, hinge.child) for hinge in tree.HINGES)
 
 
-def describe(surface: Surface, calibration: Mapping[str, Array]) -> None:
+def describe(endpoints: RoleEndpoints, calibration: Mapping[str, Array]) -> None:
     """Publish what holds for good: the description, and every frame that does not move in its parent.
 
     Args:
-        surface: of the robot.
+        endpoints: of the robot.
         calibration: of each camera; see `Robot.calibration`. Its optical frame in /tf_static is the claimed one.
     """
-    surface.publish("/robot_description", String(export_urdf(hands=True)))
+    endpoints.publish("/robot_description", String(export_urdf(hands=True)))
     links = [(edge.parent, edge.child) for edge in tree.FIXED]
     poses = [edge.T_parent_child for edge in tree.FIXED]
     for camera, T in calibration.items():
         links.append((OPTICAL_FRAMES[camera], public.optical_frame(camera)))
         poses.append(T)
-    surface.publish("/tf_static", convert.transforms(0.0, links, np.array(poses)))
+    endpoints.publish("/tf_static", convert.transforms(0.0, links, np.array(poses)))
 
 
 class ClockOut:
@@ -46,14 +45,14 @@ class ClockOut:
 
     period = TICK
 
-    def __init__(self, surface: Surface) -> None:
+    def __init__(self, endpoints: RoleEndpoints) -> None:
         """Publish on `surface`."""
-        self._surface = surface
+        self._endpoints = endpoints
 
     def step(self, t: float) -> None:
         """Send the time."""
-        if self._surface.heard("/clock"):
-            self._surface.publish("/clock", Clock(convert.time(t)))
+        if self._endpoints.heard("/clock"):
+            self._endpoints.publish("/clock", Clock(convert.time(t)))
 
 
 class JointsOut:
@@ -61,17 +60,17 @@ class JointsOut:
 
     period = 0.01
 
-    def __init__(self, bus: Bus, surface: Surface) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
         """Publish on `surface` what is on `bus`."""
-        self._bus, self._surface = bus, surface
+        self._bus, self._endpoints = bus, endpoints
 
     def step(self, t: float) -> None:
         """Send the present angles; the fingers' speeds and torques are not measured."""
         state = self._bus.latest(topics.LOW_STATE, LowState)
-        if state is not None and self._surface.heard("/joint_states"):
+        if state is not None and self._endpoints.heard("/joint_states"):
             angle, none = _angles(self._bus, state), np.zeros(len(JOINTS) - len(state.q))
             dq, tau = (np.concatenate([v, none]) for v in (state.dq, state.tau))
-            self._surface.publish("/joint_states", convert.joint_state(state.t, JOINTS, angle, dq, tau))
+            self._endpoints.publish("/joint_states", convert.joint_state(state.t, JOINTS, angle, dq, tau))
 
 
 class FramesOut:
@@ -79,16 +78,16 @@ class FramesOut:
 
     period = 0.02
 
-    def __init__(self, bus: Bus, surface: Surface) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
         """Publish on `surface` what is on `bus`."""
-        self._bus, self._surface = bus, surface
+        self._bus, self._endpoints = bus, endpoints
 
     def step(self, t: float) -> None:
         """Send the present poses."""
         state = self._bus.latest(topics.LOW_STATE, LowState)
-        if state is not None and self._surface.heard("/tf"):
+        if state is not None and self._endpoints.heard("/tf"):
             poses = tree.poses(_angles(self._bus, state))
-            self._surface.publish("/tf", convert.transforms(state.t, LINKS, poses))
+            self._endpoints.publish("/tf", convert.transforms(state.t, LINKS, poses))
 
 
 class CameraOut:
@@ -96,16 +95,16 @@ class CameraOut:
 
     period = TICK
 
-    def __init__(self, bus: Bus, surface: Surface, camera: str) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints, camera: str) -> None:
         """Publish on `surface` what `camera` puts on `bus`."""
-        self._surface = surface
+        self._endpoints = endpoints
         self._exposures = News(bus, topics.exposures(camera), Exposure)
         self._frame = public.optical_frame(camera)
         self._topics = {what: public.image(camera, what) for what in public.IMAGES}
 
     def wanted(self) -> bool:
         """Return whether anybody wants images."""
-        return self._surface.heard(*self._topics.values())
+        return self._endpoints.heard(*self._topics.values())
 
     def step(self, t: float) -> None:
         """Send a new exposure."""
@@ -126,8 +125,8 @@ class CameraOut:
             public.DEPTH_INFO: info,
         }
         for what, topic in self._topics.items():
-            if self._surface.heard(topic):
-                self._surface.publish(topic, forms[what]())
+            if self._endpoints.heard(topic):
+                self._endpoints.publish(topic, forms[what]())
 
 
 class HandOut:
@@ -135,20 +134,20 @@ class HandOut:
 
     period = 0.01
 
-    def __init__(self, bus: Bus, surface: Surface, side: Side) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints, side: Side) -> None:
         """Publish on `surface` what the hand on `side` puts on `bus`."""
-        self._bus, self._surface = bus, surface
+        self._bus, self._endpoints = bus, endpoints
         self._side: Side = side
         self._topic = public.gripper(side, "state")
 
     def step(self, t: float) -> None:
         """Send the present report."""
         state = self._bus.latest(topics.hand_state(self._side), HandState)
-        if state is not None and self._surface.heard(self._topic):
-            self._surface.publish(self._topic, convert.hand_state(state, self._side))
+        if state is not None and self._endpoints.heard(self._topic):
+            self._endpoints.publish(self._topic, convert.hand_state(state, self._side))
 
 
-def take_hand_commands(bus: Bus, surface: Surface, side: Side) -> None:
+def take_hand_commands(bus: Bus, endpoints: RoleEndpoints, side: Side) -> None:
     """Bring what the hand on `side` is told to `bus`, whenever the node is polled."""
     topic = topics.hand_command(side)
 
@@ -156,7 +155,7 @@ def take_hand_commands(bus: Bus, surface: Surface, side: Side) -> None:
         command = convert.to_hand_command(message)
         bus.publish(topic, command, command.t)
 
-    surface.subscribe(public.gripper(side, "command"), take)
+    endpoints.subscribe(public.gripper(side, "command"), take)
 
 
 def _angles(bus: Bus, state: LowState) -> Array:

@@ -9,7 +9,7 @@ from golem.hardware.safety.base import GateState, GateStatus
 from golem.middleware import public, topics
 from golem.middleware.bus import Bus
 from golem.middleware.ros import convert, images
-from golem.middleware.ros.base import Client, Node, Subscription
+from golem.middleware.ros.base import Client, RosNode, Subscription
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs import golem_interfaces, sensor_msgs
 from golem.middleware.ros.msgs.geometry_msgs import Twist
@@ -18,15 +18,14 @@ from golem.middleware.topics import Exposure
 from golem.robots.sensors.calibration import calibrations
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.pairing import Pairing
-from golem.runtime.cameras import looked_for
-from golem.runtime.executor import TICK
-from golem.runtime.live.member import say
-from golem.runtime.live.pace import SILENCE
-from golem.runtime.live.surface import Surface
+from golem.runtime.live.node_setup import log_line
+from golem.runtime.live.role_endpoints import RoleEndpoints
+from golem.runtime.live.safety_status import to_status
+from golem.runtime.live.sim_sync import SILENCE
 from golem.runtime.live.velocity import Velocities
-from golem.runtime.live.verdict import to_status
 from golem.runtime.nodes import moving
-from golem.types import SIDES, Array, CameraInfo, Side
+from golem.runtime.perception_nodes import detection_requested
+from golem.types import SIDES, TICK, Array, CameraInfo, Side
 
 AHEAD = 0.05
 """How far ahead of the robot's time an image may be stamped [s] [own]: more, and its clock is another."""
@@ -37,11 +36,11 @@ class CameraIn:
 
     period = TICK
 
-    def __init__(self, bus: Bus, surface: Surface, camera: str) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints, camera: str) -> None:
         """Bring the exposures of `camera` to `bus`."""
         self._t, self._warned = 0.0, False
-        self._bus, self._surface, self._camera = bus, surface, camera
-        self._wanted = looked_for(bus, camera)
+        self._bus, self._endpoints, self._camera = bus, endpoints, camera
+        self._wanted = detection_requested(bus, camera)
         self._open: list[Subscription] = []
         self._info: CameraInfo | None = None
         self._pairing = Pairing(self._take)
@@ -60,7 +59,7 @@ class CameraIn:
             (public.DEPTH, self._pairing.depth),
         )
         for what, callback in callbacks:
-            self._open.append(self._surface.subscribe(public.image(self._camera, what), callback))
+            self._open.append(self._endpoints.subscribe(public.image(self._camera, what), callback))
 
     def close(self) -> None:
         """Read no more."""
@@ -85,7 +84,7 @@ class CameraIn:
     def _warn(self, t: float) -> None:
         if not self._warned:
             self._warned = True
-            say(
+            log_line(
                 f"Images of the {self._camera} camera are ignored: they are stamped {t:.3f} s, the robot's time is "
                 f"{self._t:.3f} s. Start the camera's driver with use_sim_time: /clock is the robot's."
             )
@@ -96,12 +95,14 @@ class GateIn:
 
     period = TICK
 
-    def __init__(self, bus: Bus, surface: Surface, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, bus: Bus, endpoints: RoleEndpoints, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         """Bring them to `bus`; `clock` is this process's own [s]."""
         self._bus, self._clock = bus, clock
         self._heard_at, self._t = -SILENCE, 0.0
         self._status: GateStatus | None = None
-        surface.subscribe("/safety/status", self._take)
+        endpoints.subscribe("/safety/status", self._take)
 
     def step(self, t: float) -> None:
         """Publish the newest verdict."""
@@ -118,18 +119,18 @@ class GateIn:
         self._heard_at, self._status = self._clock(), to_status(message, self._t)
 
 
-class RemoteBand:
-    """The band of a twin that stands, let go by a call; see `Banded`.
+class RemoteGantry:
+    """The band of a twin that stands, let go by a call; see `HasGantry`.
 
     Attributes:
-        banded: whether it is still to be let go, as far as is known.
+        on_gantry: whether it is still to be let go, as far as is known.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: RosNode) -> None:
         """Call through `node`."""
         self._client: Client = node.client("/elastic_band/release", public.TRIGGER)
         self._answer: Future[Trigger_Response] | None = None
-        self.banded = True
+        self.on_gantry = True
 
     def release(self) -> None:
         """Ask for it; the answer comes later, and a call that fails is made again."""
@@ -139,7 +140,7 @@ class RemoteBand:
 
     def renew(self) -> None:
         """Begin anew: the robot was started again."""
-        self._answer, self.banded = None, True
+        self._answer, self.on_gantry = None, True
 
     def _answered(self, answer: Future[Trigger_Response]) -> None:
         if answer is not self._answer:
@@ -150,12 +151,12 @@ class RemoteBand:
         except Exception:  # whatever became of the call: it is made again
             return
         # Let go, or there was none.
-        self.banded = False
+        self.on_gantry = False
 
 
 def listen(
     bus: Bus,
-    surface: Surface,
+    endpoints: RoleEndpoints,
     calibration: dict[str, Array],
     now: Callable[[], float],
     busy: Callable[[], bool],
@@ -164,7 +165,7 @@ def listen(
 
     Args:
         bus: where they go.
-        surface: where they come from.
+        endpoints: where they come from.
         calibration: by camera; see `Robot.calibration`.
         now: robot time [s].
         busy: whether a skill has the robot: velocities from elsewhere are then ignored.
@@ -178,7 +179,7 @@ def listen(
         topic = topics.hand_state(side)
         return lambda message: bus.publish(topic, convert.to_hand_state(message), now())
 
-    surface.subscribe("/tf_static", lambda message: calibration.update(calibrations(message)))
-    surface.subscribe("/cmd_vel", take_twist)
+    endpoints.subscribe("/tf_static", lambda message: calibration.update(calibrations(message)))
+    endpoints.subscribe("/cmd_vel", take_twist)
     for side in SIDES:
-        surface.subscribe(public.gripper(side, "state"), take_hand(side))
+        endpoints.subscribe(public.gripper(side, "state"), take_hand(side))

@@ -13,13 +13,12 @@ from golem.middleware.bus import Bus, News
 from golem.middleware.ros import convert
 from golem.middleware.ros.msgs import golem_interfaces
 from golem.middleware.ros.msgs.std_srvs import Trigger_Response
-from golem.middleware.topics import HandGoal, LegStatus, Sightings
-from golem.robots.model import magpie
-from golem.robots.model.imu import sensed_base_rate
-from golem.runtime.executor import TICK
-from golem.runtime.live.surface import Surface
+from golem.middleware.topics import Detections, HandGoal, LegStatus
+from golem.robots.model import magpie_model
+from golem.robots.model.imu_mount import sensed_base_rate
+from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.nodes import moving
-from golem.types import BaseEstimate, HandCommand, LowState, Side
+from golem.types import TICK, BaseEstimate, HandCommand, LowState, Side
 
 SHUT = "The safety gate is shut, see /safety/status."
 
@@ -29,15 +28,15 @@ class BaseOut:
 
     period = TICK
 
-    def __init__(self, bus: Bus, surface: Surface) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
         """Publish on `surface` what is on `bus`."""
-        self._surface, self._news = surface, News(bus, topics.BASE, BaseEstimate)
+        self._endpoints, self._news = endpoints, News(bus, topics.BASE, BaseEstimate)
 
     def step(self, t: float) -> None:
         """Send a new estimate."""
         estimate = self._news.read()
         if estimate is not None:
-            self._surface.publish("/base_estimate", convert.base_estimate(estimate))
+            self._endpoints.publish("/base_estimate", convert.base_estimate(estimate))
 
 
 class OdometryOut:
@@ -45,9 +44,9 @@ class OdometryOut:
 
     period = 0.02
 
-    def __init__(self, bus: Bus, surface: Surface) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
         """Publish on `surface` what is on `bus`."""
-        self._bus, self._surface = bus, surface
+        self._bus, self._endpoints = bus, endpoints
 
     def step(self, t: float) -> None:
         """Send the present estimate."""
@@ -55,12 +54,14 @@ class OdometryOut:
         state = self._bus.latest(topics.LOW_STATE, LowState)
         if estimate is None or state is None:
             return
-        if self._surface.heard("/odom"):
+        if self._endpoints.heard("/odom"):
             message = convert.odometry(estimate, sensed_base_rate(state))
-            self._surface.publish("/odom", message)
-        if self._surface.heard("/tf"):
+            self._endpoints.publish("/odom", message)
+        if self._endpoints.heard("/tf"):
             pose = estimate.T_odom_base[np.newaxis]
-            self._surface.publish("/tf", convert.transforms(estimate.t, [("odom", public.BASE_FRAME)], pose))
+            self._endpoints.publish(
+                "/tf", convert.transforms(estimate.t, [("odom", public.BASE_FRAME)], pose)
+            )
 
 
 class LegsOut:
@@ -68,15 +69,15 @@ class LegsOut:
 
     period = 0.02
 
-    def __init__(self, bus: Bus, surface: Surface) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
         """Publish on `surface` what is on `bus`."""
-        self._bus, self._surface = bus, surface
+        self._bus, self._endpoints = bus, endpoints
 
     def step(self, t: float) -> None:
         """Send the present status."""
         status = self._bus.latest(topics.LEG_STATUS, LegStatus)
-        if status is not None and self._surface.heard("/legs/status"):
-            self._surface.publish("/legs/status", convert.leg_status(status))
+        if status is not None and self._endpoints.heard("/legs/status"):
+            self._endpoints.publish("/legs/status", convert.leg_status(status))
 
 
 class SightingsOut:
@@ -84,16 +85,16 @@ class SightingsOut:
 
     period = TICK
 
-    def __init__(self, bus: Bus, surface: Surface, camera: str) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints, camera: str) -> None:
         """Publish on `surface` what was found in the frames of `camera`."""
-        self._surface, self._topic = surface, f"/objects/{camera}"
-        self._news = News(bus, topics.sightings(camera), Sightings)
+        self._endpoints, self._topic = endpoints, f"/objects/{camera}"
+        self._news = News(bus, topics.detections(camera), Detections)
 
     def step(self, t: float) -> None:
         """Send new sightings."""
         sightings = self._news.read()
         if sightings is not None:
-            self._surface.publish(self._topic, convert.sightings(sightings))
+            self._endpoints.publish(self._topic, convert.sightings(sightings))
 
 
 class HandCommandOut:
@@ -101,9 +102,9 @@ class HandCommandOut:
 
     period = 0.01
 
-    def __init__(self, bus: Bus, surface: Surface, side: Side) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints, side: Side) -> None:
         """Publish on `surface` what is on `bus`."""
-        self._bus, self._surface = bus, surface
+        self._bus, self._endpoints = bus, endpoints
         self._side: Side = side
 
     def step(self, t: float) -> None:
@@ -111,7 +112,7 @@ class HandCommandOut:
         command = self._bus.latest(topics.hand_command(self._side), HandCommand)
         if command is not None:
             message = convert.hand_command(command, self._side)
-            self._surface.publish(public.gripper(self._side, "command"), message)
+            self._endpoints.publish(public.gripper(self._side, "command"), message)
 
 
 class HandStatusOut:
@@ -119,20 +120,20 @@ class HandStatusOut:
 
     period = 0.1
 
-    def __init__(self, bus: Bus, surface: Surface, side: Side) -> None:
+    def __init__(self, bus: Bus, endpoints: RoleEndpoints, side: Side) -> None:
         """Publish on `surface` what is on `bus`."""
-        self._bus, self._surface = bus, surface
+        self._bus, self._endpoints = bus, endpoints
         self._side: Side = side
 
     def step(self, t: float) -> None:
         """Send the present status."""
         topic = public.gripper(self._side, "status")
         status = self._bus.latest(topics.hand_status(self._side), HandStatus)
-        if status is None or not self._surface.heard(topic):
+        if status is None or not self._endpoints.heard(topic):
             return
         head = convert.header(max(status.t, 0.0), f"{self._side}_gripper")
         force = np.array(status.force, np.float64)
-        self._surface.publish(
+        self._endpoints.publish(
             topic, golem_interfaces.HandStatus(head, status.state, status.gap, status.offset, force)
         )
 
@@ -153,23 +154,26 @@ def hand_services(bus: Bus, side: Side, now: Callable[[], float]) -> dict[str, C
         return True, ""
 
     def set_gap(request: Any) -> Any:
-        if not 0.0 <= request.gap <= magpie.MAX_GAP:
+        if not 0.0 <= request.gap <= magpie_model.MAX_GAP:
             return golem_interfaces.SetGap_Response(
-                False, f"The gap is {request.gap} m; it must lie between 0 and {magpie.MAX_GAP:.3f} m."
+                False, f"The gap is {request.gap} m; it must lie between 0 and {magpie_model.MAX_GAP:.3f} m."
             )
         return golem_interfaces.SetGap_Response(*give(HandGoal(request.gap)))
 
     def set_force(request: Any) -> Any:
-        if not magpie.MIN_FORCE <= request.force <= magpie.MAX_FORCE:
+        if not magpie_model.MIN_FORCE <= request.force <= magpie_model.MAX_FORCE:
             return golem_interfaces.SetForce_Response(
                 False,
-                f"The force is {request.force} N; it must lie between {magpie.MIN_FORCE} and {magpie.MAX_FORCE} N.",
+                f"The force is {request.force} N; it must lie between {magpie_model.MIN_FORCE} and "
+                f"{magpie_model.MAX_FORCE} N.",
             )
         return golem_interfaces.SetForce_Response(*give(HandGoal(None, request.force)))
 
     return {
-        public.gripper(side, "open"): lambda _: Trigger_Response(*give(HandGoal(magpie.MAX_GAP))),
-        public.gripper(side, "close"): lambda _: Trigger_Response(*give(HandGoal(None, magpie.MAX_FORCE))),
+        public.gripper(side, "open"): lambda _: Trigger_Response(*give(HandGoal(magpie_model.MAX_GAP))),
+        public.gripper(side, "close"): lambda _: Trigger_Response(
+            *give(HandGoal(None, magpie_model.MAX_FORCE))
+        ),
         public.gripper(side, "set_position"): set_gap,
         public.gripper(side, "set_force"): set_force,
     }

@@ -9,8 +9,8 @@ import numpy as np
 import tyro
 
 from golem.training.detector import dataset
-from golem.training.detector.train import TrainConfig
-from golem.training.detector.train import train as run_training
+from golem.training.detector.train_detector import TrainDetectorConfig
+from golem.training.detector.train_detector import train as run_training
 
 RUNS = Path("runs/detector")
 
@@ -44,7 +44,7 @@ def train(data: Path = RUNS / "data", out: Path = RUNS / "run", seed: int = 0, s
         seed: of weights and crops.
         steps: gradient steps of 8 crops.
     """
-    print(run_training(TrainConfig(data=data, out=out, seed=seed, steps=steps)))
+    print(run_training(TrainDetectorConfig(data=data, out=out, seed=seed, steps=steps)))
 
 
 def export(checkpoint: Path = RUNS / "run" / "best.pt", out: Path = RUNS / "detector.onnx") -> None:
@@ -54,7 +54,7 @@ def export(checkpoint: Path = RUNS / "run" / "best.pt", out: Path = RUNS / "dete
         checkpoint: of `train`.
         out: the ONNX file.
     """
-    from golem.training.detector.export import export_onnx
+    from golem.training.detector.export_detector import export_onnx
 
     print(export_onnx(checkpoint, out))
 
@@ -78,7 +78,7 @@ def evaluate(data: Path = RUNS / "data", weights: Path | None = None) -> None:
         data: folder of the splits.
         weights: ONNX file; the shipped one if absent.
     """
-    from golem.capabilities.localization.onnx_detector import OnnxDetector, OnnxDetectorConfig
+    from golem.capabilities.perception.onnx_detector import OnnxDetector, OnnxDetectorConfig
     from golem.training.detector.evaluate import THRESHOLD, evaluate, table
 
     detector = OnnxDetector(OnnxDetectorConfig(None if weights is None else str(weights), THRESHOLD))

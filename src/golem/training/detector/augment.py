@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.localization.classes import CLASSES
-from golem.capabilities.localization.peaks import STRIDE
+from golem.capabilities.perception.classes import CLASSES
+from golem.capabilities.perception.peaks import STRIDE
 from golem.types import Array
 
 MEAN = (0.45, 0.45, 0.45)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
-from golem.capabilities.localization.classes import CLASSES
+from golem.capabilities.perception.classes import CLASSES
 
 SIZE = (900, 420)
 MARGIN = (60, 30, 150, 45)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from golem.robots.sensors.streams import stream
-from golem.training.detector import scene
+from golem.training.detector import random_scene
 from golem.training.detector.labels import COLUMNS, label_image
 from golem.types import Array
 
@@ -48,13 +48,13 @@ def render(
         per_camera: images of the head camera, and as many of the palm cameras.
     """
     rng = stream(seed, f"detector/{split}/{world_index}")
-    world = scene.build_world(rng)
-    plain, fancy = scene.make_rigs(world)
+    world = random_scene.build_world(rng)
+    plain, fancy = random_scene.make_rigs(world)
     with plain, fancy:
         for k in range(2 * per_camera):
-            scene.randomise_looks(world, rng)
-            scene.randomise_objects(world, rng)
-            info = (scene.place_head if k % 2 == 0 else scene.place_palm)(world, rng)
+            random_scene.randomise_looks(world, rng)
+            random_scene.randomise_objects(world, rng)
+            info = (random_scene.place_head if k % 2 == 0 else random_scene.place_palm)(world, rng)
             rig = fancy if rng.random() < FANCY_SHARE else plain
             rgb, _ = rig.render(world.data, info.name)
             labels = label_image(world, info, plain.segment(world.data, info.name))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.localization.classes import CLASSES
+from golem.capabilities.perception.classes import CLASSES
 from golem.training.detector.dataset import Dataset
 from golem.types import Array, Detection
 

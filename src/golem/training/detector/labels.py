@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.localization.classes import CLASSES
+from golem.capabilities.perception.classes import CLASSES
 from golem.robots.sensors.cameras import project
-from golem.robots.worlds.pack import Part
+from golem.robots.worlds.pack import PackPart
 from golem.robots.worlds.screws import screw_name
-from golem.training.detector.scene import World, camera_pose
+from golem.training.detector.random_scene import RandomScene, camera_pose
 from golem.types import Array, CameraInfo
 
 MIN_SIDE = 3.0
@@ -21,7 +21,7 @@ MIN_VISIBLE = 0.35
 COLUMNS = ("class", "x", "y", "x_min", "y_min", "x_max", "y_max", "ignore")
 
 
-def label_image(world: World, info: CameraInfo, segmentation: NDArray[np.int32]) -> Array:
+def label_image(world: RandomScene, info: CameraInfo, segmentation: NDArray[np.int32]) -> Array:
     """Return (n, 8) labels, columns as in `COLUMNS`; centres inside the image only, boxes not clipped.
 
     Args:
@@ -45,7 +45,7 @@ def label_image(world: World, info: CameraInfo, segmentation: NDArray[np.int32])
 
 
 def _solid(
-    world: World, info: CameraInfo, T: Array, part: Part, seen: NDArray[np.int64]
+    world: RandomScene, info: CameraInfo, T: Array, part: PackPart, seen: NDArray[np.int64]
 ) -> list[list[float]]:
     model, data = world.model, world.data
     names = [n for n in part.geoms if not n.endswith("_thread")]
@@ -80,7 +80,12 @@ def _solid(
 
 
 def _hole(
-    world: World, info: CameraInfo, T: Array, mouth: Array, radius: float, segmentation: NDArray[np.int32]
+    world: RandomScene,
+    info: CameraInfo,
+    T: Array,
+    mouth: Array,
+    radius: float,
+    segmentation: NDArray[np.int32],
 ) -> list[list[float]]:
     angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(12)])

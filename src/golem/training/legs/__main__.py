@@ -13,8 +13,8 @@ from tyro.conf import arg
 from golem.training.legs.checkpoint import CHECKPOINT
 from golem.training.legs.curve import draw_curves
 from golem.training.legs.env import Task
-from golem.training.legs.train import Adversary, TrainConfig
-from golem.training.legs.train import train as run_training
+from golem.training.legs.train_legs import Adversary, TrainLegsConfig
+from golem.training.legs.train_legs import train as run_training
 
 RUNS = Path("runs/legs")
 
@@ -23,7 +23,7 @@ def run(
     out: Path = RUNS / "seed0",
     seed: int = 0,
     task: Task = "walk",
-    steps: float = TrainConfig.steps,
+    steps: float = TrainLegsConfig.steps,
     adversary: Adversary = "learned",
     robots: int = 512,
     threads: int = 2,
@@ -43,7 +43,7 @@ def run(
         start: checkpoint of another run to go on from, under this command's options; or an exported network, at
             full difficulty from its first step on.
     """
-    config = TrainConfig(out, seed, task, steps, robots, threads, adversary, start=start)
+    config = TrainLegsConfig(out, seed, task, steps, robots, threads, adversary, start=start)
     print(run_training(config))
 
 
@@ -54,7 +54,7 @@ def export(checkpoint: Path = RUNS / "seed0" / CHECKPOINT, folder: Path = RUNS /
         checkpoint: of `run`.
         folder: where to write almi_TASK.onnx and .yaml.
     """
-    from golem.training.legs.export import export as write
+    from golem.training.legs.export_policy import export as write
 
     print(*write(checkpoint, folder), sep="\n")
 

@@ -16,7 +16,7 @@ import torch
 from onnx import helper
 
 from golem.errors import ConfigError
-from golem.training.legs.export import TRAINED, graph_of, load_actor
+from golem.training.legs.export_policy import TRAINED, graph_of, load_actor
 
 
 def average(networks: Sequence[Path], weights: Sequence[float], out: Path) -> None:

@@ -91,13 +91,13 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
     pen, font = ImageDraw.Draw(image), ImageFont.load_default(12)
     left, top, right, bottom = MARGIN
     width, height = SIZE[0] - left - right, SIZE[1] - top - bottom
-    for panel, (column, title, most) in enumerate(PANELS):
+    for panel, (column, title, maximum) in enumerate(PANELS):
         x0 = panel * SIZE[0] + left
         pen.text((x0, 8), title, fill="black", font=font)
         for k in range(6):
             y = top + height * (1 - k / 5)
             pen.line([(x0, y), (x0 + width, y)], fill="#dddddd")
-            pen.text((x0 - 6, y), f"{most * k / 5:.2g}", fill="black", font=font, anchor="rm")
+            pen.text((x0 - 6, y), f"{maximum * k / 5:.2g}", fill="black", font=font, anchor="rm")
         for k in range(5):
             x = x0 + width * k / 4
             pen.text((x, top + height + 8), f"{last * k / 4e6:.1f}M", fill="black", font=font, anchor="ma")
@@ -106,7 +106,7 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
             values = np.convolve(curve.columns[column], np.full(rows, 1.0 / rows), mode="valid")
             steps = curve.columns["steps"][-len(values) :]
             points = [
-                (x0 + width * s / last, top + height * (1 - min(v / most, 1.0)))
+                (x0 + width * s / last, top + height * (1 - min(v / maximum, 1.0)))
                 for s, v in zip(steps, values, strict=True)
             ]
             pen.line(points, fill=colour, width=2)

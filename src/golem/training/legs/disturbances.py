@@ -109,7 +109,7 @@ class UpperBodyMotion:
         )
 
 
-class Pushes:
+class RandomPushes:
     """Horizontal forces on torso or pelvis of `n` robots: short knocks and slow rods.
 
     Attributes:

@@ -8,17 +8,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.legs.balance import balance_errors, heading_frame
+from golem.capabilities.legs.balance_errors import balance_errors, heading_frame
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import Gait, GaitConfig
-from golem.capabilities.legs.observation import Layout, Signals, Term
+from golem.capabilities.legs.observation import ObservationLayout, Signals, Term
 from golem.capabilities.legs.swing import swing_offset
 from golem.hardware.safety.base import SafetyLimits
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
-from golem.training.legs.disturbances import Difficulty, Pushes, UpperBodyMotion
-from golem.training.legs.model import FEET_APART, KD, KP, STANCE, STEP
-from golem.training.legs.rewards import Rewards, Weights
-from golem.training.legs.world import Rows, World, WorldConfig
+from golem.training.legs.batch_world import BatchWorld, Rows, WorldConfig
+from golem.training.legs.disturbances import Difficulty, RandomPushes, UpperBodyMotion
+from golem.training.legs.rewards import Rewards, RewardWeights
+from golem.training.legs.training_model import FEET_APART, KD, KP, STANCE, STEP
 from golem.types import LEGS, Array
 
 PERIOD = 0.02
@@ -78,7 +78,7 @@ class EnvConfig:
     fall: float = 5.0
     gait: GaitConfig = field(default_factory=lambda: GaitConfig(period=0.64))
     world: WorldConfig = field(default_factory=WorldConfig)
-    weights: Weights = field(default_factory=Weights)
+    weights: RewardWeights = field(default_factory=RewardWeights)
 
 
 Task = Literal["walk", "stand"]
@@ -89,7 +89,7 @@ TASKS: dict[Task, EnvConfig] = {
         calm=0.3,
         impulse=100.0,
         world=WorldConfig(delay=4),
-        weights=Weights(feet=-4.0, toes=0.0),
+        weights=RewardWeights(feet=-4.0, toes=0.0),
     ),
 }
 """A network for each. One for both learned neither well: shoves of 90 N s teach a robot that walks to shuffle, and one
@@ -131,12 +131,12 @@ class LegsEnv:
         """Build the world and start every robot."""
         self.n, self.config = n, config
         self._rng = np.random.default_rng(seed)
-        self.world = World(n, config.world, self._rng, threads)
+        self.world = BatchWorld(n, config.world, self._rng, threads)
         self.difficulty = Difficulty()
-        self.layout = Layout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
+        self.layout = ObservationLayout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
         self.gait = Gait(config.gait, (n,))
         self.upper = UpperBodyMotion(n, self._rng)
-        self._pushes = Pushes(n, config.impulse, self._rng)
+        self._pushes = RandomPushes(n, config.impulse, self._rng)
         self._limits = SafetyLimits.from_profile()
         self._rewards = Rewards(n, config.weights, config.gait, self._limits)
         self.twist: Array = np.zeros((n, 3))
@@ -181,7 +181,7 @@ class LegsEnv:
         self._command(where)
 
     def shove(self, force: Array, duration: float, start: float) -> None:
-        """Push each robot once and never again; see `Pushes.once`."""
+        """Push each robot once and never again; see `RandomPushes.once`."""
         self._pushes.once(force, duration, start)
 
     def observe(self) -> tuple[Array, Array]:
@@ -261,8 +261,8 @@ class LegsEnv:
         truncated = ~ended & (self.age >= config.episode)
         self._left -= dt
         self._command(np.flatnonzero(self._left <= 0.0))
-        most = np.array(config.accelerate) * dt
-        self.twist = self.twist + np.clip(self._goal - self.twist, -most, most)
+        maximum = np.array(config.accelerate) * dt
+        self.twist = self.twist + np.clip(self._goal - self.twist, -maximum, maximum)
         stopped = ~self._goal.any(axis=1) & (np.linalg.norm(self.twist, axis=1) < 0.1)
         self.twist[stopped] = 0.0
         self._advance_gait(dt)

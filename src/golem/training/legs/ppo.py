@@ -173,9 +173,9 @@ class Ppo:
         return stats
 
     @torch.no_grad()
-    def bound_noise(self, most: float) -> None:
+    def bound_noise(self, maximum: float) -> None:
         """Let the standard deviation of no action exceed `most`."""
-        self.actor.log_std.clamp_(max=float(np.log(most)))
+        self.actor.log_std.clamp_(max=float(np.log(maximum)))
 
     @torch.no_grad()
     def set_noise(self, deviation: float) -> None:

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.legs.balance import GRAVITY
+from golem.capabilities.legs.balance_errors import GRAVITY
 from golem.capabilities.legs.gait import Gait, GaitConfig
 from golem.capabilities.legs.swing import rise, swing_share
 from golem.hardware.safety.base import SafetyLimits
-from golem.training.legs.model import FEET_APART, STANCE, STAND_HEIGHT
-from golem.training.legs.world import Rows, Truth
+from golem.training.legs.batch_world import BatchTruth, Rows
+from golem.training.legs.training_model import FEET_APART, STANCE, STAND_HEIGHT
 from golem.types import LEGS, Array
 
 _YAW = np.array([0, 6])
@@ -30,7 +30,7 @@ LOW = 0.02
 
 
 @dataclass(frozen=True)
-class Weights:
+class RewardWeights:
     """Weight of each term, per second; positive rewards, negative punishes.
 
     Attributes:
@@ -119,7 +119,7 @@ class Rewards:
     from the start it never stepped sideways.
     """
 
-    def __init__(self, n: int, weights: Weights, gait: GaitConfig, limits: SafetyLimits) -> None:
+    def __init__(self, n: int, weights: RewardWeights, gait: GaitConfig, limits: SafetyLimits) -> None:
         """Begin at rest; `limits` are the safety gate's."""
         self._limits = limits
         self._lower, self._upper = limits.lower[LEGS], limits.upper[LEGS]
@@ -141,7 +141,7 @@ class Rewards:
 
     def __call__(
         self,
-        truth: Truth,
+        truth: BatchTruth,
         twist: Array,
         gait: Gait,
         action: Array,

@@ -13,9 +13,9 @@ import numpy as np
 import torch
 
 from golem.errors import ConfigError
-from golem.evaluation.pushes import DIRECTIONS, SHOVE_TIME
+from golem.robots.mujoco.shoves import DIRECTIONS, SHOVE_TIME
 from golem.training.legs.env import PERIOD, TASKS, LegsEnv
-from golem.training.legs.export import load_actor
+from golem.training.legs.export_policy import load_actor
 
 SETTLE, PATIENCE = 2.0, 3.0
 """Time of standing before the shove, and time after its begin [s]; both have to be survived."""

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from golem.capabilities.legs.base import Envelope, LegCommand, Motion
+from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.legs.mpc.cost import CostConfig, cost
-from golem.capabilities.legs.mpc.model import PlanningModel
 from golem.capabilities.legs.mpc.planner import Planner, PlannerConfig
+from golem.capabilities.legs.mpc.planning_model import PlanningModel
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
@@ -108,7 +108,7 @@ class MPC:
         self._age = np.inf
         self._failures = 0
 
-    def step(self, state: LowState, base: BaseEstimate, motion: Motion, dt: float) -> LegCommand:
+    def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Return the plan's targets for when they arrive, after planning anew if it is time; see `LowerBody.step`.
 
         Raises:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.legs.balance import balance_errors
-from golem.capabilities.legs.mpc.model import Stance, Trajectories
+from golem.capabilities.legs.balance_errors import balance_errors
+from golem.capabilities.legs.mpc.planning_model import Stance, Trajectories
 from golem.types import Array
 
 

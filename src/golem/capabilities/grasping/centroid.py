@@ -1,0 +1,77 @@
+"""The paper's `Centroid`: close, top-down, on the centre of the object as the head camera saw it once."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.capabilities.grasping.base import Grasp, OpenLoop
+from golem.types import Array, LocalizedObject
+
+
+@dataclass(frozen=True)
+class CentroidConfig:
+    """Where around the object the fingers close.
+
+    Attributes:
+        depth: how far below the seen surface point the fingertips go at most [m]: a flange head is 5-7 mm high, and
+            the pads shall cover it.
+        clearance: height of the fingertips above the ground around the object [m]; with the hand tilted by 5 deg
+            the lower finger of a 50 mm opening is 2 mm below the middle.
+        gap: opening to arrive with [m]: room for +-20 mm of error, and the fingertips still advance by less than
+            2 mm while they close from there (parallelogram linkage).
+    """
+
+    depth: float = 0.010
+    clearance: float = 0.004
+    gap: float = 0.050
+
+
+UP: Array = np.array([0.0, 0.0, 1.0])
+"""(3,) vertical in odom."""
+
+
+def grasp_pose(position: Array, yaw: float, normal: Array = UP) -> Array:
+    """Return the (4, 4) gripper pose at `position` (3,) that looks against `normal`.
+
+    The gripper's z (approach) is -`normal` (3,), of unit length; its x axis is as near to the heading `yaw` about the
+    vertical [rad] as that allows.
+    """
+    x = np.array([math.cos(yaw), math.sin(yaw), 0.0])
+    x -= (x @ normal) * normal
+    x /= np.linalg.norm(x)
+    T = np.eye(4)
+    T[:3, 0] = x
+    T[:3, 1] = np.cross(-normal, x)
+    T[:3, 2] = -normal
+    T[:3, 3] = position
+    return T
+
+
+def grasp_depth(target: LocalizedObject, depth: float, clearance: float) -> float:
+    """Return how far below the top of `target` the fingertips shall go [m].
+
+    That is `depth`, or less where the ground around the object (the lowest tenth of its cloud) is so near that less
+    than `clearance` would be left [m]; never less than a third of `depth`.
+    """
+    if len(target.points) == 0:
+        return depth
+    ground = float(np.quantile(target.points[:, 2], 0.1))
+    height = float(target.position[2]) - ground
+    return float(np.clip(height - clearance, depth / 3.0, depth))
+
+
+class Centroid(OpenLoop):
+    """One grasp, straight down on the object's centre."""
+
+    def __init__(self, config: CentroidConfig | None = None) -> None:
+        """Take the distances from `config`."""
+        self.config = config or CentroidConfig()
+
+    def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+        """Return the one top-down grasp; see `GraspMethod`."""
+        depth = grasp_depth(target, self.config.depth, self.config.clearance)
+        position = target.position - (0.0, 0.0, depth)
+        return [Grasp(grasp_pose(position, yaw), self.config.gap, target.detection.score)]

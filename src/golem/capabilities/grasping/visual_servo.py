@@ -1,0 +1,208 @@
+"""The paper's `C-VS`: centroid grasp whose target is followed by the palm camera while the hand comes down.
+
+Not look-and-move (their 75 s): every frame updates a Kalman filter on the object's position in odom, and the gripper
+goes to the filtered position at the arm's rate. Errors of the head camera, of its calibration and of the joint
+encoders drop out, because camera and gripper sit on the same hand. For the same reason the hand is turned until it
+faces the plate squarely: tilt that the encoders do not know of shows in the plate's depth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from golem.capabilities.grasping.base import Grasp, ServoLaw, ServoStatus, ServoStep
+from golem.capabilities.grasping.centroid import UP, Centroid, CentroidConfig, grasp_depth, grasp_pose
+from golem.capabilities.grasping.ground import ground_normal
+from golem.types import Array, LocalizedObject
+
+
+@dataclass(frozen=True)
+class ServoLawConfig:
+    """Noise, gates and patience of the loop.
+
+    Attributes:
+        normal_gain: share of a frame's ground normal that is taken over; 0 keeps the vertical.
+        drift: how fast the object may wander in odom, by base sway and encoder error [m/sqrt(s)].
+        sigma_lateral: standard deviation of one sighting across the optical axis [m].
+        sigma_depth: the same along the axis, at close range [m].
+        gate: squared Mahalanobis distance beyond which a sighting is another object (chi2, 3 dof, p = 0.999).
+        first_radius: how far from the head camera's guess the first sighting may be [m].
+        confirm: sightings needed before the hand leaves its stand-off.
+        standoff: height above the grasp at which the hand centres itself [m].
+        slope: metres of height the hand keeps per metre of lateral error beyond `tolerance`.
+        tolerance: lateral error within which the fingers close [m].
+        height_tolerance: error of height within which the fingers close [m].
+        dwell: frames in a row within both tolerances before the fingers close.
+        lost_after: time without a sighting until the hand backs off [s].
+        retreat: how far it backs off to see more [m].
+        retreats: how often it may do so.
+        stall_after: time without progress until it gives up [s].
+        progress: what counts as progress [m].
+    """
+
+    normal_gain: float = 0.2
+    drift: float = 0.003
+    sigma_lateral: float = 0.002
+    sigma_depth: float = 0.002
+    gate: float = 16.3
+    first_radius: float = 0.20
+    confirm: int = 3
+    standoff: float = 0.07
+    slope: float = 6.0
+    tolerance: float = 0.003
+    height_tolerance: float = 0.0025
+    dwell: int = 3
+    lost_after: float = 1.0
+    retreat: float = 0.05
+    retreats: int = 2
+    stall_after: float = 4.0
+    progress: float = 0.001
+
+
+class CentroidServo:
+    """Kalman filter on a resting object, and a funnel that trades height against lateral error."""
+
+    def __init__(
+        self, config: ServoLawConfig, centroid: CentroidConfig, target: LocalizedObject, yaw: float, t: float
+    ) -> None:
+        """Start at time `t` [s] from what the head camera saw.
+
+        Args:
+            config: noise, gates and patience.
+            centroid: where around the object the fingers close.
+            target: the object as the head camera saw it.
+            yaw: heading of the gripper's x axis [rad].
+            t: start time [s].
+        """
+        self.label = target.label
+        self._config = config
+        self._centroid = centroid
+        self._x = np.array(target.position, dtype=float)
+        self._variance: Array = np.full(3, config.first_radius**2)
+        self._depth = centroid.depth
+        self._normal: Array = UP
+        self._yaw = yaw
+        self._t = t
+        self._seen_at = t
+        self._sightings = 0
+        self._retreats = 0
+        self._inside = 0
+        self._lift = 0.0
+        self._best = np.inf
+        self._best_at = t
+
+    def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
+        """Advance; see `ServoLaw`."""
+        c = self._config
+        self._variance = self._variance + c.drift**2 * (t - self._t)
+        self._t = t
+        seen = sightings is not None and self._update(t, sightings, T_odom_gripper)
+        status = ServoStatus.TRACKING
+        if t - self._seen_at > c.lost_after:
+            self._seen_at = t
+            self._sightings = 0
+            self._retreats += 1
+            self._lift = c.retreat * self._retreats
+            self._variance = np.full(3, c.first_radius**2)
+            if self._retreats > c.retreats:
+                status = ServoStatus.LOST
+
+        grasp = self._x - self._depth * self._normal
+        offset = T_odom_gripper[:3, 3] - grasp
+        height = float(offset @ self._normal)
+        lateral = float(np.linalg.norm(offset - height * self._normal))
+        confirmed = self._sightings >= c.confirm
+        if status is ServoStatus.TRACKING and confirmed:
+            if lateral > c.tolerance or abs(height) > c.height_tolerance:
+                self._inside = 0
+            elif seen:
+                self._inside += 1
+            if self._inside >= c.dwell:
+                status = ServoStatus.CONVERGED
+            error = lateral + abs(height)
+            if error < self._best - c.progress:
+                self._best, self._best_at = error, t
+            elif t - self._best_at > c.stall_after and status is not ServoStatus.CONVERGED:
+                status = ServoStatus.STALLED
+        else:
+            self._best, self._best_at = np.inf, t
+
+        funnel = float(np.clip(c.slope * (lateral - c.tolerance), 0.0, c.standoff))
+        above = funnel if confirmed else c.standoff + self._lift
+        goal = grasp_pose(grasp + above * self._normal, self._yaw, self._normal)
+        return ServoStep(goal, self._x.copy(), float(np.sqrt(self._variance.max())), status)
+
+    def _update(self, t: float, sightings: list[LocalizedObject], T_odom_gripper: Array) -> bool:
+        """Fuse the sighting that belongs to the target; return whether there is one in this frame."""
+        c = self._config
+        candidates = [s for s in sightings if s.label == self.label]
+        if not candidates:
+            return False
+        noise = np.array([c.sigma_lateral**2, c.sigma_lateral**2, c.sigma_depth**2])
+        if self._sightings == 0:
+            # The head camera may be off by more than the pitch of the screws: take what is under the hand.
+            boresight = T_odom_gripper[:2, 3]
+            nearest = min(candidates, key=lambda s: float(np.hypot(*(s.position[:2] - boresight))))
+            if np.hypot(*(nearest.position[:2] - boresight)) > c.first_radius:
+                return False
+            self._x, self._variance = nearest.position.copy(), noise
+            self._depth = self._wanted_depth(nearest)
+        else:
+            total = self._variance + noise
+            distances = [float(np.sum((s.position - self._x) ** 2 / total)) for s in candidates]
+            best = int(np.argmin(distances))
+            if distances[best] > c.gate:
+                return False
+            gain = self._variance / total
+            self._x = self._x + gain * (candidates[best].position - self._x)
+            self._variance = (1.0 - gain) * self._variance
+            # The ground gets clearer as the hand comes closer; the same gain as the height follows it.
+            self._depth += float(gain[2]) * (self._wanted_depth(candidates[best]) - self._depth)
+            self._turn(candidates[best])
+        self._sightings += 1
+        self._seen_at = t
+        return True
+
+    def _turn(self, sighting: LocalizedObject) -> None:
+        """Turn the approach towards the ground's normal: a hand that comes in askew jams the screw it pulls."""
+        normal = ground_normal(sighting)
+        if normal is not None:
+            mixed = self._normal + self._config.normal_gain * (normal - self._normal)
+            self._normal = mixed / np.linalg.norm(mixed)
+
+    def _wanted_depth(self, sighting: LocalizedObject) -> float:
+        return grasp_depth(sighting, self._centroid.depth, self._centroid.clearance)
+
+
+@dataclass(frozen=True)
+class VisualServoConfig:
+    """Options of `VisualServo`.
+
+    Attributes:
+        centroid: where around the object the fingers close.
+        servo: noise, gates and patience of the loop.
+    """
+
+    centroid: CentroidConfig = field(default_factory=CentroidConfig)
+    servo: ServoLawConfig = field(default_factory=ServoLawConfig)
+
+
+class VisualServo:
+    """Centroid grasp, refined by the palm camera at image rate."""
+
+    def __init__(self, config: VisualServoConfig | None = None) -> None:
+        """Take the numbers from `config`."""
+        self.config = config or VisualServoConfig()
+        self._coarse = Centroid(self.config.centroid)
+
+    def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+        """Return the centroid grasp, to start from; see `GraspMethod`."""
+        return self._coarse.propose(target, yaw)
+
+    def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw:
+        """Return the loop that refines `grasp`; see `GraspMethod`."""
+        x_axis = grasp.T_odom_gripper[:3, 0]
+        yaw = float(np.arctan2(x_axis[1], x_axis[0]))
+        return CentroidServo(self.config.servo, self.config.centroid, target, yaw, t)

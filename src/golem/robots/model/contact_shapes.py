@@ -1,0 +1,202 @@
+"""What of the robot can touch the world: a few primitives per link, fitted to the extents of the vendor's meshes.
+
+Who collides with whom (MuJoCo tests `contype` of one geom against `conaffinity` of the other, both ways):
+
+| geom              | contype     | conaffinity   | touches                                  |
+|-------------------|-------------|---------------|------------------------------------------|
+| world and parts   | `WORLD` (1) | any with 1    | each other, the robot                    |
+| body links        | `BODY` (2)  | `WORLD`       | the world; no link, no hand              |
+| hands, pads       | `HAND` (4)  | `WORLD`       | the world; no link, not the other finger |
+
+So the robot does not touch itself by default: in a hoist the legs rest, and it is the arm planner's job to keep the
+arms apart. Where legs step and arms swing while they do, `self_pairs` names the shapes that may meet. They are explicit
+pairs of the engine, so nothing else changes its partners. A geom that shall touch the hands alone takes contype 0 and
+conaffinity `HAND`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+import numpy as np
+from mujoco import mjtGeom
+
+from golem.robots.model import magpie_model
+from golem.robots.model.table import SOLE
+from golem.types import SIDES, Array, Side
+
+WORLD = 1
+BODY = 2
+HAND = 4
+
+Feet = Literal["spheres", "box"]
+"""What stands on the floor: four small spheres at the corners of each sole, or the sole as one box. Both stand on the
+same four corners; they differ on rubble and on the edge of a foot."""
+
+FOOT_FRICTION = 0.8
+"""Sliding friction of the rubber sole; chosen: the vendor's model leaves MuJoCo's default of 1."""
+FOOT_SPHERE = 0.01
+"""Radius of the four contact spheres at the corners of each sole [m]."""
+FOOT_THICKNESS = 0.03
+"""Height of the box that a foot is to the other leg, and to the floor where `Feet` says so [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A collision primitive in its link's frame.
+
+    Attributes:
+        link: the body it belongs to.
+        kind: sphere, capsule, cylinder or box.
+        size: (3,) as in MJCF [m]: radius; radius, half length; half extents.
+        pos: (3,) centre [m].
+        axis: direction of a capsule's or cylinder's length (a box is never turned).
+        friction: sliding.
+        name: of the geom, where something refers to it.
+    """
+
+    link: str
+    kind: mjtGeom
+    size: Array
+    pos: Array
+    axis: str = "z"
+    friction: float = 0.6
+    name: str = ""
+
+    @property
+    def quat(self) -> tuple[float, float, float, float]:
+        """Orientation, wxyz: the length, z in MuJoCo, along `axis`."""
+        h = float(np.sqrt(0.5))
+        return {"x": (h, 0.0, h, 0.0), "y": (h, -h, 0.0, 0.0), "z": (1.0, 0.0, 0.0, 0.0)}[self.axis]
+
+
+_SPHERE, _CAPSULE = mjtGeom.mjGEOM_SPHERE, mjtGeom.mjGEOM_CAPSULE
+_CYLINDER, _BOX = mjtGeom.mjGEOM_CYLINDER, mjtGeom.mjGEOM_BOX
+
+
+def _shape(
+    link: str,
+    kind: mjtGeom,
+    size: Sequence[float],
+    pos: Sequence[float],
+    axis: str = "z",
+    friction: float = 0.6,
+    name: str = "",
+) -> Shape:
+    padded = np.zeros(3)
+    padded[: len(size)] = size
+    return Shape(link, kind, padded, np.array(pos, dtype=float), axis, friction, name)
+
+
+def body_shapes(feet: Feet = "spheres") -> list[Shape]:
+    """Return the shapes of the 28 body links."""
+    shapes = [
+        _shape("pelvis", _CAPSULE, [0.055, 0.095], [0, 0, -0.035], "y", name="pelvis"),
+        _shape("torso_link", _BOX, [0.073, 0.105, 0.235], [0, 0, 0.245], name="trunk"),
+        _shape("torso_link", _CAPSULE, [0.085, 0.05], [0.02, 0, 0.64], name="head"),
+    ]
+    for side in SIDES:
+        s = 1.0 if side == "left" else -1.0
+        shapes += [
+            _shape(f"{side}_hip_yaw_link", _CAPSULE, [0.062, 0.02], [0, 0, 0], "y"),
+            _shape(f"{side}_hip_pitch_link", _CAPSULE, [0.06, 0.01], [0, 0, 0], "y"),
+            _shape(f"{side}_hip_roll_link", _CAPSULE, [0.062, 0.15], [0.003, 0, -0.2], name=f"{side}_thigh"),
+            _shape(f"{side}_knee_link", _CAPSULE, [0.046, 0.15], [0, 0, -0.18], name=f"{side}_shin"),
+            _shape(f"{side}_shoulder_pitch_link", _CAPSULE, [0.04, 0.03], [0, s * 0.055, -0.006], "y"),
+            _shape(f"{side}_shoulder_roll_link", _CAPSULE, [0.045, 0.05], [-0.034, 0, -0.05]),
+            _shape(
+                f"{side}_shoulder_yaw_link",
+                _CAPSULE,
+                [0.04, 0.08],
+                [0.003, 0, -0.1],
+                name=f"{side}_upper_arm",
+            ),
+            _shape(
+                f"{side}_elbow_link",
+                _CAPSULE,
+                [0.042, 0.055],
+                [0.03, s * -0.03, -0.003],
+                "x",
+                name=f"{side}_forearm",
+            ),
+            _shape(
+                f"{side}_wrist_roll_link", _CAPSULE, [0.035, 0.02], [0.05, 0, 0], "x", name=f"{side}_wrist"
+            ),
+            _shape(f"{side}_wrist_yaw_link", _CYLINDER, [0.042, 0.028], [0.026, 0, 0], "x"),
+            # The adapter disc between wrist and hand (correlllab/h1_mujoco).
+            _shape(f"{side}_wrist_yaw_link", _CYLINDER, [0.032, 0.0125], [0.0665, 0, 0], "x"),
+        ]
+        if feet == "box":
+            shapes.append(foot_box(side))
+            continue
+        for x in SOLE.x:
+            for y in SOLE.y:
+                center = [x, y, SOLE.z + FOOT_SPHERE]
+                shapes.append(
+                    _shape(f"{side}_ankle_roll_link", _SPHERE, [FOOT_SPHERE], center, friction=FOOT_FRICTION)
+                )
+    return shapes
+
+
+def foot_box(side: Side) -> Shape:
+    """Return a foot as one box that stands on the sole's four corners."""
+    (x0, x1), (y0, y1), half = SOLE.x, SOLE.y, FOOT_THICKNESS / 2
+    size = [(x1 - x0) / 2, (y1 - y0) / 2, half]
+    center = [(x0 + x1) / 2, (y0 + y1) / 2, SOLE.z + half]
+    link = f"{side}_ankle_roll_link"
+    return _shape(link, _BOX, size, center, friction=FOOT_FRICTION, name=f"{side}_foot")
+
+
+def hand_box(side: Side) -> Shape:
+    """Return the box around a hand, from the housing to the tips of its open fingers, in the hand frame."""
+    link = magpie_model.hand_name(side)
+    return _shape(link, _BOX, [0.019, 0.0667, 0.0975], [-0.002, 0, 0.0995], name=f"{side}_hand_box")
+
+
+_ARM = ("upper_arm", "forearm", "wrist", "hand_box")
+_ARM_MEETS: dict[str, tuple[str, ...]] = {
+    "upper_arm": ("trunk",),
+    "forearm": ("trunk", "head", "pelvis", "left_thigh", "right_thigh"),
+    "wrist": ("trunk", "head", "pelvis"),
+    "hand_box": ("trunk", "head", "pelvis", "left_thigh", "right_thigh", "left_shin", "right_shin"),
+}
+"""What each part of an arm can reach of the rest of the body."""
+_LEGS_MEET = (
+    ("thigh", "thigh"), ("thigh", "shin"), ("shin", "thigh"), ("shin", "shin"),
+    ("shin", "foot"), ("foot", "shin"), ("foot", "foot"),
+)  # fmt: skip
+"""What of the left leg can reach what of the right one."""
+
+
+def self_pairs(hands: bool) -> list[tuple[str, str]]:
+    """Return the names of the shapes that may meet: leg and leg, arm and arm, arm and the rest.
+
+    Neighbours along a limb are left out, since their shapes overlap, and so is what the joints keep apart anyway. A
+    robot without hands has no `hand_box`.
+    """
+    pairs = [(f"left_{a}", f"right_{b}") for a, b in _LEGS_MEET]
+    arm = _ARM if hands else _ARM[:-1]
+    pairs += [(f"{side}_{part}", other) for side in SIDES for part in arm for other in _ARM_MEETS[part]]
+    # An upper arm is out of the other upper arm's reach.
+    pairs += [
+        (f"left_{a}", f"right_{b}") for a, b in product(arm, arm) if (a, b) != ("upper_arm", "upper_arm")
+    ]
+    return pairs
+
+
+def housing_shape(link: str) -> Shape:
+    """Return the hand's housing, in the hand frame."""
+    return _shape(link, _BOX, [0.019, 0.0667, 0.0415], [-0.002, 0, 0.0435])
+
+
+def blade_shape(link: str, finger: magpie_model.Finger) -> Shape:
+    """Return a finger without its pad, in the finger frame."""
+    return _shape(
+        link,
+        _BOX,
+        [0.008, 0.006, 0.04],
+        magpie_model.mirror(finger, np.array([0.003, -0.0147, 0.0413])).tolist(),
+    )

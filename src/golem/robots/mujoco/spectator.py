@@ -1,0 +1,160 @@
+"""What a spectator sees of the simulated world: meshes, poses, pictures.
+
+This is the only place where the dashboard reads the simulator. It may: a viewer of the simulation is no module of the
+stack, and nothing read here goes back into it. Reading changes nothing either: pictures come from a renderer of the
+spectator's own, so that the noise of the robot's cameras stays the same whether somebody watches or not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from trimesh.exchange.gltf import export_glb
+
+from golem.robots.mujoco import body_meshes
+from golem.robots.mujoco.camera import CameraRig
+from golem.robots.mujoco.engine import MujocoRobot
+from golem.types import Array, CameraInfo
+
+HEADLIGHT = (0.28, 0.32)
+"""Ambient and diffuse part of the light at a spectator's camera: the hall itself is lit for the robot's eyes."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A spectator's camera.
+
+    Attributes:
+        look_at: (x, y, z) point in the middle of the picture, in the world: the floor below the robot's start [m].
+        azimuth: heading of the line of sight [deg], 0 along x, counter-clockwise.
+        elevation: pitch of the line of sight [deg], negative looks down.
+        distance: between camera and point [m].
+        fovy: vertical field of view [deg].
+    """
+
+    look_at: tuple[float, float, float]
+    azimuth: float
+    elevation: float
+    distance: float
+    fovy: float = 40.0
+
+    def view(self) -> mujoco.MjvCamera:
+        """Return the shot as MuJoCo's camera."""
+        view = mujoco.MjvCamera()
+        view.type = mujoco.mjtCamera.mjCAMERA_FREE
+        view.lookat[:] = self.look_at
+        view.azimuth, view.elevation, view.distance = self.azimuth, self.elevation, self.distance
+        return view
+
+    def info(self, name: str, size: tuple[int, int]) -> CameraInfo:
+        """Return the intrinsics of the shot for a picture of `size` (width, height) [px]."""
+        width, height = size
+        focal = 0.5 * height / np.tan(0.5 * np.radians(self.fovy))
+        return CameraInfo(
+            name, width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1), 0.0, 60.0, 0.0
+        )
+
+
+@dataclass(frozen=True)
+class BodyMesh:
+    """The visible part of one body.
+
+    Attributes:
+        name: the body; `"world"` for all that cannot move.
+        glb: binary glTF in the body's frame.
+    """
+
+    name: str
+    glb: bytes
+
+
+class SpectatorView:
+    """The simulated world of one robot, read only."""
+
+    def __init__(
+        self,
+        robot: MujocoRobot,
+        shots: Mapping[str, Shot] | None = None,
+        size: tuple[int, int] = (960, 540),
+        *,
+        fancy: bool = False,
+    ) -> None:
+        """Look at `robot` and its world.
+
+        Args:
+            robot: the twin.
+            shots: a spectator's cameras by name, besides the robot's own.
+            size: width and height of the shots' pictures [px].
+            fancy: shadows, reflections, smooth edges: a second and more per picture on a CPU.
+        """
+        self._model, self._data = robot.scene.model, robot.data
+        self._shots = dict(shots or {})
+        self._infos = [shot.info(name, size) for name, shot in self._shots.items()]
+        # A picture only for the eye: half the robot's own resolution is what an inset shows.
+        self._infos += [_halved(info) for info in robot.cameras.values()]
+        self._fancy = fancy
+        self._rig: CameraRig | None = None
+        self._moving = np.array([body for body in body_meshes.visual_geoms(self._model) if body], dtype=int)
+        self._origin = robot.truth.T_world_odom[:3, 3]
+
+    @property
+    def moving(self) -> list[str]:
+        """The visible bodies that can move, in the order of `poses`."""
+        return [self._model.body(int(body)).name for body in self._moving]
+
+    def meshes(self) -> list[BodyMesh]:
+        """Return one mesh per visible body."""
+        meshes = body_meshes.body_meshes(self._model, self._data)
+        return [BodyMesh(self._model.body(body).name, export_glb(scene)) for body, scene in meshes.items()]
+
+    def poses(self) -> tuple[Array, Array]:
+        """Return positions (n, 3) [m] and orientations (n, 4) wxyz of the moving bodies in the world."""
+        return self._data.xpos[self._moving].copy(), self._data.xquat[self._moving].copy()
+
+    def position(self, body: str) -> Array:
+        """Return (3,) where a body is in the world [m]."""
+        return self._data.body(body).xpos.copy()
+
+    def from_odom(self, point: Array) -> Array:
+        """Return (3,) a point of the odom frame in the world: odom is where the pelvis was at the start."""
+        return np.asarray(point, dtype=float) + self._origin
+
+    def picture(self, name: str) -> NDArray[np.uint8]:
+        """Return (height, width, 3) what a shot, or a camera of the robot, shows now."""
+        if self._rig is None:
+            views = {name: shot.view() for name, shot in self._shots.items()}
+            self._rig = CameraRig(self._model, self._infos, fancy=self._fancy, views=views)
+        if name not in self._shots:
+            return self._rig.render(self._data, name)[0]
+        # The lights belong to the model, and the robot's cameras see by them too.
+        lamp, shadows = self._model.vis.headlight, self._model.light_castshadow.copy()
+        kept = lamp.ambient.copy(), lamp.diffuse.copy()
+        lamp.ambient[:], lamp.diffuse[:] = HEADLIGHT
+        self._model.light_castshadow[:] = self._fancy
+        try:
+            return self._rig.render(self._data, name)[0]
+        finally:
+            lamp.ambient[:], lamp.diffuse[:] = kept
+            self._model.light_castshadow[:] = shadows
+
+    def close(self) -> None:
+        """Release the renderer."""
+        if self._rig is not None:
+            self._rig.close()
+            self._rig = None
+
+
+def _halved(info: CameraInfo) -> CameraInfo:
+    return replace(
+        info,
+        width=info.width // 2,
+        height=info.height // 2,
+        fx=info.fx / 2,
+        fy=info.fy / 2,
+        cx=(info.cx - 0.5) / 2,
+        cy=(info.cy - 0.5) / 2,
+    )

@@ -1,0 +1,78 @@
+"""Modules that skills call, behind a guard: a user's may raise or return nonsense, and the fault carries its name."""
+
+from __future__ import annotations
+
+from golem.capabilities.arms.base import check_pose
+from golem.capabilities.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus, ServoStep
+from golem.capabilities.navigation.base import Navigator, NavStep
+from golem.runtime.contract_check import ContractCheck
+from golem.types import Array, LocalizedObject, PlanarPose, Twist
+
+
+class CheckedGraspMethod:
+    """A `GraspMethod` whose faults name the module."""
+
+    def __init__(self, method: GraspMethod, contract: ContractCheck) -> None:
+        """Watch `method`."""
+        self._method, self._contract = method, contract
+
+    def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+        """Return the method's grasps; see `GraspMethod`."""
+        grasps = self._contract.call(lambda: list(self._method.propose(target, yaw)))
+        for grasp in grasps:
+            self._contract.kind("a proposal", grasp, Grasp)
+            self._contract.array("T_odom_gripper", grasp.T_odom_gripper, 4, 4)
+            self._contract.call(check_pose, "T_odom_gripper", grasp.T_odom_gripper)
+            self._contract.number("gap", grasp.gap, minimum=0.0)
+        return grasps
+
+    def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw | None:
+        """Return the method's law, guarded; see `GraspMethod`."""
+        law = self._contract.call(self._method.servo, target, grasp, t)
+        if law is None:
+            return None
+        self._contract.satisfies(law, ServoLaw)
+        return CheckedServoLaw(law, self._contract)
+
+
+class CheckedServoLaw:
+    """A `ServoLaw` whose faults name the module."""
+
+    def __init__(self, law: ServoLaw, contract: ContractCheck) -> None:
+        """Watch `law`."""
+        self._law, self._contract = law, contract
+        self.label = law.label
+
+    def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
+        """Return the law's step; see `ServoLaw`."""
+        step = self._contract.call(self._law.step, t, sightings, T_odom_gripper)
+        self._contract.kind("the servo step", step, ServoStep)
+        self._contract.kind("status", step.status, ServoStatus)
+        self._contract.array("T_odom_gripper", step.T_odom_gripper, 4, 4)
+        self._contract.call(check_pose, "T_odom_gripper", step.T_odom_gripper)
+        self._contract.array("target", step.target, 3)
+        self._contract.number("sigma", step.sigma, minimum=0.0)
+        return step
+
+
+class CheckedNavigator:
+    """A `Navigator` whose faults name the module."""
+
+    def __init__(self, navigator: Navigator, contract: ContractCheck) -> None:
+        """Watch `navigator`."""
+        self._navigator, self._contract = navigator, contract
+
+    def start(self, goal: PlanarPose) -> None:
+        """Give the navigator its goal; see `Navigator`."""
+        self._contract.call(self._navigator.start, goal)
+
+    def step(self, pose: PlanarPose, moving: bool, dt: float) -> NavStep:
+        """Return the navigator's course; see `Navigator`."""
+        course = self._contract.call(self._navigator.step, pose, moving, dt)
+        self._contract.kind("the course", course, NavStep)
+        self._contract.kind("twist", course.twist, Twist)
+        for name in ("vx", "vy", "wz"):
+            self._contract.number(name, getattr(course.twist, name))
+        self._contract.kind("arrived", course.arrived, bool)
+        self._contract.kind("left", course.left, PlanarPose)
+        return course

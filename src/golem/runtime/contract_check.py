@@ -1,0 +1,101 @@
+"""Turns whatever goes wrong inside a module into a fault that names the module."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from golem.errors import MissingExtra, MissingSystemLibrary, ModuleFault, RobotGone
+from golem.types import Array
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class ContractCheck:
+    """Watches one module of the stack.
+
+    Attributes:
+        slot: its slot.
+        use: the implementation as the stack file names it.
+    """
+
+    slot: str
+    use: str
+
+    def satisfies(self, module: object, contract: type[Any]) -> None:
+        """Check that `module` has every member of the protocol `contract`.
+
+        Raises:
+            ModuleFault: it lacks some; names them.
+        """
+        members = {**contract.__annotations__, **vars(contract)}
+        lacking = [name for name in members if not name.startswith("_") and not hasattr(module, name)]
+        if lacking:
+            raise self.fault(f"it lacks {', '.join(lacking)} of the contract {contract.__name__}")
+
+    def call(self, function: Callable[..., T], *arguments: Any) -> T:
+        """Return `function(*arguments)`.
+
+        Raises:
+            ModuleFault: the module raised anything but such a fault.
+            MissingExtra, MissingSystemLibrary: it needs what this machine lacks, which is not its fault.
+            RobotGone: it is the robot, and is no longer there.
+        """
+        try:
+            return function(*arguments)
+        except (ModuleFault, MissingExtra, MissingSystemLibrary, RobotGone):
+            raise
+        except Exception as error:  # a user's module may raise anything
+            raise self.fault(f"{type(error).__name__}: {error}") from error
+
+    def kind(self, name: str, value: object, kind: type[T]) -> T:
+        """Return `value`, which is called `name` and must be a `kind`.
+
+        Raises:
+            ModuleFault: it is something else.
+        """
+        if not isinstance(value, kind):
+            raise self.fault(f"{name} is a {type(value).__name__}, the contract asks for a {kind.__name__}")
+        return value
+
+    def number(self, name: str, value: object, minimum: float = -math.inf) -> float:
+        """Return `value`, which is called `name` and must be a finite number of at least `least`.
+
+        Raises:
+            ModuleFault: it is something else.
+        """
+        if not isinstance(value, numbers.Real) or not math.isfinite(value) or value < minimum:
+            bound = "" if minimum == -math.inf else f" of at least {minimum:g}"
+            raise self.fault(f"{name} is {value!r}, the contract asks for a finite number{bound}")
+        return float(value)
+
+    def array(self, name: str, value: object, *shape: int | None) -> Array:
+        """Return `value`, which is called `name` and must be a finite array of numbers of `shape`; None is any length.
+
+        Raises:
+            ModuleFault: it is something else.
+        """
+        if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiu":
+            kind = f"array of {value.dtype}" if isinstance(value, np.ndarray) else type(value).__name__
+            raise self.fault(f"{name} is a {kind}, the contract asks for an array of numbers")
+        if value.shape != shape and not _fits(value.shape, shape):
+            asked = tuple("n" if length is None else length for length in shape)
+            raise self.fault(f"{name} has shape {value.shape}, the contract asks for {asked}")
+        # A product with itself costs a third of isfinite and all, and is finite unless something is not (or is huge).
+        if not math.isfinite(np.vdot(value, value)) and not np.isfinite(value).all():
+            raise self.fault(f"{name} contains NaN or infinity")
+        return value
+
+    def fault(self, reason: str) -> ModuleFault:
+        """Return the fault of this module for `reason`."""
+        return ModuleFault(self.slot, self.use, reason)
+
+
+def _fits(shape: tuple[int, ...], asked: tuple[int | None, ...]) -> bool:
+    return len(shape) == len(asked) and all(b is None or a == b for a, b in zip(shape, asked, strict=True))

@@ -1,0 +1,58 @@
+"""Lets the band of a robot that stands go: the operator's act at the end of every start on the ground."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from golem.capabilities.legs.base import LegCommand
+from golem.middleware import topics
+from golem.middleware.bus import Bus
+from golem.robots.base import HasGantry
+from golem.runtime.contract_check import ContractCheck
+from golem.runtime.nodes import moving
+from golem.types import BaseEstimate
+
+READY = 1.6
+"""Time from the gate's activation to the release [s]: the servo's ramp, after which the arms hang still, and a bit."""
+
+FOUND = 0.5
+"""Time from the release within which the estimator must have found a foot on the floor [s]: who balances by an
+estimate of nothing falls later, and nobody would say why."""
+
+
+class GantryReleaseNode:
+    """Releases the band once the gate is active, the servo stiff, and a leg controller at work.
+
+    Raises, from `step`:
+        ModuleFault: the estimator is still without an estimate some time after the release.
+    """
+
+    period = 0.01
+
+    def __init__(self, bus: Bus, robot: HasGantry, contract: ContractCheck, estimator: ContractCheck) -> None:
+        """Watch `bus` for `robot`, whose base `estimator` watches."""
+        self._bus, self._robot, self._contract, self._estimator = bus, robot, contract, estimator
+        self._waiting_since, self._released, self._found = 0.0, math.inf, False
+
+    def step(self, t: float) -> None:
+        """Release the band when all is ready; a stop before that starts the wait anew."""
+        if not self._robot.on_gantry:
+            self._look(t)
+            return
+        legs = self._bus.latest(topics.LEG_COMMAND, LegCommand)
+        if not moving(self._bus) or legs is None or not (legs.kp.any() or np.any(legs.tau)):
+            self._waiting_since = t
+        elif t - self._waiting_since >= READY:
+            self._contract.call(self._robot.release)
+            self._released, self._found = t, False
+
+    def _look(self, t: float) -> None:
+        """Look whether the estimator finds the floor."""
+        if self._found:
+            return
+        base = self._bus.latest(topics.BASE, BaseEstimate)
+        self._found = base is not None and not base.stale
+        if not self._found and t - self._released > FOUND:
+            raise self._estimator.fault(f"it found no foot on the floor within {FOUND:g} s of the release")

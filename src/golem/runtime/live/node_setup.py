@@ -1,0 +1,98 @@
+"""Membership of a domain as a process of GOLEM, and who else is there."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from queue import SimpleQueue
+
+from golem.middleware.dds import discovery
+from golem.middleware.dds.connect import connect
+from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.dds.participant import CycloneParticipant
+from golem.middleware.exclusive_writers import identity
+from golem.middleware.ros.base import ActionClient, Client, RosNode
+from golem.middleware.ros.future import RosError
+from golem.middleware.ros.node import DdsNode
+
+SEARCH = 5.0
+"""How long is looked for whoever offers something [s]."""
+ANSWER = 30.0
+"""How long is waited for an answer of somebody who is there, but may be starting on a busy machine [s]."""
+
+
+@contextmanager
+def member(name: str, dds: DdsConfig) -> Iterator[tuple[CycloneParticipant, DdsNode]]:
+    """Join a domain as the process called `name`.
+
+    Raises:
+        MissingExtra: cyclonedds is not installed.
+        ConfigError, DdsError: the domain cannot be joined.
+    """
+    with closing(connect(dds, identity(name))) as participant:
+        with closing(DdsNode(participant, name, distro=dds.distro)) as node:
+            yield participant, node
+
+
+def company(participant: CycloneParticipant, dds: DdsConfig) -> str:
+    """Return how many others are on the domain, and where there is nobody, what to look at."""
+    others = len(discovery.others(participant))
+    if others:
+        return "one other is there" if others == 1 else f"{others} others are there"
+    if dds.interface == "lo":
+        return "nobody else is there"
+    return (
+        "nobody else is there: look at the cable and the address of the interface, and where multicast does not pass, "
+        "name the other machine with --peers ADDRESS"
+    )
+
+
+def until(node: RosNode, condition: Callable[[], bool], timeout: float) -> bool:
+    """Spin `node` until `condition()` is true; return False if `timeout` [s] passed first."""
+    end = time.monotonic() + timeout
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        node.spin_once(0.02)
+    return True
+
+
+def find(node: RosNode, name: str, client: Client | ActionClient, remedy: str) -> None:
+    """Wait until somebody offers what `client` asks for.
+
+    Raises:
+        RosError: nobody offers `name`; `remedy` says what the user can do.
+    """
+    if not until(node, client.ready, SEARCH):
+        raise RosError(f"Nobody offers '{name}'; {remedy}.")
+
+
+def log_line(text: str) -> None:
+    """Print a line at once, also into a pipe, and whole, whichever thread says another."""
+    print(f"{text}\n", end="", flush=True)
+
+
+class AsyncLogger:
+    """Says lines on a thread of its own: a terminal that is held up, or gone, does not hold up who has them said."""
+
+    def __init__(self) -> None:
+        """Start the thread."""
+        self._lines: SimpleQueue[str | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._tell, name="teller", daemon=True)
+        self._thread.start()
+
+    def __call__(self, text: str) -> None:
+        """Have a line said."""
+        self._lines.put(text)
+
+    def close(self) -> None:
+        """Say what is left, unless that takes a second."""
+        self._lines.put(None)
+        self._thread.join(1.0)
+
+    def _tell(self) -> None:
+        while (text := self._lines.get()) is not None:
+            with suppress(OSError):
+                log_line(text)

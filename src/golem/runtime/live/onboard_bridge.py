@@ -1,0 +1,190 @@
+"""The robot's own computer across processes: calls, answers and the legs it controls, between a bus and the domain.
+
+A bus holds the newest value of a stream only: calls that arrive together are therefore let onto it one per tick.
+"""
+
+from __future__ import annotations
+
+import random
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from golem.capabilities.legs.base import LegCommand
+from golem.middleware.bus import Bus, News
+from golem.middleware.dds.base import Payload, Reader, Writer
+from golem.middleware.unitree_api import ApiRequest, Response, request_topic, response_topic
+from golem.middleware.wire import hg
+from golem.middleware.wire.convert import decode_low_command, encode_low_command
+from golem.middleware.wire.rpc import RpcClient, RpcServer
+from golem.middleware.wire.struct_layout import WireError
+from golem.runtime.live.rejected import RejectedMessages
+from golem.runtime.onboard_nodes import ONBOARD_LEGS
+from golem.types import LEGS, NUM_JOINTS, TICK, LowCommand
+
+WAITING = 64
+"""Calls that may wait for their tick; of more the oldest are dropped [own]."""
+_CALLS = 2**16
+"""Calls of one client before its identities repeat."""
+_TO_SERVO = 1
+"""Index in `reserve` of the word that says whether the feed-forward torque is left to the servo."""
+
+
+class CallsIn:
+    """Brings calls from the domain to the service on the bus."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, service: str, server: RpcServer) -> None:
+        """Take calls to `service` from `server`."""
+        self._bus, self._topic, self._server = bus, request_topic(service), server
+        self._waiting: deque[ApiRequest] = deque(maxlen=WAITING)
+
+    def step(self, t: float) -> None:
+        """Let the oldest call onto the bus."""
+        self._waiting.extend(self._server.take())
+        if self._waiting:
+            self._bus.publish(self._topic, self._waiting.popleft(), t)
+
+
+class AnswersOut:
+    """Sends the answers of the service on the bus."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, service: str, server: RpcServer) -> None:
+        """Send answers of `service` through `server`."""
+        self._news, self._server = News(bus, response_topic(service), Response), server
+
+    def step(self, t: float) -> None:
+        """Send a new answer."""
+        response = self._news.read()
+        if response is not None:
+            self._server.reply(response)
+
+
+class Identities:
+    """Tells the calls of one client of a bus from those of every other client of the domain."""
+
+    def __init__(self) -> None:
+        """Choose 65536 identities that nobody else is likely to use."""
+        self._first = random.SystemRandom().getrandbits(46) * _CALLS
+
+    def outgoing(self, request: ApiRequest) -> ApiRequest:
+        """Return `request` as it goes to the domain."""
+        return replace(request, id=self._first + request.id % _CALLS)
+
+    def incoming(self, response: Response) -> Response | None:
+        """Return `response` as the bus knows its call; None if it answers somebody else's."""
+        number = response.id - self._first
+        return replace(response, id=number) if 0 <= number < _CALLS else None
+
+
+class CallsOut:
+    """Sends the calls on the bus to a service on the domain; while nobody offers it the newest call waits."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, service: str, client: RpcClient, identities: Identities) -> None:
+        """Send calls to `service` through `client`."""
+        self._news, self._client = News(bus, request_topic(service), ApiRequest), client
+        self._identities = identities
+        self._unsent: ApiRequest | None = None
+
+    def step(self, t: float) -> None:
+        """Send a new call."""
+        self._unsent = self._news.read() or self._unsent
+        if self._unsent is not None and self._client.connected:
+            self._client.send(self._identities.outgoing(self._unsent))
+            self._unsent = None
+
+
+class AnswersIn:
+    """Brings the answers to the calls of `CallsOut` to the bus."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, service: str, client: RpcClient, identities: Identities) -> None:
+        """Take answers of `service` from `client`."""
+        self._bus, self._topic, self._client = bus, response_topic(service), client
+        self._identities = identities
+        self._waiting: deque[Response] = deque(maxlen=WAITING)
+
+    def step(self, t: float) -> None:
+        """Let the oldest answer onto the bus."""
+        for response in self._client.take():
+            own = self._identities.incoming(response)
+            if own is not None:
+                self._waiting.append(own)
+        if self._waiting:
+            self._bus.publish(self._topic, self._waiting.popleft(), t)
+
+
+class OnboardLegsOut:
+    """Sends what the on-board controller tells the legs."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, writer: Writer) -> None:
+        """Send through `writer`, of `LowCmd_`."""
+        self._news, self._writer = News(bus, ONBOARD_LEGS, LegCommand), writer
+
+    def step(self, t: float) -> None:
+        """Send new targets."""
+        command = self._news.read()
+        if command is not None:
+            self._writer.write(encode_legs(command))
+
+
+class LegsIn:
+    """Brings the on-board controller's targets to the bus.
+
+    Attributes:
+        refused: messages that were not well-formed.
+    """
+
+    period = TICK
+
+    def __init__(self, bus: Bus, reader: Reader, tell: Callable[[str], None]) -> None:
+        """Take them from `reader`, of `LowCmd_`; `tell` a person what is refused."""
+        self._bus, self._reader = bus, reader
+        self.refused = RejectedMessages("targets of the on-board legs", tell)
+
+    def step(self, t: float) -> None:
+        """Take the newest targets."""
+        for sample in self._reader.take():
+            if sample.alive:
+                try:
+                    self._bus.publish(ONBOARD_LEGS, decode_legs(sample.payload), t)
+                except WireError as error:
+                    self.refused.add(error)
+
+
+def encode_legs(command: LegCommand) -> bytes:
+    """Return leg targets as a `LowCmd_` whose other motors get zero gains and zero torque.
+
+    Raises:
+        WireError: a value is not finite in single precision.
+    """
+    whole = {name: np.zeros(NUM_JOINTS) for name in ("q", "dq", "tau", "kp", "kd")}
+    for name in ("q", "kp", "kd"):
+        whole[name][LEGS] = getattr(command, name)
+    if command.tau is not None:
+        whole["tau"][LEGS] = command.tau
+    payload = bytearray(encode_low_command(LowCommand(0.0, **whole), 0))
+    hg.LOW_CMD.read(payload)["reserve"][_TO_SERVO] = command.tau is None
+    hg.COMMAND_CHECKSUM.seal(payload)
+    return bytes(payload)
+
+
+def decode_legs(payload: Payload) -> LegCommand:
+    """Return the leg targets in a `LowCmd_`.
+
+    Raises:
+        WireError: see `decode_low_command`.
+    """
+    whole = decode_low_command(payload, 0.0)
+    to_servo = bool(hg.LOW_CMD.read(payload)["reserve"][_TO_SERVO])
+    return LegCommand(whole.q[LEGS], whole.kp[LEGS], whole.kd[LEGS], None if to_servo else whole.tau[LEGS])

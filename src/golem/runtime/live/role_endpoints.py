@@ -1,0 +1,130 @@
+"""What one process offers and reads on the domain, created from the table of public streams and from nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+from golem.middleware import public
+from golem.middleware.dds.base import Participant, Qos, Reader, Sample, Writer
+from golem.middleware.public import Role
+from golem.middleware.ros import names
+from golem.middleware.ros.base import ActionHandler, ActionServer, Publisher, RosNode, Subscription
+from golem.middleware.ros.codec import dds_name
+from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.waitset import Inbox, WaitSet
+from golem.types import TICK
+
+
+class RoleEndpoints:
+    """The endpoints of one role.
+
+    Attributes:
+        node: its ROS node.
+    """
+
+    def __init__(
+        self, role: Role, participant: Participant, node: RosNode, only: Collection[str] | None = None
+    ) -> None:
+        """Publish every topic of `role`, or `only` some of them.
+
+        Args:
+            role: whose surface it is.
+            participant: what the vendor's own topics are created by.
+            node: what all others are created by.
+            only: names of topics; None is all.
+        """
+        self.node = node
+        self._role, self._participant = role, participant
+        self._publishers: dict[str, Publisher] = {}
+        self._writers: dict[str, Writer] = {}
+        for row in public.TOPICS:
+            if only is not None and row.name not in only:
+                continue
+            if row.by == role and row.vendor:
+                self._writers[row.name] = participant.writer(
+                    names.topic(row.name), dds_name(row.type), row.qos
+                )
+            elif row.by == role:
+                self._publishers[row.name] = node.publisher(row.name, row.type, row.qos)
+
+    def publish(self, topic: str, message: Any) -> None:
+        """Send a message."""
+        self._publishers[topic].publish(message)
+
+    def writer(self, topic: str) -> Writer:
+        """Return the writer of one of the vendor's topics."""
+        return self._writers[topic]
+
+    def heard(self, *topics: str) -> bool:
+        """Return whether anybody listens to one of the topics."""
+        return any((self._writers.get(topic) or self._publishers[topic]).matched() > 0 for topic in topics)
+
+    def subscribe(self, topic: str, callback: Callable[[Any], None]) -> Subscription:
+        """Give the messages of a topic to `callback`, when the node is polled; one that it cannot read is dropped.
+
+        What users send is read best effort: a joystick may offer no more.
+        """
+        row = self._read(topic)
+        qos = replace(row.qos, reliable=False) if row.by == "user" else row.qos
+
+        def take(message: Any) -> None:
+            with suppress(CodecError):
+                callback(message)
+
+        return self.node.subscription(row.name, row.type, take, qos)
+
+    def reader(self, topic: str, qos: Qos | None = None) -> Reader:
+        """Return a reader of one of the vendor's topics, with another `qos` than the table's if one is given."""
+        row = self._read(topic)
+        return self._participant.reader(names.topic(row.name), dds_name(row.type), qos or row.qos)
+
+    def receive(self, topic: str, waitset: WaitSet, handle: Callable[[Sample], None]) -> Inbox:
+        """Give the samples of one of the vendor's topics to `handle`, when `waitset` is polled."""
+        row = self._read(topic)
+        inbox = Inbox(waitset, handle, row.qos)
+        inbox.open(self._participant, names.topic(row.name), dds_name(row.type), row.qos, "")
+        return inbox
+
+    def serve(self, services: Mapping[str, Callable[[Any], Any]]) -> None:
+        """Offer every service of the role; `services` says what answers each."""
+        rows = {row.name: row for row in public.SERVICES if row.by == self._role}
+        _same(rows, services)
+        for name, callback in services.items():
+            self.node.service(name, rows[name].type, callback)
+
+    def act(self, handlers: Mapping[str, ActionHandler]) -> dict[str, ActionServer]:
+        """Offer every action of the role; `handlers` says who decides about the goals of each."""
+        rows = {row.name: row for row in public.ACTIONS if row.by == self._role}
+        _same(rows, handlers)
+        return {
+            name: self.node.action_server(name, rows[name].type, handler)
+            for name, handler in handlers.items()
+        }
+
+    def _read(self, topic: str) -> public.TopicRow:
+        row = public.topic(topic)
+        if self._role not in row.to:
+            raise ValueError(f"the table does not let '{self._role}' read {topic}")
+        return row
+
+
+class Poll:
+    """Lets a ROS node handle what has arrived, once per tick."""
+
+    period = TICK
+
+    def __init__(self, node: RosNode) -> None:
+        """Poll `node`."""
+        self._node = node
+
+    def step(self, t: float) -> None:
+        """Handle what has arrived."""
+        self._node.poll()
+
+
+def _same(rows: Mapping[str, object], given: Mapping[str, object]) -> None:
+    if rows.keys() != given.keys():
+        raise ValueError(f"the table has {sorted(rows)}, the process {sorted(given)}")

@@ -1,0 +1,187 @@
+"""Turns a stack file into a running stack in lock-step: the three sides in one process, on one bus and one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from golem import registry
+from golem.capabilities.arms.postures import POSTURES
+from golem.capabilities.grasping.base import GraspMethod
+from golem.capabilities.legs.base import Envelope
+from golem.capabilities.legs.hold import STANCES
+from golem.capabilities.navigation.base import Navigator
+from golem.errors import ConfigError, ModuleFault, RobotGone
+from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.safety.base import GateStatus, OperatorRequest, SafetyLimits
+from golem.middleware.bus import Bus
+from golem.robots.base import HasGantry, Robot
+from golem.robots.sensors.profiles import load_profile
+from golem.runtime.contract_check import ContractCheck
+from golem.runtime.executor import Executor, in_order
+from golem.runtime.node_groups import RobotNodes, SafetyNodes, StackNodes
+from golem.runtime.perception_nodes import LATENCY, detection_requested
+from golem.skills.base import Skill, SkillResult
+from golem.skills.context import Context
+from golem.skills.runner import SkillRun
+from golem.stack import Stack
+from golem.types import LEGS, NUM_JOINTS, UPPER, Array, Side
+
+
+class LockstepRunner:
+    """A stack in execution.
+
+    Attributes:
+        stack: what it was built from.
+        bus: every stream.
+        executor: the clock.
+        estop: the virtual emergency stop, to be pressed.
+    """
+
+    def __init__(self, stack: Stack, robot: Robot) -> None:
+        """Wire the modules of `stack` to `robot`.
+
+        Raises:
+            ConfigError: a name or an option of the stack is wrong.
+            ModuleFault: a module's constructor raised, or the module lacks a part of its contract.
+        """
+        self.stack = stack
+        self.bus = Bus()
+        self.estop = VirtualEstop()
+        gantry = robot if isinstance(robot, HasGantry) else None
+        self._robot = RobotNodes(self.bus, stack, robot, partial(detection_requested, self.bus))
+        self._safety = SafetyNodes(self.bus, SafetyLimits.from_profile(stack.limits), self.estop)
+        self._stack = StackNodes(self.bus, stack, robot.calibration, gantry, LATENCY)
+        placed = self._robot.nodes + self._safety.nodes + self._stack.nodes
+        self.executor = Executor(self.bus, in_order(placed))
+        self.request(OperatorRequest.ACTIVATE)
+
+    @property
+    def method(self) -> GraspMethod:
+        """The stack's grasp method, new and guarded."""
+        return self._stack.method
+
+    @property
+    def navigator(self) -> Navigator:
+        """The stack's navigator, guarded."""
+        return self._stack.navigator
+
+    @property
+    def safety(self) -> GateStatus | None:
+        """The newest verdict of the safety gate."""
+        return self._stack.safety
+
+    @property
+    def envelope(self) -> Envelope:
+        """The twists that the leg controller in charge can follow."""
+        return self._stack.envelope
+
+    def request(self, request: OperatorRequest) -> None:
+        """Ask something of the safety gate as an operator does: activate, stop, reset; it decides."""
+        self._safety.request(request)
+
+    def start(self, skill: Skill[Context, Any], goal: object) -> SkillRun:
+        """Start a skill; see `StackNodes.start`."""
+        return self._stack.start(skill, goal)
+
+    def commanded(self, side: Side) -> Array:
+        """Return the (4, 4) pose in odom that the hand on `side` is being sent to."""
+        return self._stack.commanded(side)
+
+    def execute(
+        self,
+        skill: Skill[Context, Any],
+        goal: object,
+        timeout: float,
+        realtime: bool = False,
+        watch: Callable[[], None] = lambda: None,
+    ) -> SkillResult:
+        """Run a skill to its end in robot time.
+
+        Args:
+            skill: what to do.
+            goal: its goal.
+            timeout: robot time after which it is given up [s].
+            realtime: pace by the wall clock.
+            watch: called after every tick, for judges and viewers.
+
+        Returns:
+            The result; a safety stop, a timeout or the end of a recording that stands in for the robot ends the skill
+            with a result that says so. After a fault of the lower body the fallback gets the time to stand before
+            this returns.
+        """
+        run = self.start(skill, goal)
+        self._stack.legs.realtime = realtime
+
+        def over() -> bool:
+            watch()
+            ended = run.result is not None and not self._stack.legs.recovering(self.executor.t)
+            return ended or self._stack.stopped
+
+        try:
+            self.executor.run(self.executor.t + timeout, over, realtime)
+        except RobotGone as gone:
+            result = run.result
+            run.cancel()
+            return result or SkillResult(False, "robot", "robot", str(gone))
+        except BaseException:
+            run.cancel()
+            self.halt()
+            raise
+        if run.result is not None:
+            return run.result
+        run.cancel()
+        safety = self.safety
+        if safety is not None and safety.stopped:
+            return SkillResult(False, "safety", "safety", f"Safety stop: {safety.why}.")
+        return SkillResult(False, "timeout", None, f"Not done after {timeout:g} s of robot time.")
+
+    def halt(self) -> None:
+        """Stop the motors now, past every other module: the gate is asked to stop, and its damping command goes out."""
+        self.request(OperatorRequest.STOP)
+        with suppress(ModuleFault):  # where the robot itself is what failed
+            self._safety.gate.step(self.executor.t)
+            self._robot.act.step(self.executor.t)
+
+
+def start_posture(on_ground: bool = False) -> Array:
+    """Return the (27,) posture an episode starts in [rad]: arms at home, legs as they hang or as they stand."""
+    q = np.zeros(NUM_JOINTS)
+    q[LEGS] = np.tile(STANCES["crouch" if on_ground else "stand"], 2)
+    q[UPPER] = POSTURES["home"]
+    return q
+
+
+def build_robot(stack: Stack, seed: int) -> Any:
+    """Build the robot of `stack` for episode `seed`.
+
+    Raises:
+        ConfigError: a name, an option, the profile or the seed is wrong.
+        ModuleFault: its constructor raised, or it lacks a part of its contract.
+    """
+    load_profile(stack.profile)
+    if seed < 0:
+        raise ConfigError(f"The seed is {seed}; it must be 0 or more.")
+    choice, posture = stack.robot, start_posture(stack.on_ground)
+    robot = registry.create(
+        "robot", choice.use, choice.options, profile=stack.profile, seed=seed, posture=posture
+    )
+    ContractCheck("robot", choice.use).satisfies(robot, Robot)
+    return robot
+
+
+def build(stack: Stack, seed: int) -> tuple[LockstepRunner, Any]:
+    """Build the robot of `stack` for episode `seed`, and the stack around it.
+
+    Returns:
+        The running stack, and the robot: for evaluation and viewers, never for modules.
+
+    Raises:
+        ConfigError, ModuleFault: see `build_robot`; so for every other module.
+    """
+    robot = build_robot(stack, seed)
+    return LockstepRunner(stack, robot), robot

@@ -1,0 +1,128 @@
+"""The twin's on-board computer: the vendor's services on the bus, and the legs it controls itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from golem.capabilities.legs.base import STANDING, LegCommand
+from golem.capabilities.legs.hold import STANCES, HoldConfig, JointHold
+from golem.capabilities.legs.locomotion import Locomotion
+from golem.capabilities.legs.vendor import damp
+from golem.errors import ModuleFault
+from golem.middleware import topics
+from golem.middleware.bus import Bus, News
+from golem.middleware.unitree_api import ApiRequest, LocoApi, Response, request_topic, response_topic
+from golem.robots.onboard.loco_service import LocoService
+from golem.runtime.lower_body_node import CheckedLowerBody
+from golem.types import LEGS, TICK, BaseEstimate, LowState
+
+ONBOARD_LEGS = "onboard/legs"
+"""`LegCommand` of the on-board controller."""
+ANSWER = 0.004
+"""Time a call takes to be answered [s] [own: two servo periods, so that no client can count on an answer at once]."""
+STANCE = "crouch"
+"""Where the stand-up state ends."""
+
+
+class BusOnboard:
+    """The on-board computer behind the bus; see `vendor.Onboard`."""
+
+    def __init__(self, bus: Bus) -> None:
+        """Speak over `bus`."""
+        self._bus = bus
+        self._news: dict[str, News[Response]] = {}
+
+    def send(self, service: str, request: ApiRequest) -> None:
+        """Send a request; see `vendor.Onboard`."""
+        if service not in self._news:
+            self._news[service] = News(self._bus, response_topic(service), Response)
+        self._bus.publish(request_topic(service), request, 0.0)  # no latency: the time has no meaning
+
+    def receive(self, service: str) -> Response | None:
+        """Return a new response; see `vendor.Onboard`."""
+        return self._news[service].read() if service in self._news else None
+
+    def legs(self) -> LegCommand | None:
+        """Return the on-board controller's targets; see `vendor.Onboard`."""
+        return self._bus.latest(ONBOARD_LEGS, LegCommand)
+
+
+class ServiceNode:
+    """Answers the calls to one service, one per tick."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, service: str, answer: Callable[[ApiRequest, float], Response]) -> None:
+        """Serve `service` on `bus`; `answer` acts on a call at a time [s]."""
+        self._bus, self._answer = bus, answer
+        self._topic = response_topic(service)
+        self._requests = News(bus, request_topic(service), ApiRequest)
+
+    def step(self, t: float) -> None:
+        """Answer the call that came, if one did."""
+        request = self._requests.read()
+        if request is None:
+            return
+        response = self._answer(request, t)
+        if not request.noreply:
+            self._bus.publish(self._topic, response, t, ANSWER)
+
+
+class LocoServiceNode:
+    """Answers calls, and controls the legs on board in the state that was called for.
+
+    In the start state the robot is controlled by any lower body, under a base layer of its own. A controller that fails
+    is not replaced: the robot damps, and the service refuses to go on.
+
+    Attributes:
+        service: what answers.
+    """
+
+    period = TICK
+
+    def __init__(self, bus: Bus, api: LocoApi, legs: CheckedLowerBody) -> None:
+        """Serve `api` on `bus`, with `legs` for the start state."""
+        self._bus, self._legs = bus, legs
+        self.service = LocoService(api)
+        self._state = self.service.state
+        self._hold = JointHold(HoldConfig(stance=STANCE, speed=1.0))
+        self._locomotion = Locomotion(legs.controller)
+        self._calls = ServiceNode(bus, api.service, self.service.answer)
+
+    def step(self, t: float) -> None:
+        """Answer a call, and publish what the legs are told."""
+        self._calls.step(t)
+        state = self._bus.latest(topics.LOW_STATE, LowState)
+        base = self._bus.latest(topics.BASE, BaseEstimate)
+        if state is None or base is None:
+            return
+        try:
+            command, latency = self._control(state, base, t), self._legs.check_latency()
+        except ModuleFault as fault:
+            self.service.fail(str(fault))
+            command, latency = damp(state), 0.0
+        self._bus.publish(ONBOARD_LEGS, command, t, latency)
+
+    def _control(self, state: LowState, base: BaseEstimate, t: float) -> LegCommand:
+        """Return what the legs are told in the present state of the service."""
+        service, contract = self.service, self._legs.contract
+        entered, self._state = service.state != self._state, service.state
+        if service.state == service.api.start:
+            if entered:
+                contract.call(self._locomotion.reset, state)
+            command = contract.call(self._locomotion.step, state, base, service.twist(t), TICK)
+            return self._legs.check(command)
+        if service.state == service.api.stand_up:
+            if entered:
+                self._hold.reset(state)
+            command = self._hold.step(state, base, STANDING, TICK)
+            service.standing = bool(np.allclose(command.q, np.tile(STANCES[STANCE], 2)))
+            # The legs carry the robot: their own weight is not what the motors have to bear.
+            return replace(command, tau=np.zeros(LEGS.stop))
+        if service.state == service.api.damp:
+            return damp(state)
+        zero = np.zeros(LEGS.stop)
+        return LegCommand(state.q[LEGS].copy(), zero, zero, zero)

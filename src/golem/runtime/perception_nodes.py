@@ -1,0 +1,162 @@
+"""The nodes of sight: a camera is exposed, its frame gets the pose the robot believes, objects are located in it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+
+from golem.capabilities.perception.base import Localizer
+from golem.errors import MissingExtra, MissingSystemLibrary, ModuleFault
+from golem.middleware import topics
+from golem.middleware.bus import Bus, News
+from golem.middleware.topics import DetectionRequest, Detections, Exposure, ModuleFaultMsg
+from golem.robots.base import STAMP_TOLERANCE, Robot
+from golem.robots.model.kinematics import Kinematics
+from golem.robots.sensors.calibration import OPTICAL_FRAMES
+from golem.runtime.contract_check import ContractCheck
+from golem.types import TICK, Array, BaseEstimate, LocalizedObject, LowState, RgbdImage
+
+LATENCY = 0.033
+"""Time from exposure to the frame being available [s]: one frame period of a D400 at 30 Hz."""
+MEMORY = 1.0
+"""How old an exposure may be when its frame arrives [s]."""
+
+
+class CameraNode:
+    """Exposes one camera at its frame rate while somebody wants its frames."""
+
+    def __init__(
+        self, bus: Bus, robot: Robot, name: str, wanted: Callable[[], bool], contract: ContractCheck
+    ) -> None:
+        """Expose camera `name` whenever `wanted()` is true at its time."""
+        self._bus, self._robot, self._info, self._contract = bus, robot, robot.cameras[name], contract
+        self._wanted = wanted
+        self.period = 1.0 / self._info.rate
+
+    def step(self, t: float) -> None:
+        """Publish one exposure."""
+        if self._wanted():
+            rgb, depth = self._contract.call(self._robot.capture, self._info.name)
+            self._bus.publish(topics.exposures(self._info.name), Exposure(t, self._info, rgb, depth), t)
+
+
+class ImagePoseNode:
+    """Gives each exposure the pose the robot believes the camera had when it was made."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, calibration: Mapping[str, Array], latency: float) -> None:
+        """Serve the cameras of `calibration` (see `Robot.calibration`); frames take another `latency` [s]."""
+        self._bus, self._calibration, self._latency = bus, calibration, latency
+        self._exposures = {name: News(bus, topics.exposures(name), Exposure) for name in calibration}
+        self._kinematics = Kinematics()
+        self._moments: deque[tuple[LowState, BaseEstimate]] = deque()
+
+    def step(self, t: float) -> None:
+        """Remember where the robot is, and publish a frame for each exposure that came."""
+        state = self._bus.latest(topics.LOW_STATE, LowState)
+        base = self._bus.latest(topics.BASE, BaseEstimate)
+        if state is None or base is None:
+            return
+        moments = self._moments
+        moments.append((state, base))
+        while len(moments) > 1 and moments[0][0].t < t - MEMORY:
+            moments.popleft()
+        for name, news in self._exposures.items():
+            exposure = news.read()
+            if exposure is not None and moments[0][0].t <= exposure.t + STAMP_TOLERANCE:
+                pose = self._pose(name, exposure.t)
+                frame = RgbdImage(exposure.t, exposure.info, exposure.rgb, exposure.depth, pose)
+                self._bus.publish(topics.rgbd_images(name), frame, t, self._latency)
+
+    def _pose(self, name: str, t: float) -> Array:
+        """Return the (4, 4) pose in odom of a camera's optical frame at time `t` [s]."""
+        # Newest first: it is the newest unless the exposure came from afar.
+        state, base = next(m for m in reversed(self._moments) if m[0].t <= t + STAMP_TOLERANCE)
+        self._kinematics.update(state.q)
+        T_base_optical = self._kinematics.pose(OPTICAL_FRAMES[name]) @ self._calibration[name]
+        return base.T_odom_base @ T_base_optical
+
+
+class LocalizerNode:
+    """Runs the localizer on every new frame of one camera; live, beside the clock, on a thread of its own.
+
+    A fault of it ends the skill that looks, and nothing else: no robot falls over a label that nobody knows.
+    """
+
+    period = TICK
+
+    def __init__(
+        self,
+        bus: Bus,
+        localizer: Localizer,
+        camera: str,
+        contract: ContractCheck,
+        pool: ThreadPoolExecutor | None = None,
+    ) -> None:
+        """Run a localizer.
+
+        Args:
+            bus: where frames and sightings are.
+            localizer: what is run.
+            camera: whose frames.
+            contract: watches it.
+            pool: where it runs; None is here, at the price of the latency that it declares.
+        """
+        self._bus, self._localizer, self._camera, self._contract = bus, localizer, camera, contract
+        self._latency = contract.number("latency", localizer.latency, minimum=0.0) if pool is None else 0.0
+        self._frames = News(bus, topics.rgbd_images(camera), RgbdImage)
+        self._pool = pool
+        self._job: tuple[Future[Detections], tuple[str, ...]] | None = None
+
+    def step(self, t: float) -> None:
+        """Publish what is in the newest frame, if it is new, or what the thread has found."""
+        if self._job is not None:
+            job, labels = self._job
+            if not job.done():
+                return
+            self._job = None
+            self._tell(job.result, labels, t)
+        frame, labels = self._frames.read(), self._wanted()
+        if frame is None or not labels:
+            return
+        if self._pool is not None:
+            self._job = self._pool.submit(self._locate, frame, labels), labels
+            return
+        self._tell(lambda: self._locate(frame, labels), labels, t)
+
+    def _wanted(self) -> tuple[str, ...]:
+        """Return the labels that a skill looks for now."""
+        request = self._bus.latest(topics.detection_request(self._camera), DetectionRequest)
+        return () if request is None else request.labels
+
+    def _tell(self, found: Callable[[], Detections], labels: tuple[str, ...], t: float) -> None:
+        """Publish what was found, or, if `labels` are still looked for, that the localizer failed."""
+        try:
+            self._bus.publish(topics.detections(self._camera), found(), t, self._latency)
+        except ModuleFault as fault:
+            if labels == self._wanted():
+                self._bus.publish(topics.MODULE_FAULT, ModuleFaultMsg(fault.slot, str(fault)), t)
+        except (MissingExtra, MissingSystemLibrary) as lack:
+            if self._pool is None:
+                raise
+            self._bus.publish(topics.MODULE_FAULT, ModuleFaultMsg(self._contract.slot, str(lack)), t)
+
+    def _locate(self, frame: RgbdImage, labels: tuple[str, ...]) -> Detections:
+        objects = self._contract.call(lambda: tuple(self._localizer.locate(frame, labels)))
+        for o in objects:
+            self._contract.kind("a located object", o, LocalizedObject)
+            self._contract.array("position", o.position, 3)
+            self._contract.array("points", o.points, None, 3)
+        return Detections(frame.t, self._camera, objects)
+
+
+def detection_requested(bus: Bus, camera: str) -> Callable[[], bool]:
+    """Return whether a skill wants the frames of a camera of its own process."""
+
+    def wanted() -> bool:
+        request = bus.latest(topics.detection_request(camera), DetectionRequest)
+        return request is not None and bool(request.labels)
+
+    return wanted
