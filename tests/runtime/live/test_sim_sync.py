@@ -98,7 +98,7 @@ def test_only_a_patient_gate_that_is_active_says_what_its_commands_answer(
     live.run(0.1)
     assert live.twin is not None
     (newest,) = reader.take()
-    assert answered(newest.payload) == pytest.approx(live.twin.executor.t - TICK if relaxed_limits else 0.0)
+    assert answered(newest.payload) == pytest.approx(live.twin.executor.t - TICK if patient else 0.0)
 
 
 def test_the_gate_is_more_patient_than_the_robot_and_otherwise_as_strict() -> None:
