@@ -1,0 +1,43 @@
+"""One name stands for one thing: no class name and no file name occurs twice in the package."""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from pathlib import Path
+
+SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
+MESSAGES = "msgs"
+"""Folder of the generated ROS messages, whose names are those of their packages."""
+MAY_REPEAT = {"__init__.py", "__main__.py", "base.py", "config.py"}
+"""File names that say what a file is to its folder."""
+
+PENDING_FILES = {"convert.py", "curve.py", "pick.py", "shoves.py"}
+"""File names that still occur twice; none may come in."""
+
+
+def files() -> list[Path]:
+    """Return every source file but the generated ones."""
+    return [path for path in SOURCE.rglob("*.py") if MESSAGES not in path.parts]
+
+
+def twice(names: list[str]) -> set[str]:
+    """Return the names that occur more than once."""
+    return {name for name, count in Counter(names).items() if count > 1}
+
+
+def test_no_class_name_occurs_twice() -> None:
+    classes = [
+        node.name
+        for path in files()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    ]
+    assert len(classes) > 300
+    assert twice(classes) == set()
+
+
+def test_no_file_name_occurs_twice() -> None:
+    names = [path.name for path in files() if path.name not in MAY_REPEAT]
+    assert len(names) > 250
+    assert twice(names) <= PENDING_FILES
