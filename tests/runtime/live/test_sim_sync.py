@@ -84,9 +84,7 @@ def test_a_stack_that_was_waited_for_in_vain_is_waited_for_once() -> None:
 
 
 @pytest.mark.parametrize("patient", [True, False])
-def test_only_a_patient_gate_that_is_active_says_what_its_commands_answer(
-    live: Live, patient: bool
-) -> None:
+def test_only_a_patient_gate_that_is_active_says_what_its_commands_answer(live: Live, patient: bool) -> None:
     live.leave("safety")
     live.start_gate(patient)
     watcher, _ = live.member("watcher")
