@@ -32,7 +32,8 @@ docs: venv-docs  ## build the documentation into site/
 lock: venv-dev  ## resolve the requirements again (UPGRADE=--upgrade takes newer releases)
 	scripts/lock.sh $(UPGRADE)
 
-venv: venv-core  ## create .venv with what `golem` needs to run
+venv:  ## create .venv with what `golem` needs to run and to write reports
+	@PYTHON="$(PYTHON)" scripts/bootstrap.sh core report
 
 venv-%:
 	@PYTHON="$(PYTHON)" scripts/bootstrap.sh $*

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Usage: scripts/bootstrap.sh GROUP...     GROUP is the name of a lock in requirements/: core, dds, dev, docs, pink, record, train
+# Usage: scripts/bootstrap.sh GROUP...     GROUP is the name of a lock in requirements/: cluster, core, dds, dev, docs, pink, record, report, train
 #
 # Creates .venv with the locked packages of every GROUP and this package itself, and sees to it that they find their
 # system libraries. Needs Python 3.11-3.13 and a network to the package index; brings everything else: uv goes to .uv/
@@ -74,7 +74,7 @@ python=$(find_python)
 export UV_PYTHON_DOWNLOADS=never UV_NO_PROGRESS=1
 locks=()
 for group in "$@"; do
-    [ -f "requirements/$group.txt" ] || die "no lock requirements/$group.txt; groups: core, dds, dev, docs, pink, record, train"
+    [ -f "requirements/$group.txt" ] || die "no lock requirements/$group.txt; groups: cluster, core, dds, dev, docs, pink, record, report, train"
     stamp=".venv/.golem-$group"
     sum=$(cat "requirements/$group.txt" pyproject.toml | cksum)
     if [ ! -x .venv/bin/golem ] || [ "$sum" != "$(cat "$stamp" 2> /dev/null)" ]; then

@@ -19,8 +19,10 @@ compile pyproject.toml --constraints "$together" --output-file requirements/core
 compile pyproject.toml --constraints "$together" --extra pink --output-file requirements/pink.txt "$@"
 compile pyproject.toml --constraints "$together" --extra dds --output-file requirements/dds.txt "$@"
 compile pyproject.toml --constraints "$together" --extra record --extra foxglove --output-file requirements/record.txt "$@"
+compile pyproject.toml --constraints "$together" --extra report --output-file requirements/report.txt "$@"
+compile pyproject.toml --constraints "$together" --extra cluster --output-file requirements/cluster.txt "$@"
 compile pyproject.toml --constraints "$together" --extra train --output-file requirements/train.txt "$@"
 compile pyproject.toml --constraints "$together" --extra docs --output-file requirements/docs.txt "$@"
 compile pyproject.toml --constraints "$together" --extra dev --extra pink --extra dds --extra record --extra foxglove \
-    --output-file requirements/dev.txt "$@"
+    --extra report --extra cluster --output-file requirements/dev.txt "$@"
 echo "uv>=0.13,<0.14" | compile - --output-file requirements/uv.txt "$@"

@@ -36,6 +36,8 @@ EXTRAS = {
     "dds": ("cyclonedds", "rosbags"),
     "record": ("mcap", "rosbags"),
     "foxglove": ("foxglove", "rosbags"),
+    "report": ("matplotlib", "jinja2"),
+    "cluster": ("distributed",),
     "train": ("torch", "onnx"),
     "docs": ("mkdocs",),
     "dev": ("pytest",),
