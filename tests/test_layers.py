@@ -72,7 +72,7 @@ def test_imports_go_downward(path: Path) -> None:
     ("statement", "owner"),
     [
         ("from golem.skills import grasping", "hardware"),
-        ("import golem.evaluation.oracle", "skills"),
+        ("import golem.evaluation.episodes.oracle", "skills"),
         ("from ..evaluation import oracle", "capabilities"),
         ("def f():\n    from golem import cli", "evaluation"),
         ("from golem.training.detector import renders", "evaluation"),

@@ -94,8 +94,8 @@ def test_only_insiders_import_the_simulator(path: Path) -> None:
         "from golem.robots import mujoco",
         "from golem.robots.mujoco.engine import MujocoRobot",
         "from golem.robots.worlds.layout import PackLayout",
-        "import golem.evaluation.oracle",
-        "import importlib\nimportlib.import_module('golem.evaluation.oracle')",
+        "import golem.evaluation.episodes.oracle",
+        "import importlib\nimportlib.import_module('golem.evaluation.episodes.oracle')",
     ],
 )
 @pytest.mark.parametrize(

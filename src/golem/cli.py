@@ -45,7 +45,7 @@ def _run(words: list[str]) -> int:
 def _ladder(words: list[str]) -> int:
     """Compare methods on one rung of the capability ladder, on the same seeds."""
     _prepare_graphics()
-    from golem.evaluation.ladder import LadderConfig, run_ladder
+    from golem.evaluation.harness.ladder import LadderConfig, run_ladder
 
     config = _parse(LadderConfig, "ladder", words)
     result = run_ladder(config)
@@ -58,7 +58,7 @@ def _ladder(words: list[str]) -> int:
 
 def _compare(words: list[str]) -> int:
     """Compare two ladder runs on the same seeds, e.g. tether with stand."""
-    from golem.evaluation.compare import CompareConfig, run_compare
+    from golem.evaluation.metrics.compare import CompareConfig, run_compare
 
     run_compare(_parse(CompareConfig, "compare", words))
     return 0
@@ -104,11 +104,11 @@ def _bench(words: list[str]) -> int:
 
         run_estimation(_parse(EstimationConfig, "bench estimation", words[1:]))
     elif words[:1] == ["dds"]:
-        from golem.evaluation.dds_bench import DdsBenchConfig, run_dds_bench
+        from golem.evaluation.speed.dds_bench import DdsBenchConfig, run_dds_bench
 
         run_dds_bench(_parse(DdsBenchConfig, "bench dds", words[1:]))
     else:
-        from golem.evaluation.bench import BenchConfig, run_bench
+        from golem.evaluation.speed.bench import BenchConfig, run_bench
 
         run_bench(_parse(BenchConfig, "bench", words))
     return 0

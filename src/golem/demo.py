@@ -20,7 +20,7 @@ from golem.dashboard.live import LiveView
 from golem.dashboard.page import PickRecord, render_page
 from golem.dashboard.status import Timeline
 from golem.errors import ConfigError, OutputError
-from golem.evaluation.oracle import Oracle
+from golem.evaluation.episodes.oracle import Oracle
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.shoves import Pusher, shove

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from golem.evaluation import base
-from golem.evaluation.ladder import LadderConfig
+from golem.evaluation.harness.ladder import LadderConfig
 
 
 @pytest.fixture

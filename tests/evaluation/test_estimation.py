@@ -7,9 +7,9 @@ import pytest
 
 from golem.capabilities.legs.hold import STANCES
 from golem.errors import ConfigError
-from golem.evaluation import walks
+from golem.evaluation.episodes import walk_dataset as walks
+from golem.evaluation.episodes.walk_dataset import RecordedWalk, slipping, wrong_contacts
 from golem.evaluation.estimation import EstimationConfig, _longest, _way, run_estimation
-from golem.evaluation.walks import RecordedWalk, slipping, wrong_contacts
 from golem.hardware.estimator.feet import Feet, FeetConfig
 from golem.hardware.estimator.random_walk import base_velocity
 from golem.robots.model.leg_dynamics import LegDynamics

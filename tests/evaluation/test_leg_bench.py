@@ -13,8 +13,8 @@ from golem.capabilities.legs.base import Envelope
 from golem.errors import ConfigError
 from golem.evaluation import leg_tests
 from golem.evaluation.campaign import Done
+from golem.evaluation.episodes.odometry import LATENCY, PERIOD, POSITION_NOISE, YAW_NOISE, SimulatedOdometry
 from golem.evaluation.leg_bench import LegBenchConfig, LegTrial, run_leg_bench, summarise
-from golem.evaluation.odometry import LATENCY, PERIOD, POSITION_NOISE, YAW_NOISE, SimulatedOdometry
 from golem.evaluation.subject import Subject, labels
 from golem.middleware import topics
 from golem.middleware.bus import Bus

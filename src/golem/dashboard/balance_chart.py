@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from golem.evaluation.courses import MarginCurve, margin_plot
+from golem.evaluation.report.margin_plot import MarginCurve, margin_plot
 from golem.robots.mujoco.balance import BalanceTrace
 
 SPAN = 10.0

@@ -71,7 +71,7 @@ def render_page(
         body.append(f"<h2>Film</h2><figure>{inner}<figcaption>{links}</figcaption></figure>")
     rows = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts.items())
     body.append(f"<h2>Provenance</h2><dl>{rows}</dl>")
-    css = resources.files("golem.evaluation").joinpath("report.css").read_text(encoding="utf-8")
+    css = resources.files("golem.evaluation.report").joinpath("report.css").read_text(encoding="utf-8")
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'

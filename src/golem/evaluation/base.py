@@ -21,8 +21,8 @@ DONE = "done"
 """The stage of a trial that lost nothing."""
 
 RUNGS: dict[str, str] = {
-    "tether": "golem.evaluation.rungs.pick:TetherRung",
-    "stand": "golem.evaluation.rungs.pick:StandRung",
+    "tether": "golem.evaluation.rungs.pick_screw:TetherRung",
+    "stand": "golem.evaluation.rungs.pick_screw:StandRung",
     "push": "golem.evaluation.rungs.push:PushRung",
     "push-ramp": "golem.evaluation.rungs.push_ramp:PushRampRung",
     "navigate-line": "golem.evaluation.rungs.navigate_line:NavigateLine",

@@ -13,8 +13,8 @@ from typing import Any, Protocol
 from tqdm import tqdm
 
 from golem.errors import ConfigError, GolemError, OutputError
-from golem.evaluation.pool import Workers
-from golem.evaluation.records import RunFolder, append_line, whole_lines
+from golem.evaluation.harness.pool import Workers
+from golem.evaluation.harness.records import RunFolder, append_line, whole_lines
 from golem.provenance import Unchanged, code_digest, commit, digest, versions
 
 Result = dict[str, Any]

@@ -16,8 +16,8 @@ from tyro.conf import arg
 
 from golem import registry
 from golem.errors import ConfigError, GolemError
+from golem.evaluation.episodes.walk_dataset import SPOILS, RecordedWalk, nothing, record
 from golem.evaluation.subject import Subject
-from golem.evaluation.walks import SPOILS, RecordedWalk, nothing, record
 from golem.hardware.estimator.base import BaseEstimator
 from golem.robots.sensors.profiles import load_profile
 from golem.types import TICK, Array, LowState

@@ -15,10 +15,10 @@ from tyro.conf import arg
 
 from golem.errors import ConfigError, ModuleFault, unknown_name
 from golem.evaluation.campaign import Done, Result, run_campaign, write_files
-from golem.evaluation.episode import LATENCY, legs_stack
+from golem.evaluation.episodes.episode import LATENCY, legs_stack
+from golem.evaluation.harness.arguments import replaced_modules, robot_options
 from golem.evaluation.leg_tests import LOST, MISSED, TESTS, lost_in, plans
 from golem.evaluation.subject import Subject, labels
-from golem.evaluation.words import replaced_modules, robot_options
 from golem.provenance import commit
 from golem.robots.sensors.profiles import load_profile
 from golem.skills.runner import FAULT

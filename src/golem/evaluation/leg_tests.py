@@ -18,10 +18,10 @@ import numpy as np
 
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.mpc.controller import MPC, MPCConfig
-from golem.evaluation.bench import stopwatch
-from golem.evaluation.episode import Episode, episode_seed
-from golem.evaluation.exercise import WIDE_AREA, ArmMotion, Exercise
-from golem.evaluation.odometry import SimulatedOdometry
+from golem.evaluation.episodes.episode import Episode, episode_seed
+from golem.evaluation.episodes.odometry import SimulatedOdometry
+from golem.evaluation.episodes.scripted_motion import WIDE_AREA, ArmMotion, ScriptedMotion
+from golem.evaluation.speed.bench import stopwatch
 from golem.evaluation.subject import Subject
 from golem.options import fill
 from golem.robots.mujoco.shoves import DIRECTIONS, shove
@@ -76,7 +76,7 @@ def arms(subject: Subject, seed: int, index: int) -> Figures:
     """Stand for a minute while both arms sweep their workspace with a kilogram in each hand."""
     with closing(subject.episode(seed, index, payload=PAYLOAD)) as episode:
         draw = subject.draw(seed, index)
-        episode.start(Exercise(ArmMotion(draw.rng("arms"), WIDE_AREA)))
+        episode.start(ScriptedMotion(ArmMotion(draw.rng("arms"), WIDE_AREA)))
         return _minute(episode, SETTLE)
 
 
@@ -97,7 +97,7 @@ def tracking(subject: Subject, seed: int, index: int) -> Figures:
         twist = command(envelope, subject.draw(seed, index).rng("twist"), index)
         asked = np.array([twist.vx, twist.vy, twist.wz])
         episode.stand(SETTLE)
-        episode.start(Exercise(twist=lambda t: twist))
+        episode.start(ScriptedMotion(twist=lambda t: twist))
         episode.run(COMMAND)
         figures = dict(zip(("vx", "vy", "wz"), asked.tolist(), strict=True)) | _lost(episode)
         if not episode.over:
@@ -120,7 +120,7 @@ def endurance(subject: Subject, seed: int, index: int) -> Figures:
         while script[-1][0] < MINUTE:
             still = rng.random() < 0.2
             script.append((script[-1][0] + rng.uniform(3.0, 6.0), _random(envelope, rng, still)))
-        exercise = Exercise(ArmMotion(draw.rng("arms")))
+        exercise = ScriptedMotion(ArmMotion(draw.rng("arms")))
         episode.start(exercise)
         episode.stand(SETTLE)
         start = episode.t
@@ -246,7 +246,7 @@ def _rough(subject: Subject, seed: int, index: int, world: str) -> Figures:
             return DOES_NOT_WALK
         episode.stand(SETTLE)
         start = episode.t
-        episode.start(Exercise(twist=lambda t: ROUGH))
+        episode.start(ScriptedMotion(twist=lambda t: ROUGH))
         episode.run(ROUGH_TIME)
         if episode.over:
             return _lost(episode)

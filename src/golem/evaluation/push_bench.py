@@ -16,12 +16,12 @@ from tyro.conf import arg
 
 from golem.errors import ConfigError, ModuleFault, unknown_name
 from golem.evaluation.campaign import Done, Job, Result, run_campaign, write_files
-from golem.evaluation.episode import LATENCY, Episode
-from golem.evaluation.exercise import ArmMotion, Exercise
+from golem.evaluation.episodes.episode import LATENCY, Episode
+from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
+from golem.evaluation.harness.arguments import replaced_modules, robot_options
+from golem.evaluation.harness.pool import CAN_COPY, in_a_copy
 from golem.evaluation.leg_tests import can_walk
-from golem.evaluation.pool import CAN_COPY, in_a_copy
 from golem.evaluation.subject import Subject, labels
-from golem.evaluation.words import replaced_modules, robot_options
 from golem.provenance import commit
 from golem.robots.mujoco.shoves import DIRECTIONS, rod, shove
 from golem.robots.sensors.profiles import load_profile
@@ -137,7 +137,7 @@ class Trial:
         draw = self.subject.draw(self.seed, self.index)
         times = draw.rng("times")
         settle, late = times.uniform(*SETTLE), times.uniform(0.0, SWING)
-        exercise = Exercise(ArmMotion(draw.rng("arms")))
+        exercise = ScriptedMotion(ArmMotion(draw.rng("arms")))
         episode.start(exercise)
         episode.stand(settle)
         if self.phase != "standing":

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from golem.evaluation.base import TrialSpec
-from golem.evaluation.episode import Episode, episode_seed, legs_stack
+from golem.evaluation.episodes.episode import Episode, episode_seed, legs_stack
 from golem.provenance import digest, user_files
 from golem.stack import Stack
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from golem.evaluation.base import TrialSpec
-from golem.evaluation.episode import Loss
+from golem.evaluation.episodes.episode import Loss
 from golem.evaluation.rungs.push import LEAST_PEAK, PEAK, PushRung, judge
 from golem.evaluation.rungs.push_ramp import MOST, RATE, PushRampRung
 from golem.robots.mujoco.balance import TRACE, BalanceTrace

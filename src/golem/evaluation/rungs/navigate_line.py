@@ -13,9 +13,9 @@ import numpy as np
 
 from golem import registry
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
-from golem.evaluation.episode import Episode, Loss, episode_seed, legs_stack
-from golem.evaluation.odometry import SimulatedOdometry
-from golem.evaluation.strip import Strip
+from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, legs_stack
+from golem.evaluation.episodes.film_strip import FilmStrip
+from golem.evaluation.episodes.odometry import SimulatedOdometry
 from golem.middleware import topics
 from golem.middleware.topics import Odometry
 from golem.provenance import stack_facts
@@ -42,7 +42,8 @@ class NavigateLine:
     """The robot walks to (6, 0, 0) in odom; the error is that of the true pose.
 
     There is no LiDAR odometry yet: the robot goes by its base estimator, to whose pose a noise of 1 cm and 1 deg is
-    added (`golem.evaluation.odometry`, source `estimator`). The drift of legs and IMU over the line is in the error.
+    added (`golem.evaluation.episodes.odometry`, source `estimator`). The drift of legs and IMU over the line is in the
+    error.
     """
 
     name = "navigate-line"
@@ -71,7 +72,7 @@ class NavigateLine:
                 episode.running.bus, episode.robot, "estimator", spec.rng("odometry")
             )
             episode.locate(odometry)
-            strip = Strip(episode.robot, 0.0)
+            strip = FilmStrip(episode.robot, 0.0)
             episode.stand(SETTLE)
             if not episode.over:
                 goal = WalkGoal(DISTANCE, 0.0, 0.0, "odom", TIMEOUT)

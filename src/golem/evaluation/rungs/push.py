@@ -12,9 +12,9 @@ import numpy as np
 
 from golem import registry
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
-from golem.evaluation.episode import LATENCY, Episode, Loss, episode_seed, legs_stack
-from golem.evaluation.exercise import ArmMotion, Exercise
-from golem.evaluation.strip import Strip
+from golem.evaluation.episodes.episode import LATENCY, Episode, Loss, episode_seed, legs_stack
+from golem.evaluation.episodes.film_strip import FilmStrip
+from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE, BalanceTrace
 from golem.robots.mujoco.shoves import DIRECTIONS, Push, rod
@@ -64,8 +64,8 @@ class PushRung:
         stack = legs_stack(spec.method, spec.profile, spec.overrides, PLANT)
         push, settle = self.draw(spec.rng("push"))
         with closing(Episode(stack, episode_seed(spec.seed, spec.index))) as episode:
-            episode.start(Exercise(ArmMotion(spec.rng("arms"))))
-            strip = Strip(episode.robot, push.bearing)
+            episode.start(ScriptedMotion(ArmMotion(spec.rng("arms"))))
+            strip = FilmStrip(episode.robot, push.bearing)
             episode.stand(settle)
             if episode.loss is not None:
                 return never_pushed(episode.loss, spec.method)
@@ -88,7 +88,7 @@ class PushRung:
         peak = max(float(rng.normal(*PEAK)), LEAST_PEAK)
         return rod(direction, peak), float(rng.uniform(*SETTLE))
 
-    def pursue(self, episode: Episode, strip: Strip) -> None:
+    def pursue(self, episode: Episode, strip: FilmStrip) -> None:
         """Go on with the push that has begun until it is over, and keep pictures of it."""
         for seconds in MOMENTS:
             strip.keep(episode.t, episode.force)

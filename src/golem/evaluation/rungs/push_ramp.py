@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from golem.evaluation.episode import Episode
+from golem.evaluation.episodes.episode import Episode
+from golem.evaluation.episodes.film_strip import FilmStrip
 from golem.evaluation.rungs.push import MOMENTS, SETTLE, PushRung
-from golem.evaluation.strip import Strip
 from golem.robots.mujoco.shoves import DIRECTIONS, Push, ramp
 
 RATE = 40.0
@@ -37,7 +37,7 @@ class PushRampRung(PushRung):
         direction = DIRECTIONS[rng.integers(len(DIRECTIONS))]
         return ramp(direction, MOST, MOST / RATE), float(rng.uniform(*SETTLE))
 
-    def pursue(self, episode: Episode, strip: Strip) -> None:
+    def pursue(self, episode: Episode, strip: FilmStrip) -> None:
         """Push until the balance is lost, and keep pictures of what comes then."""
         strip.keep(episode.t, episode.force)
         episode.run(MOST / RATE, until=lambda: episode.recorder.margin < 0.0)

@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Generic, ParamSpec, TypeVar
 
 from golem.errors import GolemError
-from golem.evaluation.trials import SINGLE_THREAD, start_worker
+from golem.evaluation.harness.trials import SINGLE_THREAD, start_worker
 
 CAN_COPY = sys.platform == "linux"
 """Whether a process may go on in a copy of itself: Apple's libraries do not survive it, Windows has none."""

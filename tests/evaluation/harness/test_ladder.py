@@ -17,9 +17,9 @@ import pytest
 import tyro
 
 from golem.errors import ConfigError, GolemError, OutputError
-from golem.evaluation import ladder
-from golem.evaluation.ladder import LadderConfig, LadderInterrupted, run_ladder
-from golem.evaluation.records import read_records
+from golem.evaluation.harness import ladder
+from golem.evaluation.harness.ladder import LadderConfig, LadderInterrupted, run_ladder
+from golem.evaluation.harness.records import read_records
 
 Make = Callable[..., LadderConfig]
 
@@ -28,8 +28,9 @@ import signal, sys
 from pathlib import Path
 # A background job of a shell starts with Ctrl-C ignored, and so would this process if the tests run in one.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-from golem.evaluation import base, ladder
-from golem.evaluation.ladder import LadderConfig, run_ladder
+from golem.evaluation import base
+from golem.evaluation.harness import ladder
+from golem.evaluation.harness.ladder import LadderConfig, run_ladder
 ladder.code_digest = ladder.commit = lambda: "tested"
 base.RUNGS["fake"] = "fake_rung:Fake"
 if __name__ == "__main__":

@@ -11,8 +11,8 @@ from typing import Any
 from tyro.conf import Positional
 
 from golem.errors import ConfigError
-from golem.evaluation.records import TrialRecord, read_records
-from golem.evaluation.statistics import PairedTable, holm, mcnemar, paired_difference, wilson
+from golem.evaluation.harness.records import TrialRecord, read_records
+from golem.evaluation.metrics.statistics import PairedTable, holm, mcnemar, paired_difference, wilson
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.evaluation.svg import WIDTH, line, polyline, rect, svg, text, ticks
+from golem.evaluation.report.svg import WIDTH, line, polyline, rect, svg, text, ticks
 from golem.robots.mujoco.balance import BalanceTrace
 from golem.types import Array
 

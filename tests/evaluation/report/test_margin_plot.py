@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from golem.evaluation.courses import MarginCurve, margin_plot, push_start
-from golem.evaluation.strip import project
+from golem.evaluation.episodes.film_strip import project
+from golem.evaluation.report.margin_plot import MarginCurve, margin_plot, push_start
 from golem.robots.mujoco.balance import PERIOD, BalanceTrace
 from golem.robots.mujoco.spectator import Shot
 

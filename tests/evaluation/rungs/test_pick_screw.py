@@ -9,10 +9,10 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
-from golem.evaluation.episode import Loss, episode_seed
-from golem.evaluation.oracle import GraspTruth, Oracle
-from golem.evaluation.rungs import pick
-from golem.evaluation.rungs.pick import PAD_REACH, STRAIGHT, StandRung, TetherRung, blame
+from golem.evaluation.episodes.episode import Loss, episode_seed
+from golem.evaluation.episodes.oracle import GraspTruth, Oracle
+from golem.evaluation.rungs import pick_screw as pick
+from golem.evaluation.rungs.pick_screw import PAD_REACH, STRAIGHT, StandRung, TetherRung, blame
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.lockstep import build
 from golem.stack import load_stack

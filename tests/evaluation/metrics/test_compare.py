@@ -6,10 +6,10 @@ from dataclasses import replace
 import pytest
 
 from golem.errors import ConfigError
-from golem.evaluation.compare import CompareConfig, run_compare
-from golem.evaluation.ladder import LadderConfig, run_ladder
-from golem.evaluation.records import TrialRecord, read_records
-from golem.evaluation.statistics import PairedTable, mcnemar
+from golem.evaluation.harness.ladder import LadderConfig, run_ladder
+from golem.evaluation.harness.records import TrialRecord, read_records
+from golem.evaluation.metrics.compare import CompareConfig, run_compare
+from golem.evaluation.metrics.statistics import PairedTable, mcnemar
 
 
 @pytest.fixture

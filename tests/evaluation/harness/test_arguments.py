@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from golem.errors import ConfigError
+from golem.evaluation.harness.arguments import replaced_modules, robot_options
 from golem.evaluation.subject import Subject
-from golem.evaluation.words import replaced_modules, robot_options
 
 
 def test_options_of_the_robot_are_words_and_numbers() -> None:

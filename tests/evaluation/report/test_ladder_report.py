@@ -8,11 +8,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from golem.evaluation.ladder import LadderConfig, LadderResult, run_ladder
-from golem.evaluation.paper import PAPER
-from golem.evaluation.records import artefacts
-from golem.evaluation.report import render
-from golem.evaluation.svg import ticks
+from golem.evaluation.harness.ladder import LadderConfig, LadderResult, run_ladder
+from golem.evaluation.harness.records import artefacts
+from golem.evaluation.metrics.published import PAPER
+from golem.evaluation.report.ladder_report import render
+from golem.evaluation.report.svg import ticks
 from golem.robots.mujoco.balance import TRACE, BalanceTrace
 
 VOID = {"meta", "img", "br"}

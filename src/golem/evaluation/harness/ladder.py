@@ -14,12 +14,12 @@ from tyro.conf import arg
 
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.evaluation.base import TrialSpec, make_rung, rung_target
-from golem.evaluation.pool import Workers
-from golem.evaluation.records import Provenance, RunFolder, TrialRecord, artefacts
-from golem.evaluation.report import render
-from golem.evaluation.summary import Summary, summarise
-from golem.evaluation.trials import Finished, Refused, run_trial
-from golem.evaluation.words import replaced_modules
+from golem.evaluation.harness.arguments import replaced_modules
+from golem.evaluation.harness.pool import Workers
+from golem.evaluation.harness.records import Provenance, RunFolder, TrialRecord, artefacts
+from golem.evaluation.harness.trials import Finished, Refused, run_trial
+from golem.evaluation.metrics.summary import Summary, summarise
+from golem.evaluation.report.ladder_report import render
 from golem.provenance import Unchanged, code_digest, commit, digest, versions
 
 

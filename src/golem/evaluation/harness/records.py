@@ -20,7 +20,7 @@ from types import TracebackType
 
 from golem.errors import OutputError
 from golem.evaluation.base import TrialOutcome, TrialSpec
-from golem.evaluation.trials import Finished
+from golem.evaluation.harness.trials import Finished
 
 SCHEMA = 1
 """Version of the record's fields; raised when one changes its meaning."""

@@ -9,13 +9,13 @@ from html import escape
 from importlib import resources
 from pathlib import Path
 
-from golem.evaluation.courses import MOST, MarginCurve, margin_plot
-from golem.evaluation.measures import MEASURES, Measure
-from golem.evaluation.paper import PAPER
-from golem.evaluation.records import TrialRecord, artefacts
-from golem.evaluation.statistics import spread, wilson
-from golem.evaluation.summary import NO_MODULE, MethodSummary, Summary
-from golem.evaluation.svg import Dot, interval_bar, percent_axis, stacked, strips, trial_map
+from golem.evaluation.harness.records import TrialRecord, artefacts
+from golem.evaluation.metrics.metric_labels import MEASURES, Measure
+from golem.evaluation.metrics.published import PAPER
+from golem.evaluation.metrics.statistics import spread, wilson
+from golem.evaluation.metrics.summary import NO_MODULE, MethodSummary, Summary
+from golem.evaluation.report.margin_plot import MOST, MarginCurve, margin_plot
+from golem.evaluation.report.svg import Dot, interval_bar, percent_axis, stacked, strips, trial_map
 from golem.robots.mujoco.balance import TRACE, BalanceTrace
 
 HEADLINE_TIMES = {"detect_to_grasp": "detection<br>to grasp", "recovery": "recovery", "walk": "walk"}
@@ -47,7 +47,7 @@ def render(command: str, records: Sequence[TrialRecord], summary: Summary, folde
         _reading(first.rung),
         _provenance(first, summary),
     ]
-    css = resources.files("golem.evaluation").joinpath("report.css").read_text(encoding="utf-8")
+    css = resources.files("golem.evaluation.report").joinpath("report.css").read_text(encoding="utf-8")
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'

@@ -22,7 +22,7 @@ from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.library import cyclone
 from golem.types import Array
 
-GOLEM = (sys.executable, "-m", "golem.evaluation.dds_loop")
+GOLEM = (sys.executable, "-m", "golem.evaluation.speed.dds_loop")
 SDK_SCRIPT = Path(__file__).with_name("sdk_loop.py")
 PERIOD = 0.002
 TARGETS = "0 lost, median latency 150 us, robot 20 % of a core without images, 3 ms per image"

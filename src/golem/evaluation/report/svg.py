@@ -9,7 +9,7 @@ from html import escape
 
 import numpy as np
 
-from golem.evaluation.statistics import Interval
+from golem.evaluation.metrics.statistics import Interval
 
 WIDTH = 860
 """Width of a full-width plot in SVG units; the page scales it."""

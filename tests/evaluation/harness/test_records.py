@@ -9,8 +9,8 @@ import pytest
 
 from golem.errors import OutputError
 from golem.evaluation.base import TrialOutcome, TrialSpec
-from golem.evaluation.records import Provenance, RunFolder, TrialRecord, read_records, trial_name
-from golem.evaluation.trials import Finished
+from golem.evaluation.harness.records import Provenance, RunFolder, TrialRecord, read_records, trial_name
+from golem.evaluation.harness.trials import Finished
 
 PROVENANCE = Provenance({"a": "c0ffee", "b": "beef"}, "code", "commit", {"numpy": "2"})
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.evaluation.base import TrialSpec
-from golem.evaluation.exercise import ArmMotion, Exercise
+from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.evaluation.subject import Subject
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
@@ -108,7 +108,7 @@ def record(subject: Subject, spec: TrialSpec, pushed: bool) -> RecordedWalk:
         return False
 
     try:
-        episode.start(Exercise(ArmMotion(spec.rng("arms")), twist_at))
+        episode.start(ScriptedMotion(ArmMotion(spec.rng("arms")), twist_at))
         episode.run(START, sample)
         for i in range(len(TWISTS) + 1):
             episode.run(0.5, sample)

@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from golem.evaluation.records import TrialRecord
-from golem.evaluation.statistics import (
+from golem.evaluation.harness.records import TrialRecord
+from golem.evaluation.metrics.statistics import (
     Interval,
     PairedTable,
     Spread,

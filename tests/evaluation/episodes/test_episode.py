@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError
-from golem.evaluation import episode as episodes
-from golem.evaluation.episode import Episode, legs_stack, with_legs
-from golem.evaluation.exercise import WIDE_AREA, ArmMotion, Exercise
+from golem.evaluation.episodes import episode as episodes
+from golem.evaluation.episodes.episode import Episode, legs_stack, with_legs
+from golem.evaluation.episodes.scripted_motion import WIDE_AREA, ArmMotion, ScriptedMotion
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
 from golem.robots.mujoco.shoves import shove
@@ -18,7 +18,7 @@ from golem.skills.runner import FAULT
 from golem.stack import Choice, Stack
 from golem.types import PalmTargets, Twist
 
-METHODS = Path(__file__).with_name("leg_methods.py")
+METHODS = Path(__file__).parents[1] / "leg_methods.py"
 
 
 def episode(name: str) -> Episode:
@@ -92,7 +92,7 @@ def test_an_exercise_moves_the_hands_through_the_work_area_and_commands_the_base
     assert np.linalg.norm(np.diff(path, axis=0), axis=2).max() / 0.02 < 0.6
     robot = episode("Stiff")
     try:
-        robot.start(Exercise(motion, lambda t: Twist(vx=0.1 * t)))
+        robot.start(ScriptedMotion(motion, lambda t: Twist(vx=0.1 * t)))
         robot.run(1.0)
         targets = robot.running.bus.latest(topics.PALM_TARGETS, PalmTargets)
         status = robot.running.bus.latest(topics.LEG_STATUS, LegStatus)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from golem.errors import ConfigError
-from golem.evaluation.odometry import SimulatedOdometry
+from golem.evaluation.episodes.odometry import SimulatedOdometry
 from golem.middleware import topics
 from golem.middleware.topics import LegStatus
 from golem.robots.mujoco.balance import BalanceRecorder

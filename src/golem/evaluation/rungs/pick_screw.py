@@ -16,8 +16,8 @@ import numpy as np
 from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
-from golem.evaluation.episode import HANGS, READY, Loss, episode_seed, lost
-from golem.evaluation.oracle import GraspTruth, Oracle
+from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, lost
+from golem.evaluation.episodes.oracle import GraspTruth, Oracle
 from golem.middleware import topics
 from golem.middleware.bus import News
 from golem.provenance import stack_facts

@@ -25,7 +25,7 @@ LONGEST = 0.6
 INK, ACCENT = (245, 246, 248), (232, 78, 60)
 
 
-class Strip:
+class FilmStrip:
     """Keeps moments of a trial, and draws them when the trial is over."""
 
     def __init__(self, robot: MujocoRobot, bearing: float) -> None:

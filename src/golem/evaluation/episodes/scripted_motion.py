@@ -38,7 +38,7 @@ class ArmMotion:
         return np.array([CENTER[side] for side in SIDES]) + self._extent * waves.mean(axis=1)
 
 
-class Exercise:
+class ScriptedMotion:
     """A skill that runs until it is cancelled; see `golem.skills.base.Skill`.
 
     Attributes:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from golem.evaluation.statistics import PairedTable, holm, mcnemar, paired_difference, spread, wilson
+from golem.evaluation.metrics.statistics import PairedTable, holm, mcnemar, paired_difference, spread, wilson
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,1 @@
+"""Runs trials in parallel, keeps their records, and goes on where it was interrupted."""

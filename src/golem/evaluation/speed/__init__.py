@@ -1,0 +1,1 @@
+"""How fast this machine runs it; nothing here is a trial."""
