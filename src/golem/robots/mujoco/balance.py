@@ -14,11 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from itertools import islice
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.robots.mujoco.engine import MujocoRobot
+from golem.robots.mujoco.truth import Truth
 from golem.types import Array
 
 TRACE = "trace.npz"
@@ -162,6 +163,12 @@ def _runs(values: NDArray[np.bool_], minimum: int) -> int:
     return int((edges[1::2] - edges[::2] >= minimum).sum())
 
 
+class HasTruth(Protocol):
+    """A simulated robot whose truth can be read."""
+
+    truth: Truth
+
+
 class BalanceRecorder:
     """Samples one twin; call it after every tick.
 
@@ -172,7 +179,7 @@ class BalanceRecorder:
         quiet: for how long the robot has been standing still, both feet down, margin positive [s].
     """
 
-    def __init__(self, robot: MujocoRobot, memory: float = math.inf) -> None:
+    def __init__(self, robot: HasTruth, memory: float = math.inf) -> None:
         """Look at `robot`, and keep the samples of the last `memory` [s]."""
         self._truth = robot.truth
         maximum = None if math.isinf(memory) else round(memory / PERIOD)

@@ -108,8 +108,8 @@ def _robot(config: MujocoConfig) -> mujoco.MjSpec:
     return spec
 
 
-def foreign_robot(path: Path) -> mujoco.MjSpec:
-    """Return the robot of another MJCF file with our hands, cameras and names, its limbs touching the world only.
+def read_robot(path: Path) -> mujoco.MjSpec:
+    """Return the robot of another MJCF file, its free joint called `base`, else as it is.
 
     Args:
         path: an H1-2 with the vendor's 27 motors, links, joints and `imu` site, angles in radians.
@@ -129,6 +129,16 @@ def foreign_robot(path: Path) -> mujoco.MjSpec:
             f"{JOINT_NAMES[0]} to {JOINT_NAMES[-1]} in the vendor's order."
         )
     base.joints[0].name = "base"
+    return spec
+
+
+def foreign_robot(path: Path) -> mujoco.MjSpec:
+    """Return the robot of `read_robot` with our hands, cameras and names, its limbs touching the world only.
+
+    Raises:
+        ConfigError: see `read_robot`.
+    """
+    spec = read_robot(path)
     for element in (*spec.sensors, *spec.cameras):
         spec.delete(element)
     for geom in spec.geoms:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
 from golem.robots.model.table import BASE_LINK
-from golem.robots.mujoco.engine import MujocoRobot
 from golem.types import TICK, Array
 
 DIRECTIONS = ("front", "front_left", "left", "back_left", "back", "back_right", "right", "front_right")
@@ -87,6 +86,14 @@ def shove(direction: str, impulse: float) -> Push:
     return Push("torso_link", None, direction, impulse / SHOVE_TIME, SHOVE_TIME, "constant")
 
 
+class Pushable(Protocol):
+    """A simulated robot that can be pushed; see `MujocoRobot.push`."""
+
+    def push(self, force: Array, body: str, point: Array | None) -> None:
+        """Push a link from outside."""
+        ...
+
+
 class Pusher:
     """Pushes one twin, one push at a time.
 
@@ -94,7 +101,7 @@ class Pusher:
         force: (3,) present force in the world [N].
     """
 
-    def __init__(self, robot: MujocoRobot) -> None:
+    def __init__(self, robot: Pushable) -> None:
         """Push `robot`."""
         self._robot = robot
         self._push: tuple[Push, float, float] | None = None
