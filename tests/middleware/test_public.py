@@ -13,8 +13,8 @@ from golem.robots.sensors.cameras import CAMERAS
 
 
 def test_the_documentation_is_that_of_the_table() -> None:
-    path = REPOSITORY / "docs" / "interfaces.md"
-    advice = "write it anew: python -m golem.middleware.public_page docs/interfaces.md"
+    path = REPOSITORY / "docs" / "reference" / "topics.md"
+    advice = "write it anew: python -m golem.middleware.public_page docs/reference/topics.md"
     assert path.read_text(encoding="utf-8") == page(), advice
 
 

@@ -1,7 +1,7 @@
 """Every public stream, service and action of a running robot, simulated or real: the one table of them.
 
-What offers a row creates its endpoints from the row, `docs/interfaces.md` is written from the rows, and tests compare
-both with what running processes really offer. Names are those of ROS 2; on the wire `/x` is `rt/x`, so that
+What offers a row creates its endpoints from the row, `docs/reference/topics.md` is written from the rows, and tests
+compare both with what running processes really offer. Names are those of ROS 2; on the wire `/x` is `rt/x`, so that
 `/lowstate` and the vendor's `rt/lowstate` are the same topic.
 """
 

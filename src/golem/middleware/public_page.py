@@ -1,4 +1,4 @@
-"""Writes docs/interfaces.md from the table: `python -m golem.middleware.public_page docs/interfaces.md`."""
+"""Writes docs/reference/topics.md from the table: `python -m golem.middleware.public_page docs/reference/topics.md`."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ WHO: dict[Role, str] = {
 SHORT: dict[Role, str] = {"robot": "robot", "safety": "safety", "stack": "up", "user": "you"}
 INTRODUCTION = """# Interfaces
 
-Written by `python -m golem.middleware.public_page docs/interfaces.md` from `golem.middleware.public`, which is what the
-processes create their endpoints from; tests compare this page with the table, and the table with what running processes
-offer. Names are those of ROS 2. On the wire the topic `/x` is `rt/x`: `/lowstate` is the vendor's `rt/lowstate`.
+Written by `python -m golem.middleware.public_page docs/reference/topics.md` from `golem.middleware.public`, which is
+what the processes create their endpoints from; tests compare this page with the table, and the table with what running
+processes offer. Names are those of ROS 2. On the wire the topic `/x` is `rt/x`: `/lowstate` is
+the vendor's `rt/lowstate`.
 
 - Time: messages from robot and stack are stamped with robot time, which is `/clock` and the tick of `/lowstate`; the
   safety process stamps by a clock of its own, the time since boot. Goals of actions are stamped by the wall clock.
@@ -38,7 +39,7 @@ offer. Names are those of ROS 2. On the wire the topic `/x` is `rt/x`: `/lowstat
 
 
 def page() -> str:
-    """Return the text of docs/interfaces.md."""
+    """Return the text of docs/reference/topics.md."""
     parts = [INTRODUCTION]
     for role, who in WHO.items():
         rows = [row for row in public.TOPICS if row.by == role]

@@ -1,6 +1,6 @@
 """The shipped legs: two networks, each trained against an adversary that moves the upper body (the game of ALMI).
 
-One walks, the other stands: a network for both was worse at both (docs/legs.md, "How `almi` is trained").
+One walks, the other stands: a network for both was worse at both (docs/how-to/train-legs.md).
 """
 
 from __future__ import annotations

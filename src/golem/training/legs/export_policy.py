@@ -170,5 +170,5 @@ def _description(network: str, config: EnvConfig) -> str:
         "action": {"scale": config.action_scale, "clip": 10.0, "swing": config.swing},
         "observation": terms,
     }
-    head = "# A shipped leg policy; written by `golem train legs export`, see docs/legs.md.\n"
+    head = "# A shipped leg policy; written by `golem train legs export`, see docs/how-to/train-legs.md.\n"
     return head + yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=110)
