@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from golem.middleware import topics
+from golem.interfaces import topics
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.stack import Stack
-from golem.types import BaseEstimate, LowState, RgbdImage
 
 # Sees "something" where the depth image is deepest: needs no weights and depends on every pixel.
 EYES = """
@@ -73,8 +72,8 @@ def trace(eyes: Path, seed: int, profile: str) -> Trace:
     counts = dict.fromkeys(robot.cameras, 0)
 
     def record(running: LockstepRunner) -> None:
-        state = running.bus.latest(topics.LOW_STATE, LowState)
-        base = running.bus.latest(topics.BASE, BaseEstimate)
+        state = running.bus.latest(topics.LOW_STATE)
+        base = running.bus.latest(topics.BASE)
         assert state is not None and base is not None
         for a in (
             state.q,
@@ -88,7 +87,7 @@ def trace(eyes: Path, seed: int, profile: str) -> Trace:
             states.update(np.ascontiguousarray(a).tobytes())
         for camera in counts:
             count = running.bus.count(topics.rgbd_images(camera))
-            frame = running.bus.latest(topics.rgbd_images(camera), RgbdImage)
+            frame = running.bus.latest(topics.rgbd_images(camera))
             if frame is not None and count != counts[camera]:
                 counts[camera] = count
                 for a in (frame.rgb, frame.depth, frame.T_odom_optical):

@@ -13,6 +13,7 @@ SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
 LAYERS = (
     ("__init__", "types", "errors", "options", "registry"),
     ("middleware",),
+    ("interfaces",),
     ("robots",),
     ("hardware",),
     ("capabilities",),

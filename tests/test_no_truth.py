@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 
 from golem import registry
+from golem.interfaces import topics
+from golem.middleware.bus import Topic
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.external_forces import Pushes
 from golem.robots.mujoco.scene import Scene
@@ -207,7 +209,7 @@ def inspected(monkeypatch: pytest.MonkeyPatch) -> Iterator[Inspected]:
 def test_no_module_holds_a_way_to_the_truth(inspected: Inspected) -> None:
     made = {name for name, _ in inspected.roots}
     assert made >= set(registry.slots()) - {"robot"}
-    assert inspected.running.bus.count("realsense/head") > 0
+    assert inspected.running.bus.count(topics.rgbd_images("head")) > 0
     assert reachable(inspected.roots) == []
 
 
@@ -278,7 +280,7 @@ def test_a_planted_leak_is_found(kind: str, inspected: Inspected) -> None:
 
 
 def test_a_leak_over_the_bus_is_found(inspected: Inspected) -> None:
-    inspected.running.bus.publish("leak", inspected.robot.data, 0.0)
+    inspected.running.bus.publish(Topic("leak", object), inspected.robot.data, 0.0)
     assert any("MjData" in way for way in reachable(inspected.roots))
 
 

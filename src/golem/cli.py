@@ -201,21 +201,21 @@ def _topics(words: list[str]) -> int:
 
 def _record(words: list[str]) -> int:
     """Record a domain into a bag that ROS 2 tools and Foxglove read."""
-    from golem.middleware.record.commands import RecordConfig, run_record
+    from golem.runtime.live.record_commands import RecordConfig, run_record
 
     return 0 if run_record(_parse(RecordConfig, "record", words)) else FAILED
 
 
 def _replay(words: list[str]) -> int:
     """Play a bag onto a domain."""
-    from golem.middleware.record.commands import ReplayBagConfig, run_replay
+    from golem.runtime.live.record_commands import ReplayBagConfig, run_replay
 
     return 0 if run_replay(_parse(ReplayBagConfig, "replay", words)) else FAILED
 
 
 def _view(words: list[str]) -> int:
     """Show a domain live in Foxglove."""
-    from golem.middleware.record.view import ViewConfig, run_view
+    from golem.runtime.live.foxglove_view import ViewConfig, run_view
 
     run_view(_parse(ViewConfig, "view", words))
     return 0

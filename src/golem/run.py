@@ -15,13 +15,13 @@ from tyro.conf import Positional
 
 from golem.dashboard.live import LiveView
 from golem.errors import ConfigError
-from golem.middleware import topics
+from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.robots.base import Robot
 from golem.robots.mujoco.config import World
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.lockstep import LockstepRunner, build
-from golem.skills.base import Feedback, SkillResult
+from golem.skills.base import SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import Stack, load_stack
 
@@ -154,7 +154,7 @@ class Narrator:
 
     def __init__(self, running: LockstepRunner) -> None:
         """Listen to the skill of `running`."""
-        self._news = News(running.bus, topics.FEEDBACK, Feedback)
+        self._news = News(running.bus, topics.FEEDBACK)
         self._stage = ""
 
     def __call__(self) -> None:

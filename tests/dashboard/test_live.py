@@ -12,15 +12,13 @@ import pytest
 from golem.dashboard.live import LiveView
 from golem.dashboard.panel import Button
 from golem.errors import ConfigError
-from golem.hardware.safety.base import GateState, Reason
-from golem.middleware import topics
-from golem.middleware.topics import LegStatus
+from golem.interfaces import topics
+from golem.interfaces.payloads import Feedback, GateState, Reason
 from golem.robots.mujoco.balance import PERIOD
 from golem.robots.mujoco.spectator import BodyMesh, SpectatorView
 from golem.runtime.lockstep import LockstepRunner, build
-from golem.skills.base import Feedback
 from golem.stack import Stack
-from golem.types import LowCommand, Twist
+from golem.types import Twist
 
 MESHES: dict[int, list[BodyMesh]] = {}
 
@@ -89,7 +87,7 @@ def test_the_button_stops_the_robot_through_the_gate_and_a_reset_revives_it(
     view.panel.press(Button.PRESS)
     until_state(view, running, GateState.STOP1)
     assert running.safety is not None and running.safety.reason is Reason.ESTOP_PRESSED
-    command = running.bus.latest(topics.LOW_CMD, LowCommand)
+    command = running.bus.latest(topics.LOW_CMD)
     assert command is not None and (command.kp == 0.0).all()
     view.panel.press(Button.REVIVE)  # refused: still pressed
     end = running.executor.t + 0.7
@@ -153,12 +151,12 @@ def test_the_sliders_drive_until_nobody_looks(
     assert legs._sliders["vx"].max == maximum > 0.0
     legs.twist = Twist(vx=9.0)
     run(walk, running, 0.4)
-    heard = running.bus.latest(topics.LEG_STATUS, LegStatus)
+    heard = running.bus.latest(topics.LEG_STATUS)
     assert heard is not None and heard.commanded == Twist(vx=maximum)
     end = running.executor.t + 3.0  # the base estimate has to find the floor, and the legs to change hands
 
     def walks() -> bool:
-        status = running.bus.latest(topics.LEG_STATUS, LegStatus)
+        status = running.bus.latest(topics.LEG_STATUS)
         return running.executor.t > end or (status is not None and status.applied.vx > 0.1)
 
     walk.idle(walks)
@@ -166,11 +164,11 @@ def test_the_sliders_drive_until_nobody_looks(
     assert "ahead" in walk.panel._status.content
     walk.panel.press(Button.STAND)
     run(walk, running, 0.1)
-    assert legs.twist == Twist() == running.bus.latest(topics.TWIST, Twist)
+    assert legs.twist == Twist() == running.bus.latest(topics.TWIST)
     legs.twist = Twist(wz=0.3)
     monkeypatch.setattr(walk._server, "get_clients", dict)
     run(walk, running, 0.1)
-    assert legs.twist == Twist() == running.bus.latest(topics.TWIST, Twist)
+    assert legs.twist == Twist() == running.bus.latest(topics.TWIST)
 
 
 def test_an_emergency_stop_takes_the_sliders_back(walker: tuple[LockstepRunner, Any], walk: LiveView) -> None:

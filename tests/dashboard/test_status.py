@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from golem.dashboard.status import Timeline, camera_picture, read_status
-from golem.hardware.safety.base import GateState
-from golem.middleware import topics
-from golem.middleware.topics import Detections
+from golem.interfaces import topics
+from golem.interfaces.payloads import Detections, Feedback, GateState
 from golem.robots.mujoco.spectator import SpectatorView
 from golem.runtime.lockstep import LockstepRunner
-from golem.skills.base import Feedback
 from golem.types import Detection, LocalizedObject, RgbdImage
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
+from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.hold import HoldConfig, JointHold
+from golem.interfaces.payloads import LegCommand
 from golem.types import BaseEstimate, LowState
 
 

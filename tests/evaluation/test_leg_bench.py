@@ -16,9 +16,8 @@ from golem.evaluation.campaign import Done
 from golem.evaluation.episodes.odometry import LATENCY, PERIOD, POSITION_NOISE, YAW_NOISE, SimulatedOdometry
 from golem.evaluation.leg_bench import LegBenchConfig, LegTrial, run_leg_bench, summarise
 from golem.evaluation.subject import Subject, labels
-from golem.middleware import topics
+from golem.interfaces import topics
 from golem.middleware.bus import Bus
-from golem.middleware.topics import Odometry
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.lockstep import start_posture
 from golem.types import BaseEstimate
@@ -78,7 +77,7 @@ def test_simulated_odometry_is_its_source_with_noise_at_its_rate(source: Any) ->
         odometry(t)
         if bus.count(topics.ODOMETRY) > seen:
             seen = bus.count(topics.ODOMETRY)
-            found = bus.latest(topics.ODOMETRY, Odometry)
+            found = bus.latest(topics.ODOMETRY)
             assert found is not None and t - found.t >= LATENCY - 1e-9
             x, y = found.T_odom_base[:2, 3] - middle
             errors.append((x, y, np.arctan2(found.T_odom_base[1, 0], found.T_odom_base[0, 0])))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
+from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.hold import JointHold
 from golem.capabilities.legs.locomotion import Locomotion
@@ -16,6 +16,7 @@ from golem.errors import ConfigError
 from golem.evaluation.episodes.plain_episode import BARE, PlainEpisode
 from golem.evaluation.own_terms import OwnTermsTrial
 from golem.evaluation.push_bench import DOES_NOT_WALK
+from golem.interfaces.payloads import LegCommand
 from golem.robots.mujoco.plain_robot import PlainRobot
 from golem.runtime.lockstep import start_posture
 from golem.skills.runner import FAULT

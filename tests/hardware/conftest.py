@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from golem.hardware.estop.base import EstopMessage
-from golem.hardware.safety.base import GateInputs, GateResult, GateState, OperatorRequest, SafetyLimits
+from golem.hardware.safety.base import GateInputs, GateResult, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
+from golem.interfaces.payloads import EstopMessage, GateState
 from golem.robots.model.mjcf import robot_spec
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import NUM_JOINTS, Array, Imu, LowCommand, LowState

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from golem.errors import ConfigError
-from golem.middleware.bus import Bus
+from golem.middleware.bus import Bus, Topic
 from golem.runtime.executor import Executor
 from golem.types import TICK
 
@@ -63,16 +63,16 @@ def test_a_node_faster_than_the_clock_is_refused_by_name() -> None:
 
 
 def test_what_is_due_is_delivered_before_the_nodes_run() -> None:
-    bus = Bus()
+    bus, x = Bus(), Topic("x", int)
     seen: list[tuple[float, int | None]] = []
 
     class Reader:
         period = TICK
 
         def step(self, t: float) -> None:
-            seen.append((t, bus.latest("x", int)))
+            seen.append((t, bus.latest(x)))
 
-    bus.publish("x", 5, t=0.0, latency=2 * TICK)
+    bus.publish(x, 5, t=0.0, latency=2 * TICK)
     Executor(bus, [Reader()]).run(4 * TICK)
     assert [value for _, value in seen] == [None, None, 5, 5]
 

@@ -13,13 +13,12 @@ import pytest
 from tests.runtime.test_lower_body_node import Drive
 
 from golem.capabilities.navigation.goto import GoTo
-from golem.hardware.safety.base import GateState
-from golem.middleware import topics
-from golem.middleware.topics import LegStatus
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.walk import Stand, StandGoal, Walk, WalkGoal
 from golem.stack import Choice, load_stack
-from golem.types import LowCommand, Twist
+from golem.types import Twist
 
 DYING = """
 from golem.capabilities.legs.{module} import {name}
@@ -72,7 +71,7 @@ def standing(path: Path, text: str, fallback: str) -> Iterator[tuple[LockstepRun
 def assert_it_stands_on(running: LockstepRunner, robot: Any, fallback: str) -> None:
     """Check that the robot stands by its fallback, now and two seconds later."""
     for _ in range(2):
-        status = running.bus.latest(topics.LEG_STATUS, LegStatus)
+        status = running.bus.latest(topics.LEG_STATUS)
         assert status is not None
         assert (status.controller, status.applied, status.stepping) == (fallback, Twist(), False)
         assert running.safety is not None and running.safety.state is GateState.ACTIVE, running.safety
@@ -111,7 +110,7 @@ def test_a_robot_whose_estimate_goes_stale_while_it_walks_is_damped_and_says_why
         assert (result.success, result.stage, result.slot) == (False, "safety", "safety")
         assert "base_estimate_stale" in result.reason and 4.0 < running.executor.t < 4.6
         assert running.safety is not None and running.safety.state is GateState.STOP1
-        command = running.bus.latest(topics.LOW_CMD, LowCommand)
+        command = running.bus.latest(topics.LOW_CMD)
         assert command is not None and not command.kp.any() and (command.kd > 0.0).all()
 
 

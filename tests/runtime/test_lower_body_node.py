@@ -11,16 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.capabilities.legs.base import LegCommand
 from golem.errors import ConfigError, ModuleFault
-from golem.hardware.safety.base import GateState
-from golem.middleware import topics
-from golem.middleware.topics import LegStatus
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState, LegStatus
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.stack import Choice, Stack
-from golem.types import LEGS, LowCommand, LowState, Twist
+from golem.types import LEGS, Twist
 
 CONTROLLER = """
 import time
@@ -113,7 +111,7 @@ def write(folder: Path, how: str) -> Path:
 
 
 def status(running: LockstepRunner) -> LegStatus:
-    newest = running.bus.latest(topics.LEG_STATUS, LegStatus)
+    newest = running.bus.latest(topics.LEG_STATUS)
     assert newest is not None
     return newest
 
@@ -144,8 +142,8 @@ def test_failed_legs_go_to_the_fallback_and_the_skill_ends_with_their_name(how: 
         # It failed after 0.4 s, and the fallback then had the time to take its posture.
         assert running.executor.t == pytest.approx(2.42, abs=0.1)
         assert running.safety is not None and running.safety.state is GateState.ACTIVE
-        state = running.bus.latest(topics.LOW_STATE, LowState)
-        command = running.bus.latest(topics.LOW_CMD, LowCommand)
+        state = running.bus.latest(topics.LOW_STATE)
+        command = running.bus.latest(topics.LOW_CMD)
         assert state is not None and command is not None
         np.testing.assert_allclose(command.q[[3, 9]], 0.8, atol=1e-6)
         np.testing.assert_allclose(state.q[LEGS], command.q[LEGS], atol=0.05)
@@ -183,7 +181,7 @@ def test_a_fallback_that_fails_too_leaves_the_motors_damped(tmp_path: Path) -> N
         assert "q contains NaN" in caught.value.reason
         assert f"the fallback {path}:Doomed failed too: RuntimeError: gone" in caught.value.reason
         assert running.safety is not None and running.safety.state is GateState.STOP1
-        command = running.bus.latest(topics.LOW_CMD, LowCommand)
+        command = running.bus.latest(topics.LOW_CMD)
         assert command is not None
         assert not command.kp.any() and (command.kd > 0.0).all() and not command.tau.any()
 
@@ -204,7 +202,7 @@ def test_what_failed_legs_sent_late_does_not_come_any_more(tmp_path: Path) -> No
         while status(running).fault is None:
             running.executor.run(running.executor.t + 0.002)
         running.executor.run(running.executor.t + 0.05)
-        command = running.bus.latest(topics.LEG_COMMAND, LegCommand)
+        command = running.bus.latest(topics.LEG_COMMAND)
         assert command is not None
         # A third of the way from 200 to the fallback's gains; those of its own last commands would come until 0.1 s.
         assert 240.0 < command.kp[0] < 300.0

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError, GolemError, ModuleFault
-from golem.hardware.safety.base import GateState
-from golem.middleware import topics
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import SkillResult
 from golem.skills.context import Context

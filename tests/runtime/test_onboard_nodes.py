@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 from golem.capabilities.legs.hold import STANCES, JointHold
-from golem.hardware.safety.base import GateState
-from golem.middleware import topics
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState, LegStatus
 from golem.middleware.bus import Bus
-from golem.middleware.topics import LegStatus
 from golem.middleware.unitree_api import (
     LOCO_APIS,
     ApiRequest,
@@ -31,7 +30,7 @@ from golem.runtime.onboard_nodes import ANSWER, BusOnboard, LocoServiceNode
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.stack import Choice, Stack, load_stack
-from golem.types import LEGS, LowState, Twist
+from golem.types import LEGS, Twist
 
 API = LOCO_APIS["h1"]
 FAILING = """
@@ -67,7 +66,7 @@ class Drive:
 
 
 def legs(running: LockstepRunner) -> LegStatus:
-    status = running.bus.latest(topics.LEG_STATUS, LegStatus)
+    status = running.bus.latest(topics.LEG_STATUS)
     assert status is not None
     return status
 
@@ -77,7 +76,7 @@ def test_the_onboard_controller_moves_the_legs_by_the_calls_of_any_robot(robot: 
     vendor = Choice("vendor", {"robot": robot})
     with hanging(lower_body=vendor, onboard=Choice("hold", {"stance": "straight", "speed": 2.0})) as running:
         running.executor.run(3.0)
-        state = running.bus.latest(topics.LOW_STATE, LowState)
+        state = running.bus.latest(topics.LOW_STATE)
         safety = running.safety
         assert state is not None and safety is not None
         assert safety.state is GateState.ACTIVE

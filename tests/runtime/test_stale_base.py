@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.hardware.estop.base import EstopMessage
-from golem.hardware.safety.base import GateState, GateStatus, OperatorRequest, Reason, SafetyLimits
-from golem.middleware import topics
+from golem.hardware.safety.base import OperatorRequest, SafetyLimits
+from golem.interfaces import topics
+from golem.interfaces.payloads import EstopMessage, GateState, Reason
 from golem.middleware.bus import Bus
 from golem.runtime.nodes import SafetyNode
 from golem.types import NUM_JOINTS, BaseEstimate, Imu, LowCommand, LowState
@@ -29,7 +29,7 @@ def test_an_estimate_that_stays_stale_stops_the_motors() -> None:
         bus.publish(topics.BASE, BaseEstimate(t, np.eye(4), stale=i >= 100), t)
         bus.deliver(t)
         node.step(t)
-        result = bus.latest(topics.SAFETY, GateStatus)
+        result = bus.latest(topics.SAFETY)
         assert result is not None
         results.append(result)
     assert all(r.state is GateState.ACTIVE for r in results[5:200])

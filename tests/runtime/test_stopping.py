@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from golem.errors import ModuleFault
-from golem.hardware.safety.base import GateState
-from golem.middleware import topics
-from golem.middleware.topics import HandGoal
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState, HandGoal
 from golem.runtime.lockstep import build
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.stack import Choice, Stack
-from golem.types import HandState, LowCommand, PalmTargets
+from golem.types import PalmTargets
 
 DYING_ARMS = """
 from golem.capabilities.arms.diff_ik import DiffIK
@@ -49,7 +48,7 @@ def test_the_motors_damp_when_a_module_dies(tmp_path: Path) -> None:
     robot.close()
     assert running.executor.t == pytest.approx(0.2, abs=0.02)
     assert running.safety is not None and running.safety.state is GateState.STOP1
-    command = running.bus.latest(topics.LOW_CMD, LowCommand)
+    command = running.bus.latest(topics.LOW_CMD)
     assert command is not None
     assert not command.kp.any() and (command.kd > 0.0).all() and not command.tau.any()
 
@@ -78,7 +77,7 @@ def test_no_arm_is_drawn_to_where_a_skill_or_a_stop_left_it(stopped: bool) -> No
     running, robot = build(Stack(profile="ideal"), seed=0)
 
     def sent() -> PalmTargets:
-        targets = running.bus.latest(topics.PALM_TARGETS, PalmTargets)
+        targets = running.bus.latest(topics.PALM_TARGETS)
         assert targets is not None
         return targets
 
@@ -100,7 +99,7 @@ def test_a_stopped_hand_stays_as_it_is_and_forgets_what_it_was_told() -> None:
     running, robot = build(Stack(profile="ideal"), seed=0)
 
     def gap() -> float:
-        state = running.bus.latest(topics.hand_state("right"), HandState)
+        state = running.bus.latest(topics.hand_state("right"))
         assert state is not None
         return state.gap
 

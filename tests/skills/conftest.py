@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.hardware.hands.base import GripState, HandStatus
-from golem.middleware import topics
+from golem.interfaces import topics
+from golem.interfaces.payloads import Detections, GripState, HandStatus
 from golem.middleware.bus import Bus
-from golem.middleware.topics import DetectionRequest, Detections, HandGoal
 from golem.robots.model.kinematics import Kinematics
-from golem.skills.base import Feedback
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
-from golem.types import SIDES, Array, Detection, LocalizedObject, PalmTargets, Side
+from golem.types import SIDES, Array, Detection, LocalizedObject, Side
 
 PERIOD = 0.01
 FRAME = 7
@@ -44,7 +42,7 @@ class Ideal(Kinematics):
     def pose(self, frame: str) -> Array:
         """Return where the gripper was sent, off by `offset`."""
         side = frame.removesuffix("_gripper")
-        targets = self._bus.latest(topics.PALM_TARGETS, PalmTargets)
+        targets = self._bus.latest(topics.PALM_TARGETS)
         sent = None if targets is None else getattr(targets, side)
         T = np.diag([1.0, -1.0, -1.0, 1.0]) if sent is None else sent.copy()
         if sent is None:
@@ -101,22 +99,22 @@ class World:
         self._tick += 1
         self.bus.deliver(self.t)
         for camera in ("head", "left_hand", "right_hand"):
-            request = self.bus.latest(topics.detection_request(camera), DetectionRequest)
+            request = self.bus.latest(topics.detection_request(camera))
             if request is not None and request.labels and self._tick % FRAME == 0 and camera in self.objects:
                 objects = tuple(o for o in self.objects[camera]() if o.label in request.labels)
                 self.bus.publish(topics.detections(camera), Detections(self.t, camera, objects), self.t)
         for side in SIDES:
             self._hand(side)
-        targets = self.bus.latest(topics.PALM_TARGETS, PalmTargets)
+        targets = self.bus.latest(topics.PALM_TARGETS)
         if targets is not None and targets.right is not None:
             self.sent.append(targets.right)
-        feedback = self.bus.latest(topics.FEEDBACK, Feedback)
+        feedback = self.bus.latest(topics.FEEDBACK)
         if feedback is not None and self.stages[-1:] != [feedback.stage]:
             self.stages.append(feedback.stage)
         self.context.refresh(self.t)
 
     def _hand(self, side: Side) -> None:
-        goal = self.bus.latest(topics.hand_goal(side), HandGoal)
+        goal = self.bus.latest(topics.hand_goal(side))
         count = self.bus.count(topics.hand_goal(side))
         if goal is not None and count != self._goals[side]:
             self._goals[side] = count

@@ -10,8 +10,8 @@ import pytest
 from golem.capabilities.grasping.base import Grasp, GraspMethod, OpenLoop
 from golem.capabilities.grasping.centroid import Centroid
 from golem.capabilities.grasping.visual_servo import VisualServo
-from golem.middleware import topics
-from golem.middleware.topics import DetectionRequest, HandGoal
+from golem.interfaces import topics
+from golem.interfaces.payloads import DetectionRequest
 from golem.skills.base import SkillResult
 from golem.skills.pick import Pick, PickConfig, PickGoal
 from golem.types import Array, LocalizedObject, Side
@@ -52,11 +52,11 @@ def picked(
 def assert_safe(world: Any, side: Side = "right") -> None:
     """Check that every camera sleeps, the hand was told to open, and the arm was sent home."""
     for camera in world.objects:
-        assert world.bus.latest(topics.detection_request(camera), DetectionRequest) in (
+        assert world.bus.latest(topics.detection_request(camera)) in (
             None,
             DetectionRequest(),
         )
-    goal = world.bus.latest(topics.hand_goal(side), HandGoal)
+    goal = world.bus.latest(topics.hand_goal(side))
     assert goal is not None and goal.gap is not None
     np.testing.assert_allclose(world.context.arms[side].commanded[:3, 3], [0.35, -0.2, 0.1], atol=1e-9)
 
@@ -84,7 +84,7 @@ def test_the_hand_closes_where_the_palm_camera_saw_the_screw(full: Any) -> None:
 
     def step() -> None:
         tick()
-        goal = full.bus.latest(topics.hand_goal("right"), HandGoal)
+        goal = full.bus.latest(topics.hand_goal("right"))
         if goal is not None and goal.gap is None and not seen_at:
             seen_at.append(full.context.arms["right"].commanded[:3, 3].copy())
 
@@ -100,7 +100,7 @@ def test_the_screw_is_let_go_above_the_tray(full: Any) -> None:
     def step() -> None:
         held = full.holds
         tick()
-        goal = full.bus.latest(topics.hand_goal("right"), HandGoal)
+        goal = full.bus.latest(topics.hand_goal("right"))
         if held and goal is not None and goal.gap is not None and not let_go:
             let_go.append(full.context.arms["right"].commanded[:3, 3].copy())
 
@@ -201,7 +201,7 @@ def test_a_hand_that_cannot_follow_stalls(full: Any) -> None:
 
 
 def assert_safe_after_offset(world: Any) -> None:
-    goal = world.bus.latest(topics.hand_goal("right"), HandGoal)
+    goal = world.bus.latest(topics.hand_goal("right"))
     assert goal is not None and goal.gap == CONFIG.release_gap
 
 
@@ -256,7 +256,7 @@ def test_a_pick_can_be_cancelled_at_any_time(share: float, world: Any, thing: An
     assert world.holds == held or world.stages[-2:-1] == ["grasp"]
     np.testing.assert_array_equal(world.context.arms["right"].commanded, sent)
     for camera in world.objects:
-        assert world.bus.latest(topics.detection_request(camera), DetectionRequest) in (
+        assert world.bus.latest(topics.detection_request(camera)) in (
             None,
             DetectionRequest(),
         )

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from golem.capabilities.navigation.goto import GoTo
-from golem.middleware import topics
+from golem.interfaces import topics
+from golem.interfaces.payloads import LegStatus, Odometry
 from golem.middleware.bus import Bus
-from golem.middleware.topics import LegStatus, Odometry
 from golem.robots.model.kinematics import Kinematics
-from golem.skills.base import Feedback, SkillResult
+from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
 from golem.skills.walk import Stand, StandGoal, Walk, WalkGoal
@@ -53,7 +53,7 @@ class Ground:
     @property
     def twist(self) -> Twist:
         """What the legs were told last."""
-        return self.bus.latest(topics.TWIST, Twist) or Twist()
+        return self.bus.latest(topics.TWIST) or Twist()
 
     def run(self, coroutine: Coroutine[None, None, SkillResult], seconds: float = 60.0) -> SkillRun:
         """Run a skill to its end, or for so many seconds."""
@@ -63,7 +63,7 @@ class Ground:
                 break
             self._advance()
             run.step()
-            feedback = self.bus.latest(topics.FEEDBACK, Feedback)
+            feedback = self.bus.latest(topics.FEEDBACK)
             if feedback is not None and self.stages[-1:] != [feedback.stage]:
                 self.stages.append(feedback.stage)
         return run

@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw, ImageFont
 from golem.dashboard.balance_chart import SPAN, balance_chart
 from golem.dashboard.status import CLASS_COLOURS, Status, camera_picture, read_status
 from golem.errors import OutputError
-from golem.hardware.safety.base import GateState
+from golem.interfaces.payloads import GateState
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.spectator import Shot, SpectatorView

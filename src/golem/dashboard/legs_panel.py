@@ -9,7 +9,7 @@ import viser
 
 from golem.capabilities.legs.base import Envelope
 from golem.dashboard.status import Status
-from golem.middleware.topics import LegStatus
+from golem.interfaces.payloads import LegStatus
 from golem.robots.mujoco.shoves import DIRECTIONS, Push, shove
 from golem.types import BaseEstimate, Twist
 

@@ -24,8 +24,9 @@ from golem.dashboard.panel import Button, Panel
 from golem.dashboard.stage import Stage
 from golem.dashboard.status import Timeline, camera_picture, read_status
 from golem.errors import ConfigError
-from golem.hardware.safety.base import GateState, OperatorRequest
-from golem.middleware import topics
+from golem.hardware.safety.base import OperatorRequest
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from golem.dashboard.legs_panel import LegsPanel, legs_html
 from golem.dashboard.status import Status
-from golem.hardware.safety.base import GateState
+from golem.interfaces.payloads import GateState
 
 STAGE_COLOURS = ("#3b7ea1", "#5a9367", "#e0933f", "#c2503a", "#7d5ba6", "#2b9c92", "#8a6d3b")
 SAFETY_COLOURS = {

@@ -8,13 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.hardware.safety.base import GateState
-from golem.middleware import topics
-from golem.middleware.topics import Detections, LegStatus
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState, LegStatus
 from golem.robots.mujoco.spectator import SpectatorView
 from golem.runtime.lockstep import LockstepRunner
-from golem.skills.base import Feedback
-from golem.types import Array, BaseEstimate, RgbdImage
+from golem.types import Array, BaseEstimate
 
 FRESH = 0.2
 """Age up to which a frame on the bus is shown [s]: three frame periods."""
@@ -52,7 +50,7 @@ class Status:
 
 def read_status(running: LockstepRunner) -> Status:
     """Return the present status of a stack."""
-    feedback = running.bus.latest(topics.FEEDBACK, Feedback)
+    feedback = running.bus.latest(topics.FEEDBACK)
     gate = running.safety
     return Status(
         running.executor.t,
@@ -60,8 +58,8 @@ def read_status(running: LockstepRunner) -> Status:
         "" if feedback is None else feedback.text,
         GateState.INIT if gate is None else gate.state,
         "" if gate is None else gate.why,
-        running.bus.latest(topics.LEG_STATUS, LegStatus),
-        running.bus.latest(topics.BASE, BaseEstimate),
+        running.bus.latest(topics.LEG_STATUS),
+        running.bus.latest(topics.BASE),
     )
 
 
@@ -89,7 +87,7 @@ class Timeline:
     def update(self, running: LockstepRunner) -> None:
         """Take in the newest feedback; call it often enough to miss no stage."""
         count = running.bus.count(topics.FEEDBACK)
-        feedback = running.bus.latest(topics.FEEDBACK, Feedback)
+        feedback = running.bus.latest(topics.FEEDBACK)
         if feedback is None or count == self._seen:
             return
         self._seen = count
@@ -113,11 +111,11 @@ def camera_picture(running: LockstepRunner, view: SpectatorView, camera: str) ->
     Returns:
         (height, width, 3) RGB, half the camera's resolution.
     """
-    frame = running.bus.latest(topics.rgbd_images(camera), RgbdImage)
+    frame = running.bus.latest(topics.rgbd_images(camera))
     if frame is None or running.executor.t - frame.t > FRESH:
         return view.picture(camera)
     picture = np.ascontiguousarray(frame.rgb[::2, ::2])
-    sightings = running.bus.latest(topics.detections(camera), Detections)
+    sightings = running.bus.latest(topics.detections(camera))
     if sightings is not None and frame.t - sightings.t <= FRESH:
         for found in sightings.objects:
             x0, y0, x1, y1 = (round(float(v) / 2) for v in found.detection.box)

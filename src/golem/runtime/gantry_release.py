@@ -6,13 +6,11 @@ import math
 
 import numpy as np
 
-from golem.capabilities.legs.base import LegCommand
-from golem.middleware import topics
+from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.robots.base import HasGantry
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import moving
-from golem.types import BaseEstimate
 
 READY = 1.6
 """Time from the gate's activation to the release [s]: the servo's ramp, after which the arms hang still, and a bit."""
@@ -41,7 +39,7 @@ class GantryReleaseNode:
         if not self._robot.on_gantry:
             self._look(t)
             return
-        legs = self._bus.latest(topics.LEG_COMMAND, LegCommand)
+        legs = self._bus.latest(topics.LEG_COMMAND)
         if not moving(self._bus) or legs is None or not (legs.kp.any() or np.any(legs.tau)):
             self._waiting_since = t
         elif t - self._waiting_since >= READY:
@@ -52,7 +50,7 @@ class GantryReleaseNode:
         """Look whether the estimator finds the floor."""
         if self._found:
             return
-        base = self._bus.latest(topics.BASE, BaseEstimate)
+        base = self._bus.latest(topics.BASE)
         self._found = base is not None and not base.stale
         if not self._found and t - self._released > FOUND:
             raise self._estimator.fault(f"it found no foot on the floor within {FOUND:g} s of the release")

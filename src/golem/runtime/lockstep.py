@@ -17,7 +17,8 @@ from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.navigation.base import Navigator
 from golem.errors import ConfigError, ModuleFault, RobotGone
 from golem.hardware.estop.virtual import VirtualEstop
-from golem.hardware.safety.base import GateStatus, OperatorRequest, SafetyLimits
+from golem.hardware.safety.base import OperatorRequest, SafetyLimits
+from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
 from golem.robots.base import HasGantry, Robot
 from golem.robots.sensors.profiles import load_profile

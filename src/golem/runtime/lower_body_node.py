@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 
-from golem.capabilities.legs.base import Envelope, LegCommand, LowerBody
+from golem.capabilities.legs.base import Envelope, LowerBody
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.locomotion import Locomotion
 from golem.errors import ModuleFault
-from golem.middleware import topics
+from golem.interfaces import topics
+from golem.interfaces.payloads import LegCommand, LegStatus
 from golem.middleware.bus import Bus, News
-from golem.middleware.topics import LegStatus
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import MIN_RATE, moving
 from golem.types import LEGS, BaseEstimate, LowState, Twist
@@ -82,7 +82,7 @@ class LowerBodyNode:
         """Run `legs`, with `fallback` in reserve."""
         self._bus, self._legs, self._fallback = bus, legs, fallback
         self._locomotion = Locomotion(legs.controller)
-        self._twists = News(bus, topics.TWIST, Twist)
+        self._twists = News(bus, topics.TWIST)
         self._fault: ModuleFault | None = None
         self._failed_at = -RECOVERY
         self._overruns = 0
@@ -100,8 +100,8 @@ class LowerBodyNode:
 
     def step(self, t: float) -> None:
         """Publish leg targets, and what the base layer did."""
-        state = self._bus.latest(topics.LOW_STATE, LowState)
-        base = self._bus.latest(topics.BASE, BaseEstimate)
+        state = self._bus.latest(topics.LOW_STATE)
+        base = self._bus.latest(topics.BASE)
         if state is None or base is None:
             return
         twist = self._twists.read()
@@ -117,7 +117,7 @@ class LowerBodyNode:
             self._bus.withdraw(topics.LEG_COMMAND)  # what the failed one sent late shall not come any more
             try:
                 # What the motors are at now, which is not what was computed last if that was on its way.
-                last = self._bus.latest(topics.LEG_COMMAND, LegCommand)
+                last = self._bus.latest(topics.LEG_COMMAND)
                 self._legs.contract.call(self._locomotion.hand_over, self._legs.controller, state, last)
                 command, latency = self._control(state, base, None)
             except ModuleFault as second:

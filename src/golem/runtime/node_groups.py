@@ -20,9 +20,10 @@ from golem.errors import GolemError
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.hands.base import HandController
-from golem.hardware.safety.base import GateStatus, OperatorRequest, SafetyLimits
+from golem.hardware.safety.base import OperatorRequest, SafetyLimits
 from golem.hardware.servo.base import MotorServo
-from golem.middleware import topics
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
 from golem.robots.base import HasGantry, Robot
 from golem.robots.model.kinematics import Kinematics
@@ -211,7 +212,7 @@ class StackNodes:
     @property
     def safety(self) -> GateStatus | None:
         """The newest verdict of the safety gate."""
-        return self.bus.latest(topics.SAFETY, GateStatus)
+        return self.bus.latest(topics.SAFETY)
 
     @property
     def stopped(self) -> bool:

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.arms.base import ArmCommand, UpperBody
-from golem.capabilities.legs.base import LegCommand
+from golem.capabilities.arms.base import UpperBody
 from golem.hardware.estimator.base import BaseEstimator
-from golem.hardware.estop.base import EmergencyStop, EstopMessage
-from golem.hardware.hands.base import HandController, HandStatus
-from golem.hardware.safety.base import Fault, GateInputs, GateState, GateStatus, OperatorRequest, SafetyLimits
+from golem.hardware.estop.base import EmergencyStop
+from golem.hardware.hands.base import HandController
+from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
 from golem.hardware.servo.base import MotorServo
-from golem.middleware import topics
+from golem.interfaces import topics
+from golem.interfaces.payloads import (
+    ArmCommand,
+    GateState,
+    GateStatus,
+    HandStatus,
+)
 from golem.middleware.bus import Bus, News
-from golem.middleware.topics import HandGoal, LegStatus, ModuleFaultMsg
 from golem.robots.base import Robot
 from golem.runtime.contract_check import ContractCheck
 from golem.skills.context import Context
@@ -72,12 +76,12 @@ class ActNode:
 
     def step(self, t: float) -> None:
         """Advance the robot by one tick; motors without a command of late are limp."""
-        command = self._bus.latest(topics.LOW_CMD, LowCommand)
+        command = self._bus.latest(topics.LOW_CMD)
         if command is None or t - command.t > WATCHDOG:
             command = _limp(t)
         hands: dict[Side, HandCommand] = {}
         for side in SIDES:
-            hand = self._bus.latest(topics.hand_command(side), HandCommand)
+            hand = self._bus.latest(topics.hand_command(side))
             if hand is not None:
                 hands[side] = hand
         self._contract.call(self._robot.advance, command, hands, TICK)
@@ -95,7 +99,7 @@ class EstimatorNode:
 
     def step(self, t: float) -> None:
         """Publish the estimate of the base."""
-        state = self._bus.latest(topics.LOW_STATE, LowState)
+        state = self._bus.latest(topics.LOW_STATE)
         if state is None:
             return
         if not self._started:
@@ -126,14 +130,14 @@ class UpperBodyNode:
 
     def step(self, t: float) -> None:
         """Publish upper-body targets."""
-        state = self._bus.latest(topics.LOW_STATE, LowState)
-        base = self._bus.latest(topics.BASE, BaseEstimate)
+        state = self._bus.latest(topics.LOW_STATE)
+        base = self._bus.latest(topics.BASE)
         if state is None or base is None:
             return
         if not moving(self._bus):
             self._stopped_at = t
             self._contract.call(self._arms.reset, state.q)
-        targets = self._bus.latest(topics.PALM_TARGETS, PalmTargets)
+        targets = self._bus.latest(topics.PALM_TARGETS)
         if targets is None or targets.t <= self._stopped_at:
             # A target from before a stop must not set the arms in motion when the robot is released.
             targets = PalmTargets(t)
@@ -159,7 +163,7 @@ class HandNode:
 
     def step(self, t: float) -> None:
         """Pass a new goal on, take in the hand's report, publish its command and status."""
-        state = self._bus.latest(topics.hand_state(self._side), HandState)
+        state = self._bus.latest(topics.hand_state(self._side))
         if state is None:
             return
         if moving(self._bus):
@@ -177,7 +181,7 @@ class HandNode:
         self._bus.publish(topics.hand_status(self._side), status, t)
 
     def _pass_goal(self) -> None:
-        goal = self._bus.latest(topics.hand_goal(self._side), HandGoal)
+        goal = self._bus.latest(topics.hand_goal(self._side))
         count = self._bus.count(topics.hand_goal(self._side))
         if goal is None or count == self._goals:
             return
@@ -207,13 +211,13 @@ class ServoNode:
 
     def step(self, t: float) -> None:
         """Publish the command that the safety gate shall judge."""
-        state = self._bus.latest(topics.LOW_STATE, LowState)
+        state = self._bus.latest(topics.LOW_STATE)
         if state is None:
             return
         if not moving(self._bus):
             self._contract.call(self._servo.reset, state)
-        legs = self._bus.latest(topics.LEG_COMMAND, LegCommand)
-        arms = self._bus.latest(topics.ARM_COMMAND, ArmCommand)
+        legs = self._bus.latest(topics.LEG_COMMAND)
+        arms = self._bus.latest(topics.ARM_COMMAND)
         # A half that has not spoken yet stays where it is.
         q = state.q.copy()
         if legs is not None:
@@ -256,12 +260,12 @@ class SafetyNode:
     def __init__(self, bus: Bus, limits: SafetyLimits) -> None:
         """Enforce `limits`."""
         self._bus, self._gate = bus, Gate(limits)
-        self._faults = News(bus, topics.TRANSPORT_FAULT, Fault)
+        self._faults = News(bus, topics.TRANSPORT_FAULT)
         self.request = OperatorRequest.NONE
 
     def step(self, t: float) -> None:
         """Let the newest command through, limited, or stop the robot."""
-        estop = self._bus.latest(topics.ESTOP, EstopMessage)
+        estop = self._bus.latest(topics.ESTOP)
         # The gate acts on the edge of a request, and an activation before it is armed would be spent for nothing.
         waiting = self.request is OperatorRequest.ACTIVATE and self._gate.memory.mode is GateState.INIT
         if waiting and estop is not None and estop.pressed:
@@ -269,11 +273,11 @@ class SafetyNode:
             self.request = OperatorRequest.NONE
         inputs = GateInputs(
             t,
-            self._bus.latest(topics.LOW_STATE, LowState),
-            self._bus.latest(topics.LOW_CMD_REQUEST, LowCommand),
+            self._bus.latest(topics.LOW_STATE),
+            self._bus.latest(topics.LOW_CMD_REQUEST),
             estop,
             OperatorRequest.NONE if waiting else self.request,
-            self._bus.latest(topics.BASE, BaseEstimate),
+            self._bus.latest(topics.BASE),
             self._faults.read(),
         )
         result = self._gate.step(inputs)
@@ -293,7 +297,7 @@ class SkillNode:
     def __init__(self, context: Context) -> None:
         """Serve `context` to the skills."""
         self._context = context
-        self._faults = News(context.bus, topics.MODULE_FAULT, ModuleFaultMsg)
+        self._faults = News(context.bus, topics.MODULE_FAULT)
         self.run: SkillRun | None = None
 
     def step(self, t: float) -> None:
@@ -309,7 +313,7 @@ class SkillNode:
             return
         if fault is not None:
             self.run.fail(fault.slot, fault.reason)
-        legs = self._context.bus.latest(topics.LEG_STATUS, LegStatus)
+        legs = self._context.bus.latest(topics.LEG_STATUS)
         if legs is not None and legs.fault is not None:
             self.run.fail("lower_body", legs.fault)
         self.run.step()
@@ -321,7 +325,7 @@ def moving(bus: Bus) -> bool:
     While it does not, every controller starts over from the measured state at each step, so that a release finds all
     of them where the robot is.
     """
-    status = bus.latest(topics.SAFETY, GateStatus)
+    status = bus.latest(topics.SAFETY)
     return status is not None and status.state is GateState.ACTIVE
 
 

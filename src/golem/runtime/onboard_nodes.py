@@ -7,20 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from golem.capabilities.legs.base import STANDING, LegCommand
+from golem.capabilities.legs.base import STANDING
 from golem.capabilities.legs.hold import STANCES, HoldConfig, JointHold
 from golem.capabilities.legs.locomotion import Locomotion
 from golem.capabilities.legs.vendor import damp
 from golem.errors import ModuleFault
-from golem.middleware import topics
+from golem.interfaces import topics
+from golem.interfaces.payloads import LegCommand
 from golem.middleware.bus import Bus, News
-from golem.middleware.unitree_api import ApiRequest, LocoApi, Response, request_topic, response_topic
+from golem.middleware.unitree_api import ApiRequest, LocoApi, Response
 from golem.robots.onboard.loco_service import LocoService
 from golem.runtime.lower_body_node import CheckedLowerBody
 from golem.types import LEGS, TICK, BaseEstimate, LowState
 
-ONBOARD_LEGS = "onboard/legs"
-"""`LegCommand` of the on-board controller."""
 ANSWER = 0.004
 """Time a call takes to be answered [s] [own: two servo periods, so that no client can count on an answer at once]."""
 STANCE = "crouch"
@@ -38,8 +37,8 @@ class BusOnboard:
     def send(self, service: str, request: ApiRequest) -> None:
         """Send a request; see `vendor.Onboard`."""
         if service not in self._news:
-            self._news[service] = News(self._bus, response_topic(service), Response)
-        self._bus.publish(request_topic(service), request, 0.0)  # no latency: the time has no meaning
+            self._news[service] = News(self._bus, topics.api_response(service))
+        self._bus.publish(topics.api_request(service), request, 0.0)  # no latency: the time has no meaning
 
     def receive(self, service: str) -> Response | None:
         """Return a new response; see `vendor.Onboard`."""
@@ -47,7 +46,7 @@ class BusOnboard:
 
     def legs(self) -> LegCommand | None:
         """Return the on-board controller's targets; see `vendor.Onboard`."""
-        return self._bus.latest(ONBOARD_LEGS, LegCommand)
+        return self._bus.latest(topics.ONBOARD_LEGS)
 
 
 class ServiceNode:
@@ -58,8 +57,8 @@ class ServiceNode:
     def __init__(self, bus: Bus, service: str, answer: Callable[[ApiRequest, float], Response]) -> None:
         """Serve `service` on `bus`; `answer` acts on a call at a time [s]."""
         self._bus, self._answer = bus, answer
-        self._topic = response_topic(service)
-        self._requests = News(bus, request_topic(service), ApiRequest)
+        self._topic = topics.api_response(service)
+        self._requests = News(bus, topics.api_request(service))
 
     def step(self, t: float) -> None:
         """Answer the call that came, if one did."""
@@ -95,8 +94,8 @@ class LocoServiceNode:
     def step(self, t: float) -> None:
         """Answer a call, and publish what the legs are told."""
         self._calls.step(t)
-        state = self._bus.latest(topics.LOW_STATE, LowState)
-        base = self._bus.latest(topics.BASE, BaseEstimate)
+        state = self._bus.latest(topics.LOW_STATE)
+        base = self._bus.latest(topics.BASE)
         if state is None or base is None:
             return
         try:
@@ -104,7 +103,7 @@ class LocoServiceNode:
         except ModuleFault as fault:
             self.service.fail(str(fault))
             command, latency = damp(state), 0.0
-        self._bus.publish(ONBOARD_LEGS, command, t, latency)
+        self._bus.publish(topics.ONBOARD_LEGS, command, t, latency)
 
     def _control(self, state: LowState, base: BaseEstimate, t: float) -> LegCommand:
         """Return what the legs are told in the present state of the service."""

@@ -8,9 +8,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 from golem.capabilities.perception.base import Localizer
 from golem.errors import MissingExtra, MissingSystemLibrary, ModuleFault
-from golem.middleware import topics
+from golem.interfaces import topics
+from golem.interfaces.payloads import Detections, Exposure, ModuleFaultMsg
 from golem.middleware.bus import Bus, News
-from golem.middleware.topics import DetectionRequest, Detections, Exposure, ModuleFaultMsg
 from golem.robots.base import STAMP_TOLERANCE, Robot
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
@@ -49,14 +49,14 @@ class ImagePoseNode:
     def __init__(self, bus: Bus, calibration: Mapping[str, Array], latency: float) -> None:
         """Serve the cameras of `calibration` (see `Robot.calibration`); frames take another `latency` [s]."""
         self._bus, self._calibration, self._latency = bus, calibration, latency
-        self._exposures = {name: News(bus, topics.exposures(name), Exposure) for name in calibration}
+        self._exposures = {name: News(bus, topics.exposures(name)) for name in calibration}
         self._kinematics = Kinematics()
         self._moments: deque[tuple[LowState, BaseEstimate]] = deque()
 
     def step(self, t: float) -> None:
         """Remember where the robot is, and publish a frame for each exposure that came."""
-        state = self._bus.latest(topics.LOW_STATE, LowState)
-        base = self._bus.latest(topics.BASE, BaseEstimate)
+        state = self._bus.latest(topics.LOW_STATE)
+        base = self._bus.latest(topics.BASE)
         if state is None or base is None:
             return
         moments = self._moments
@@ -106,7 +106,7 @@ class LocalizerNode:
         """
         self._bus, self._localizer, self._camera, self._contract = bus, localizer, camera, contract
         self._latency = contract.number("latency", localizer.latency, minimum=0.0) if pool is None else 0.0
-        self._frames = News(bus, topics.rgbd_images(camera), RgbdImage)
+        self._frames = News(bus, topics.rgbd_images(camera))
         self._pool = pool
         self._job: tuple[Future[Detections], tuple[str, ...]] | None = None
 
@@ -128,7 +128,7 @@ class LocalizerNode:
 
     def _wanted(self) -> tuple[str, ...]:
         """Return the labels that a skill looks for now."""
-        request = self._bus.latest(topics.detection_request(self._camera), DetectionRequest)
+        request = self._bus.latest(topics.detection_request(self._camera))
         return () if request is None else request.labels
 
     def _tell(self, found: Callable[[], Detections], labels: tuple[str, ...], t: float) -> None:
@@ -156,7 +156,7 @@ def detection_requested(bus: Bus, camera: str) -> Callable[[], bool]:
     """Return whether a skill wants the frames of a camera of its own process."""
 
     def wanted() -> bool:
-        request = bus.latest(topics.detection_request(camera), DetectionRequest)
+        request = bus.latest(topics.detection_request(camera))
         return request is not None and bool(request.labels)
 
     return wanted

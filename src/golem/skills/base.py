@@ -8,31 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Coroutine, Generator
 from dataclasses import dataclass, field
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from golem.errors import GolemError
 
 G = TypeVar("G", contravariant=True)
 C = TypeVar("C", contravariant=True)
-
-
-@dataclass(frozen=True, slots=True)
-class Feedback:
-    """What a running skill says of itself.
-
-    Attributes:
-        t: time [s].
-        skill: name of the skill.
-        stage: the stage it is in, e.g. `"detect"`.
-        text: one line for a person.
-        data: numbers and points that a viewer may show, e.g. `{"target": [x, y, z]}` in odom.
-    """
-
-    t: float
-    skill: str
-    stage: str
-    text: str
-    data: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 
 from golem.capabilities.arms.base import check_pose
 from golem.capabilities.arms.line import Line
-from golem.hardware.hands.base import HandStatus
-from golem.middleware import topics
-from golem.middleware.bus import Bus
-from golem.middleware.topics import DetectionRequest, Detections, HandGoal, LegStatus, Odometry
+from golem.interfaces import topics
+from golem.interfaces.payloads import (
+    DetectionRequest,
+    Detections,
+    Feedback,
+    HandGoal,
+    HandStatus,
+    LegStatus,
+)
+from golem.middleware.bus import Bus, Topic
 from golem.robots.model.kinematics import Kinematics
-from golem.skills.base import Feedback, StageFailed, Tick
-from golem.types import Array, BaseEstimate, LowState, PalmTargets, Side, Twist
+from golem.skills.base import StageFailed, Tick
+from golem.types import Array, PalmTargets, Side, Twist
+
+T = TypeVar("T")
 
 ODOMETRY_TIMEOUT = 0.5
 """Age of the newest odometry from which on it says nothing about where the robot is [s]."""
@@ -35,7 +44,7 @@ class Hand:
         Raises:
             StageFailed: it has not reported yet.
         """
-        status = self._context.bus.latest(topics.hand_status(self._side), HandStatus)
+        status = self._context.bus.latest(topics.hand_status(self._side))
         if status is None:
             raise StageFailed("grasp", "hand", f"The {self._side} hand does not report.")
         return status
@@ -153,7 +162,7 @@ class LegsInterface:
         Raises:
             StageFailed: it has not reported yet.
         """
-        status = self._context.bus.latest(topics.LEG_STATUS, LegStatus)
+        status = self._context.bus.latest(topics.LEG_STATUS)
         if status is None:
             raise StageFailed("walk", "lower_body", "The legs do not report.")
         return status
@@ -165,7 +174,7 @@ class LegsInterface:
         Raises:
             StageFailed: the odometry has fallen silent.
         """
-        odometry = self._context.bus.latest(topics.ODOMETRY, Odometry)
+        odometry = self._context.bus.latest(topics.ODOMETRY)
         if odometry is not None and self._context.t - odometry.t > ODOMETRY_TIMEOUT:
             age = self._context.t - odometry.t
             raise StageFailed("walk", "odometry", f"The odometry has been silent for {age:.1f} s.")
@@ -203,17 +212,17 @@ class Context:
     def refresh(self, t: float) -> None:
         """Take over time and measured joints; the runner calls it before it resumes the skill."""
         self.t = t
-        state = self.bus.latest(topics.LOW_STATE, LowState)
+        state = self.bus.latest(topics.LOW_STATE)
         if state is not None:
             self.kinematics.update(state.q)
 
     @property
     def T_odom_base(self) -> Array:
         """(4, 4) estimated pose of base_link in odom."""
-        base = self.bus.latest(topics.BASE, BaseEstimate)
+        base = self.bus.latest(topics.BASE)
         return np.eye(4) if base is None else base.T_odom_base
 
-    def publish(self, topic: str, value: object) -> None:
+    def publish(self, topic: Topic[T], value: T) -> None:
         """Send `value` on `topic` now."""
         self.bus.publish(topic, value, self.t)
 
@@ -286,7 +295,7 @@ class DetectionStream:
         if count == self._seen:
             return None
         self._seen = count
-        newest = self._context.bus.latest(topic, Detections)
+        newest = self._context.bus.latest(topic)
         return newest if newest is not None and newest.t >= self._since else None
 
     async def look(self, timeout: float) -> Detections | None:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.capabilities.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus
-from golem.hardware.hands.base import GripState
-from golem.middleware.topics import Detections
+from golem.interfaces.payloads import Detections, GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.types import Array, LocalizedObject, Side

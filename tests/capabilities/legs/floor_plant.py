@@ -6,10 +6,11 @@ import mujoco
 import numpy as np
 
 from golem.capabilities.arms.postures import POSTURES
-from golem.capabilities.legs.base import STANDING, LegCommand, LowerBody
+from golem.capabilities.legs.base import STANDING, LowerBody
 from golem.capabilities.legs.hold import STANCES
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gains import default_gains
+from golem.interfaces.payloads import LegCommand
 from golem.robots.model.mjcf import robot_spec
 from golem.robots.model.spatial import quat_of
 from golem.robots.model.table import JOINT_NAMES

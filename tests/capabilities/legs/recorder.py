@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
+from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.hold import STANCES
+from golem.interfaces.payloads import LegCommand
 from golem.types import LEGS, NUM_JOINTS, BaseEstimate, Imu, LowState
 
 

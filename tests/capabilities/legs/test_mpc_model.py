@@ -7,9 +7,9 @@ import pytest
 from tests.capabilities.legs.floor_plant import STEP, FloorPlant
 
 from golem.capabilities.arms.postures import POSTURES
-from golem.capabilities.legs.base import LegCommand
 from golem.capabilities.legs.hold import STANCES, HoldConfig
 from golem.capabilities.legs.mpc.planning_model import PlanningModel, Trajectories
+from golem.interfaces.payloads import LegCommand
 from golem.types import LEGS, UPPER, BaseEstimate, LowState
 
 POSTURE = np.tile(STANCES["crouch"], 2)

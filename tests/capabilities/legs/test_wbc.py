@@ -9,13 +9,13 @@ import pytest
 from tests.capabilities.legs.floor_plant import FloorPlant
 
 from golem.capabilities.arms.postures import POSTURES
-from golem.capabilities.legs.base import STANDING, LegCommand, LowerBody
+from golem.capabilities.legs.base import STANDING, LowerBody
 from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.legs.wbc import StanceError, Wbc, WbcConfig
 from golem.capabilities.legs.wbc_qp import QpWeights, StanceDynamics, StanceProgram, Tasks
 from golem.errors import ConfigError
-from golem.middleware import topics
-from golem.middleware.topics import LegStatus
+from golem.interfaces import topics
+from golem.interfaces.payloads import LegCommand
 from golem.robots.model import pinocchio_model
 from golem.robots.model.leg_kinematics import SOLE_CENTER
 from golem.robots.model.limits import load_limits
@@ -206,7 +206,7 @@ def test_stands_in_the_whole_stack_on_estimates_alone() -> None:
     start = twin.truth.base()
     running.executor.run(5.5)
     end = twin.truth.base()
-    legs = running.bus.latest(topics.LEG_STATUS, LegStatus)
+    legs = running.bus.latest(topics.LEG_STATUS)
     assert legs is not None and (legs.controller, legs.fault) == ("wbc", None)
     assert np.abs(end.T_world_base[:3, 3] - start.T_world_base[:3, 3]).max() < 0.005
     assert end.tilt < 0.05

@@ -11,12 +11,11 @@ from golem.errors import ConfigError
 from golem.evaluation.episodes import episode as episodes
 from golem.evaluation.episodes.episode import Episode, legs_stack, with_legs
 from golem.evaluation.episodes.scripted_motion import WIDE_AREA, ArmMotion, ScriptedMotion
-from golem.middleware import topics
-from golem.middleware.topics import LegStatus
+from golem.interfaces import topics
 from golem.robots.mujoco.shoves import shove
 from golem.skills.runner import FAULT
 from golem.stack import Choice, Stack
-from golem.types import PalmTargets, Twist
+from golem.types import Twist
 
 METHODS = Path(__file__).parents[1] / "leg_methods.py"
 
@@ -94,8 +93,8 @@ def test_an_exercise_moves_the_hands_through_the_work_area_and_commands_the_base
     try:
         robot.start(ScriptedMotion(motion, lambda t: Twist(vx=0.1 * t)))
         robot.run(1.0)
-        targets = robot.running.bus.latest(topics.PALM_TARGETS, PalmTargets)
-        status = robot.running.bus.latest(topics.LEG_STATUS, LegStatus)
+        targets = robot.running.bus.latest(topics.PALM_TARGETS)
+        status = robot.running.bus.latest(topics.LEG_STATUS)
         assert targets is not None and targets.left is not None and targets.right is not None
         assert status is not None and 0.08 < status.commanded.vx < 0.1
     finally:

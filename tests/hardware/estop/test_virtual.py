@@ -2,8 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from golem.hardware.estop.base import EmergencyStop, EstopMessage
+from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.estop.virtual import VirtualEstop
+from golem.interfaces.payloads import EstopMessage
 
 
 def frames(estop: VirtualEstop, start: float, ticks: int, dt: float = 0.002) -> list[EstopMessage]:

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from golem.hardware.hands.base import GripState, HandController
+from golem.hardware.hands.base import HandController
 from golem.hardware.hands.magpie import FORCE_STEP, MagpieHand, clamp_force
+from golem.interfaces.payloads import GripState
 from golem.robots.model.magpie_model import MAX_FORCE, MAX_GAP, MIN_FORCE
 from golem.types import HandCommand, HandState
 

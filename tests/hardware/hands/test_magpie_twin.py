@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from golem.hardware.hands.base import GripState
 from golem.hardware.hands.magpie import MagpieHand
+from golem.interfaces.payloads import GripState
 from golem.robots.model.mjcf import robot_spec
 from golem.robots.mujoco.hand_servos import HandServos
 

@@ -11,16 +11,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from golem.hardware.estop.base import EstopMessage
-from golem.hardware.safety.base import (
-    GateInputs,
-    GateMemory,
-    GateResult,
-    GateState,
-    OperatorRequest,
-    SafetyLimits,
-)
+from golem.hardware.safety.base import GateInputs, GateMemory, GateResult, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import check
+from golem.interfaces.payloads import EstopMessage, GateState
 from golem.types import Array, Imu, LowCommand, LowState
 
 LIMITS = SafetyLimits.from_profile()

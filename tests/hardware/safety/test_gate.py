@@ -7,16 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.hardware.estop.base import EstopMessage
-from golem.hardware.safety.base import (
-    GateInputs,
-    GateMemory,
-    GateState,
-    OperatorRequest,
-    Reason,
-    SafetyLimits,
-)
+from golem.hardware.safety.base import GateInputs, GateMemory, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import check
+from golem.interfaces.payloads import EstopMessage, GateState, Reason
 from golem.types import LowCommand, LowState
 
 Make = Callable[..., Any]

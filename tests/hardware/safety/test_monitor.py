@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from golem.hardware.safety.base import Counters, GateState, GateStatus, Reason, SafetyLimits
+from golem.hardware.safety.base import Counters, SafetyLimits
 from golem.hardware.safety.monitor import examine, finite, tilt, whole, whole_command
+from golem.interfaces.payloads import GateState, GateStatus, Reason
 from golem.types import LowCommand, LowState
 
 

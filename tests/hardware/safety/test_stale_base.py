@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.hardware.safety.base import GateState, OperatorRequest, Reason
+from golem.hardware.safety.base import OperatorRequest
+from golem.interfaces.payloads import GateState, Reason
 from golem.types import BaseEstimate
 
 

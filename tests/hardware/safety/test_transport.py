@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from tests.hardware.conftest import Bench
 
-from golem.hardware.safety.base import Fault, GateState, OperatorRequest, Reason
+from golem.hardware.safety.base import OperatorRequest
+from golem.interfaces.payloads import Fault, GateState, Reason
 
 
 @pytest.mark.parametrize("reason", [Reason.WRITERS, Reason.STATE_DAMAGED, Reason.COMMAND_DAMAGED])

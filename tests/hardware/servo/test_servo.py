@@ -8,10 +8,11 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.hardware.estop.virtual import VirtualEstop
-from golem.hardware.safety.base import GateInputs, GateState, OperatorRequest
+from golem.hardware.safety.base import GateInputs, OperatorRequest
 from golem.hardware.safety.gate import Gate
 from golem.hardware.servo.base import MotorServo
 from golem.hardware.servo.servo import Servo, ServoConfig
+from golem.interfaces.payloads import GateState
 from golem.types import Array, LowState
 
 DT = 0.002

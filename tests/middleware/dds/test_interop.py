@@ -22,7 +22,7 @@ from tests.middleware.dds.cdr import MESSAGES, Cdr, image, message
 from tests.middleware.dds.idl import idl, wire_name
 from tests.middleware.ros.samples import random_message
 
-from golem.middleware import public
+from golem.interfaces import public
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig

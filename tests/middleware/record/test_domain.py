@@ -14,10 +14,11 @@ pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
 from golem.errors import ConfigError
+from golem.interfaces.recorded import public_topics
 from golem.middleware.dds.base import DEFAULT, LATCHED, Participant, Qos, Reader
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.record.base import BagMessage, BagTopic
-from golem.middleware.record.catalog import offered, public_topics, topic
+from golem.middleware.record.catalog import offered, topic
 from golem.middleware.record.player import PlayConfig, Player
 from golem.middleware.record.reader import Bag
 from golem.middleware.record.recorder import GONE, HOLD, MANY, Recorder, clock_time

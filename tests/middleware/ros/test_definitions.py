@@ -12,8 +12,7 @@ import pytest
 
 pytest.importorskip("rosbags")
 
-from golem.hardware.hands.base import GripState
-from golem.hardware.safety.base import GateState
+from golem.interfaces.payloads import GateState, GripState
 from golem.middleware.ros import definitions, generate
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -16,15 +16,15 @@ pytest.importorskip("rosbags")
 
 from tests.middleware.ros.samples import mutated, random_message, travelling
 
-from golem.middleware import public
-from golem.middleware.ros import codec, images
-from golem.middleware.ros.convert import (
+from golem.interfaces import images, public
+from golem.interfaces.ros_convert import (
     to_base_estimate,
     to_hand_command,
     to_hand_state,
     to_twist,
     transforms,
 )
+from golem.middleware.ros import codec
 from golem.middleware.ros.message import CodecError
 from golem.robots.sensors.calibration import OPTICAL_FRAMES, calibrations
 from golem.runtime.live.safety_status import to_status

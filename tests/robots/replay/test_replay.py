@@ -14,17 +14,18 @@ pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
 from golem.errors import RobotGone
-from golem.middleware import topics
+from golem.interfaces import images, topics
+from golem.interfaces import ros_convert as convert
+from golem.interfaces.payloads import Detections, Exposure
+from golem.interfaces.public import CAMERA_INFO, COLOR, DEPTH, gripper, image, optical_frame
 from golem.middleware.bus import News
 from golem.middleware.dds.base import LATCHED, SENSOR, Payload
-from golem.middleware.public import CAMERA_INFO, COLOR, DEPTH, gripper, image, optical_frame
 from golem.middleware.record.base import BagError, BagMessage, BagTopic
 from golem.middleware.record.catalog import topic
 from golem.middleware.record.reader import Bag
 from golem.middleware.record.writer import BagWriter
-from golem.middleware.ros import codec, convert, images
+from golem.middleware.ros import codec
 from golem.middleware.ros.message import NANO
-from golem.middleware.topics import Detections, Exposure
 from golem.middleware.wire.convert import encode_low_state
 from golem.robots.replay.robot import ReplayRobot, ReplayRobotConfig
 from golem.robots.sensors.cameras import HEAD
@@ -166,8 +167,8 @@ class Seen:
 def pick(stack: Stack, seconds: float, bag: Path | None) -> Seen:
     """Let `stack` begin to pick, recorded into `bag`."""
     running, robot = build(stack, seed=0)
-    frames = [(n, News(running.bus, topics.exposures(n), Exposure)) for n in robot.cameras]
-    found = [News(running.bus, topics.detections(n), Detections) for n in robot.cameras]
+    frames = [(n, News(running.bus, topics.exposures(n))) for n in robot.cameras]
+    found = [News(running.bus, topics.detections(n)) for n in robot.cameras]
     seen = Seen({}, {}, SkillResult(False, "", None, ""))
     with broadcast(running, robot, bag) as show:
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.middleware.ros import images
+from golem.interfaces import images
 from golem.middleware.ros.msgs.sensor_msgs import Image
 from golem.robots.sensors.pairing import Pairing
 

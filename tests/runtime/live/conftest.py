@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from golem.hardware.estop.virtual import VirtualEstop
-from golem.hardware.safety.base import GateState, SafetyLimits
+from golem.hardware.safety.base import SafetyLimits
+from golem.interfaces.payloads import GateState
 from golem.middleware.dds.local import LocalDomain, LocalParticipant
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, Trigger_Request
 from golem.middleware.ros.node import DdsNode

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 from tests.runtime.live.conftest import BLIND, Live
 
-from golem.hardware.safety.base import GateState
-from golem.middleware import topics
-from golem.middleware.topics import LegStatus
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState
 from golem.stack import Choice, load_stack
 
 
@@ -30,7 +29,7 @@ def test_it_stands_without_its_band(legs: str, tmp_path: Path) -> None:
     assert not live.robot.on_gantry
     assert live.state is GateState.ACTIVE
     assert live.up is not None and live.up.side is not None
-    status = live.up.side.bus.latest(topics.LEG_STATUS, LegStatus)
+    status = live.up.side.bus.latest(topics.LEG_STATUS)
     assert status is not None and (status.controller, status.fault) == (legs, None)
     assert live.robot.data.qpos[2] > 0.93  # the height of the pelvis [m]
     live.close()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from tests.runtime.live.conftest import BLIND, Live
 
-from golem.hardware.safety.base import GateState, GateStatus
-from golem.middleware import topics
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState, GateStatus
 from golem.middleware.bus import Bus
 from golem.runtime.live.legs_monitor import BLIND as PATIENCE
 from golem.runtime.live.legs_monitor import LegsMonitor

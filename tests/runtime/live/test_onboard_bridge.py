@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from tests.middleware.wire.rpc import reach, serve
 
-from golem.capabilities.legs.base import LegCommand
 from golem.capabilities.legs.hold import JointHold
+from golem.interfaces import topics
+from golem.interfaces.payloads import LegCommand
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import CALLS, DEFAULT
 from golem.middleware.dds.local import LocalDomain
@@ -27,7 +28,7 @@ from golem.runtime.live.onboard_bridge import (
     encode_legs,
 )
 from golem.runtime.lower_body_node import CheckedLowerBody
-from golem.runtime.onboard_nodes import ONBOARD_LEGS, BusOnboard, LocoServiceNode, ServiceNode
+from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode
 from golem.types import Array
 
 API = LOCO_APIS["h1"]
@@ -119,7 +120,7 @@ def test_targets_of_the_legs_cross_over(tau: Array | None) -> None:
     writer = domain.participant().writer("rt/onboard/lowcmd", hg.LOW_CMD.type_name, DEFAULT)
     reader = domain.participant().reader("rt/onboard/lowcmd", hg.LOW_CMD.type_name, CALLS)
     out, incoming = OnboardLegsOut(bus, writer), LegsIn(there, reader, print)
-    bus.publish(ONBOARD_LEGS, legs(tau), 0.0)
+    bus.publish(topics.ONBOARD_LEGS, legs(tau), 0.0)
     out.step(0.0)
     writer.write(hg.LOW_CMD.blank())
     incoming.step(0.0)

@@ -14,13 +14,13 @@ from tests.runtime.live.conftest import Live
 from tests.runtime.live.test_live import VENDOR
 
 from golem.errors import ConfigError
-from golem.hardware.safety.base import GateState, SafetyLimits
-from golem.middleware import public, topics
+from golem.hardware.safety.base import SafetyLimits
+from golem.interfaces import images, public, topics
+from golem.interfaces import ros_convert as convert
+from golem.interfaces.payloads import DetectionRequest, GateState
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.ros import convert, images
-from golem.middleware.topics import DetectionRequest
 from golem.middleware.wire import convert as wire
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import answered, encode_low_state
@@ -146,7 +146,7 @@ def test_images_of_another_clock_are_refused_with_a_remedy(
         send[public.COLOR](images.color_image(t, np.zeros((info.height, info.width, 3), np.uint8), frame))
         send[public.DEPTH](images.depth_image(t, np.ones((info.height, info.width), np.float32), frame))
         live.run(0.02)
-        newest = bus.latest(topics.exposures("head"), topics.Exposure)
+        newest = bus.latest(topics.exposures("head"))
         assert (newest is None) == (t > 1.0)
     assert capsys.readouterr().out.count("use_sim_time") == 1
 

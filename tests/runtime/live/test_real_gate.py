@@ -9,7 +9,7 @@ from tests.middleware.wire.rpc import reach
 from tests.runtime.live.conftest import Live
 
 from golem.errors import ConfigError
-from golem.hardware.safety.base import GateState
+from golem.interfaces.payloads import GateState
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.local import LocalReader

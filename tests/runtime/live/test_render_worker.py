@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from tests.middleware.ros.conftest import domain_id
 
-from golem.middleware import public, topics
+from golem.interfaces import public, topics
 from golem.middleware.bus import Bus
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.node import DdsNode
-from golem.middleware.topics import Exposure
 from golem.robots.base import Restorable
 from golem.runtime.live import render_worker as live_darkroom
 from golem.runtime.live.render_worker import RenderWorker, expose, image_topics
@@ -55,7 +54,7 @@ def test_nothing_is_rendered_unless_somebody_listens() -> None:
     row = public.topic(public.image("left_hand", public.COLOR_JPEG))
     subscription = listener.subscription(row.name, row.type, None, row.qos)
     expose(robot, cameras, bus, "left_hand", 1.5, save_state)
-    assert bus.latest(topic, Exposure) is not None
+    assert bus.latest(topic) is not None
     message = subscription.latest()
     assert message is not None and (message.header.stamp.sec, message.header.stamp.nanosec) == (1, 500000000)
     assert message.header.frame_id == row.frame and bytes(message.data[:2]) == b"\xff\xd8"

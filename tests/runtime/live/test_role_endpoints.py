@@ -9,13 +9,13 @@ from typing import Any
 import pytest
 from tests.runtime.live.conftest import BLIND, Live
 
-from golem.middleware import public, topics
+from golem.interfaces import public, topics
+from golem.interfaces.payloads import DetectionRequest
+from golem.interfaces.public import Role
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.local import LocalDomain, LocalParticipant
-from golem.middleware.public import Role
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import action, dds_name, service
-from golem.middleware.topics import DetectionRequest
 from golem.runtime.live.stack_process import SHOWN
 from golem.stack import Choice, Stack
 from golem.types import TICK

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from tests.runtime.live.conftest import Live
 
-from golem.hardware.safety.base import GateState, SafetyLimits
-from golem.middleware import topics
+from golem.hardware.safety.base import SafetyLimits
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Qos, Writer
 from golem.middleware.dds.local import LocalDomain
@@ -46,7 +47,7 @@ class Drives:
 
     def stiffness(self) -> float:
         """Return the gain of the newest command."""
-        command = self.bus.latest(topics.LOW_CMD, LowCommand)
+        command = self.bus.latest(topics.LOW_CMD)
         assert command is not None
         return float(command.kp[0])
 

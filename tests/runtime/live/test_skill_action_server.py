@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 from tests.runtime.live.conftest import Live
 
-from golem.middleware import public, topics
-from golem.middleware.ros import convert
+from golem.interfaces import public, topics
+from golem.interfaces import ros_convert as convert
+from golem.interfaces.payloads import HandGoal
 from golem.middleware.ros.base import ClientGoal
 from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs.geometry_msgs import PoseStamped
@@ -23,7 +24,6 @@ from golem.middleware.ros.msgs.golem_interfaces import (
 )
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.ros.node import DdsNode
-from golem.middleware.topics import HandGoal
 from golem.runtime.live.velocity import LET_GO
 from golem.skills.base import SkillResult
 from golem.types import TICK, Twist
@@ -110,13 +110,13 @@ def test_velocities_from_elsewhere_wait_while_a_skill_has_the_robot(client: Clie
 
     goal = client.send("/skill/stand", stand(0.2))
     drive(Twist(0.3))
-    assert live.up.side.bus.latest(topics.TWIST, Twist) == Twist()  # the skill's
+    assert live.up.side.bus.latest(topics.TWIST) == Twist()  # the skill's
     assert client.outcome(goal)[0] is GoalStatus.SUCCEEDED
     drive(Twist(0.3))
-    assert live.up.side.bus.latest(topics.TWIST, Twist) == Twist()  # somebody still holds the joystick
+    assert live.up.side.bus.latest(topics.TWIST) == Twist()  # somebody still holds the joystick
     drive(Twist())
     drive(Twist(0.3))
-    assert live.up.side.bus.latest(topics.TWIST, Twist) == Twist(0.3)
+    assert live.up.side.bus.latest(topics.TWIST) == Twist(0.3)
 
 
 def test_a_joystick_that_is_held_does_not_move_a_robot_that_is_released(client: Client) -> None:
@@ -138,10 +138,10 @@ def test_a_joystick_that_is_held_does_not_move_a_robot_that_is_released(client: 
     hold(0.1)
     live.activate()
     hold(0.5)
-    assert bus.latest(topics.TWIST, Twist) is None
+    assert bus.latest(topics.TWIST) is None
     live.run(LET_GO + 0.1)
     hold(0.1)
-    assert bus.latest(topics.TWIST, Twist) == Twist(0.3)
+    assert bus.latest(topics.TWIST) == Twist(0.3)
 
 
 def test_a_cancelled_skill_ends_as_cancelled_and_makes_room(client: Client) -> None:
@@ -208,7 +208,7 @@ def test_hands_obey_services_while_the_gate_is_open(client: Client) -> None:
     assert side is not None
 
     def goal() -> HandGoal | None:
-        return side.bus.latest(topics.hand_goal("left"), HandGoal)
+        return side.bus.latest(topics.hand_goal("left"))
 
     assert client.call("/left/gripper/set_position", SetGap_Request(0.03)).success and goal() == HandGoal(
         0.03

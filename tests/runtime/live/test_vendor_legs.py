@@ -10,9 +10,8 @@ from tests.middleware.wire.rpc import reach
 from tests.runtime.live.conftest import Live
 
 from golem.capabilities.legs.hold import STANCES
-from golem.hardware.safety.base import GateState
-from golem.middleware import topics
-from golem.middleware.topics import LegStatus
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState, LegStatus
 from golem.middleware.unitree_api import ApiRequest
 from golem.robots.onboard.motion_switcher import RELEASE_MODE, SERVICE
 from golem.stack import Choice
@@ -21,7 +20,7 @@ from golem.types import LEGS
 
 def legs(live: Live) -> LegStatus:
     assert live.up is not None and live.up.side is not None
-    status = live.up.side.bus.latest(topics.LEG_STATUS, LegStatus)
+    status = live.up.side.bus.latest(topics.LEG_STATUS)
     assert status is not None
     return status
 

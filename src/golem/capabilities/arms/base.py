@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from golem.errors import GolemError
+from golem.interfaces.payloads import ArmCommand
 from golem.types import NUM_JOINTS, UPPER, Array, Side
 
 NUM_UPPER = UPPER.stop - UPPER.start
@@ -20,26 +20,6 @@ GRIPPER_FRAME: dict[Side, str] = {"left": "left_gripper", "right": "right_grippe
 
 class TargetError(GolemError):
     """A palm target or a measured posture is not something an arm can be sent to."""
-
-
-@dataclass(frozen=True, slots=True)
-class ArmCommand:
-    """What the upper body is told at one tick.
-
-    Attributes:
-        q: (15,) joint targets, torso, left arm, right arm [rad]; inside the position limits, and no
-            further from the previous tick's targets than the velocity limits allow.
-        error_position: (2,) distance of the left and right grasp frame from its target at `q` [m]; 0 for
-            an arm without a target.
-        error_rotation: (2,) angle between grasp frame and target at `q` [rad]; 0 for an arm without one.
-        limited: True where a limit (position, velocity, or the guard of a far target) held the motion back at
-            this tick, so that the error cannot be expected to shrink at the nominal rate.
-    """
-
-    q: Array
-    error_position: Array
-    error_rotation: Array
-    limited: bool
 
 
 @runtime_checkable

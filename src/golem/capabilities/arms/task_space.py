@@ -10,16 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
-from golem.capabilities.arms.base import (
-    ARM_COLUMNS,
-    NUM_UPPER,
-    ArmCommand,
-    check_dt,
-    check_joints,
-    check_pose,
-)
+from golem.capabilities.arms.base import ARM_COLUMNS, NUM_UPPER, check_dt, check_joints, check_pose
 from golem.capabilities.arms.postures import posture
 from golem.errors import ConfigError
+from golem.interfaces.payloads import ArmCommand
 from golem.types import SIDES, UPPER, Array, Side
 
 

@@ -10,25 +10,8 @@ import numpy as np
 
 from golem.capabilities.legs.gait import GaitConfig
 from golem.errors import ConfigError
+from golem.interfaces.payloads import LegCommand
 from golem.types import Array, BaseEstimate, LowState, Twist
-
-
-@dataclass(frozen=True, slots=True)
-class LegCommand:
-    """What the legs are told at one tick: tau_motor = kp (q - q_meas) - kd dq_meas + tau.
-
-    Attributes:
-        q: (12,) joint targets in motor order, left leg then right leg [rad].
-        kp: (12,) stiffness the controller wants at the motors [N m/rad].
-        kd: (12,) damping the controller wants at the motors [N m s/rad].
-        tau: (12,) feed-forward torque [N m]. None leaves it to the servo, which then carries the weight of legs that
-            hang free: right in a hoist, wrong on the ground.
-    """
-
-    q: Array
-    kp: Array
-    kd: Array
-    tau: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from golem.capabilities.legs.base import LegCommand
+from golem.interfaces.payloads import LegCommand
 from golem.types import Array
 
 

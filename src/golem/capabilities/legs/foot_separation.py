@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from golem.capabilities.legs.base import LegCommand
 from golem.capabilities.legs.gait import Bools
+from golem.interfaces.payloads import LegCommand
 from golem.robots.model.leg_dynamics import LEG, LegDynamics
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, LowState

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from golem import registry
-from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand, LowerBody, Starting, follows
+from golem.capabilities.legs.base import Envelope, LocomotionCommand, LowerBody, Starting, follows
 from golem.capabilities.legs.command_blender import CommandBlender
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.rate_divider import RateDivider
 from golem.capabilities.legs.vendor import Onboard
+from golem.interfaces.payloads import LegCommand
 from golem.types import LEGS, BaseEstimate, LowState, Twist
 
 ZERO = Twist()

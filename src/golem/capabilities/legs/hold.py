@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
+from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.errors import ConfigError, unknown_name
+from golem.interfaces.payloads import LegCommand
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
 STANCES: dict[str, tuple[float, ...]] = {

@@ -13,13 +13,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from golem.capabilities.legs.balance_errors import balance_errors
-from golem.capabilities.legs.base import LegCommand, LocomotionCommand, LowerBody, follows
+from golem.capabilities.legs.base import LocomotionCommand, LowerBody, follows
 from golem.capabilities.legs.command_blender import CommandBlender
 from golem.capabilities.legs.foot_separation import FootSeparation, FootSeparationConfig
 from golem.capabilities.legs.gait import Gait
 from golem.capabilities.legs.rate_divider import RateDivider
 from golem.capabilities.legs.stop_predictor import StopPredictor
 from golem.capabilities.legs.velocity_integrator import VelocityIntegrator, VelocityIntegratorConfig
+from golem.interfaces.payloads import LegCommand
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.leg_kinematics import SOLE_CENTER

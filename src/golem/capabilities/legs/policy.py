@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.legs.base import LegCommand, LocomotionCommand
+from golem.capabilities.legs.base import LocomotionCommand
 from golem.capabilities.legs.description import JOINTS, load_description
 from golem.capabilities.legs.network import load_network
 from golem.capabilities.legs.observation import measure
 from golem.capabilities.legs.swing import swing_offset
 from golem.errors import GolemError
+from golem.interfaces.payloads import LegCommand
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from golem.capabilities.legs.base import LegCommand, LocomotionCommand, LowerBody
+from golem.capabilities.legs.base import LocomotionCommand, LowerBody
+from golem.interfaces.payloads import LegCommand
 from golem.types import BaseEstimate, LowState
 
 

@@ -15,9 +15,10 @@ from typing import Protocol
 
 import numpy as np
 
-from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
+from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.errors import ConfigError, GolemError
+from golem.interfaces.payloads import LegCommand
 from golem.middleware.unitree_api import LOCO_API, OK, ApiRequest, Response, decode_int, encode, loco_api
 from golem.options import require
 from golem.types import LEGS, Array, BaseEstimate, LowState, Twist

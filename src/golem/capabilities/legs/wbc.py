@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
+from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.legs.wbc_qp import (
@@ -31,6 +31,7 @@ from golem.capabilities.legs.wbc_qp import (
     Tasks,
 )
 from golem.errors import ConfigError, GolemError, unknown_name
+from golem.interfaces.payloads import LegCommand
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.limits import load_limits

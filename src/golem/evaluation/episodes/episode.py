@@ -8,8 +8,7 @@ from typing import Any
 
 from golem.errors import ConfigError
 from golem.evaluation.episodes.odometry import SimulatedOdometry
-from golem.middleware import topics
-from golem.middleware.topics import LegStatus
+from golem.interfaces import topics
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.shoves import Push, Pusher
@@ -109,7 +108,7 @@ def lost(running: LockstepRunner, recorder: BalanceRecorder | None) -> Loss | No
         recorder: what has watched it since it carried its weight; None for a robot that hangs.
     """
     t, safety = running.executor.t, running.safety
-    legs = running.bus.latest(topics.LEG_STATUS, LegStatus)
+    legs = running.bus.latest(topics.LEG_STATUS)
     if legs is not None and legs.fault is not None:
         return Loss(FAULT, legs.fault)
     if recorder is not None and recorder.fallen:

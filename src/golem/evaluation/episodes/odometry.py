@@ -11,11 +11,10 @@ from typing import Literal
 
 import numpy as np
 
-from golem.middleware import topics
+from golem.interfaces import topics
+from golem.interfaces.payloads import Odometry
 from golem.middleware.bus import Bus
-from golem.middleware.topics import Odometry
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.types import BaseEstimate
 
 Source = Literal["estimator", "truth"]
 
@@ -48,7 +47,7 @@ class SimulatedOdometry:
         if self._source == "truth":
             T = self._T_odom_world @ self._robot.truth.base().T_world_base
         else:
-            base = self._bus.latest(topics.BASE, BaseEstimate)
+            base = self._bus.latest(topics.BASE)
             if base is None:
                 return
             T = base.T_odom_base.copy()

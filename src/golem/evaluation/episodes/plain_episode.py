@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from golem import registry
-from golem.capabilities.legs.base import Envelope, LegCommand, LowerBody
+from golem.capabilities.legs.base import Envelope, LowerBody
 from golem.capabilities.legs.description import load_description
 from golem.capabilities.legs.foot_separation import FootSeparationConfig
 from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
@@ -21,6 +21,7 @@ from golem.capabilities.legs.velocity_integrator import VelocityIntegratorConfig
 from golem.errors import ConfigError, ModuleFault
 from golem.evaluation.episodes.episode import Loss, with_legs
 from golem.hardware.servo.gains import default_gains
+from golem.interfaces.payloads import LegCommand
 from golem.robots.model.limits import load_limits
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.plain_robot import PlainRobot

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from golem.middleware import topics
+from golem.interfaces import topics
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.types import SIDES, Array, PalmTargets, Side, Twist

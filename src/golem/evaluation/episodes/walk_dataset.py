@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.evaluation.subject import Subject
-from golem.middleware import topics
-from golem.middleware.topics import LegStatus
+from golem.interfaces import topics
 from golem.robots.model.leg_dynamics import LEG, LegDynamics
 from golem.robots.mujoco.shoves import DIRECTIONS, shove
 from golem.types import LEGS, TICK, Array, LowState, Twist
@@ -95,8 +94,8 @@ def record(subject: Subject, spec: TrialSpec, pushed: bool) -> RecordedWalk:
 
     def sample() -> bool:
         nonlocal now
-        state = episode.running.bus.latest(topics.LOW_STATE, LowState)
-        legs = episode.running.bus.latest(topics.LEG_STATUS, LegStatus)
+        state = episode.running.bus.latest(topics.LOW_STATE)
+        legs = episode.running.bus.latest(topics.LEG_STATUS)
         if state is None or (states and state.t == states[-1].t):
             return False  # asked before the first tick of a stretch
         states.append(state)

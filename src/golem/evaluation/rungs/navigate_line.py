@@ -16,8 +16,7 @@ from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, legs_stack
 from golem.evaluation.episodes.film_strip import FilmStrip
 from golem.evaluation.episodes.odometry import SimulatedOdometry
-from golem.middleware import topics
-from golem.middleware.topics import Odometry
+from golem.interfaces import topics
 from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE
 from golem.robots.sensors.profiles import PROFILES
@@ -103,7 +102,7 @@ def judge(episode: Episode, method: str) -> TrialOutcome:
         "steps": float(trace.steps),
         "margin_min": float(trace.margin.min()),
     }
-    believed = episode.running.bus.latest(topics.ODOMETRY, Odometry)
+    believed = episode.running.bus.latest(topics.ODOMETRY)
     if believed is not None:
         drift = true.to(PlanarPose.of(believed.T_odom_base))
         series["odometry_error"] = math.hypot(drift.x, drift.y)

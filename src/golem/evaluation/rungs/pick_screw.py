@@ -18,7 +18,7 @@ from golem.errors import ConfigError
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
-from golem.middleware import topics
+from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
@@ -26,7 +26,7 @@ from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.sensors.profiles import PROFILES
 from golem.runtime.lockstep import LockstepRunner, build
-from golem.skills.base import Feedback, SkillResult
+from golem.skills.base import SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickConfig, PickGoal
 from golem.skills.runner import FAULT
 from golem.stack import Stack, load_stack
@@ -137,7 +137,7 @@ class _Watch:
     def __init__(self, running: LockstepRunner, oracle: Oracle, recorder: BalanceRecorder | None) -> None:
         self._running, self._oracle = running, oracle
         self.recorder = recorder
-        self._news = News(running.bus, topics.FEEDBACK, Feedback)
+        self._news = News(running.bus, topics.FEEDBACK)
         self.grasp: GraspTruth | None = None
         self.picture: bytes | None = None
 

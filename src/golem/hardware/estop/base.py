@@ -2,23 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-
-@dataclass(frozen=True, slots=True)
-class EstopMessage:
-    """One frame of an emergency-stop board.
-
-    Attributes:
-        t: time of reception [s].
-        sequence: counts up by one per frame and may wrap; a frame with the sequence of its predecessor says nothing.
-        pressed: whether the button is pressed, or its wire cut.
-    """
-
-    t: float
-    sequence: int
-    pressed: bool
+from golem.interfaces.payloads import EstopMessage
 
 
 @runtime_checkable

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from golem.hardware.estop.base import EstopMessage
+from golem.interfaces.payloads import EstopMessage
 
 
 class VirtualEstop:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.hardware.hands.base import GripState, HandStatus
+from golem.interfaces.payloads import GripState, HandStatus
 from golem.robots.model.magpie_model import MAX_FORCE, MAX_GAP, MIN_FORCE
 from golem.types import HandCommand, HandState
 

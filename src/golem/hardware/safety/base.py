@@ -8,77 +8,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import NamedTuple
 
 import numpy as np
 
-from golem.hardware.estop.base import EstopMessage
+from golem.interfaces.payloads import EstopMessage, Fault, GateState, Reason
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, Array, BaseEstimate, LowCommand, LowState
 
 LIMIT_RATIO = 0.9
 """Share of the vendor's maxima that is used [paper]."""
-
-
-class GateState(StrEnum):
-    """Where the gate is. Only `ACTIVE` lets a command through."""
-
-    INIT = "init"
-    """Something that must be there is missing; the command is limp, and a live gate sends none."""
-    ARMED = "armed"
-    """State and emergency stop are sound; the motors damp; waits for the request to activate."""
-    ACTIVE = "active"
-    """Commands pass, limited."""
-    STOP1 = "stop1"
-    """Stopped and latched: the motors damp (kp = 0, kd > 0)."""
-    STOP0 = "stop0"
-    """Stopped and latched: the motors are limp (kp = kd = 0)."""
-
-    @property
-    def stopped(self) -> bool:
-        """Whether the robot was stopped, and stays so until the gate is reset."""
-        return self in (GateState.STOP1, GateState.STOP0)
-
-
-class Reason(StrEnum):
-    """Why the gate is not armed, or why it stopped."""
-
-    CLOCK = "clock_backwards"
-    STALLED = "gate_stalled"
-    REQUESTED = "stop_requested"
-    ESTOP_MISSING = "estop_never_seen"
-    ESTOP_STALE = "estop_stale"
-    ESTOP_TIME = "estop_time_invalid"
-    ESTOP_PRESSED = "estop_pressed"
-    STATE_MISSING = "state_never_seen"
-    STATE_STALE = "state_stale"
-    STATE_TIME = "state_time_invalid"
-    STATE_INVALID = "state_not_finite"
-    STATE_CLOCK = "state_clock"
-    POSITION = "joint_position"
-    VELOCITY = "joint_velocity"
-    TORQUE = "joint_torque"
-    BRAKING = "joint_braking_distance"
-    TILT = "tilt"
-    BASE_STALE = "base_estimate_stale"
-    WRITERS = "two_writers"
-    HELD = "motors_held"
-    UNHEARD = "motors_unheard"
-    STATE_DAMAGED = "state_damaged"
-    MOTOR = "motor_error"
-    COMMAND_DAMAGED = "command_damaged"
-    COMMAND_MISSING = "command_never_seen"
-    COMMAND_STALE = "command_stale"
-    COMMAND_TIME = "command_time_invalid"
-    COMMAND_INVALID = "command_not_finite"
-
-
-class Fault(NamedTuple):
-    """A reason, and one line that names the joint, the sender or the figures."""
-
-    reason: Reason
-    detail: str = ""
 
 
 class OperatorRequest(StrEnum):
@@ -302,28 +241,3 @@ class GateResult:
     reason: Reason | None
     detail: str
     memory: GateMemory
-
-
-@dataclass(frozen=True, slots=True)
-class GateStatus:
-    """What the gate lets everybody know.
-
-    Attributes:
-        t: when it ran [s].
-        state, reason, detail: see `GateResult`.
-    """
-
-    t: float
-    state: GateState
-    reason: Reason | None = None
-    detail: str = ""
-
-    @property
-    def stopped(self) -> bool:
-        """See `GateState.stopped`."""
-        return self.state.stopped
-
-    @property
-    def why(self) -> str:
-        """The reason and its detail in one line, without a full stop; empty where there is none."""
-        return ": ".join(filter(None, (self.reason, self.detail)))

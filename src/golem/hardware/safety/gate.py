@@ -16,21 +16,18 @@ import math
 
 import numpy as np
 
-from golem.hardware.estop.base import EstopMessage
 from golem.hardware.safety.base import (
     Counters,
-    Fault,
     GateInputs,
     GateMemory,
     GateResult,
-    GateState,
     OperatorRequest,
     Outgoing,
-    Reason,
     SafetyLimits,
 )
 from golem.hardware.safety.limiter import limit_command
 from golem.hardware.safety.monitor import examine, whole, whole_command
+from golem.interfaces.payloads import EstopMessage, Fault, GateState, Reason
 from golem.types import NUM_JOINTS, Array, BaseEstimate, LowCommand, LowState
 
 

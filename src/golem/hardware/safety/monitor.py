@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from golem.hardware.safety.base import Counters, Fault, Reason, SafetyLimits
+from golem.hardware.safety.base import Counters, SafetyLimits
+from golem.interfaces.payloads import Fault, Reason
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand, LowState
 

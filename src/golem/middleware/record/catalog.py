@@ -1,17 +1,14 @@
-"""Topics of a bag: those that are public, and those that are found on a domain."""
+"""Topics of a bag, as they are found on a domain."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 from typing import Protocol
 
-from golem.middleware import public
 from golem.middleware.dds.base import DEFAULT, Qos
 from golem.middleware.record.base import BagTopic
 from golem.middleware.ros import codec, names
-
-COMPRESSED = "sensor_msgs/msg/CompressedImage"
 
 
 class OfferedTopic(Protocol):
@@ -41,17 +38,6 @@ def topic(name: str, kind: str, qos: Qos = DEFAULT) -> BagTopic:
         MissingExtra: rosbags, which knows the types, is not installed.
     """
     return BagTopic(name, kind, codec.definition(kind), qos, codec.type_hash(kind))
-
-
-def public_topics(chosen: Collection[str] = ()) -> list[BagTopic]:
-    """Return the public topics among `chosen`; default: all, but images in one form only: as they are.
-
-    Raises:
-        MissingExtra: as for `topic`.
-    """
-    rows = {row.name: row for row in public.TOPICS}
-    wanted = chosen or [name for name, row in rows.items() if row.type != COMPRESSED]
-    return [topic(name, rows[name].type, rows[name].qos) for name in dict.fromkeys(wanted) if name in rows]
 
 
 def offered(writers: Iterable[OfferedTopic]) -> list[BagTopic]:

@@ -12,10 +12,11 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.middleware import public
+from golem.interfaces import images, public
+from golem.interfaces import ros_convert as convert
 from golem.middleware.record.base import BagError, BagMessage
 from golem.middleware.record.reader import Bag
-from golem.middleware.ros import codec, convert, images
+from golem.middleware.ros import codec
 from golem.middleware.ros.goal_info import from_time
 from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.golem_interfaces import HandState as HandMessage

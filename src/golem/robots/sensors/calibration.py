@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from golem.middleware import public
-from golem.middleware.ros import convert
+from golem.interfaces import public
+from golem.interfaces import ros_convert as convert
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
 from golem.types import SIDES, Array
 

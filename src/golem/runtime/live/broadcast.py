@@ -9,13 +9,12 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
-from golem.hardware.safety.base import GateStatus
-from golem.middleware import topics
+from golem.interfaces import topics
+from golem.interfaces.public import Role
+from golem.interfaces.recorded import public_topics
 from golem.middleware.bus import Bus, News
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.public import Role
 from golem.middleware.record.base import Sink
-from golem.middleware.record.catalog import public_topics
 from golem.middleware.record.recorder import PERIOD, Recorder
 from golem.middleware.ros.node import DdsNode
 from golem.middleware.wire.convert import MODE_MACHINE, encode_low_command
@@ -27,7 +26,7 @@ from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.safety_process import REPORT
 from golem.runtime.live.safety_status import status_message
 from golem.runtime.lockstep import LockstepRunner
-from golem.types import SIDES, TICK, LowCommand
+from golem.types import SIDES, TICK
 
 
 class CommandOut:
@@ -37,7 +36,7 @@ class CommandOut:
 
     def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
         """Send what is on `bus`."""
-        self._commands, self._writer = News(bus, topics.LOW_CMD, LowCommand), endpoints.writer("/lowcmd")
+        self._commands, self._writer = News(bus, topics.LOW_CMD), endpoints.writer("/lowcmd")
 
     def step(self, t: float) -> None:
         """Send a new command."""
@@ -59,7 +58,7 @@ class StatusOut:
 
     def step(self, t: float) -> None:
         """Send the verdict if it changed, or was not sent for long."""
-        status = self._bus.latest(topics.SAFETY, GateStatus)
+        status = self._bus.latest(topics.SAFETY)
         if status is None:
             return
         says = (status.state, status.reason, status.detail)

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from golem.errors import ConfigError
-from golem.hardware.safety.base import GateState, GateStatus
-from golem.middleware import public
+from golem.interfaces import public
+from golem.interfaces.payloads import GateState, GateStatus
 from golem.middleware.interrupt import LIFELINE, interrupted
 from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.future import Future

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from golem.middleware import topics
+from golem.interfaces import topics
 from golem.middleware.bus import Bus
-from golem.middleware.topics import LegStatus
 from golem.runtime.nodes import moving
-from golem.types import BaseEstimate
 
 BLIND = 3.0
 """Time from the gate's activation on after which an estimator that has found no floor is worth a word [s]: one that
@@ -28,13 +26,13 @@ class LegsMonitor:
 
     def step(self, t: float) -> None:
         """Look at the legs' newest report and the newest base estimate at time `t` [s]."""
-        legs = self._bus.latest(topics.LEG_STATUS, LegStatus)
+        legs = self._bus.latest(topics.LEG_STATUS)
         if legs is not None and legs.fault is not None and legs.fault != self._fault:
             self._fault = legs.fault
             self._tell(
                 f"{legs.fault}. '{legs.controller}' has the legs now, and stands until a new twist comes."
             )
-        base = self._bus.latest(topics.BASE, BaseEstimate)
+        base = self._bus.latest(topics.BASE)
         if not moving(self._bus):
             self._blind_since = t
         elif base is not None and not base.stale:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from golem.middleware import topics
+from golem.interfaces import topics
 from golem.middleware.bus import Bus, News
 from golem.middleware.dds.base import Sample
 from golem.middleware.ros.waitset import WaitSet
@@ -14,7 +14,7 @@ from golem.middleware.wire.struct_layout import WireError
 from golem.runtime.live.rejected import RejectedMessages
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.sim_sync import LAG, PATIENCE
-from golem.types import TICK, LowCommand, LowState
+from golem.types import TICK
 
 
 class StateOut:
@@ -28,7 +28,7 @@ class StateOut:
 
     def step(self, t: float) -> None:
         """Send the present state."""
-        state = self._bus.latest(topics.LOW_STATE, LowState)
+        state = self._bus.latest(topics.LOW_STATE)
         if state is not None:
             self._writer.write(encode_low_state(state))
 
@@ -92,10 +92,10 @@ class RequestOut:
         """Send what is on `bus`; `mode_machine()` is the machine type that the robot reports."""
         self._bus, self._mode_machine = bus, mode_machine
         self._writer = endpoints.writer("/safety/lowcmd_in")
-        self._commands = News(bus, topics.LOW_CMD_REQUEST, LowCommand)
+        self._commands = News(bus, topics.LOW_CMD_REQUEST)
 
     def step(self, t: float) -> None:
         """Send a new command, with the time of the state it answers."""
-        command, state = self._commands.read(), self._bus.latest(topics.LOW_STATE, LowState)
+        command, state = self._commands.read(), self._bus.latest(topics.LOW_STATE)
         if command is not None and state is not None:
             self._writer.write(encode_low_command(command, self._mode_machine(), answers=state.t))

@@ -12,16 +12,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from golem.capabilities.legs.base import LegCommand
+from golem.interfaces import topics
+from golem.interfaces.payloads import LegCommand
 from golem.middleware.bus import Bus, News
 from golem.middleware.dds.base import Payload, Reader, Writer
-from golem.middleware.unitree_api import ApiRequest, Response, request_topic, response_topic
+from golem.middleware.unitree_api import ApiRequest, Response
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import decode_low_command, encode_low_command
 from golem.middleware.wire.rpc import RpcClient, RpcServer
 from golem.middleware.wire.struct_layout import WireError
 from golem.runtime.live.rejected import RejectedMessages
-from golem.runtime.onboard_nodes import ONBOARD_LEGS
 from golem.types import LEGS, NUM_JOINTS, TICK, LowCommand
 
 WAITING = 64
@@ -39,7 +39,7 @@ class CallsIn:
 
     def __init__(self, bus: Bus, service: str, server: RpcServer) -> None:
         """Take calls to `service` from `server`."""
-        self._bus, self._topic, self._server = bus, request_topic(service), server
+        self._bus, self._topic, self._server = bus, topics.api_request(service), server
         self._waiting: deque[ApiRequest] = deque(maxlen=WAITING)
 
     def step(self, t: float) -> None:
@@ -56,7 +56,7 @@ class AnswersOut:
 
     def __init__(self, bus: Bus, service: str, server: RpcServer) -> None:
         """Send answers of `service` through `server`."""
-        self._news, self._server = News(bus, response_topic(service), Response), server
+        self._news, self._server = News(bus, topics.api_response(service)), server
 
     def step(self, t: float) -> None:
         """Send a new answer."""
@@ -89,7 +89,7 @@ class CallsOut:
 
     def __init__(self, bus: Bus, service: str, client: RpcClient, identities: Identities) -> None:
         """Send calls to `service` through `client`."""
-        self._news, self._client = News(bus, request_topic(service), ApiRequest), client
+        self._news, self._client = News(bus, topics.api_request(service)), client
         self._identities = identities
         self._unsent: ApiRequest | None = None
 
@@ -108,7 +108,7 @@ class AnswersIn:
 
     def __init__(self, bus: Bus, service: str, client: RpcClient, identities: Identities) -> None:
         """Take answers of `service` from `client`."""
-        self._bus, self._topic, self._client = bus, response_topic(service), client
+        self._bus, self._topic, self._client = bus, topics.api_response(service), client
         self._identities = identities
         self._waiting: deque[Response] = deque(maxlen=WAITING)
 
@@ -129,7 +129,7 @@ class OnboardLegsOut:
 
     def __init__(self, bus: Bus, writer: Writer) -> None:
         """Send through `writer`, of `LowCmd_`."""
-        self._news, self._writer = News(bus, ONBOARD_LEGS, LegCommand), writer
+        self._news, self._writer = News(bus, topics.ONBOARD_LEGS), writer
 
     def step(self, t: float) -> None:
         """Send new targets."""
@@ -157,7 +157,7 @@ class LegsIn:
         for sample in self._reader.take():
             if sample.alive:
                 try:
-                    self._bus.publish(ONBOARD_LEGS, decode_legs(sample.payload), t)
+                    self._bus.publish(topics.ONBOARD_LEGS, decode_legs(sample.payload), t)
                 except WireError as error:
                     self.refused.add(error)
 

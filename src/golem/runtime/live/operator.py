@@ -9,8 +9,8 @@ from typing import Any, Literal
 from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.errors import ConfigError
-from golem.hardware.safety.base import GateState
-from golem.middleware import public
+from golem.interfaces import public
+from golem.interfaces.payloads import GateState
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros.base import RosNode

@@ -15,7 +15,8 @@ from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.errors import ConfigError
 from golem.hardware.estop.virtual import VirtualEstop
-from golem.hardware.safety.base import GateState, GateStatus, SafetyLimits
+from golem.hardware.safety.base import SafetyLimits
+from golem.interfaces.payloads import GateState, GateStatus
 from golem.middleware.dds.domain import ROBOT_DOMAIN, DdsConfig
 from golem.middleware.exclusive_writers import owner, refuse_second
 from golem.middleware.interrupt import interrupted

@@ -15,10 +15,10 @@ from contextlib import closing
 from multiprocessing.connection import Connection
 
 from golem.errors import GolemError
-from golem.middleware import public, topics
+from golem.interfaces import public, topics
+from golem.interfaces.payloads import Exposure
 from golem.middleware.bus import Bus
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.topics import Exposure
 from golem.robots.base import Restorable
 from golem.runtime.live.node_setup import member
 from golem.runtime.live.robot_out import CameraOut

@@ -6,19 +6,18 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from golem.middleware import public, topics
+from golem.interfaces import images, public, topics
+from golem.interfaces import ros_convert as convert
 from golem.middleware.bus import Bus, News
-from golem.middleware.ros import convert, images
 from golem.middleware.ros.msgs.golem_interfaces import HandCommand as HandCommandMessage
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo
 from golem.middleware.ros.msgs.std_msgs import String
-from golem.middleware.topics import Exposure
 from golem.robots.model import tree
 from golem.robots.model.export import export_urdf
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.runtime.live.role_endpoints import RoleEndpoints
-from golem.types import SIDES, TICK, Array, HandState, LowState, Side
+from golem.types import SIDES, TICK, Array, LowState, Side
 
 JOINTS = tuple(hinge.joint for hinge in tree.HINGES)
 LINKS = tuple((hinge.parent, hinge.child) for hinge in tree.HINGES)
@@ -66,7 +65,7 @@ class JointsOut:
 
     def step(self, t: float) -> None:
         """Send the present angles; the fingers' speeds and torques are not measured."""
-        state = self._bus.latest(topics.LOW_STATE, LowState)
+        state = self._bus.latest(topics.LOW_STATE)
         if state is not None and self._endpoints.heard("/joint_states"):
             angle, none = _angles(self._bus, state), np.zeros(len(JOINTS) - len(state.q))
             dq, tau = (np.concatenate([v, none]) for v in (state.dq, state.tau))
@@ -84,7 +83,7 @@ class FramesOut:
 
     def step(self, t: float) -> None:
         """Send the present poses."""
-        state = self._bus.latest(topics.LOW_STATE, LowState)
+        state = self._bus.latest(topics.LOW_STATE)
         if state is not None and self._endpoints.heard("/tf"):
             poses = tree.poses(_angles(self._bus, state))
             self._endpoints.publish("/tf", convert.transforms(state.t, LINKS, poses))
@@ -98,7 +97,7 @@ class CameraOut:
     def __init__(self, bus: Bus, endpoints: RoleEndpoints, camera: str) -> None:
         """Publish on `surface` what `camera` puts on `bus`."""
         self._endpoints = endpoints
-        self._exposures = News(bus, topics.exposures(camera), Exposure)
+        self._exposures = News(bus, topics.exposures(camera))
         self._frame = public.optical_frame(camera)
         self._topics = {what: public.image(camera, what) for what in public.IMAGES}
 
@@ -142,7 +141,7 @@ class HandOut:
 
     def step(self, t: float) -> None:
         """Send the present report."""
-        state = self._bus.latest(topics.hand_state(self._side), HandState)
+        state = self._bus.latest(topics.hand_state(self._side))
         if state is not None and self._endpoints.heard(self._topic):
             self._endpoints.publish(self._topic, convert.hand_state(state, self._side))
 
@@ -160,6 +159,6 @@ def take_hand_commands(bus: Bus, endpoints: RoleEndpoints, side: Side) -> None:
 
 def _angles(bus: Bus, state: LowState) -> Array:
     """Return the angle of every hinge [rad]; a hand that has not reported counts as closed."""
-    hands = [bus.latest(topics.hand_state(side), HandState) for side in SIDES]
+    hands = [bus.latest(topics.hand_state(side)) for side in SIDES]
     left, right = (np.zeros(2) if hand is None else hand.fingers for hand in hands)
     return tree.angles(state.q, (left, right))

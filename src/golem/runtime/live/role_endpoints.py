@@ -7,9 +7,9 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from golem.middleware import public
+from golem.interfaces import public
+from golem.interfaces.public import Role
 from golem.middleware.dds.base import Participant, Qos, Reader, Sample, Writer
-from golem.middleware.public import Role
 from golem.middleware.ros import names
 from golem.middleware.ros.base import ActionHandler, ActionServer, Publisher, RosNode, Subscription
 from golem.middleware.ros.codec import dds_name

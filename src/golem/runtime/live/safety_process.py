@@ -10,16 +10,17 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import Any
 
-from golem.hardware.estop.base import EstopMessage
 from golem.hardware.estop.virtual import VirtualEstop
-from golem.hardware.safety.base import Fault, GateState, GateStatus, OperatorRequest, Reason, SafetyLimits
+from golem.hardware.safety.base import OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import passive
-from golem.middleware import topics
-from golem.middleware.bus import Bus, News
+from golem.interfaces import topics
+from golem.interfaces.payloads import Fault, GateState, GateStatus, Reason
+from golem.interfaces.ros_convert import diagnostic, diagnostics, header, to_base_estimate
+from golem.middleware.bus import Bus, News, Topic
 from golem.middleware.dds.base import Participant, Qos, Sample
 from golem.middleware.ros.base import RosNode
-from golem.middleware.ros.convert import diagnostic, diagnostics, header, to_base_estimate
 from golem.middleware.ros.msgs import golem_interfaces
 from golem.middleware.ros.msgs.diagnostic_msgs import DiagnosticStatus
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response, Trigger_Response
@@ -34,7 +35,7 @@ from golem.runtime.live.motion_switcher_client import MotionSwitcherClient
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.safety_status import describe_status, status_message
 from golem.runtime.node_groups import SafetyNodes
-from golem.types import BaseEstimate, LowCommand, LowState
+from golem.types import LowCommand
 
 REMEMBERED = 256
 """States whose time of arrival is remembered: half a second."""
@@ -172,7 +173,7 @@ class SafetyProcess:
         self._estop = estop
         self._side = SafetyNodes(self.bus, limits, estop)
         self._nodes = in_order(self._side.nodes)
-        self._estops = News(self.bus, topics.ESTOP, EstopMessage)
+        self._estops = News(self.bus, topics.ESTOP)
         self._base_stamp = -math.inf
         self._crowded, self._unheard = "", ""
         self._listeners: set[bytes] | None = None
@@ -235,8 +236,8 @@ class SafetyProcess:
         for node in self._nodes:
             node.step(now)
         self._steps += 1
-        status = self.bus.latest(topics.SAFETY, GateStatus)
-        command = self.bus.latest(topics.LOW_CMD, LowCommand)
+        status = self.bus.latest(topics.SAFETY)
+        command = self.bus.latest(topics.LOW_CMD)
         assert status is not None and command is not None
         self.status = status
         self._halts = moving and status.state is not GateState.ACTIVE
@@ -318,14 +319,14 @@ class SafetyProcess:
         """Say once a second how old everything is."""
         values: dict[str, object] = {"state": self.status.state, "steps per second": self._steps}
         self._steps = 0
-        stamped = (
-            ("state", topics.LOW_STATE, LowState),
-            ("command", topics.LOW_CMD_REQUEST, LowCommand),
-            ("base estimate", topics.BASE, BaseEstimate),
-            ("e-stop", topics.ESTOP, EstopMessage),
-        )
-        for name, topic, kind in stamped:
-            newest = self.bus.latest(topic, kind)
+        stamped: dict[str, Topic[Any]] = {
+            "state": topics.LOW_STATE,
+            "command": topics.LOW_CMD_REQUEST,
+            "base estimate": topics.BASE,
+            "e-stop": topics.ESTOP,
+        }
+        for name, topic in stamped.items():
+            newest = self.bus.latest(topic)
             values[f"age of {name} [ms]"] = (
                 "never seen" if newest is None else f"{(now - newest.t) * 1e3:.0f}"
             )

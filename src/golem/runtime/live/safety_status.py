@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from golem.hardware.safety.base import GateState, GateStatus, Reason
-from golem.middleware.ros.convert import header
+from golem.interfaces.payloads import GateState, GateStatus, Reason
+from golem.interfaces.ros_convert import header
 from golem.middleware.ros.msgs import golem_interfaces
 
 

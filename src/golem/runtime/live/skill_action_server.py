@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 
 from golem.errors import GolemError
-from golem.hardware.safety.base import GateState
-from golem.middleware import topics
+from golem.interfaces import ros_convert as convert
+from golem.interfaces import topics
+from golem.interfaces.payloads import Feedback, GateState
 from golem.middleware.bus import News
-from golem.middleware.ros import convert
 from golem.middleware.ros.base import ServerGoal
 from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs import golem_interfaces
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.safety_status import describe_status
 from golem.runtime.node_groups import StackNodes
-from golem.skills.base import Feedback, Skill, SkillResult
+from golem.skills.base import Skill, SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.skills.runner import SkillRun
 from golem.skills.walk import Stand, StandGoal, Walk, WalkGoal
@@ -157,7 +157,7 @@ class SkillActionServer:
         except GolemError as error:
             goal.abort(offer.result(result_message(SkillResult(False, REFUSED, None, str(error)))))
             return
-        news = News(stack.bus, topics.FEEDBACK, Feedback)
+        news = News(stack.bus, topics.FEEDBACK)
         self._pursuit = ActiveGoal(offer, goal, run, self._t + offer.allowance(wanted), news)
 
     def cancel(self, goal: ServerGoal) -> bool:

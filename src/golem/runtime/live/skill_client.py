@@ -10,10 +10,10 @@ import tyro
 from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.errors import ConfigError, unknown_name
-from golem.middleware import public
+from golem.interfaces import public
+from golem.interfaces import ros_convert as convert
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.interrupt import interrupted
-from golem.middleware.ros import convert
 from golem.middleware.ros.base import ClientGoal, RosNode
 from golem.middleware.ros.future import Future, RosError
 from golem.middleware.ros.goals import GoalStatus

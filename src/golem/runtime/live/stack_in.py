@@ -5,16 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from golem.hardware.safety.base import GateState, GateStatus
-from golem.middleware import public, topics
+from golem.interfaces import images, public, topics
+from golem.interfaces import ros_convert as convert
+from golem.interfaces.payloads import Exposure, GateState, GateStatus
 from golem.middleware.bus import Bus
-from golem.middleware.ros import convert, images
 from golem.middleware.ros.base import Client, RosNode, Subscription
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs import golem_interfaces, sensor_msgs
 from golem.middleware.ros.msgs.geometry_msgs import Twist
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
-from golem.middleware.topics import Exposure
 from golem.robots.sensors.calibration import calibrations
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.pairing import Pairing

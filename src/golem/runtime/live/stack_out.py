@@ -7,18 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from golem.hardware.hands.base import HandStatus
-from golem.middleware import public, topics
+from golem.interfaces import public, topics
+from golem.interfaces import ros_convert as convert
+from golem.interfaces.payloads import HandGoal
 from golem.middleware.bus import Bus, News
-from golem.middleware.ros import convert
 from golem.middleware.ros.msgs import golem_interfaces
 from golem.middleware.ros.msgs.std_srvs import Trigger_Response
-from golem.middleware.topics import Detections, HandGoal, LegStatus
 from golem.robots.model import magpie_model
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.nodes import moving
-from golem.types import TICK, BaseEstimate, HandCommand, LowState, Side
+from golem.types import TICK, Side
 
 SHUT = "The safety gate is shut, see /safety/status."
 
@@ -30,7 +29,7 @@ class BaseOut:
 
     def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
         """Publish on `surface` what is on `bus`."""
-        self._endpoints, self._news = endpoints, News(bus, topics.BASE, BaseEstimate)
+        self._endpoints, self._news = endpoints, News(bus, topics.BASE)
 
     def step(self, t: float) -> None:
         """Send a new estimate."""
@@ -50,8 +49,8 @@ class OdometryOut:
 
     def step(self, t: float) -> None:
         """Send the present estimate."""
-        estimate = self._bus.latest(topics.BASE, BaseEstimate)
-        state = self._bus.latest(topics.LOW_STATE, LowState)
+        estimate = self._bus.latest(topics.BASE)
+        state = self._bus.latest(topics.LOW_STATE)
         if estimate is None or state is None:
             return
         if self._endpoints.heard("/odom"):
@@ -75,7 +74,7 @@ class LegsOut:
 
     def step(self, t: float) -> None:
         """Send the present status."""
-        status = self._bus.latest(topics.LEG_STATUS, LegStatus)
+        status = self._bus.latest(topics.LEG_STATUS)
         if status is not None and self._endpoints.heard("/legs/status"):
             self._endpoints.publish("/legs/status", convert.leg_status(status))
 
@@ -88,7 +87,7 @@ class SightingsOut:
     def __init__(self, bus: Bus, endpoints: RoleEndpoints, camera: str) -> None:
         """Publish on `surface` what was found in the frames of `camera`."""
         self._endpoints, self._topic = endpoints, f"/objects/{camera}"
-        self._news = News(bus, topics.detections(camera), Detections)
+        self._news = News(bus, topics.detections(camera))
 
     def step(self, t: float) -> None:
         """Send new sightings."""
@@ -109,7 +108,7 @@ class HandCommandOut:
 
     def step(self, t: float) -> None:
         """Send the present command."""
-        command = self._bus.latest(topics.hand_command(self._side), HandCommand)
+        command = self._bus.latest(topics.hand_command(self._side))
         if command is not None:
             message = convert.hand_command(command, self._side)
             self._endpoints.publish(public.gripper(self._side, "command"), message)
@@ -128,7 +127,7 @@ class HandStatusOut:
     def step(self, t: float) -> None:
         """Send the present status."""
         topic = public.gripper(self._side, "status")
-        status = self._bus.latest(topics.hand_status(self._side), HandStatus)
+        status = self._bus.latest(topics.hand_status(self._side))
         if status is None or not self._endpoints.heard(topic):
             return
         head = convert.header(max(status.t, 0.0), f"{self._side}_gripper")

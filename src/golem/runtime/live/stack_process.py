@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from golem.errors import ConfigError
-from golem.middleware import public, topics
+from golem.interfaces import public, topics
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant, Sample
 from golem.middleware.ros.base import RosNode

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from golem.middleware import public
+from golem.interfaces import public
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant
 from golem.middleware.ros.base import RosNode

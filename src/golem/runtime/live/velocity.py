@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from golem.capabilities.legs.locomotion import LocomotionConfig
-from golem.middleware import topics
+from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.types import Twist
 

@@ -6,13 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from golem.capabilities.legs.base import Envelope, LegCommand, LocomotionCommand
+from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.hold import STANCES
 from golem.capabilities.legs.mpc.cost import CostConfig, cost
 from golem.capabilities.legs.mpc.planner import Planner, PlannerConfig
 from golem.capabilities.legs.mpc.planning_model import PlanningModel
 from golem.errors import ConfigError, GolemError, unknown_name
+from golem.interfaces.payloads import LegCommand
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
 FAILURES = 5

@@ -10,14 +10,14 @@ from dataclasses import dataclass, field
 from tyro.conf import OmitArgPrefixes
 
 from golem.errors import ConfigError, unknown_name
-from golem.middleware import public
+from golem.interfaces import public
+from golem.interfaces.recorded import public_topics
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.exclusive_writers import identity
 from golem.middleware.interrupt import interrupted
 from golem.middleware.record.base import BagTopic
-from golem.middleware.record.catalog import public_topics
 from golem.middleware.record.foxglove_server import FoxgloveServer, ServerConfig
 from golem.middleware.record.recorder import Recorder
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.middleware.ros.convert import header
+from golem.interfaces.ros_convert import header
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.sensor_msgs import (
     CameraInfo,

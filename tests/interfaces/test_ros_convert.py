@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from golem.middleware.ros import convert
+from golem.interfaces import ros_convert as convert
+from golem.interfaces.payloads import Detections, LegStatus
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.diagnostic_msgs import DiagnosticStatus
 from golem.middleware.ros.msgs.geometry_msgs import Point, Pose, Quaternion
-from golem.middleware.topics import Detections, LegStatus
 from golem.types import (
     BaseEstimate,
     Detection,

@@ -11,13 +11,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from golem.interfaces.payloads import Detections, LegStatus
 from golem.middleware.ros.message import NANO, CodecError
 from golem.middleware.ros.msgs import diagnostic_msgs, geometry_msgs, golem_interfaces, sensor_msgs
 from golem.middleware.ros.msgs.builtin_interfaces import Duration, Time
 from golem.middleware.ros.msgs.nav_msgs import Odometry
 from golem.middleware.ros.msgs.std_msgs import Header
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
-from golem.middleware.topics import Detections, LegStatus
 from golem.types import Array, BaseEstimate, HandCommand, HandState, Imu, Twist
 
 POSE_COVARIANCE = np.diag(np.square([0.03, 0.03, 0.01, 0.01, 0.01, 0.03])).ravel()

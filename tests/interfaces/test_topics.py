@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from golem.middleware import topics
-from golem.middleware.topics import DetectionRequest, HandGoal
+from golem.interfaces import topics
+from golem.interfaces.payloads import DetectionRequest, HandGoal
+from golem.middleware.bus import Topic
 from golem.types import SIDES
 
 
 def test_no_two_streams_share_a_name() -> None:
-    fixed = [value for name, value in vars(topics).items() if name.isupper() and isinstance(value, str)]
+    fixed = [value.name for value in vars(topics).values() if isinstance(value, Topic)]
     per_side = (topics.hand_state, topics.hand_command, topics.hand_goal, topics.hand_status)
     per_camera = (topics.rgbd_images, topics.detection_request, topics.detections)
     names = (
         fixed
-        + [topic(side) for topic in per_side for side in SIDES]
-        + [topic(camera) for topic in per_camera for camera in ("head", "left_hand", "right_hand")]
+        + [topic(side).name for topic in per_side for side in SIDES]
+        + [topic(camera).name for topic in per_camera for camera in ("head", "left_hand", "right_hand")]
     )
     assert len(fixed) >= 10
     assert len(set(names)) == len(names)

@@ -7,14 +7,14 @@ from collections import Counter
 import pytest
 from tests.conftest import REPOSITORY
 
-from golem.middleware import public
-from golem.middleware.public_page import page
+from golem.interfaces import public
+from golem.interfaces.public_page import page
 from golem.robots.sensors.cameras import CAMERAS
 
 
 def test_the_documentation_is_that_of_the_table() -> None:
     path = REPOSITORY / "docs" / "reference" / "topics.md"
-    advice = "write it anew: python -m golem.middleware.public_page docs/reference/topics.md"
+    advice = "write it anew: python -m golem.interfaces.public_page docs/reference/topics.md"
     assert path.read_text(encoding="utf-8") == page(), advice
 
 

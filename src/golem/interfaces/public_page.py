@@ -1,4 +1,4 @@
-"""Writes docs/reference/topics.md from the table: `python -m golem.middleware.public_page docs/reference/topics.md`."""
+"""Writes docs/reference/topics.md from the table: `python -m golem.interfaces.public_page docs/reference/topics.md`."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from golem.middleware import public
+from golem.interfaces import public
+from golem.interfaces.public import Role
 from golem.middleware.dds.base import Qos
-from golem.middleware.public import Role
 
 WHO: dict[Role, str] = {
     "robot": "robot: `golem twin`, or the H1-2 and its drivers",
@@ -20,7 +20,7 @@ WHO: dict[Role, str] = {
 SHORT: dict[Role, str] = {"robot": "robot", "safety": "safety", "stack": "up", "user": "you"}
 INTRODUCTION = """# Interfaces
 
-Written by `python -m golem.middleware.public_page docs/reference/topics.md` from `golem.middleware.public`, which is
+Written by `python -m golem.interfaces.public_page docs/reference/topics.md` from `golem.interfaces.public`, which is
 what the processes create their endpoints from; tests compare this page with the table, and the table with what running
 processes offer. Names are those of ROS 2. On the wire the topic `/x` is `rt/x`: `/lowstate` is
 the vendor's `rt/lowstate`.

@@ -11,12 +11,13 @@ from pathlib import Path
 from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.errors import ConfigError
+from golem.interfaces.recorded import public_topics
 from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.exclusive_writers import SOLE, identity, refuse_second
 from golem.middleware.interrupt import interrupted
-from golem.middleware.record.catalog import offered, public_topics
+from golem.middleware.record.catalog import offered
 from golem.middleware.record.player import PlayConfig, Player
 from golem.middleware.record.reader import Bag, repair
 from golem.middleware.record.recorder import Recorder

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from golem.middleware.ros import images
+from golem.interfaces import images
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.sensor_msgs import Image, PointCloud2, PointField
 from golem.types import CameraInfo

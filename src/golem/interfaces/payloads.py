@@ -1,0 +1,324 @@
+"""What the streams between modules carry, beside the words of `golem.types`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.types import Array, CameraInfo, LocalizedObject, PlanarPose, Twist
+
+
+@dataclass(frozen=True, slots=True)
+class LegCommand:
+    """What the legs are told at one tick: tau_motor = kp (q - q_meas) - kd dq_meas + tau.
+
+    Attributes:
+        q: (12,) joint targets in motor order, left leg then right leg [rad].
+        kp: (12,) stiffness the controller wants at the motors [N m/rad].
+        kd: (12,) damping the controller wants at the motors [N m s/rad].
+        tau: (12,) feed-forward torque [N m]. None leaves it to the servo, which then carries the weight of legs that
+            hang free: right in a hoist, wrong on the ground.
+    """
+
+    q: Array
+    kp: Array
+    kd: Array
+    tau: Array | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ArmCommand:
+    """What the upper body is told at one tick.
+
+    Attributes:
+        q: (15,) joint targets, torso, left arm, right arm [rad]; inside the position limits, and no
+            further from the previous tick's targets than the velocity limits allow.
+        error_position: (2,) distance of the left and right grasp frame from its target at `q` [m]; 0 for
+            an arm without a target.
+        error_rotation: (2,) angle between grasp frame and target at `q` [rad]; 0 for an arm without one.
+        limited: True where a limit (position, velocity, or the guard of a far target) held the motion back at
+            this tick, so that the error cannot be expected to shrink at the nominal rate.
+    """
+
+    q: Array
+    error_position: Array
+    error_rotation: Array
+    limited: bool
+
+
+class GripState(StrEnum):
+    """What a hand is doing, or has found."""
+
+    OPENING = "opening"
+    """The fingers move to a commanded gap."""
+    OPEN = "open"
+    """They are there."""
+    CLOSING = "closing"
+    """They close; nothing is touched by both."""
+    CONTACT = "contact"
+    """Both fingers touch something; the grip has not settled yet."""
+    HOLDING = "holding"
+    """Both fingers press on something and the gap is at rest."""
+    EMPTY = "empty"
+    """They closed on nothing."""
+    SLIPPED = "slipped"
+    """Something was held and no longer is."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandGoal:
+    """What a skill wants of one hand: open to `gap`, or close with `force`.
+
+    Attributes:
+        gap: opening to move to [m]; None closes.
+        force: force of each finger to close with [N]; used when `gap` is None.
+    """
+
+    gap: float | None
+    force: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class HandStatus:
+    """What a hand's controller reports.
+
+    Attributes:
+        t: time stamp of the report it is based on [s].
+        state: see `GripState`.
+        gap: opening [m].
+        offset: where between the fingers the middle of the opening is, along the closing axis [m]: 0 when both are
+            equally far from the hand's centre plane, positive when finger a (+y) is further out.
+        force: (2,) force of each finger [N].
+    """
+
+    t: float
+    state: GripState
+    gap: float
+    offset: float
+    force: Array
+
+    @property
+    def holding(self) -> bool:
+        """Whether something is held: both fingers press, wider apart than closed, at rest."""
+        return self.state is GripState.HOLDING
+
+
+@dataclass(frozen=True, slots=True)
+class LegStatus:
+    """What the base layer of the lower body did at one tick.
+
+    Attributes:
+        t: time [s].
+        commanded: the newest twist, as it came: it may be far outside what is possible, or not finite.
+        applied: the twist the robot shall move at; the controller is given a corrected one.
+        clamped: whether `commanded` lies outside the controller's envelope.
+        reason: why `applied` is not on its way to `commanded`; empty where it is.
+        stepping: whether the gait clock runs.
+        moving: whether the robot changes its place: a twist is applied, or it steps though its controller's clock could
+            rest. A controller without a clock moves without stepping, one that marks time steps without moving.
+        rest: where base_link would come to rest if the robot were told to stand now, as seen from base_link.
+        phase: (2,) gait phase of the left and the right leg, 0 to 1.
+        controller: the implementation in charge, as the stack names it.
+        fault: how the stack's own controller failed, once the fallback is in charge; else None.
+    """
+
+    t: float
+    commanded: Twist
+    applied: Twist
+    clamped: bool
+    reason: str
+    stepping: bool
+    moving: bool
+    rest: PlanarPose
+    phase: Array
+    controller: str
+    fault: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Where base_link is in odom by a source of its own.
+
+    Attributes:
+        t: time of the measurement [s].
+        T_odom_base: (4, 4) pose of base_link in odom.
+    """
+
+    t: float
+    T_odom_base: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Exposure:
+    """What a camera saw, before anybody says from where: a `RgbdImage` without its pose.
+
+    Attributes:
+        t, info, rgb, depth: as in `RgbdImage`.
+    """
+
+    t: float
+    info: CameraInfo
+    rgb: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class DetectionRequest:
+    """Ask a camera and the localizer behind it to stream.
+
+    Attributes:
+        labels: what to look for; empty stops the stream, so that nothing is rendered or inferred unasked.
+    """
+
+    labels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Detections:
+    """What a localizer found in one frame.
+
+    Attributes:
+        t: time of the frame [s].
+        camera: which camera.
+        objects: everything found, in no order.
+    """
+
+    t: float
+    camera: str
+    objects: tuple[LocalizedObject, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class EstopMessage:
+    """One frame of an emergency-stop board.
+
+    Attributes:
+        t: time of reception [s].
+        sequence: counts up by one per frame and may wrap; a frame with the sequence of its predecessor says nothing.
+        pressed: whether the button is pressed, or its wire cut.
+    """
+
+    t: float
+    sequence: int
+    pressed: bool
+
+
+class GateState(StrEnum):
+    """Where the gate is. Only `ACTIVE` lets a command through."""
+
+    INIT = "init"
+    """Something that must be there is missing; the command is limp, and a live gate sends none."""
+    ARMED = "armed"
+    """State and emergency stop are sound; the motors damp; waits for the request to activate."""
+    ACTIVE = "active"
+    """Commands pass, limited."""
+    STOP1 = "stop1"
+    """Stopped and latched: the motors damp (kp = 0, kd > 0)."""
+    STOP0 = "stop0"
+    """Stopped and latched: the motors are limp (kp = kd = 0)."""
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the robot was stopped, and stays so until the gate is reset."""
+        return self in (GateState.STOP1, GateState.STOP0)
+
+
+class Reason(StrEnum):
+    """Why the gate is not armed, or why it stopped."""
+
+    CLOCK = "clock_backwards"
+    STALLED = "gate_stalled"
+    REQUESTED = "stop_requested"
+    ESTOP_MISSING = "estop_never_seen"
+    ESTOP_STALE = "estop_stale"
+    ESTOP_TIME = "estop_time_invalid"
+    ESTOP_PRESSED = "estop_pressed"
+    STATE_MISSING = "state_never_seen"
+    STATE_STALE = "state_stale"
+    STATE_TIME = "state_time_invalid"
+    STATE_INVALID = "state_not_finite"
+    STATE_CLOCK = "state_clock"
+    POSITION = "joint_position"
+    VELOCITY = "joint_velocity"
+    TORQUE = "joint_torque"
+    BRAKING = "joint_braking_distance"
+    TILT = "tilt"
+    BASE_STALE = "base_estimate_stale"
+    WRITERS = "two_writers"
+    HELD = "motors_held"
+    UNHEARD = "motors_unheard"
+    STATE_DAMAGED = "state_damaged"
+    MOTOR = "motor_error"
+    COMMAND_DAMAGED = "command_damaged"
+    COMMAND_MISSING = "command_never_seen"
+    COMMAND_STALE = "command_stale"
+    COMMAND_TIME = "command_time_invalid"
+    COMMAND_INVALID = "command_not_finite"
+
+
+class Fault(NamedTuple):
+    """A reason, and one line that names the joint, the sender or the figures."""
+
+    reason: Reason
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class GateStatus:
+    """What the gate lets everybody know.
+
+    Attributes:
+        t: when it ran [s].
+        state, reason, detail: see `GateResult`.
+    """
+
+    t: float
+    state: GateState
+    reason: Reason | None = None
+    detail: str = ""
+
+    @property
+    def stopped(self) -> bool:
+        """See `GateState.stopped`."""
+        return self.state.stopped
+
+    @property
+    def why(self) -> str:
+        """The reason and its detail in one line, without a full stop; empty where there is none."""
+        return ": ".join(filter(None, (self.reason, self.detail)))
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """What a running skill says of itself.
+
+    Attributes:
+        t: time [s].
+        skill: name of the skill.
+        stage: the stage it is in, e.g. `"detect"`.
+        text: one line for a person.
+        data: numbers and points that a viewer may show, e.g. `{"target": [x, y, z]}` in odom.
+    """
+
+    t: float
+    skill: str
+    stage: str
+    text: str
+    data: dict[str, Any] = field(default_factory=dict[str, Any])
+
+
+@dataclass(frozen=True, slots=True)
+class ModuleFaultMsg:
+    """A module broke its contract; the skill that runs ends with it.
+
+    Attributes:
+        slot: its slot.
+        reason: what it did, and its name.
+    """
+
+    slot: str
+    reason: str

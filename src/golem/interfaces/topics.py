@@ -1,0 +1,128 @@
+"""The streams of the bus: one typed key per stream, with its rate and who writes it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from golem.interfaces.payloads import (
+    ArmCommand,
+    DetectionRequest,
+    Detections,
+    EstopMessage,
+    Exposure,
+    Fault,
+    Feedback,
+    GateStatus,
+    HandGoal,
+    HandStatus,
+    LegCommand,
+    LegStatus,
+    ModuleFaultMsg,
+    Odometry,
+)
+from golem.middleware.bus import Topic
+from golem.middleware.unitree_api import ApiRequest, Response, request_topic, response_topic
+from golem.types import (
+    BaseEstimate,
+    HandCommand,
+    HandState,
+    LowCommand,
+    LowState,
+    PalmTargets,
+    RgbdImage,
+    Side,
+    Twist,
+)
+
+LOW_STATE = Topic("lowstate", LowState)
+"""At 500 Hz, from the robot."""
+LOW_CMD_REQUEST = Topic("safety/lowcmd_in", LowCommand)
+"""At 500 Hz, from the servo to the safety gate."""
+LOW_CMD = Topic("lowcmd", LowCommand)
+"""At 500 Hz, from the safety gate to the robot; nobody else writes it."""
+BASE = Topic("base_estimate", BaseEstimate)
+"""At 500 Hz, from the base estimator."""
+ESTOP = Topic("estop", EstopMessage)
+"""At 100 Hz, from the emergency stop."""
+SAFETY = Topic("safety/status", GateStatus)
+"""Whenever the safety gate ran."""
+TRANSPORT_FAULT = Topic("safety/transport", Fault)
+"""What the gate shall stop for: something is wrong with the way its frames come."""
+PALM_TARGETS = Topic("palm_targets", PalmTargets)
+"""In odom, from the running skill."""
+ARM_COMMAND = Topic("arm_command", ArmCommand)
+"""From the upper-body controller."""
+LEG_COMMAND = Topic("leg_command", LegCommand)
+"""From the lower-body controller."""
+TWIST = Topic("cmd_vel", Twist)
+"""For the lower body."""
+MODULE_FAULT = Topic("module_fault", ModuleFaultMsg)
+"""Of a module without which the robot can still stand."""
+LEG_STATUS = Topic("legs/status", LegStatus)
+"""From the base layer of the lower body."""
+ODOMETRY = Topic("odometry", Odometry)
+"""From whatever locates the robot better than its base estimate; a stack without it never sends any."""
+FEEDBACK = Topic("skill/feedback", Feedback)
+"""Of the running skill."""
+ONBOARD_LEGS = Topic("onboard/legs", LegCommand)
+"""From the on-board leg controller."""
+
+
+@cache
+def hand_state(side: Side) -> Topic[HandState]:
+    """Return the stream of what one hand reports."""
+    return Topic(f"{side}/gripper/state", HandState)
+
+
+@cache
+def hand_command(side: Side) -> Topic[HandCommand]:
+    """Return the stream of what one hand is told."""
+    return Topic(f"{side}/gripper/command", HandCommand)
+
+
+@cache
+def hand_goal(side: Side) -> Topic[HandGoal]:
+    """Return the stream on which a skill tells one hand what to do."""
+    return Topic(f"{side}/gripper/goal", HandGoal)
+
+
+@cache
+def hand_status(side: Side) -> Topic[HandStatus]:
+    """Return the stream of what a hand's controller found."""
+    return Topic(f"{side}/gripper/status", HandStatus)
+
+
+@cache
+def api_request(service: str) -> Topic[ApiRequest]:
+    """Return the stream of calls to one service of the on-board computer."""
+    return Topic(request_topic(service), ApiRequest)
+
+
+@cache
+def api_response(service: str) -> Topic[Response]:
+    """Return the stream of answers of one service of the on-board computer."""
+    return Topic(response_topic(service), Response)
+
+
+@cache
+def exposures(camera: str) -> Topic[Exposure]:
+    """Return the stream of what one camera saw."""
+    return Topic(f"exposures/{camera}", Exposure)
+
+
+@cache
+def rgbd_images(camera: str) -> Topic[RgbdImage]:
+    """Return the stream of the posed images of one camera."""
+    return Topic(f"realsense/{camera}", RgbdImage)
+
+
+@cache
+def detection_request(camera: str) -> Topic[DetectionRequest]:
+    """Return the stream on which a skill asks for detections of one camera."""
+    return Topic(f"look/{camera}", DetectionRequest)
+
+
+@cache
+def detections(camera: str) -> Topic[Detections]:
+    """Return the stream of what was detected in the images of one camera."""
+    return Topic(f"objects/{camera}", Detections)
