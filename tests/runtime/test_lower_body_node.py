@@ -23,7 +23,8 @@ from golem.types import LEGS, Twist
 CONTROLLER = """
 import time
 import numpy as np
-from golem.capabilities.legs.base import Envelope, LegCommand
+from golem.capabilities.legs.base import Envelope
+from golem.interfaces.payloads import LegCommand
 from golem.capabilities.legs.hold import JointHold
 
 class Failing(JointHold):

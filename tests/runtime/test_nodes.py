@@ -20,10 +20,9 @@ from golem.stack import Choice, Stack
 
 GOOD = """
 import numpy as np
-from golem.capabilities.arms.base import ArmCommand
-from golem.capabilities.legs.base import Envelope, LegCommand
+from golem.interfaces.payloads import ArmCommand, GripState, HandStatus, LegCommand
+from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import GaitConfig
-from golem.hardware.hands.base import GripState, HandStatus
 from golem.types import BaseEstimate, HandCommand, LowCommand
 
 BROKEN = {broken!r}

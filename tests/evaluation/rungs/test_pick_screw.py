@@ -20,7 +20,7 @@ from golem.stack import load_stack
 LIMP = f"{Path(__file__).parents[1] / 'leg_methods.py'}:Limp"
 BAD_MODULES = """
 import numpy as np
-from golem.capabilities.arms.base import ArmCommand
+from golem.interfaces.payloads import ArmCommand
 from golem.capabilities.arms.diff_ik import DiffIK
 
 class Raises(DiffIK):
