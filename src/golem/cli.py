@@ -35,11 +35,13 @@ def _demo(words: list[str]) -> int:
 
 
 def _run(words: list[str]) -> int:
-    """Run a stack file once, in lock-step or with the live view."""
+    """Run a stack file once, in lock-step or with the live view; `--skill NAME` and its goal say what to do."""
     _prepare_graphics()
-    from golem.run import RunConfig, run_stack
+    from golem.run import read_run, run_stack
+    from golem.skills.base import REFUSED
 
-    return 0 if run_stack(_parse(RunConfig, "run", words)).success else FAILED
+    result = run_stack(*read_run(words))
+    return 0 if result.success else BAD_INPUT if result.stage == REFUSED else FAILED
 
 
 def _ladder(words: list[str]) -> int:
@@ -184,11 +186,10 @@ def _restart(words: list[str]) -> int:
 
 
 def _skill(words: list[str]) -> int:
-    """Let the robot on a domain do something: pick, walk or stand."""
-    from golem.runtime.live.skill_client import read_errand, run_errand
+    """Let the robot on a domain do something; `skill --help` lists what its stack can."""
+    from golem.runtime.live.skill_client import run_skill
 
-    errand = read_errand(words)
-    return 0 if errand is None else run_errand(errand)
+    return run_skill(words)
 
 
 def _topics(words: list[str]) -> int:

@@ -27,8 +27,8 @@ from golem.robots.mujoco.shoves import Pusher, shove
 from golem.robots.mujoco.spectator import SpectatorView
 from golem.run import Narrator, no_display, on_air, shown
 from golem.runtime.lockstep import LockstepRunner, build
-from golem.skills.base import SkillResult
-from golem.skills.pick import TIMEOUT, Pick, PickGoal
+from golem.skills.base import CANCELLED, SkillResult
+from golem.skills.pick import PickGoal
 from golem.stack import load_stack
 
 FPS = 10.0
@@ -119,8 +119,9 @@ class Demo:
         return len(self.in_tray()) >= self._config.screws
 
     def over(self) -> bool:
-        """Return whether there is nothing left to try: reached, too many attempts, or the robot was lost."""
-        return self.reached() or self.lost() or len(self.picks) >= 2 * self._config.screws
+        """Return whether there is nothing left to try: reached, too many attempts, cancelled, or the robot lost."""
+        cancelled = bool(self.picks) and self.picks[-1].stage == CANCELLED
+        return cancelled or self.reached() or self.lost() or len(self.picks) >= 2 * self._config.screws
 
     def lost(self) -> bool:
         """Return whether the robot fell or was stopped."""
@@ -293,7 +294,7 @@ def _filmed(config: DemoConfig, demo: Demo, running: LockstepRunner, robot: Mujo
     try:
         while not demo.over():
             film.headline = f"{len(demo.in_tray())} of {config.screws} screws in the tray"
-            demo.pick(lambda: running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=watch))
+            demo.pick(lambda: running.execute("pick", PickGoal(), watch=watch))
         film.headline = f"{len(demo.in_tray())} of {config.screws} screws in the tray"
         film.frame(running)
         if running.stack.on_ground and not demo.lost():
@@ -315,18 +316,16 @@ def _shown(demo: Demo, running: LockstepRunner, view: LiveView) -> DemoResult:
         narrator()
         demo.tick()
 
-    def execute() -> SkillResult:
-        return view.run(Pick(running.method), PickGoal(), watch=watch)
-
     view.await_spectator()
     while not demo.over():
-        demo.pick(execute)
+        demo.pick(lambda: view.run("pick", PickGoal(), watch=watch))
     result = demo.write([])
-    print("The view stays open: its buttons pick further screws. Ctrl-C ends it.", flush=True)
+    print("The view stays open: its buttons start further skills. Ctrl-C ends it.", flush=True)
     try:
         while True:
-            view.wait_for_pick()
-            demo.pick(execute)
+            asked = view.wait_for_skill()
+            if asked is not None:
+                print(view.run(*asked, watch=watch).reason, flush=True)
     except KeyboardInterrupt:
         print()
     return result

@@ -53,6 +53,11 @@ class RobotGone(GolemError):
     """The robot is no longer there, through no fault of its module: the recording that stands in for it is over."""
 
 
+def shorten(text: str, limit: int = 80) -> str:
+    """Return `text`, cut to `limit` characters: an error never repeats megabytes that a stranger sent."""
+    return text if len(text) <= limit else f"{text[:limit]}..."
+
+
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> ConfigError:
     """Return the error for a name that is not one of `valid`, with the nearest valid name first.
 
@@ -61,7 +66,7 @@ def unknown_name(kind: str, name: str, valid: Iterable[str]) -> ConfigError:
         name: what the user wrote.
         valid: every name that would have been accepted.
     """
-    names = sorted(valid)
+    names, name = sorted(valid), shorten(name)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f" Did you mean '{near[0]}'?" if near else ""
     return ConfigError(f"Unknown {kind} '{name}'; valid: {', '.join(names) or '(none)'}.{hint}")

@@ -14,7 +14,7 @@ from typing import Any, cast
 import numpy as np
 import yaml
 
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, shorten, unknown_name
 from golem.types import Array
 
 _SCALARS: dict[Any, tuple[tuple[type, ...], str]] = {
@@ -66,7 +66,7 @@ def convert_all(
         if parameter.default is parameter.empty and key not in options:
             raise ConfigError(f"The {what} '{key}' has no default and must be given.")
     hints = typing.get_type_hints(function if dataclasses.is_dataclass(function) else function.__init__)
-    return {key: _convert(f"{what} '{key}'", hints.get(key), value) for key, value in options.items()}
+    return {key: convert(f"{what} '{key}'", hints.get(key), value) for key, value in options.items()}
 
 
 def read_yaml(text: str, name: str) -> object:
@@ -154,22 +154,31 @@ def dataclass_in(hint: Any) -> type[Any] | None:
     return None
 
 
-def _convert(what: str, hint: Any, value: Any) -> Any:
-    """Return `value` as the type hint asks for it; a hint that is not understood here accepts anything."""
+def convert(what: str, hint: Any, value: Any) -> Any:
+    """Return `value` as the type hint asks for it; a hint that is not understood here accepts anything.
+
+    Args:
+        what: what the value is to the user.
+        hint: type hint of a parameter or field.
+        value: as YAML or JSON has it.
+
+    Raises:
+        ConfigError: it has another type.
+    """
     config = dataclass_in(hint)
     if config is not None and isinstance(value, Mapping):
         return fill(f"key of {what}", config, cast(Mapping[str, object], value))
     if config is not None and hint is config and not isinstance(value, config):
         names = ", ".join(f.name for f in dataclasses.fields(config))
-        raise ConfigError(f"The {what} is a mapping with keys from {names}; not {value!r}.")
+        raise ConfigError(f"The {what} is a mapping with keys from {names}; not {shorten(repr(value))}.")
     if hint in _SCALARS:
         kinds, wanted = _SCALARS[hint]
         if not isinstance(value, kinds) or (isinstance(value, bool) and hint is not bool):
-            raise ConfigError(f"The {what} is {wanted}, not {value!r}.")
+            raise ConfigError(f"The {what} is {wanted}, not {shorten(repr(value))}.")
         return hint(value)
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     if origin in (types.UnionType, typing.Union) and len(inner) == 2 and inner[1] is type(None):
-        return None if value is None else _convert(what, inner[0], value)
+        return None if value is None else convert(what, inner[0], value)
     if origin is typing.Literal and value not in inner:
         raise unknown_name(f"value of {what}", str(value), map(str, inner))
     if origin in (tuple, list):
@@ -180,12 +189,12 @@ def _convert(what: str, hint: Any, value: Any) -> Any:
 def _sequence(what: str, kind: type[Any], inner: tuple[Any, ...], value: Any) -> Any:
     """Return the list `value` as a tuple or list whose members have the types `inner`."""
     if not isinstance(value, list | tuple):
-        raise ConfigError(f"The {what} is a list, not {value!r}.")
+        raise ConfigError(f"The {what} is a list, not {shorten(repr(value))}.")
     members = cast(list[Any], list(cast(Any, value)))
     hints = (*inner[:1],) * len(members) if kind is list or inner[-1] is ... else inner
     if len(members) != len(hints):
         raise ConfigError(f"The {what} has {len(hints)} values, not {len(members)}.")
-    return kind([_convert(what, hint, member) for hint, member in zip(hints, members, strict=True)])
+    return kind([convert(what, hint, member) for hint, member in zip(hints, members, strict=True)])
 
 
 class _Loader(yaml.SafeLoader):

@@ -47,6 +47,7 @@ def user_files(stack: Stack) -> dict[str, str]:
     chosen = {slot: stack.choice(slot) for slot in registry.slots()} | {
         name: choice for name, choice in (("fallback", stack.fallback), ("onboard", stack.onboard)) if choice
     }
+    chosen |= {f"skills/{name}": choice for name, choice in stack.skills.items()}
     for slot, choice in chosen.items():
         for name, path in _named({"use": choice.use, **choice.options}).items():
             found[f"{slot}/{name}"] = hashlib.sha256(path.read_bytes()).hexdigest()

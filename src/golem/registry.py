@@ -52,12 +52,19 @@ _IMPLEMENTATIONS: dict[str, dict[str, str]] = {
         "visual_servo": "golem.capabilities.grasping.visual_servo:VisualServo",
     },
     "navigator": {"goto": "golem.capabilities.navigation.goto:GoTo"},
+    "skill": {
+        "pick": "golem.skills.pick:Pick",
+        "stand": "golem.skills.walk:Stand",
+        "walk": "golem.skills.walk:Walk",
+    },
 }
+SKILL = "skill"
+"""The one kind of module of which a stack has any number, each under a name of its own."""
 
 
 def slots() -> tuple[str, ...]:
-    """Return the names of the slots a stack has."""
-    return tuple(_IMPLEMENTATIONS)
+    """Return the names of the slots in which a stack has one module each."""
+    return tuple(slot for slot in _IMPLEMENTATIONS if slot != SKILL)
 
 
 def names(slot: str) -> tuple[str, ...]:

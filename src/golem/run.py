@@ -7,22 +7,24 @@ import sys
 import webbrowser
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
+import tyro
 from tyro.conf import Positional
 
 from golem.dashboard.live import LiveView
-from golem.errors import ConfigError
+from golem.errors import ConfigError, unknown_name
 from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.robots.base import Robot
 from golem.robots.mujoco.config import World
 from golem.robots.mujoco.engine import MujocoRobot
+from golem.runtime.goal_parser import HELP, parse_goal
 from golem.runtime.lockstep import LockstepRunner, build
+from golem.runtime.skill_table import SkillTable
 from golem.skills.base import SkillResult
-from golem.skills.pick import TIMEOUT, Pick, PickGoal
 from golem.stack import Stack, load_stack
 
 FOXGLOVE_PORT = 8765
@@ -36,13 +38,17 @@ def no_display() -> bool:
 
 @dataclass(frozen=True)
 class RunConfig:
-    """Run a stack file: the robot picks one screw, or stands and does what you ask for in the live view."""
+    """Run a stack file: the robot pursues one goal of a skill, or stands and does what you ask for in the live view.
+
+    The goal's fields follow the options: golem run stand --skill walk --x 1. To see them: golem run --skill walk --help.
+    """
 
     stack: Positional[str] = "tether"
     """Path of a stack file, or the name of a shipped one."""
-    task: Literal["pick", "operate"] | None = None
-    """pick: one screw, then the run ends. operate: you drive, push and pick in the live view until Ctrl-C. Default:
-    operate where the robot stands on its feet, pick where it hangs."""
+    skill: str | None = None
+    """Skill of the stack to run once. Default: pick where the robot hangs; where it stands you operate it."""
+    operate: bool = False
+    """Drive, push and start skills in the live view until Ctrl-C; the default where the robot stands on its feet."""
     world: World | None = None
     """World of the twin: pack, open, slope or rubble; default: the stack file's."""
     profile: str | None = None
@@ -50,33 +56,61 @@ class RunConfig:
     seed: int = 0
     """Seed of the episode."""
     view: bool = False
-    """Show a pick live in the browser, paced by the wall clock; operating always does."""
+    """Show a skill live in the browser, paced by the wall clock; operating always does."""
     port: int = 8080
     """Port of the live view."""
     record: Path | None = None
-    """Write everything public of a pick into a bag, a new folder of this name."""
+    """Write everything public of a skill into a bag, a new folder of this name."""
     foxglove: bool = False
-    """Serve a pick to Foxglove on port 8765, paced by the wall clock."""
+    """Serve a skill to Foxglove on port 8765, paced by the wall clock."""
 
 
-def run_stack(config: RunConfig) -> SkillResult:
-    """Run the episode and print what happens.
+def read_run(words: list[str]) -> tuple[RunConfig, Stack, dict[str, Any]]:
+    """Return what the words after `golem run` say: the options, the stack, and the fields of the skill's goal.
 
     Raises:
         ConfigError: the stack file or an option is wrong.
-        ModuleFault: a module broke its contract.
     """
+    named = any(word.partition("=")[0] == "--skill" for word in words)
+    helps = [word for word in words if word in HELP and named]  # about the goal
+    rest = [word for word in words if word not in helps]
+    config, goal = tyro.cli(RunConfig, prog="golem run", args=rest, return_unknown_args=True)
     stack = load_stack(config.stack, profile=config.profile)
     if config.world is not None:
         robot = replace(stack.robot, options={**stack.robot.options, "world": config.world})
         stack = replace(stack, robot=robot)
-    if (config.task or ("operate" if stack.on_ground else "pick")) == "operate":
+    if config.skill is None:
+        operate = config.operate or stack.on_ground
+        config = replace(config, operate=operate, skill=None if operate else "pick")
+    elif config.operate:
+        raise ConfigError("--operate lets you start skills by hand; give it or --skill, not both.")
+    if config.skill is None:
+        if goal:
+            options = [f"--{f.name}" for f in fields(RunConfig)]
+            raise unknown_name("option of golem run without --skill NAME", goal[0], options)
         if config.record is not None or config.foxglove:
             raise ConfigError(
-                "--record and --foxglove are for a pick: add --task pick. A robot that is operated lives on a "
+                "--record and --foxglove are for a skill: add --skill pick. A robot that is operated lives on a "
                 "domain: golem twin, and beside it golem record or golem view."
             )
+        return config, stack, {}
+    specs = SkillTable(stack).specs
+    if config.skill not in specs:
+        raise unknown_name("skill", config.skill, specs)
+    prog, taken = f"golem run {config.stack} --skill {config.skill}", [f.name for f in fields(RunConfig)]
+    return config, stack, parse_goal(specs[config.skill], [*goal, *helps], prog, taken)
+
+
+def run_stack(config: RunConfig, stack: Stack, goal_fields: dict[str, Any]) -> SkillResult:
+    """Run the episode that `read_run` has read, and print what happens.
+
+    Raises:
+        ConfigError: the goal makes no sense, or an option is wrong.
+        ModuleFault: a module broke its contract.
+    """
+    if config.skill is None:
         return _operate(config, stack)
+    goal = SkillTable(stack).goal(config.skill, goal_fields)
     running, robot = build(stack, config.seed)
     narrator = Narrator(running)
     with ExitStack() as closing:
@@ -90,10 +124,9 @@ def run_stack(config: RunConfig) -> SkillResult:
         if config.view:
             view = closing.enter_context(LiveView(running, shown(running, robot), config.port))
             print(f"Live view: {view.url}   (Ctrl-C ends it)")
-            result = view.run(Pick(running.method), PickGoal(), watch=watch)
+            result = view.run(config.skill, goal, watch=watch)
         else:
-            goal, paced = PickGoal(), config.foxglove
-            result = running.execute(Pick(running.method), goal, TIMEOUT, realtime=paced, watch=watch)
+            result = running.execute(config.skill, goal, realtime=config.foxglove, watch=watch)
     print(
         f"{'Done' if result.success else 'Failed'} after {running.executor.t:.1f} s of robot time: {result.reason}"
     )
@@ -101,18 +134,19 @@ def run_stack(config: RunConfig) -> SkillResult:
 
 
 def _operate(config: RunConfig, stack: Stack) -> SkillResult:
-    """Let the operator drive, push and pick in the live view until Ctrl-C."""
+    """Let the operator drive, push and start skills in the live view until Ctrl-C."""
     with ExitStack() as closing:
         running, robot = build(stack, config.seed)
         closing.callback(lambda: robot.close())
         view = closing.enter_context(LiveView(running, shown(running, robot), config.port, restarts=True))
-        print(f"Open {view.url} to drive, push and pick. Ctrl-C ends it.", flush=True)
+        print(f"Open {view.url} to drive, push and start skills. Ctrl-C ends it.", flush=True)
         if not no_display():
             webbrowser.open(view.url)
         try:
             while True:
-                if view.wait_for_pick():
-                    result = view.run(Pick(running.method), PickGoal(), watch=Narrator(running))
+                asked = view.wait_for_skill()
+                if asked is not None:
+                    result = view.run(*asked, watch=Narrator(running))
                     print(result.reason, flush=True)
                 else:
                     robot.close()

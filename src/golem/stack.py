@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from golem import registry
 from golem.capabilities.legs.vendor import Vendor
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.middleware.unitree_api import LOCO_API, LocoApi, loco_api
 from golem.options import check_values, read_yaml
+
+
+SKILLS = "skills"
+"""Key of the skills in a stack file."""
+_SKILLS_EXAMPLE = "{pick: {force: 8}, mine: {use: my_skill.py:Mine}}"
 
 
 @dataclass(frozen=True)
@@ -63,6 +69,7 @@ class Stack:
         estimator: None: `random_walk_kf` where the robot's option `support` is `ground`, else `tether`.
         fallback: the lower body that takes the legs when `lower_body` fails. None: `almi` on the ground, else `hold`.
         onboard: the lower body that the twin's on-board controller runs for `vendor`. None: `almi`.
+        skills: by name; the shipped ones that it does not name are there, too, with their default options.
         profile: realism profile of a simulated robot: ideal, bench or field.
         limits: torque limit profile the safety gate enforces: urdf or paper.
     """
@@ -78,6 +85,7 @@ class Stack:
     navigator: Choice = Choice("goto")
     fallback: Choice | None = None
     onboard: Choice | None = None
+    skills: dict[str, Choice] = field(default_factory=dict[str, Choice])
     profile: str = "bench"
     limits: str = "urdf"
 
@@ -98,6 +106,11 @@ class Stack:
         if slot == "estimator" and self.estimator is None:
             return Choice("random_walk_kf" if self.on_ground else "tether")
         return getattr(self, slot)
+
+    @property
+    def all_skills(self) -> dict[str, Choice]:
+        """Every skill of the stack by its name."""
+        return {name: Choice(name) for name in registry.names(registry.SKILL)} | self.skills
 
     @property
     def legs_in_reserve(self) -> Choice:
@@ -133,15 +146,18 @@ class Stack:
         """Return a copy with another implementation in `slot`.
 
         Args:
-            slot: where.
-            use: its name, without options, or `{use: NAME, option: value, ...}` as a stack file has it.
+            slot: where; `skills` adds to those there are.
+            use: its name, without options, or `{use: NAME, option: value, ...}` as a stack file has it; of skills
+                `{NAME: {option: value, ...}, ...}`.
 
         Raises:
             ConfigError: there is no such slot, or `use` is neither.
         """
-        if slot not in registry.slots():
-            raise unknown_name("slot", slot, registry.slots())
         value = read_yaml(use, f"'{use}'") if use.startswith("{") else use
+        if slot == SKILLS:
+            return replace(self, skills=self.skills | _skills(f"'{use}'", value))
+        if slot not in registry.slots():
+            raise unknown_name("slot", slot, (*registry.slots(), SKILLS))
         return replace(self, **{slot: _choice(f"'{use}'", slot, slot, value)})
 
     def digest(self) -> str:
@@ -193,6 +209,9 @@ def parse_stack(text: str, name: str) -> Stack:
     for key, value in data.items():
         if key not in valid:
             raise unknown_name(f"key in {name}", str(key), valid)
+        if key == SKILLS:
+            values[key] = _skills(name, value)
+            continue
         slot = "lower_body" if key in ("fallback", "onboard") else key
         values[key] = _choice(name, key, slot, value) if slot in registry.slots() else _word(name, key, value)
     return Stack(**values)
@@ -202,6 +221,25 @@ def _word(name: str, key: str, value: object) -> str:
     if not isinstance(value, str):
         raise ConfigError(f"{name}: '{key}' is one word, e.g. '{key}: {getattr(Stack(), key)}'.")
     return value
+
+
+def _skills(name: str, value: object) -> dict[str, Choice]:
+    """Return the skills that a stack file lists; one without `use` is the shipped one of its name."""
+    if not isinstance(value, Mapping):
+        raise ConfigError(
+            f"{name}: 'skills' wants '{{NAME: {{option: value, ...}}, ...}}', e.g. {_SKILLS_EXAMPLE}."
+        )
+    chosen: dict[str, Choice] = {}
+    for key, own in cast("Mapping[object, object]", value).items():
+        if not re.fullmatch(r"[a-z][a-z0-9_]*", str(key)):
+            raise ConfigError(
+                f"{name}: a skill's name is a word of a-z, 0-9 and _ such as 'pick', not {key!r}."
+            )
+        own = {"use": key, **cast("Mapping[str, object]", own)} if isinstance(own, Mapping) else own
+        choice = chosen[str(key)] = _choice(name, f"{SKILLS}: {key}", registry.SKILL, own)
+        if ":" not in choice.use and choice.use not in registry.names(registry.SKILL):
+            raise unknown_name(f"skill in {name}", choice.use, registry.names(registry.SKILL))
+    return chosen
 
 
 def _choice(name: str, key: str, slot: str, value: object) -> Choice:

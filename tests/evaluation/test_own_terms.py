@@ -19,7 +19,7 @@ from golem.evaluation.push_bench import DOES_NOT_WALK
 from golem.interfaces.payloads import LegCommand
 from golem.robots.mujoco.plain_robot import PlainRobot
 from golem.runtime.lockstep import start_posture
-from golem.skills.runner import FAULT
+from golem.skills.base import FAULT
 from golem.types import BaseEstimate, LowState, Twist
 
 METHODS = Path(__file__).with_name("leg_methods.py")

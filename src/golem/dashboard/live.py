@@ -23,7 +23,7 @@ from golem.dashboard.balance_chart import SPAN, balance_chart
 from golem.dashboard.panel import Button, Panel
 from golem.dashboard.stage import Stage
 from golem.dashboard.status import Timeline, camera_picture, read_status
-from golem.errors import ConfigError
+from golem.errors import ConfigError, GolemError
 from golem.hardware.safety.base import OperatorRequest
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState
@@ -32,10 +32,9 @@ from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.shoves import Push, Pusher
 from golem.robots.mujoco.spectator import SpectatorView
+from golem.runtime.executor import FOREVER
 from golem.runtime.lockstep import LockstepRunner
-from golem.skills.base import Skill, SkillResult
-from golem.skills.context import Context
-from golem.skills.pick import TIMEOUT
+from golem.skills.base import SkillResult
 from golem.types import Twist
 
 PERIOD = 0.05
@@ -82,11 +81,13 @@ class LiveView:
         self._server = _serve(host, port)
         self.url = f"http://{host}:{self._server.get_port()}"
         standing = running.stack.on_ground
-        picks = bool(robot.scene.names.screws)
-        self._panel = Panel(self._server, standing=standing, picks=picks, restarts=restarts)
+        first = "pick" if robot.scene.names.screws else "walk"
+        self._skills = running.skills
+        self._panel = Panel(self._server, self._skills.specs, first, standing=standing, restarts=restarts)
         self._view = SpectatorView(robot)
         self._stage = Stage(self._server, self._view, standing=standing)
-        self._paused = self._busy = self._wanted = self._restart = False
+        self._paused = self._busy = self._restart = False
+        self._wanted: tuple[str, Any] | None = None
         self._note = ""
         self._next_camera = 0.0
         self._factor = 1.0
@@ -120,21 +121,20 @@ class LiveView:
 
     def run(
         self,
-        skill: Skill[Context, Any],
+        skill: str,
         goal: object,
-        timeout: float = TIMEOUT,
         watch: Callable[[], None] = lambda: None,
     ) -> SkillResult:
-        """Run a skill in real time while showing it; see `LockstepRunner.execute`."""
+        """Run a skill of the stack in real time while showing it; see `LockstepRunner.execute`."""
         self._timeline = Timeline.of(self._running)
-        self._busy, self._wanted = True, False
+        self._busy, self._wanted = True, None
 
         def both() -> None:
             watch()
             self.tick()
 
         try:
-            return self._running.execute(skill, goal, timeout, watch=both)
+            return self._running.execute(skill, goal, watch=both)
         finally:
             self._busy = False
             self._ended = self._running.executor.t
@@ -145,11 +145,11 @@ class LiveView:
         end = self._running.executor.t + patience
         self.idle(lambda: bool(self._server.get_clients()) or self._running.executor.t >= end)
 
-    def wait_for_pick(self) -> bool:
-        """Let time pass until the operator asks for the next pick; returns False if for starting over instead."""
-        self.idle(lambda: self._wanted or self._restart)
-        wanted = self._wanted
-        self._wanted = self._restart = False
+    def wait_for_skill(self) -> tuple[str, Any] | None:
+        """Let time pass until the operator starts a skill; return its name and goal, or None for starting over."""
+        self.idle(lambda: self._wanted is not None or self._restart)
+        wanted, self._wanted = self._wanted, None
+        self._restart = False
         return wanted
 
     def idle(self, stop: Callable[[], bool]) -> None:
@@ -159,7 +159,7 @@ class LiveView:
             self.tick()
             return stop()
 
-        self._running.executor.run(float("1e9"), over)
+        self._running.executor.run(FOREVER, over)
 
     def tick(self) -> None:
         """Keep pace with the wall clock, and every now and then the picture with the robot; call it every tick."""
@@ -253,8 +253,10 @@ class LiveView:
                 self._running.estop.release()
             elif button is Button.REVIVE:
                 self._revive_until = self._running.executor.t + PATIENCE
-            elif button is Button.PICK:
-                self._wanted = not self._busy
+            elif button is Button.START:
+                self._ask()
+            elif button is Button.CANCEL:
+                self._running.cancel()
             elif button is Button.RESTART:
                 self._restart = not self._busy
             elif button is Button.STAND and self._panel.legs is not None:
@@ -264,6 +266,14 @@ class LiveView:
             else:
                 self._paused = not self._paused
         self._revive()
+
+    def _ask(self) -> None:
+        """Take up the skill and the goal that the panel shows, unless a skill runs or they make no sense."""
+        name, fields = self._panel.skill.chosen
+        try:
+            self._wanted = None if self._busy else (name, self._skills.goal(name, fields))
+        except GolemError as error:
+            self._note = str(error)
 
     def _push(self, push: Push) -> None:
         t = self._running.executor.t

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+from collections.abc import Mapping
 from enum import StrEnum
 from html import escape
 
@@ -11,8 +12,10 @@ import viser
 from numpy.typing import NDArray
 
 from golem.dashboard.legs_panel import LegsPanel, legs_html
+from golem.dashboard.skill_panel import SkillPanel
 from golem.dashboard.status import Status
 from golem.interfaces.payloads import GateState
+from golem.skills.spec import SkillSpec
 
 STAGE_COLOURS = ("#3b7ea1", "#5a9367", "#e0933f", "#c2503a", "#7d5ba6", "#2b9c92", "#8a6d3b")
 SAFETY_COLOURS = {
@@ -32,7 +35,8 @@ class Button(StrEnum):
     PRESS = "press the e-stop"
     RELEASE = "release the e-stop"
     REVIVE = "reset and activate"
-    PICK = "pick the next screw"
+    START = "start the skill"
+    CANCEL = "cancel the skill"
     PAUSE = "pause"
     RESTART = "start over"
     STAND = "stop walking"
@@ -43,16 +47,26 @@ class Panel:
     """The panel of one server. Buttons are pressed in the server's threads; `pressed` hands them over.
 
     Attributes:
+        skill: the skill and its goal.
         legs: the controls of a robot on its feet; None for one that hangs.
     """
 
-    def __init__(self, server: viser.ViserServer, *, standing: bool, picks: bool, restarts: bool) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        skills: Mapping[str, SkillSpec],
+        first: str,
+        *,
+        standing: bool,
+        restarts: bool,
+    ) -> None:
         """Build the panel of `server`.
 
         Args:
             server: of the view.
+            skills: what there is to start.
+            first: the skill that is chosen at first.
             standing: whether the robot stands on its feet.
-            picks: whether there is anything to pick.
             restarts: whether the operator may start over.
         """
         self._asked: queue.SimpleQueue[Button] = queue.SimpleQueue()
@@ -68,15 +82,16 @@ class Panel:
             self._stop = gui.add_button("Emergency stop", color="red", icon=viser.Icon.HAND_STOP)
             self._release = gui.add_button("Release emergency stop", visible=False)
             self._revive = gui.add_button("Reset and activate", visible=False)
-            self._next = gui.add_button("Pick the next screw", icon=viser.Icon.PLAYER_PLAY, visible=picks)
             self._pause = gui.add_button("Pause", color="gray")
             self._restart = gui.add_button("Start over", color="gray", visible=restarts)
+        self.skill = SkillPanel(gui, skills, first)
         self.legs = LegsPanel(gui) if standing else None
         buttons = [
             (self._stop, Button.PRESS),
             (self._release, Button.RELEASE),
             (self._revive, Button.REVIVE),
-            (self._next, Button.PICK),
+            (self.skill.start, Button.START),
+            (self.skill.cancel, Button.CANCEL),
             (self._pause, Button.PAUSE),
             (self._restart, Button.RESTART),
         ]
@@ -135,7 +150,11 @@ class Panel:
             if handle.visible != visible:
                 handle.visible = visible
         idle = not busy and status.safety is GateState.ACTIVE
-        for handle, enabled in ((self._next, idle), (self._restart, not busy)):
+        for handle, enabled in (
+            (self.skill.start, idle),
+            (self.skill.cancel, busy),
+            (self._restart, not busy),
+        ):
             if handle.disabled == enabled:
                 handle.disabled = not enabled
         word = "Resume" if paused else "Pause"

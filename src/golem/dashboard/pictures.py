@@ -14,7 +14,7 @@ from golem.errors import GolemError
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.spectator import Shot, SpectatorView
 from golem.runtime.lockstep import build
-from golem.skills.pick import TIMEOUT, Pick, PickGoal
+from golem.skills.pick import PickGoal
 from golem.stack import Stack, load_stack
 
 PULL = Shot(look_at=(0.30, 0.0, 0.90), azimuth=55.0, elevation=-12.0, distance=2.6, fovy=45.0)
@@ -56,7 +56,7 @@ def take(folder: Path, stack: Stack, seed: int = 0) -> list[Path]:
             view.close()
 
     def pick(watch: Callable[[], None]) -> None:
-        result = running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=watch)
+        result = running.execute("pick", PickGoal(), watch=watch)
         if not result.success:
             raise GolemError(f"No picture: {result.reason}")
 

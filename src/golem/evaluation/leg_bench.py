@@ -21,7 +21,7 @@ from golem.evaluation.leg_tests import LOST, MISSED, TESTS, lost_in, plans
 from golem.evaluation.subject import Subject, labels
 from golem.provenance import commit
 from golem.robots.sensors.profiles import load_profile
-from golem.skills.runner import FAULT
+from golem.skills.base import FAULT
 
 HOUR = 3600.0
 

@@ -25,7 +25,7 @@ from golem.evaluation.speed.bench import stopwatch
 from golem.evaluation.subject import Subject
 from golem.options import fill
 from golem.robots.mujoco.shoves import DIRECTIONS, shove
-from golem.skills.walk import Walk, WalkGoal
+from golem.skills.walk import WalkGoal
 from golem.stack import Choice
 from golem.types import PlanarPose, Twist
 
@@ -164,9 +164,7 @@ def stopping(subject: Subject, seed: int, index: int) -> Figures:
         episode.stand(SETTLE)
         if episode.over:
             return _lost(episode)
-        episode.start(
-            Walk(episode.running.navigator), WalkGoal(goal.x, goal.y, goal.yaw, "odom", GOAL_TIMEOUT)
-        )
+        episode.start("walk", WalkGoal(goal.x, goal.y, goal.yaw, "odom", GOAL_TIMEOUT))
         episode.run(GOAL_TIMEOUT + 1.0, until=lambda: episode.result is not None)
         episode.run(AFTER)
         truth, result = episode.robot.truth, episode.result

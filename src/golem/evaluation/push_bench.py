@@ -25,7 +25,7 @@ from golem.evaluation.subject import Subject, labels
 from golem.provenance import commit
 from golem.robots.mujoco.shoves import DIRECTIONS, rod, shove
 from golem.robots.sensors.profiles import load_profile
-from golem.skills.runner import FAULT
+from golem.skills.base import FAULT
 from golem.types import Twist
 
 DOES_NOT_WALK = "does not walk"

@@ -313,12 +313,14 @@ class Feedback:
 
 @dataclass(frozen=True, slots=True)
 class ModuleFaultMsg:
-    """A module broke its contract; the skill that runs ends with it.
+    """A module broke its contract, or cannot do what the skill that runs asks of it; the skill ends with it.
 
     Attributes:
-        slot: its slot.
+        slot: its slot; None where it is the skill's goal that makes no sense to it.
         reason: what it did, and its name.
+        stage: of the skill's result.
     """
 
-    slot: str
+    slot: str | None
     reason: str
+    stage: str = "fault"

@@ -204,6 +204,8 @@ TOPICS: tuple[TopicRow, ...] = (
     TopicRow("/onboard/lowcmd", "unitree_hg/msg/LowCmd", "robot", ("stack",), LOW, 500, "",
           "What the on-board leg controller wants of the 12 leg motors while it is on, the others off. Simulation "
           "only: there it takes the way of every other command, through the gate."),
+    TopicRow("/skill/list", "golem_interfaces/msg/SkillList", "stack", (), LATCHED, None, "",
+          "The skills of the stack, with the fields of their goals."),
     *(TopicRow(f"/objects/{camera}", "golem_interfaces/msg/Sightings", "stack", (), DEFAULT, None, "odom",
             "Objects located in the frames that a skill asked for.") for camera in CAMERAS),
 )
@@ -227,6 +229,8 @@ SERVICES: tuple[ServiceRow, ...] = (
 )
 
 ACTIONS: tuple[ActionRow, ...] = (
+    ActionRow("/skill/run", "golem_interfaces/action/RunSkill", "stack",
+           "Any skill of the stack, by name, with a goal in JSON; those below are the same with goals of their own type."),
     ActionRow("/skill/pick", "golem_interfaces/action/Pick", "stack",
            "Find an object, grasp it, pull it straight out and drop it in a container."),
     ActionRow("/skill/walk", "golem_interfaces/action/Walk", "stack", "Walk to a pose and stand there."),

@@ -16,6 +16,10 @@ from golem.middleware.bus import Bus
 from golem.types import TICK
 
 
+FOREVER = 1e9
+"""A time that no robot sees [s]."""
+
+
 class Node(Protocol):
     """What the executor drives: connects one module to the bus.
 

@@ -11,10 +11,8 @@ import numpy as np
 
 from golem import registry
 from golem.capabilities.arms.postures import POSTURES
-from golem.capabilities.grasping.base import GraspMethod
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.hold import STANCES
-from golem.capabilities.navigation.base import Navigator
 from golem.errors import ConfigError, ModuleFault, RobotGone
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
@@ -23,9 +21,10 @@ from golem.middleware.bus import Bus
 from golem.robots.base import HasGantry, Robot
 from golem.robots.sensors.profiles import load_profile
 from golem.runtime.contract_check import ContractCheck
-from golem.runtime.executor import Executor, in_order
+from golem.runtime.executor import FOREVER, Executor, in_order
 from golem.runtime.node_groups import RobotNodes, SafetyNodes, StackNodes
 from golem.runtime.perception_nodes import LATENCY, detection_requested
+from golem.runtime.skill_table import SkillTable
 from golem.skills.base import Skill, SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
@@ -62,14 +61,9 @@ class LockstepRunner:
         self.request(OperatorRequest.ACTIVATE)
 
     @property
-    def method(self) -> GraspMethod:
-        """The stack's grasp method, new and guarded."""
-        return self._stack.method
-
-    @property
-    def navigator(self) -> Navigator:
-        """The stack's navigator, guarded."""
-        return self._stack.navigator
+    def skills(self) -> SkillTable:
+        """The skills of the stack."""
+        return self._stack.skills
 
     @property
     def safety(self) -> GateStatus | None:
@@ -85,9 +79,13 @@ class LockstepRunner:
         """Ask something of the safety gate as an operator does: activate, stop, reset; it decides."""
         self._safety.request(request)
 
-    def start(self, skill: Skill[Context, Any], goal: object) -> SkillRun:
+    def start(self, skill: str | Skill[Context, Any], goal: object, timeout: float | None = None) -> SkillRun:
         """Start a skill; see `StackNodes.start`."""
-        return self._stack.start(skill, goal)
+        return self._stack.start(skill, goal, timeout)
+
+    def cancel(self) -> None:
+        """Cancel the skill that runs; see `StackNodes.cancel`."""
+        self._stack.cancel()
 
     def commanded(self, side: Side) -> Array:
         """Return the (4, 4) pose in odom that the hand on `side` is being sent to."""
@@ -95,18 +93,18 @@ class LockstepRunner:
 
     def execute(
         self,
-        skill: Skill[Context, Any],
+        skill: str | Skill[Context, Any],
         goal: object,
-        timeout: float,
+        timeout: float | None = None,
         realtime: bool = False,
         watch: Callable[[], None] = lambda: None,
     ) -> SkillResult:
         """Run a skill to its end in robot time.
 
         Args:
-            skill: what to do.
+            skill: name of one of the stack's, or one that the stack does not know.
             goal: its goal.
-            timeout: robot time after which it is given up [s].
+            timeout: robot time after which it is given up [s]; by default what the skill itself allows.
             realtime: pace by the wall clock.
             watch: called after every tick, for judges and viewers.
 
@@ -115,7 +113,7 @@ class LockstepRunner:
             with a result that says so. After a fault of the lower body the fallback gets the time to stand before
             this returns.
         """
-        run = self.start(skill, goal)
+        run = self.start(skill, goal, timeout)
         self._stack.legs.realtime = realtime
 
         def over() -> bool:
@@ -124,7 +122,7 @@ class LockstepRunner:
             return ended or self._stack.stopped
 
         try:
-            self.executor.run(self.executor.t + timeout, over, realtime)
+            self.executor.run(FOREVER, over, realtime)
         except RobotGone as gone:
             result = run.result
             run.cancel()
@@ -136,10 +134,8 @@ class LockstepRunner:
         if run.result is not None:
             return run.result
         run.cancel()
-        safety = self.safety
-        if safety is not None and safety.stopped:
-            return SkillResult(False, "safety", "safety", f"Safety stop: {safety.why}.")
-        return SkillResult(False, "timeout", None, f"Not done after {timeout:g} s of robot time.")
+        why = "" if self.safety is None else self.safety.why
+        return SkillResult(False, "safety", "safety", f"Safety stop: {why}.")
 
     def halt(self) -> None:
         """Stop the motors now, past every other module: the gate is asked to stop, and its damping command goes out."""

@@ -36,9 +36,11 @@ from golem.runtime.executor import Phase, Placed
 from golem.runtime.gantry_release import GantryReleaseNode
 from golem.runtime.lower_body_node import CheckedLowerBody, LowerBodyNode
 from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode
+from golem.runtime.skill_table import SkillTable
 from golem.skills.base import Skill
-from golem.skills.context import Context
+from golem.skills.context import Context, Modules
 from golem.skills.runner import SkillRun
+from golem.skills.spec import check_goal
 from golem.stack import Choice, Stack
 from golem.types import SIDES, Array, Side
 
@@ -144,6 +146,8 @@ class StackNodes:
         nodes: its nodes.
         legs: the one of them that runs the leg controller.
         context: what its skills work with.
+        skills: what skills there are.
+        running: the one of its nodes that resumes the skill that runs.
     """
 
     def __init__(
@@ -174,10 +178,11 @@ class StackNodes:
         self.stack, self.bus = stack, bus
         self._workshop = ModuleFactory(stack)
         make = self._workshop.make
-        self.context = Context(bus, Kinematics(), nodes.SkillNode.period)
-        self._skills = nodes.SkillNode(self.context)
-        # One for all goals: it may learn how these legs stop.
-        self.navigator: Navigator = CheckedNavigator(*make("navigator"))
+        self.skills = SkillTable(stack)
+        navigator: Navigator = CheckedNavigator(*make("navigator"))
+        modules = Modules(self._grasp_method, lambda: navigator, lambda: self.envelope, self.skills.make)
+        self.context = Context(bus, Kinematics(), nodes.SkillNode.period, modules)
+        self.running = nodes.SkillNode(self.context)
         estimator, estimator_contract = make("estimator")
         localizer, contract = make("localizer")
         lower_body = make("lower_body", onboard=None if real else BusOnboard(bus))
@@ -190,7 +195,7 @@ class StackNodes:
                 (Phase.PERCEIVE, perception_nodes.LocalizerNode(bus, localizer, name, contract, pool))
                 for name in calibration
             ),
-            (Phase.DECIDE, self._skills),
+            (Phase.DECIDE, self.running),
             (Phase.CONTROL, self.legs),
             (Phase.CONTROL, nodes.UpperBodyNode(bus, *make("upper_body"))),
         ]
@@ -204,9 +209,7 @@ class StackNodes:
                 (Phase.OPERATE, GantryReleaseNode(bus, gantry, robot_contract, estimator_contract))
             )
 
-    @property
-    def method(self) -> GraspMethod:
-        """The stack's grasp method, new and guarded."""
+    def _grasp_method(self) -> GraspMethod:
         return CheckedGraspMethod(*self._workshop.make("grasp_method"))
 
     @property
@@ -225,17 +228,38 @@ class StackNodes:
         """The twists that the leg controller in charge can follow."""
         return self.legs.envelope
 
-    def start(self, skill: Skill[Context, Any], goal: object) -> SkillRun:
+    def start(self, skill: str | Skill[Context, Any], goal: object, timeout: float | None = None) -> SkillRun:
         """Start a skill; it advances with the executor.
+
+        Args:
+            skill: name of one of the stack's, or one that the stack does not know.
+            goal: its goal.
+            timeout: robot time after which it is cancelled [s]; by default what the skill itself allows.
 
         Raises:
             GolemError: another skill is still running.
+            ConfigError: there is no skill of that name, or the goal is none of it.
+            ModuleFault: the skill's constructor raised.
         """
-        if self._skills.run is not None and self._skills.run.result is None:
+        if self.busy:
             raise GolemError("Another skill is running; cancel it first.")
+        name = skill if isinstance(skill, str) else type(skill).__name__.lower()
+        if isinstance(skill, str):
+            skill = self.skills.make(skill)
+            check_goal(name, skill.Goal, goal)
         self.context.release_arms()
-        self._skills.run = SkillRun(skill.name, skill.run(self.context, goal))
-        return self._skills.run
+        self.running.run = SkillRun(name, self.context.pursue(name, skill, goal, timeout))
+        return self.running.run
+
+    @property
+    def busy(self) -> bool:
+        """Whether a skill is running."""
+        return self.running.run is not None and self.running.run.result is None
+
+    def cancel(self) -> None:
+        """Cancel the skill that runs, if one does; it may take a while to leave the robot safe."""
+        if self.running.run is not None:
+            self.running.run.cancel()
 
     def commanded(self, side: Side) -> Array:
         """Return the (4, 4) pose in odom that the hand on `side` is being sent to."""

@@ -21,8 +21,9 @@ from golem.interfaces.payloads import (
 from golem.middleware.bus import Bus, News
 from golem.robots.base import Robot
 from golem.runtime.contract_check import ContractCheck
+from golem.skills.base import SkillResult
 from golem.skills.context import Context
-from golem.skills.runner import SkillRun
+from golem.skills.runner import LACKS, SkillRun
 from golem.types import (
     LEGS,
     NUM_JOINTS,
@@ -290,6 +291,7 @@ class SkillNode:
 
     Attributes:
         run: the skill in execution, or None.
+        live: whether what the machine lacks ends only the skill; in lock-step it is raised, as the user's to mend.
     """
 
     period = 0.01
@@ -299,6 +301,7 @@ class SkillNode:
         self._context = context
         self._faults = News(context.bus, topics.MODULE_FAULT)
         self.run: SkillRun | None = None
+        self.live = False
 
     def step(self, t: float) -> None:
         """Resume the skill until its next await.
@@ -309,14 +312,16 @@ class SkillNode:
         if self.run is None or self.run.result is not None or not moving(self._context.bus):
             self._context.release_arms()
         fault = self._faults.read()
-        if self.run is None:
+        if self.run is None or self.run.result is not None:
             return
         if fault is not None:
-            self.run.fail(fault.slot, fault.reason)
+            self.run.end(SkillResult(False, fault.stage, fault.slot, fault.reason))
         legs = self._context.bus.latest(topics.LEG_STATUS)
         if legs is not None and legs.fault is not None:
             self.run.fail("lower_body", legs.fault)
         self.run.step()
+        if isinstance(self.run.error, LACKS) and not self.live:
+            raise self.run.error
 
 
 def moving(bus: Bus) -> bool:

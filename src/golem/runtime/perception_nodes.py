@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from golem.capabilities.perception.base import Localizer
-from golem.errors import MissingExtra, MissingSystemLibrary, ModuleFault
+from golem.errors import ConfigError, MissingExtra, MissingSystemLibrary, ModuleFault
 from golem.interfaces import topics
 from golem.interfaces.payloads import Detections, Exposure, ModuleFaultMsg
 from golem.middleware.bus import Bus, News
@@ -137,7 +137,14 @@ class LocalizerNode:
             self._bus.publish(topics.detections(self._camera), found(), t, self._latency)
         except ModuleFault as fault:
             if labels == self._wanted():
-                self._bus.publish(topics.MODULE_FAULT, ModuleFaultMsg(fault.slot, str(fault)), t)
+                refusal = fault.__cause__  # a label it does not know is the user's error, by the contract
+                refused = isinstance(refusal, ConfigError)
+                message = (
+                    ModuleFaultMsg(None, str(refusal), "refused")
+                    if refused
+                    else ModuleFaultMsg(fault.slot, str(fault))
+                )
+                self._bus.publish(topics.MODULE_FAULT, message, t)
         except (MissingExtra, MissingSystemLibrary) as lack:
             if self._pool is None:
                 raise

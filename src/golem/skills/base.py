@@ -6,14 +6,24 @@ and the runner resumes the skill at its next period, in lock-step simulation exa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Awaitable, Coroutine, Generator
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from golem.errors import GolemError
 
 G = TypeVar("G", contravariant=True)
 C = TypeVar("C", contravariant=True)
+
+CANCELLED = "cancelled"
+"""Stage of the result of a skill that was cancelled."""
+REFUSED = "refused"
+"""Stage of the result of a goal that cannot be pursued: it makes no sense, or not to this robot, or not now."""
+FAULT = "fault"
+"""Stage of the result of a skill in which a module, or the skill itself, broke its contract."""
+TIMEOUT = "timeout"
+"""Stage of the result of a skill that took longer than its goal allows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,10 +32,11 @@ class SkillResult:
 
     Attributes:
         success: whether the skill believes it reached its goal.
-        stage: `"done"`, `"cancelled"`, or the stage that failed.
+        stage: `"done"`, one of the stages above, or the stage of the skill that failed.
         slot: the slot of the module that failed, by what the robot itself can tell; None on success.
         reason: one sentence.
         timings: seconds of robot time by name, e.g. `detect_to_grasp`.
+        value: what the skill found out, an instance of its `Result`; None for a skill without one.
     """
 
     success: bool
@@ -33,6 +44,26 @@ class SkillResult:
     slot: str | None
     reason: str
     timings: dict[str, float] = field(default_factory=dict[str, float])
+    value: Any = None
+
+    def __post_init__(self) -> None:
+        """Check what is sent to others as it is.
+
+        Raises:
+            TypeError: it holds something else than it says above.
+        """
+        expect("success of a result", self.success, bool)
+        for name in ("stage", "reason") if self.slot is None else ("stage", "slot", "reason"):
+            expect(f"{name} of a result", getattr(self, name), str)
+        for name, seconds in self.timings.items():
+            if not math.isfinite(seconds):
+                raise TypeError(f"the timing '{name}' of a result is {seconds}")
+
+
+def expect(what: str, value: object, kind: type[Any]) -> None:
+    """Raise a `TypeError` unless `value`, called `what`, is a `kind`."""
+    if not isinstance(value, kind):
+        raise TypeError(f"the {what} is a {kind.__name__}, not a {type(value).__name__}")
 
 
 class StageFailed(GolemError):
@@ -64,16 +95,30 @@ class Tick(Awaitable[None]):
 class Skill(Protocol, Generic[C, G]):
     """A capability with a goal, feedback and a result (a ROS 2 action at the edge).
 
+    An instance pursues one goal. Its options are those of its constructor, as of any module. The first line of its
+    docstring says to people what it does. What it found out may go into `SkillResult.value`, a dataclass of numbers,
+    words, lists and further dataclasses.
+
     Attributes:
-        name: how people and topics call it.
+        Goal: dataclass of its goals. Fields are numbers, words, truth values, `Literal`s, lists and tuples of such,
+            further dataclasses, or one of them `| None`; the section `Attributes:` of its docstring describes them to
+            people. A goal without sense raises `ConfigError` in its `__post_init__`.
     """
 
-    name: str
+    Goal: type[Any]
+
+    def timeout(self, goal: G) -> float:
+        """Return the robot time [s] after which the pursuit of `goal` is cancelled from outside."""
+        ...
 
     def run(self, context: C, goal: G) -> Coroutine[None, None, SkillResult]:
         """Pursue `goal` with what `context` offers.
 
         Failures are results, not exceptions. `SkillCancelled` is let through after the robot was left in a state
         that is safe to stay in.
+
+        Raises:
+            ConfigError: this robot cannot pursue this goal; nothing has moved. The result is then `REFUSED`.
+            StageFailed: the result is then of that stage.
         """
         ...

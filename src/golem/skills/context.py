@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
 from golem.capabilities.arms.base import check_pose
 from golem.capabilities.arms.line import Line
+from golem.capabilities.grasping.base import GraspMethod
+from golem.capabilities.legs.base import Envelope
+from golem.capabilities.navigation.base import Navigator
+from golem.errors import ModuleFault
 from golem.interfaces import topics
 from golem.interfaces.payloads import (
     DetectionRequest,
@@ -20,13 +25,43 @@ from golem.interfaces.payloads import (
 )
 from golem.middleware.bus import Bus, Topic
 from golem.robots.model.kinematics import Kinematics
-from golem.skills.base import StageFailed, Tick
+from golem.skills.base import (
+    FAULT,
+    TIMEOUT,
+    Skill,
+    SkillCancelled,
+    SkillResult,
+    StageFailed,
+    Tick,
+    expect,
+)
+from golem.skills.runner import LACKS, SLOT, SkillRun
+from golem.skills.spec import check_goal
 from golem.types import Array, PalmTargets, Side, Twist
 
 T = TypeVar("T")
 
 ODOMETRY_TIMEOUT = 0.5
 """Age of the newest odometry from which on it says nothing about where the robot is [s]."""
+CLEANUP = 10.0
+"""Time a cancelled skill gets to leave the robot in a state that is safe to stay in [s] [own: an arm goes home in 5]."""
+
+
+@dataclass(frozen=True)
+class Modules:
+    """What a skill may have of its stack's modules, each guarded.
+
+    Attributes:
+        grasp_method: makes a new one.
+        navigator: returns the stack's; one for all goals, since it may learn how these legs stop.
+        envelope: returns the twists that the leg controller in charge can follow.
+        skill: makes a new skill, by its name in the stack.
+    """
+
+    grasp_method: Callable[[], GraspMethod]
+    navigator: Callable[[], Navigator]
+    envelope: Callable[[], Envelope]
+    skill: Callable[[str], Skill[Context, Any]]
 
 
 class Hand:
@@ -168,6 +203,11 @@ class LegsInterface:
         return status
 
     @property
+    def envelope(self) -> Envelope:
+        """The twists that they can follow."""
+        return self._context.modules.envelope()
+
+    @property
     def pose(self) -> Array:
         """(4, 4) pose of base_link in odom by the odometry, or by the base estimate in a stack without one.
 
@@ -186,10 +226,11 @@ class LegsInterface:
 
 
 class Context:
-    """The world as a skill sees it. Holds the bus, never a module.
+    """The world as a skill sees it.
 
     Attributes:
         bus: where everything is read from.
+        modules: what there is of the stack's modules.
         kinematics: forward kinematics of the nominal model at the newest measured joints.
         period: time between two ticks of the skill [s].
         t: present time [s].
@@ -198,9 +239,10 @@ class Context:
         skill: name of the running skill, for its feedback.
     """
 
-    def __init__(self, bus: Bus, kinematics: Kinematics, period: float) -> None:
-        """Work over `bus`, with forward kinematics and the skill period [s] given."""
+    def __init__(self, bus: Bus, kinematics: Kinematics, period: float, modules: Modules) -> None:
+        """Work over `bus` and with `modules`, with forward kinematics and the skill period [s] given."""
         self.bus = bus
+        self.modules = modules
         self.kinematics = kinematics
         self.period = period
         self.t = 0.0
@@ -238,8 +280,83 @@ class Context:
                 arm.forget()
             self.send_palms()
 
+    def grasp_method(self) -> GraspMethod:
+        """Return a new grasp method, the one that the stack chose."""
+        return self.modules.grasp_method()
+
+    @property
+    def navigator(self) -> Navigator:
+        """The navigator that the stack chose."""
+        return self.modules.navigator()
+
+    async def run(self, name: str, goal: object, timeout: float | None = None) -> SkillResult:
+        """Pursue `goal` with another skill of the stack, and return how that ended; its feedback is heard as its own.
+
+        Cancelled meanwhile, it cancels that skill, gives it the time to leave the robot safe, and lets
+        `SkillCancelled` pass, however that skill then ended.
+
+        Args:
+            name: of the skill.
+            goal: of its kind.
+            timeout: robot time after which it is cancelled [s]; by default what the skill itself allows.
+
+        Raises:
+            ConfigError: there is no such skill, or the goal is none of it.
+        """
+        skill = self.modules.skill(name)
+        check_goal(name, skill.Goal, goal)
+        return await self._pursue(name, skill, goal, timeout, called=True)
+
+    async def pursue(
+        self, name: str, skill: Skill[Context, Any], goal: object, timeout: float | None = None
+    ) -> SkillResult:
+        """Pursue `goal` with `skill`, called `name`, which no other skill calls; see `run`."""
+        return await self._pursue(name, skill, goal, timeout, called=False)
+
+    async def _pursue(
+        self, name: str, skill: Skill[Context, Any], goal: object, timeout: float | None, called: bool
+    ) -> SkillResult:
+        allowed = skill.timeout(goal) if timeout is None else timeout
+        if not allowed > 0.0:
+            raise ModuleFault(SLOT, name, f"its timeout is {allowed}, not a positive time")
+        caller, self.skill = self.skill, name
+        run, end = SkillRun(name, skill.run(self, goal)), self.t + allowed
+        late = cancelled = False
+        try:
+            run.step()
+            while run.result is None:
+                try:
+                    await self.tick()
+                except SkillCancelled:
+                    end, cancelled = self.t + CLEANUP, True
+                    run.cancel()
+                    continue
+                if self.t < end:
+                    run.step()
+                elif run.cancelled:
+                    run.fail(
+                        SLOT, f"The skill '{name}' did not end within {CLEANUP:g} s of its cancellation."
+                    )
+                else:
+                    end, late = self.t + CLEANUP, True
+                    run.cancel()
+            result = run.result
+        finally:
+            run.close()
+            self.skill = caller
+        if run.error is not None and (not called or isinstance(run.error, LACKS)):
+            raise run.error
+        if cancelled and called:
+            raise SkillCancelled
+        if late and result.stage != FAULT:
+            text = f"Not done after {allowed:g} s of robot time."
+            return SkillResult(False, TIMEOUT, None, text, result.timings)
+        return result
+
     def say(self, stage: str, text: str, **data: object) -> None:
         """Give feedback: the stage, one line for a person, and numbers for a viewer."""
+        expect("stage of the feedback", stage, str)
+        expect("text of the feedback", text, str)
         self.publish(topics.FEEDBACK, Feedback(self.t, self.skill, stage, text, dict(data)))
 
     async def tick(self) -> None:

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.capabilities.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus
+from golem.errors import ConfigError
 from golem.interfaces.payloads import Detections, GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.types import Array, LocalizedObject, Side
 
-TIMEOUT = 90.0
-"""Robot time after which a pick is given up [s]; the paper's grasps took 75 +- 16 s by the clock."""
 CLOSED = (GripState.HOLDING, GripState.EMPTY)
 """States of a hand whose fingers have closed, on something or on nothing."""
 
@@ -31,6 +30,15 @@ class PickGoal:
     label: str = "screw"
     container: str = "tray"
     side: Side = "right"
+
+    def __post_init__(self) -> None:
+        """Check that there is something to look for.
+
+        Raises:
+            ConfigError: a class is empty.
+        """
+        if not (self.label and self.container):
+            raise ConfigError("A pick names the class of the object and that of its container.")
 
 
 @dataclass(frozen=True)
@@ -59,6 +67,7 @@ class PickConfig:
         drop_height: height of the fingertips above the container's floor when they open [m].
         release_gap: opening that lets go [m].
         look_timeout: time a camera may take to show the object [s].
+        timeout: time after which the pick is given up [s]; the paper's grasps took 75 +- 16 s by the clock.
     """
 
     workspace: tuple[float, float, float, float, float, float] = (0.30, 0.60, -0.30, 0.10, -0.15, 0.60)
@@ -80,21 +89,26 @@ class PickConfig:
     drop_height: float = 0.10
     release_gap: float = 0.060
     look_timeout: float = 3.0
+    timeout: float = 90.0
 
 
 class Pick:
-    """The pick skill, with whatever grasp method the stack chose."""
+    """Find an object, grasp it, pull it straight out and drop it in a container."""
 
-    name = "pick"
+    Goal = PickGoal
 
-    def __init__(self, method: GraspMethod, config: PickConfig | None = None) -> None:
-        """Grasp with `method`; take distances, speeds and forces from `config`."""
-        self._method = method
+    def __init__(self, config: PickConfig | None = None) -> None:
+        """Take distances, speeds and forces from `config`."""
         self._config = config or PickConfig()
+        self._method: GraspMethod
+
+    def timeout(self, goal: PickGoal) -> float:
+        """Return the time it may take [s]; see `Skill`."""
+        return self._config.timeout
 
     async def run(self, context: Context, goal: PickGoal) -> SkillResult:
-        """Pick one object; see `Skill`."""
-        context.skill = self.name
+        """Pick one object with whatever grasp method the stack chose; see `Skill`."""
+        self._method = context.grasp_method()
         try:
             return await self._pursue(context, goal)
         except SkillCancelled:

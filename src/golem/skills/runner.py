@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable, Coroutine
+from pathlib import Path
 
-from golem.errors import MissingExtra, MissingSystemLibrary, ModuleFault
-from golem.skills.base import SkillCancelled, SkillResult, StageFailed
+from golem.errors import ConfigError, MissingExtra, MissingSystemLibrary, ModuleFault
+from golem.skills.base import CANCELLED, FAULT, REFUSED, SkillCancelled, SkillResult, StageFailed
 
-FAULT = "fault"
-"""Stage of the result of a skill in which a module, or the skill itself, broke its contract."""
+LACKS = (MissingExtra, MissingSystemLibrary)
+"""What this machine may lack, which is no module's fault."""
 SLOT = "skill"
 """Who is held responsible for what a skill raises itself."""
 
 
 class SkillRun:
-    """One execution of a skill.
+    """One execution of a skill. Whatever the skill does ends in a result: nothing is raised here.
 
     Attributes:
         result: how it ended; None while it runs.
+        cancelled: whether it was cancelled, however it then ended.
+        error: what it raised that no skill should.
     """
 
     def __init__(self, name: str, coroutine: Coroutine[None, None, SkillResult]) -> None:
@@ -25,6 +29,8 @@ class SkillRun:
         self._name = name
         self._coroutine = coroutine
         self.result: SkillResult | None = None
+        self.cancelled = False
+        self.error: BaseException | None = None
         if not isinstance(coroutine, Coroutine):
             self.result = self._fault("its 'run' is not an 'async def'")
 
@@ -36,14 +42,24 @@ class SkillRun:
     def cancel(self) -> None:
         """Raise `SkillCancelled` inside the skill; it may still await to leave the robot safe."""
         if self.result is None:
+            self.cancelled = True
             self._guard(lambda: self._coroutine.throw(SkillCancelled()))
 
-    def fail(self, slot: str, reason: str) -> None:
-        """End the skill because the module in `slot` broke its contract; the skill learns it as a cancellation."""
+    def end(self, result: SkillResult) -> None:
+        """End the skill with `result` now; the skill learns it as a cancellation that leaves it no further tick."""
         if self.result is None:
-            self._guard(lambda: self._coroutine.throw(SkillCancelled()))
-            self._coroutine.close()
-            self.result = SkillResult(False, FAULT, slot, reason)
+            self.cancel()
+            self.close()
+            self.result = result
+
+    def fail(self, slot: str, reason: str) -> None:
+        """End the skill because the module in `slot` broke its contract."""
+        self.end(SkillResult(False, FAULT, slot, reason))
+
+    def close(self) -> None:
+        """Let the skill, if it has not ended, clean up without a further tick."""
+        if self.result is None:
+            self._guard(self._coroutine.close)
 
     def _guard(self, resume: Callable[[], object]) -> None:
         """Resume the skill; whatever ends it becomes its result."""
@@ -55,15 +71,23 @@ class SkillRun:
             else:
                 self.result = self._fault(f"it returned {type(end.value).__name__}, not SkillResult")
         except SkillCancelled:
-            self.result = SkillResult(False, "cancelled", None, "The skill was cancelled.")
+            self.result = SkillResult(False, CANCELLED, None, "The skill was cancelled.")
         except StageFailed as failure:
             self.result = SkillResult(False, failure.stage, failure.slot, str(failure))
+        except ConfigError as refusal:
+            self.result = SkillResult(False, REFUSED, None, str(refusal))
         except ModuleFault as fault:
             self.result = SkillResult(False, FAULT, fault.slot, str(fault))
-        except (MissingExtra, MissingSystemLibrary):
+        except LACKS as lack:
+            self.error = lack
+            self.result = SkillResult(False, FAULT, SLOT, str(lack))
+        except KeyboardInterrupt:
             raise
-        except Exception as error:  # a user's skill may raise anything
-            self.result = self._fault(f"{type(error).__name__}: {error}")
+        except BaseException as error:  # a user's skill may raise anything, even SystemExit
+            self.error = error
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            where = f"{Path(place.filename).name}, line {place.lineno}"
+            self.result = self._fault(f"{type(error).__name__}: {error} ({where})")
 
     def _fault(self, reason: str) -> SkillResult:
         return SkillResult(False, FAULT, SLOT, str(ModuleFault(SLOT, self._name, reason)))

@@ -6,12 +6,19 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from golem.capabilities.navigation.base import Navigator
+from golem.errors import ConfigError
+from golem.options import require
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.types import PlanarPose, Twist
 
 ZERO = Twist()
+MAX_TIMEOUT = 3600.0
+"""Longest walk [s] [own: what is given more time is a mistake, or needs a map]."""
+SLACK = 0.1
+"""Distance that a robot which only turns in place may be off [m] [own]."""
+MARGIN = 10.0
+"""Time a skill of this file gets on top of what its goal says [s]: it ends by itself unless it hangs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,32 +27,44 @@ class WalkGoal:
 
     Attributes:
         x, y, yaw: pose of base_link on the floor [m], [rad].
-        frame: what the pose is given in: `odom`, or `base`, where the robot stands when the skill begins.
-        timeout: time after which the skill gives up [s].
+        frame: what the pose is given in: `odom`, or `base_link`, where the robot stands when the skill begins.
+        timeout: time after which the robot gives up and stands [s].
     """
 
     x: float
-    y: float
+    y: float = 0.0
     yaw: float = 0.0
-    frame: Literal["odom", "base"] = "odom"
+    frame: Literal["base_link", "odom"] = "base_link"
     timeout: float = 60.0
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ConfigError: one is not finite, or there is no time to walk in.
+        """
+        rows = [(name, getattr(self, name)) for name in ("x", "y", "yaw", "timeout")]
+        require("goal of a walk: its ", *((name, v, math.isfinite(v), "a finite number") for name, v in rows))
+        fine = 0.0 < self.timeout <= MAX_TIMEOUT
+        require(
+            "", ("timeout of a walk", self.timeout, fine, f"a positive time of at most {MAX_TIMEOUT:g} s")
+        )
 
 
 class Walk:
-    """Walks to a pose on the floor and stands there.
+    """Walk to a pose on the floor and stand there.
 
     Stages: `walk`, `done`; feedback about once a second with the data `left` [x, y, yaw] as seen from the robot.
     """
 
-    name = "walk"
+    Goal = WalkGoal
 
-    def __init__(self, navigator: Navigator) -> None:
-        """Let `navigator` find the way."""
-        self._navigator = navigator
+    def timeout(self, goal: WalkGoal) -> float:
+        """Return the time it may take [s]; see `Skill`."""
+        return goal.timeout + MARGIN
 
     async def run(self, context: Context, goal: WalkGoal) -> SkillResult:
         """Walk to one pose; see `Skill`."""
-        context.skill = self.name
         try:
             return await self._pursue(context, goal)
         except StageFailed as failure:
@@ -58,14 +77,16 @@ class Walk:
     async def _pursue(self, context: Context, goal: WalkGoal) -> SkillResult:
         start = context.t
         target = PlanarPose(goal.x, goal.y, goal.yaw)
-        if goal.frame == "base":
+        if goal.frame == "base_link":
             target = PlanarPose.of(context.legs.pose) @ target
-        self._navigator.start(target)
+        check_reach(context, target, goal.timeout)
+        navigator = context.navigator
+        navigator.start(target)
         said = -math.inf
         while True:
             status = context.legs.status
             pose = PlanarPose.of(context.legs.pose) @ status.rest
-            course = self._navigator.step(pose, status.moving, context.period)
+            course = navigator.step(pose, status.moving, context.period)
             left = course.left
             distance, turn = math.hypot(left.x, left.y), math.degrees(left.yaw)
             if course.arrived:
@@ -86,6 +107,30 @@ class Walk:
             await context.tick()
 
 
+def check_reach(context: Context, target: PlanarPose, timeout: float) -> None:
+    """Check that the legs can walk, and get to `target`, in odom, within `timeout` [s] at all.
+
+    Raises:
+        ConfigError: they cannot.
+        StageFailed: they do not report, or nobody knows where the robot is.
+    """
+    envelope = context.legs.envelope
+    if not any(envelope.axes):
+        legs = context.legs.status.controller
+        raise ConfigError(
+            f"The legs, '{legs}', do not walk; give the stack a lower_body that does, such as almi."
+        )
+    left = PlanarPose.of(context.legs.pose).to(target)
+    distance, speed = (
+        math.hypot(left.x, left.y),
+        math.hypot(*(max(map(abs, v)) for v in (envelope.vx, envelope.vy))),
+    )
+    if distance > speed * timeout + SLACK:
+        raise ConfigError(
+            f"It is {distance:.3g} m away; at {speed:.2g} m/s the legs get {speed * timeout:.3g} m within {timeout:g} s."
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class StandGoal:
     """How long to stand.
@@ -96,15 +141,28 @@ class StandGoal:
 
     seconds: float = 60.0
 
+    def __post_init__(self) -> None:
+        """Check the time.
+
+        Raises:
+            ConfigError: it is not finite, or negative.
+        """
+        require(
+            "", ("time to stand for", self.seconds, 0.0 <= self.seconds < math.inf, "zero or more seconds")
+        )
+
 
 class Stand:
-    """Stands, with whatever the lower body does for its balance."""
+    """Stand for a while, with whatever the lower body does for its balance."""
 
-    name = "stand"
+    Goal = StandGoal
+
+    def timeout(self, goal: StandGoal) -> float:
+        """Return the time it may take [s]; see `Skill`."""
+        return goal.seconds + MARGIN
 
     async def run(self, context: Context, goal: StandGoal) -> SkillResult:
         """Stand for a time; see `Skill`."""
-        context.skill = self.name
         context.say("stand", f"Standing for {goal.seconds:g} s.")
         context.legs.drive(ZERO)
         await context.sleep(goal.seconds)

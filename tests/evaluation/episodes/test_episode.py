@@ -13,7 +13,7 @@ from golem.evaluation.episodes.episode import Episode, legs_stack, with_legs
 from golem.evaluation.episodes.scripted_motion import WIDE_AREA, ArmMotion, ScriptedMotion
 from golem.interfaces import topics
 from golem.robots.mujoco.shoves import shove
-from golem.skills.runner import FAULT
+from golem.skills.base import FAULT
 from golem.stack import Choice, Stack
 from golem.types import Twist
 

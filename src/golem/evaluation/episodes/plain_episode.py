@@ -29,7 +29,7 @@ from golem.robots.mujoco.shoves import Push, Pusher
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.lockstep import start_posture
 from golem.runtime.lower_body_node import CheckedLowerBody
-from golem.skills.runner import FAULT
+from golem.skills.base import FAULT
 from golem.stack import Choice, Stack
 from golem.types import LEGS, NUM_JOINTS, TICK, UPPER, Array, LowCommand, LowState, Twist
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -45,12 +46,16 @@ class ScriptedMotion:
         twist: what is commanded at time t [s] since the skill began; None commands nothing.
     """
 
-    name = "exercise"
+    Goal = type(None)
 
     def __init__(self, arms: ArmMotion | None = None, twist: Callable[[float], Twist] | None = None) -> None:
         """Move the hands as `arms` says, None leaves them alone, and command `twist`."""
         self._arms = arms
         self.twist = twist
+
+    def timeout(self, goal: None) -> float:
+        """Return infinity; see `Skill`."""
+        return math.inf
 
     async def run(self, context: Context, goal: None) -> SkillResult:
         """Move until cancelled."""

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from golem.errors import GolemError, ModuleFault
 from golem.evaluation.base import Rung, TrialOutcome, TrialSpec, make_rung
-from golem.skills.runner import FAULT
+from golem.skills.base import FAULT
 
 SINGLE_THREAD = {
     name: "1"

@@ -20,7 +20,7 @@ from golem.interfaces import topics
 from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE
 from golem.robots.sensors.profiles import PROFILES
-from golem.skills.walk import Walk, WalkGoal
+from golem.skills.walk import WalkGoal
 from golem.types import PlanarPose
 
 DISTANCE = 6.0
@@ -75,7 +75,7 @@ class NavigateLine:
             episode.stand(SETTLE)
             if not episode.over:
                 goal = WalkGoal(DISTANCE, 0.0, 0.0, "odom", TIMEOUT)
-                episode.start(Walk(episode.running.navigator), goal)
+                episode.start("walk", goal)
             for _ in range(PICTURES - 1):
                 strip.keep(episode.t, np.zeros(3))
                 episode.run(DISTANCE / PICTURES / 0.4, until=lambda: episode.result is not None)

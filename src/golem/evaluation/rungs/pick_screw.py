@@ -26,9 +26,8 @@ from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.sensors.profiles import PROFILES
 from golem.runtime.lockstep import LockstepRunner, build
-from golem.skills.base import SkillResult
-from golem.skills.pick import TIMEOUT, Pick, PickConfig, PickGoal
-from golem.skills.runner import FAULT
+from golem.skills.base import FAULT, SkillResult
+from golem.skills.pick import PickGoal
 from golem.stack import Stack, load_stack
 
 SLOT = "grasp_method"
@@ -73,8 +72,6 @@ class PickRung:
         return {
             **stack_facts(stack),
             "goal": asdict(PickGoal()),
-            "skill": asdict(PickConfig()),
-            "timeout": TIMEOUT,
         }
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
@@ -91,7 +88,7 @@ class PickRung:
                     )
                 running.executor.run(running.executor.t + RELEASED)
             watch = _Watch(running, oracle, BalanceRecorder(robot) if self.balances else None)
-            result = running.execute(Pick(running.method), PickGoal(), TIMEOUT, watch=watch)
+            result = running.execute("pick", PickGoal(), watch=watch)
             running.executor.run(running.executor.t + SETTLE, watch.look)
             if artefacts is not None and watch.recorder is not None:
                 watch.recorder.trace().save(artefacts / TRACE)

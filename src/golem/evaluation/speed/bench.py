@@ -28,7 +28,7 @@ from golem.robots.mujoco.config import MujocoConfig, World
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.lockstep import build, start_posture
 from golem.runtime.perception_nodes import CameraNode, LocalizerNode
-from golem.skills.pick import TIMEOUT, Pick, PickGoal
+from golem.skills.pick import PickGoal
 from golem.stack import load_stack
 from golem.types import NUM_JOINTS, TICK, UPPER, Array, Imu, LowCommand, LowState, RgbdImage
 
@@ -195,7 +195,7 @@ def _robot(config: BenchConfig) -> list[Figure]:
         running, robot = build(load_stack("tether", profile="field"), config.seed)
         try:
             start = time.process_time()
-            running.execute(Pick(running.method), PickGoal(), TIMEOUT)
+            running.execute("pick", PickGoal())
             whole = time.process_time() - start
         finally:
             robot.close()

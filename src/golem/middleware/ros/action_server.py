@@ -173,14 +173,33 @@ class DdsActionServer:
         id, stamp = from_uuid(request.goal_id), self._stamp()
         # The id of no goal could not be canceled: it means all of them.
         known = id == NO_ID or id in self._table
-        accepted = not known and bool(self._handler.decide(request.goal))
+        accepted = not known and self._agrees(self._handler.decide, request.goal)
         goal = DdsServerGoal(self, self._table.accept(id, stamp), request.goal) if accepted else None
         response = self._type.SendGoal.Response(accepted, to_time(stamp if accepted else 0))
         self._goal.reply(origin, codec.serialize(response))
         if goal is not None:
             self._active[id] = goal
             self._news = True
-            self._handler.accepted(goal)
+            try:
+                self._handler.accepted(goal)
+            except Exception as error:  # a user's handler may raise anything
+                self._endpoints.guard.caught(f"Action '{self.name}'", error)
+                self._give_up(goal)
+
+    def _agrees(self, decide: Callable[[Any], bool], about: Any) -> bool:
+        """Return what the handler decides; one that raises does not agree."""
+        try:
+            return bool(decide(about))
+        except Exception as error:  # a user's handler may raise anything
+            self._endpoints.guard.caught(f"Action '{self.name}'", error)
+            return False
+
+    def _give_up(self, goal: DdsServerGoal) -> None:
+        """Abort a goal that its handler failed to take charge of."""
+        if goal.status is GoalStatus.ACCEPTED:
+            goal.execute()
+        if goal.status.active:
+            goal.abort(self._type.Result())
 
     def _on_cancel(self, origin: Origin, request: CancelGoal_Request) -> None:
         info = request.goal_info
@@ -188,7 +207,8 @@ class DdsActionServer:
         canceling: list[GoalState] = []
         for goal in meant:
             # Asked about this one or the one before, the handler may have ended it.
-            if goal.cancelable and self._handler.cancel(self._active[goal.id]) and goal.cancelable:
+            agreed = goal.cancelable and self._agrees(self._handler.cancel, self._active[goal.id])
+            if agreed and goal.cancelable:
                 self.update(goal, GoalEvent.CANCEL_GOAL)
                 canceling.append(goal)
         if meant and not canceling:

@@ -1,6 +1,7 @@
 """The contract of a ROS 2 node: topics, services and actions, whatever carries them.
 
-Nodes are passive: nothing of the user's runs but inside `poll` and `spin_once`, in the caller's thread. Types go by
+Nodes are passive: nothing of the user's runs but inside `poll` and `spin_once`, in the caller's thread. Over DDS, what
+a callback raises is logged and goes no further: a service then answers with zeros, a goal is aborted. Types go by
 their ROS names (`std_msgs/msg/String`, `std_srvs/srv/SetBool`, `golem_interfaces/action/Pick`); messages are the
 classes of `golem.middleware.ros.codec`. Names are absolute, relative to the node's namespace, or private (`~/x`).
 """

@@ -11,6 +11,7 @@ from golem.middleware.ros import names
 from golem.middleware.ros.action_client import DdsActionClient
 from golem.middleware.ros.action_server import DdsActionServer
 from golem.middleware.ros.base import RESULT_TIMEOUT, ActionHandler
+from golem.middleware.ros.callback_guard import CallbackGuard, log_error
 from golem.middleware.ros.codec import DEFAULT_DISTRO
 from golem.middleware.ros.future import LOOK, Future, spin_until
 from golem.middleware.ros.graph import DiscoveryInfo
@@ -28,6 +29,7 @@ class DdsNode:
         name: without namespace.
         namespace: absolute, or `/`.
         now: the node's clock [s].
+        guard: keeps what callbacks raise.
     """
 
     def __init__(
@@ -37,6 +39,7 @@ class DdsNode:
         namespace: str = "/",
         distro: str = DEFAULT_DISTRO,
         now: Callable[[], float] = time.time,
+        log: Callable[[str], None] = log_error,
     ) -> None:
         """Join the ROS graph.
 
@@ -46,12 +49,15 @@ class DdsNode:
             namespace: absolute, or `/`.
             distro: whose `ros2 node list` shall show the node: `"humble"`, or `"jazzy"` for all since.
             now: the clock that goals are stamped by [s].
+            log: what callbacks raise is said by; see `CallbackGuard`.
 
         Raises:
             ConfigError: name, namespace or distro is invalid.
         """
         self.name, self.namespace, self.now = names.check_node(name), names.check_namespace(namespace), now
-        self._endpoints = NodeEndpoints(participant, DiscoveryInfo(participant, namespace, name, distro))
+        self.guard = CallbackGuard(log)
+        info = DiscoveryInfo(participant, namespace, name, distro)
+        self._endpoints = NodeEndpoints(participant, info, self.guard)
 
     def publisher(self, topic: str, type: str, qos: Qos = DEFAULT) -> DdsPublisher:
         """Publish messages of `type` on `topic`."""

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from golem.middleware.dds.base import Participant, Qos, Sample, Writer
 from golem.middleware.ros import codec
+from golem.middleware.ros.callback_guard import CallbackGuard
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.graph import DiscoveryInfo
 from golem.middleware.ros.waitset import Inbox, WaitSet
@@ -30,11 +31,12 @@ class NodeEndpoints:
 
     Attributes:
         waitset: what their samples go through.
+        guard: what users' callbacks are called by.
     """
 
-    def __init__(self, participant: Participant, info: DiscoveryInfo) -> None:
-        """Make endpoints of `participant` and announce them by `info`."""
-        self.waitset = WaitSet()
+    def __init__(self, participant: Participant, info: DiscoveryInfo, guard: CallbackGuard) -> None:
+        """Make endpoints of `participant` and announce them by `info`; call users' callbacks by `guard`."""
+        self.waitset, self.guard = WaitSet(), guard
         self._participant, self._info = participant, info
         self._open: list[Inbox | Writer] = []
         self._attended: list[Attended] = []
@@ -71,7 +73,7 @@ class NodeEndpoints:
     ) -> Inbox:
         """Create a reader whose samples go to `handle` when the node is spun; see `writer` for the rest."""
         self._check()
-        inbox = Inbox(self.waitset, handle, qos)
+        inbox = Inbox(self.waitset, lambda sample: self.guard.call(f"Topic '{topic}'", handle, sample), qos)
         inbox.open(self._participant, topic, codec.dds_name(type), qos, owner + _hash(type))
         self._add(inbox)
         return inbox
@@ -98,7 +100,7 @@ class NodeEndpoints:
         """Handle the samples that have arrived, return how many, and look after what needs it."""
         handled = self.waitset.poll()
         for what in list(self._attended):
-            what.keep()
+            self.guard.call(type(what).__name__, what.keep)
         return handled
 
     def close_all(self) -> None:

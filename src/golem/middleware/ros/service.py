@@ -225,14 +225,17 @@ class Responder:
 
 
 class DdsService:
-    """Answers the requests of one service at once; see `base.Service`."""
+    """Answers the requests of one service at once; see `base.Service`.
+
+    A callback that raises is answered for, by a response of zeros that says why where its type has a `message`.
+    """
 
     def __init__(
         self, endpoints: NodeEndpoints, name: str, type: str, callback: Callable[[Any], Any]
     ) -> None:
         """Answer requests for the service with absolute `name` by what `callback` returns."""
         self._response = codec.service(type).Response
-        self._callback = callback
+        self._callback, self._guard = callback, endpoints.guard
         self.responder = Responder(endpoints, name, type, self._answer)
 
     def close(self) -> None:
@@ -240,5 +243,16 @@ class DdsService:
         self.responder.close()
 
     def _answer(self, origin: Origin, request: Any) -> None:
-        response = self._callback(request)
-        self.responder.reply(origin, serialize(f"Service '{self.responder.name}'", response, self._response))
+        where = f"Service '{self.responder.name}'"
+        try:
+            body = serialize(where, self._callback(request), self._response)
+        except Exception as error:  # a user's callback may raise anything
+            body = codec.serialize(self._refusal(self._guard.caught(where, error)))
+        self.responder.reply(origin, body)
+
+    def _refusal(self, reason: str) -> Any:
+        """Return the answer of a service that failed for `reason`, in whose type there may be no room for that."""
+        response = self._response()
+        if isinstance(getattr(response, "message", None), str):
+            response.message = reason
+        return response

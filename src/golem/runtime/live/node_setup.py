@@ -14,6 +14,7 @@ from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.exclusive_writers import identity
 from golem.middleware.ros.base import ActionClient, Client, RosNode
+from golem.middleware.ros.callback_guard import log_error
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.node import DdsNode
 
@@ -24,15 +25,17 @@ ANSWER = 30.0
 
 
 @contextmanager
-def member(name: str, dds: DdsConfig) -> Iterator[tuple[CycloneParticipant, DdsNode]]:
-    """Join a domain as the process called `name`.
+def member(
+    name: str, dds: DdsConfig, log: Callable[[str], None] = log_error
+) -> Iterator[tuple[CycloneParticipant, DdsNode]]:
+    """Join a domain as the process called `name`; what callbacks of its node raise is said by `log`.
 
     Raises:
         MissingExtra: cyclonedds is not installed.
         ConfigError, DdsError: the domain cannot be joined.
     """
     with closing(connect(dds, identity(name))) as participant:
-        with closing(DdsNode(participant, name, distro=dds.distro)) as node:
+        with closing(DdsNode(participant, name, distro=dds.distro, log=log)) as node:
             yield participant, node
 
 

@@ -112,7 +112,7 @@ def run_twin(config: TwinConfig) -> None:
     with (
         interrupted() as stop,
         closing(AsyncLogger()) as tell,
-        member("twin", config.dds) as (participant, node),
+        member("twin", config.dds, tell) as (participant, node),
     ):
         refuse_second(participant, config.dds, "/lowstate", "/clock")
         with closing(build_robot(stack, config.seed)) as robot, ExitStack() as closing_time:
@@ -145,7 +145,7 @@ def run_safety(config: SafetyConfig) -> None:
         # Ctrl-Z or Ctrl-\ in the wrong terminal would freeze or kill the gate, and leave the motors a stiff command.
         interrupted(also=(signal.SIGTSTP, signal.SIGQUIT)) as stop,
         closing(AsyncLogger()) as tell,
-        member("safety", config.dds) as (participant, node),
+        member("safety", config.dds, tell) as (participant, node),
     ):
         refuse_second(participant, config.dds, "/lowcmd")
         who = partial(owner, participant)
@@ -187,7 +187,7 @@ def run_up(config: UpConfig) -> None:
         interrupted() as stop,
         closing(AsyncLogger()) as tell,
         ThreadPoolExecutor(1, "localizer") as pool,
-        member("up", config.dds) as (participant, node),
+        member("up", config.dds, tell) as (participant, node),
     ):
         refuse_second(participant, config.dds, "/safety/lowcmd_in")
         live = StackProcess(stack, participant, node, real=config.dds.robot, pool=pool, tell=tell)

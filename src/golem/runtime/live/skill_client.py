@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
-from typing import Any, Literal
+import json
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 import tyro
-from tyro.conf import OmitArgPrefixes, Positional
+from tyro.conf import OmitArgPrefixes
 
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError, GolemError, unknown_name
 from golem.interfaces import public
 from golem.interfaces import ros_convert as convert
 from golem.middleware.dds.domain import DdsConfig
@@ -17,143 +19,182 @@ from golem.middleware.interrupt import interrupted
 from golem.middleware.ros.base import ClientGoal, RosNode
 from golem.middleware.ros.future import Future, RosError
 from golem.middleware.ros.goals import GoalStatus
-from golem.middleware.ros.msgs import golem_interfaces
-from golem.middleware.ros.msgs.geometry_msgs import PoseStamped
-from golem.robots.model.spatial import rotation_rpy, transform
-from golem.runtime.live.node_setup import ANSWER, find, log_line, member
-from golem.types import Side
+from golem.middleware.ros.msgs.golem_interfaces import RunSkill_Goal
+from golem.runtime.goal_parser import HELP, parse_goal
+from golem.runtime.live.node_setup import ANSWER, SEARCH, find, log_line, member, until
+from golem.runtime.live.skill_messages import RUN, read_list
+from golem.runtime.skill_table import SkillTable
+from golem.skills.spec import SkillSpec
+from golem.stack import Choice, Stack, load_stack
 
 DONE, FAILED, CANCELED = 0, 1, 130
 """Exit codes."""
+Specs = Mapping[str, SkillSpec]
+"""What is known of skills, by name."""
 
 
 @dataclass(frozen=True)
-class PickErrand:
-    """Find an object, grasp it, pull it straight out and drop it in a container."""
+class SkillClientConfig:
+    """Where the robot is, and who says what its goals consist of."""
 
-    label: Positional[str] = "screw"
-    """Class of the object."""
-    arm: Side = "right"
-    """Which arm."""
-    container: str = "tray"
-    """Class of what it is dropped into."""
+    stack: str | None = None
+    """Stack file to take the skills from; by default the stack on the domain is asked for them."""
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
 
-    @property
-    def goal(self) -> golem_interfaces.Pick_Goal:
-        """The action's goal."""
-        return golem_interfaces.Pick_Goal(self.label, self.container, self.arm)
+
+OPTIONS = [f.name for kind in (SkillClientConfig, DdsConfig) for f in fields(kind) if f.name != "dds"]
+"""What no field of a goal can be called here."""
 
 
-@dataclass(frozen=True)
-class WalkErrand:
-    """Walk to a pose and stand there."""
-
-    x: Positional[float]
-    """Where to [m]."""
-    y: Positional[float] = 0.0
-    """Where to [m]."""
-    yaw: Positional[float] = 0.0
-    """Which way to look there [rad]."""
-    frame: Literal["base_link", "odom"] = "base_link"
-    """What the pose is given in: base_link, where the robot stands now, or odom."""
-    timeout: float = 60.0
-    """Time after which the robot gives up [s]."""
-    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
-
-    @property
-    def goal(self) -> golem_interfaces.Walk_Goal:
-        """The action's goal."""
-        if not all(map(math.isfinite, (self.x, self.y, self.yaw, self.timeout))):
-            raise ConfigError("A place to walk to has finite coordinates.")
-        T = transform((self.x, self.y, 0.0), rotation_rpy(0.0, 0.0, self.yaw))
-        pose = PoseStamped(convert.header(0.0, self.frame), convert.pose(T))
-        return golem_interfaces.Walk_Goal(pose, convert.duration(self.timeout))
+def read_words(words: list[str]) -> tuple[SkillClientConfig, list[str]]:
+    """Return the options among `words`, and the rest of them: a skill and its goal."""
+    return tyro.cli(SkillClientConfig, prog="golem skill", args=words, return_unknown_args=True)
 
 
-@dataclass(frozen=True)
-class StandErrand:
-    """Stand for a while."""
-
-    seconds: Positional[float] = 60.0
-    """How long [s]."""
-    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
-
-    @property
-    def goal(self) -> golem_interfaces.Stand_Goal:
-        """The action's goal."""
-        return golem_interfaces.Stand_Goal(convert.duration(self.seconds))
-
-
-Errand = PickErrand | WalkErrand | StandErrand
-ERRANDS: dict[str, tuple[str, type[Errand]]] = {
-    "pick": ("/skill/pick", PickErrand),
-    "grasp": ("/skill/pick", PickErrand),  # what the paper calls the same
-    "walk": ("/skill/walk", WalkErrand),
-    "stand": ("/skill/stand", StandErrand),
-}
-"""Action and options by the word on the command line."""
-
-
-def read_errand(words: list[str]) -> tuple[str, Errand] | None:
-    """Return the action and the errand that the words of a command line ask for; None where they ask for help.
+def run_skill(words: list[str]) -> int:
+    """Do what the words after `golem skill` say, and return the exit code.
 
     Raises:
         ConfigError: there is no such skill.
+        RosError: no stack is there, or it went away.
     """
-    if words[:1] in (["-h"], ["--help"]):
-        log_line("usage: golem skill NAME [options]     (golem skill NAME --help tells the options)\n")
-        for name, (action, kind) in ERRANDS.items():
-            log_line(f"  {name:8s} {action:12s} {kind.__doc__}")
-        return None
-    if not words:
-        raise ConfigError(f"Say which skill: {', '.join(ERRANDS)}.")
-    if words[0] not in ERRANDS:
-        raise unknown_name("skill", words[0], ERRANDS)
-    action, kind = ERRANDS[words[0]]
-    return action, tyro.cli(kind, prog=f"golem skill {words[0]}", args=words[1:])
+    asked = [word for word in words if word in HELP]
+    config, rest = read_words([word for word in words if word not in HELP])
+    if asked:
+        return _help(config, rest)
+    if not rest:
+        raise ConfigError("Say which skill; golem skill --help lists them.")
+    with interrupted() as stop, member("skill", config.dds) as (_, node):
+        remedy = f"start a stack with: {config.dds.command('up STACK')}"
+        return pursue(node, compose(node, config, rest, remedy), remedy, stop)
 
 
-def run_errand(errand: tuple[str, Errand]) -> int:
-    """Pursue an errand to its end and return the exit code.
+def _help(config: SkillClientConfig, words: list[str]) -> int:
+    """Tell the fields of the goal of a skill, or which skills there are."""
+    specs = local_skills(config, words)
+    if specs is None:
+        try:
+            with member("skill", config.dds) as (_, node):
+                specs = ask_skills(node, "")
+        except GolemError as error:
+            log_line(f"{error} These are the skills that come with GOLEM.\n")
+            specs = SkillTable(Stack()).specs
+    if words:
+        parse_goal(choose(specs, words[0]), ["--help"], f"golem skill {words[0]}", OPTIONS)
+    log_line("usage: golem skill NAME [goal] [options]     (golem skill NAME --help tells the goal)\n")
+    for spec in specs.values():
+        log_line(f"  {spec.name:10s} {spec.summary}")
+    log_line(f"\noptions, besides the goal's: {', '.join('--' + name for name in OPTIONS)}")
+    return DONE
+
+
+def local_skills(config: SkillClientConfig, words: list[str]) -> Specs | None:
+    """Return the skills that are defined here: by a stack file, or by the class that `words` begin with; else None.
+
+    Raises:
+        ConfigError, ModuleFault: it cannot be loaded.
+    """
+    if config.stack is not None:
+        return SkillTable(load_stack(config.stack)).specs
+    if words and ":" in words[0]:
+        return SkillTable(Stack(skills={words[0].rpartition(":")[2].lower(): Choice(words[0])})).specs
+    return None
+
+
+def ask_skills(node: RosNode, remedy: str) -> Specs:
+    """Return the skills of the stack on the domain.
+
+    Raises:
+        RosError: no stack is there; `remedy` says what to do.
+        GolemError: what it says of them cannot be read.
+    """
+    row = public.topic("/skill/list")
+    listed = node.subscription(row.name, row.type, None, row.qos)
+    try:
+        until(node, lambda: listed.latest() is not None, SEARCH)
+        message = listed.latest()
+        if message is None:
+            raise RosError("; ".join(filter(None, ("No stack tells its skills", remedy))) + ".")
+        return read_list(message)
+    finally:
+        listed.close()
+
+
+def choose(specs: Specs, name: str) -> SkillSpec:
+    """Return the skill called `name`, or whose implementation `name` is: `my_skill.py:Mine`.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    by_use = [spec for spec in specs.values() if ":" in name and _file(spec.use) == _file(name)]
+    if name not in specs and len(by_use) != 1:
+        raise unknown_name("skill", name, specs)
+    return specs[name] if name in specs else by_use[0]
+
+
+def _file(use: str) -> str:
+    """Return an implementation without the folder of its file, which may be another where the stack runs."""
+    return use.rpartition("/")[2]
+
+
+def compose(node: RosNode, config: SkillClientConfig, words: list[str], remedy: str) -> RunSkill_Goal:
+    """Return the goal that `words` say: a skill's name and its goal's fields.
+
+    Raises:
+        ConfigError: there is no such skill.
+        RosError: no stack is there; `remedy` says what to do.
+    """
+    name, *rest = words
+    offered = ask_skills(node, remedy)
+    known = local_skills(config, words) or offered
+    goal = parse_goal(choose(known, name), rest, f"golem skill {name}", OPTIONS)
+    return RunSkill_Goal(choose(offered, name).name, json.dumps(goal))
+
+
+def pursue(node: RosNode, goal: RunSkill_Goal, remedy: str, stop: threading.Event) -> int:
+    """Give the stack on the domain a goal, print what it says until it ends, and return the exit code.
+
+    Args:
+        node: to give it through.
+        goal: the goal.
+        remedy: what to do where nobody offers the action.
+        stop: set by Ctrl-C: first to cancel, then to leave.
 
     Raises:
         RosError: no stack is there, or it went away.
     """
-    action, what = errand
-    goal = what.goal
-    with interrupted() as stop, member("skill", what.dds) as (_, node):
-        pursued = propose(node, action, goal, f"start a stack with: {what.dds.command('up STACK')}")
-        result, asked = pursued.result(), None
-        while not result.done:
-            node.spin_once(0.1)
-            if not stop.is_set():
-                continue
-            stop.clear()
-            if asked is not None:
-                log_line("Leaving without an answer; the robot may still be at it.")
-                return CANCELED
-            log_line("Canceling; Ctrl-C again leaves at once.")
-            asked = pursued.cancel()
-        outcome = result.result()
+    pursued = propose(node, goal, remedy)
+    result, asked = pursued.result(), None
+    while not result.done:
+        node.spin_once(0.1)
+        if not stop.is_set():
+            continue
+        stop.clear()
+        if asked is not None:
+            log_line("Leaving without an answer; the robot may still be at it.")
+            return CANCELED
+        log_line("Canceling; Ctrl-C again leaves at once.")
+        asked = pursued.cancel()
+    outcome = result.result()
     ended = outcome.result.result
     log_line(f"{GoalStatus(outcome.status).name.lower()}: {ended.reason}")
     for timing in ended.timings:
         log_line(f"  {timing.name} {timing.seconds:.1f} s")
+    if outcome.result.value:
+        log_line(f"  {outcome.result.value}")
     if outcome.status is GoalStatus.SUCCEEDED:
         return DONE
     return CANCELED if outcome.status is GoalStatus.CANCELED else FAILED
 
 
-def propose(node: RosNode, action: str, goal: Any, remedy: str) -> ClientGoal:
-    """Give `goal` to an action whose feedback is printed, and return it once it was accepted.
+def propose(node: RosNode, goal: RunSkill_Goal, remedy: str) -> ClientGoal:
+    """Give a goal whose feedback is printed, and return it once it was accepted.
 
     Raises:
         RosError: nobody offers the action, it does not answer, or it rejects the goal; `remedy` says what to do.
     """
-    kind = next(row.type for row in public.ACTIONS if row.name == action)
-    client = node.action_client(action, kind)
-    find(node, action, client, remedy)
+    client = node.action_client(RUN, next(row.type for row in public.ACTIONS if row.name == RUN))
+    find(node, RUN, client, remedy)
     said: list[str] = []
 
     def feedback(message: Any) -> None:
@@ -165,5 +206,5 @@ def propose(node: RosNode, action: str, goal: Any, remedy: str) -> ClientGoal:
     sent: Future[ClientGoal] = client.send_goal(goal, feedback)
     pursued = node.wait(sent, ANSWER)
     if not pursued.accepted:
-        raise RosError(f"'{action}' rejected the goal.")
+        raise RosError(f"'{RUN}' rejected the goal.")
     return pursued

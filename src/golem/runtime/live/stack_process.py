@@ -34,8 +34,10 @@ from golem.runtime.live.robot_out import ClockOut, FramesOut, JointsOut, describ
 from golem.runtime.live.role_endpoints import Poll, RoleEndpoints
 from golem.runtime.live.sim_sync import CATCH_UP, SILENCE
 from golem.runtime.live.skill_action_server import SkillActionServer
+from golem.runtime.live.skill_messages import list_message
 from golem.runtime.live.stack_in import CameraIn, GateIn, RemoteGantry, listen
 from golem.runtime.node_groups import StackNodes
+from golem.runtime.skill_table import SkillTable
 from golem.stack import Stack
 from golem.types import SIDES, Array
 
@@ -103,7 +105,8 @@ class StackProcess:
         requests, responses = request_topic(service), response_topic(service)
         self._calls = RpcClient(endpoints.writer(f"/{requests}"), endpoints.reader(f"/{responses}"))
         self._onboard = endpoints.reader("/onboard/lowcmd")
-        self._skills = SkillActionServer(endpoints)
+        self._skills = SkillActionServer(endpoints, tell)
+        endpoints.publish("/skill/list", list_message(SkillTable(stack).specs.values()))
         endpoints.serve({k: v for s in SIDES for k, v in out.hand_services(self._bus, s, self._now).items()})
         listen(self._bus, endpoints, self._calibration, self._now, self._skills.busy)
         self._drivers = RoleEndpoints("robot", participant, node, only=SHOWN) if real else None
@@ -150,8 +153,8 @@ class StackProcess:
         side = self.side = StackNodes(
             bus, self._stack, self._calibration, self._gantry, 0.0, self._pool, self._real
         )
-        side.legs.realtime = self._real
-        self._skills.attach(side, t)
+        side.legs.realtime, side.running.live = self._real, True
+        self._skills.attach(side)
         service, identities = self._stack.loco_api.service, Identities()
         placed: list[Placed] = [
             (Phase.RECEIVE, Poll(self._node)),

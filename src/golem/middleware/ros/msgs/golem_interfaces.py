@@ -123,6 +123,44 @@ class Pick_Result(Message):
 
 
 @dataclass(slots=True, eq=False)
+class RunSkill_Feedback(Message):
+    """Message `golem_interfaces/action/RunSkill_Feedback`."""
+
+    __msgtype__: ClassVar[str] = "golem_interfaces/action/RunSkill_Feedback"
+
+    feedback: SkillFeedback = field(default_factory=SkillFeedback)
+
+
+@dataclass(slots=True, eq=False)
+class RunSkill_Goal(Message):
+    """Pursue a goal of any skill of the stack; /skill/list says which there are, and what their goals consist of.
+
+    Attributes:
+        skill: its name, e.g. "pick"
+        goal: JSON object of its goal's fields, e.g. {"label": "screw"}; what is left out has its default
+    """
+
+    __msgtype__: ClassVar[str] = "golem_interfaces/action/RunSkill_Goal"
+
+    skill: str = ""
+    goal: str = ""
+
+
+@dataclass(slots=True, eq=False)
+class RunSkill_Result(Message):
+    """Message `golem_interfaces/action/RunSkill_Result`.
+
+    Attributes:
+        value: JSON of what the skill found out; empty where that is nothing
+    """
+
+    __msgtype__: ClassVar[str] = "golem_interfaces/action/RunSkill_Result"
+
+    result: SkillResult = field(default_factory=SkillResult)
+    value: str = ""
+
+
+@dataclass(slots=True, eq=False)
 class Stand_Feedback(Message):
     """Message `golem_interfaces/action/Stand_Feedback`."""
 
@@ -385,6 +423,38 @@ class Sightings(Message):
     header: Header = field(default_factory=Header)
     camera: str = ""
     objects: list[LocalizedObject] = field(default_factory=list[LocalizedObject])
+
+
+@dataclass(slots=True, eq=False)
+class SkillDescription(Message):
+    """A skill that a stack offers.
+
+    Attributes:
+        name: by which /skill/run knows it
+        use: its implementation, as the stack file names it
+        summary: what it does, in a line
+        goal: JSON Schema of its goals
+    """
+
+    __msgtype__: ClassVar[str] = "golem_interfaces/msg/SkillDescription"
+
+    name: str = ""
+    use: str = ""
+    summary: str = ""
+    goal: str = ""
+
+
+@dataclass(slots=True, eq=False)
+class SkillList(Message):
+    """Every skill that a stack offers.
+
+    Attributes:
+        skills: by name
+    """
+
+    __msgtype__: ClassVar[str] = "golem_interfaces/msg/SkillList"
+
+    skills: list[SkillDescription] = field(default_factory=list[SkillDescription])
 
 
 @dataclass(slots=True, eq=False)

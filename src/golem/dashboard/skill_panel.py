@@ -1,0 +1,89 @@
+"""The part of the panel for skills: which one, a form for its goal, and buttons to start and to cancel it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import viser
+
+from golem.skills.spec import Schema, SkillSpec
+
+Input = viser.GuiInputHandle[Any]
+
+
+class SkillPanel:
+    """Form and buttons of one server.
+
+    Attributes:
+        start, cancel: to be listened to.
+    """
+
+    def __init__(self, gui: viser.GuiApi, skills: Mapping[str, SkillSpec], first: str) -> None:
+        """Add the controls to `gui`, with the skill called `first` chosen if there is one."""
+        self._gui, self._skills = gui, skills
+        names = sorted(skills)
+        with gui.add_folder("Skill"):
+            self._name = gui.add_dropdown(
+                "skill", names, initial_value=first if first in skills else names[0]
+            )
+            self._form = gui.add_folder("goal")
+            self.start = gui.add_button("Start", icon=viser.Icon.PLAYER_PLAY)
+            self.cancel = gui.add_button("Cancel", color="gray", icon=viser.Icon.PLAYER_STOP, disabled=True)
+        self._fields: dict[str, Input] = {}
+        self._name.on_update(lambda _: self._show())
+        self._show()
+
+    @property
+    def chosen(self) -> tuple[str, dict[str, Any]]:
+        """The skill that is chosen, and the fields of the goal that the form says."""
+        schema = self._skills[self._name.value].goal["properties"]
+        return self._name.value, {
+            name: _read(schema[name], field.value) for name, field in self._fields.items()
+        }
+
+    def choose(self, name: str) -> None:
+        """Choose the skill called `name`, as a click does."""
+        self._name.value = name
+
+    def _show(self) -> None:
+        """Build the form of the skill that is chosen."""
+        for field in self._fields.values():
+            field.remove()
+        schema = self._skills[self._name.value].goal
+        with self._form:
+            self._fields = {name: self._add(name, of) for name, of in schema["properties"].items()}
+
+    def _add(self, name: str, of: Schema) -> Input:
+        """Add the input of one field; what is neither a number nor a word is written as JSON."""
+        hint, value = of.get("description"), of.get("default")
+        if "enum" in of:
+            return self._gui.add_dropdown(
+                name,
+                list(map(str, of["enum"])),
+                initial_value=None if value is None else str(value),
+                hint=hint,
+            )
+        match of.get("type"):
+            case "boolean":
+                return self._gui.add_checkbox(name, bool(value), hint=hint)
+            case "integer" | "number":
+                step = 1 if of["type"] == "integer" else 0.01
+                return self._gui.add_number(name, value or 0 * step, step=step, hint=hint)
+            case "string":
+                return self._gui.add_text(name, value or "", hint=hint)
+            case _:
+                return self._gui.add_text(name, json.dumps(value), hint=hint)
+
+
+def _read(of: Schema, value: Any) -> Any:
+    """Return what an input says, as JSON has it."""
+    if "enum" in of:
+        return next(each for each in of["enum"] if str(each) == value)
+    if of.get("type") in ("boolean", "integer", "number", "string"):
+        return value
+    try:
+        return json.loads(value)
+    except ValueError:
+        return value  # and the goal says what it should be

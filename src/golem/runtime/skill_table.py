@@ -1,0 +1,67 @@
+"""The skills of a stack: what there are, and new instances of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from golem import registry
+from golem.errors import ModuleFault, unknown_name
+from golem.runtime.contract_check import ContractCheck
+from golem.skills.base import Skill
+from golem.skills.context import Context
+from golem.skills.spec import SkillSpec, read_goal, schema_of, summary
+from golem.stack import Choice, Stack
+
+
+class SkillTable:
+    """The skills of one stack by name.
+
+    Attributes:
+        specs: what others may know of them.
+    """
+
+    def __init__(self, stack: Stack) -> None:
+        """Load every skill of `stack`, and make each once: a wrong option is better said now than when it is called.
+
+        Raises:
+            ConfigError: a name or an option is wrong.
+            ModuleFault: a constructor raised, or a skill lacks a part of its contract.
+        """
+        self._choices = stack.all_skills
+        self.specs = {name: _spec(name, choice) for name, choice in self._choices.items()}
+        for name in self._choices:
+            self.make(name)
+
+    def make(self, name: str) -> Skill[Context, Any]:
+        """Return a new instance of the skill called `name`.
+
+        Raises:
+            ConfigError: there is none of that name.
+            ModuleFault: its constructor raised.
+        """
+        if name not in self._choices:
+            raise unknown_name("skill", name, self._choices)
+        choice = self._choices[name]
+        skill = registry.create(registry.SKILL, choice.use, choice.options)
+        ContractCheck(registry.SKILL, choice.use).satisfies(skill, Skill)
+        return skill
+
+    def goal(self, name: str, fields: Mapping[str, object]) -> Any:
+        """Return the goal of the skill called `name` that `fields` say.
+
+        Raises:
+            ConfigError: there is no such skill, or they say none; see `read_goal`.
+            ModuleFault: its class raised.
+        """
+        if name not in self._choices:
+            raise unknown_name("skill", name, self._choices)
+        return read_goal(name, registry.load(registry.SKILL, self._choices[name].use).Goal, fields)
+
+
+def _spec(name: str, choice: Choice) -> SkillSpec:
+    cls = registry.load(registry.SKILL, choice.use)
+    try:
+        return SkillSpec(name, choice.use, summary(cls), schema_of(getattr(cls, "Goal", None)))
+    except Exception as error:  # a user's dataclass may refer to what does not exist
+        raise ModuleFault(registry.SKILL, choice.use, f"its 'Goal' is unsuitable: {error}") from error
