@@ -24,8 +24,7 @@ from golem.robots.mujoco.scene import Scene
 from golem.robots.mujoco.truth import Truth
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import Tick
-from golem.skills.pick import Pick, PickGoal
-from golem.skills.walk import Walk
+from golem.skills.pick import PickGoal
 from golem.stack import Choice, Stack
 
 SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
@@ -181,17 +180,15 @@ class Inspected:
 
         monkeypatch.setattr(registry, "create", collect)
         self.running, self.robot = build(stack, seed=0)
-        skill = Pick(self.running.method)
-        self.run = self.running.start(skill, PickGoal())
+        self.run = self.running.start("pick", PickGoal())
         self.running.executor.run(0.2)
         assert self.run.result is None
         coroutine = self.run._coroutine
         self.roots += [
             ("context", self.running._stack.context),
-            ("pick", skill),
             ("coroutine", coroutine),
             ("bus", self.running.bus),
-            ("walk", Walk(self.running.navigator)),
+            ("navigator", self.running._stack.context.navigator),
         ]
 
     def module(self, slot: str) -> Any:

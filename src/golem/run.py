@@ -5,11 +5,10 @@ from __future__ import annotations
 import os
 import sys
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
 
 import tyro
 from tyro.conf import Positional
@@ -40,7 +39,7 @@ def no_display() -> bool:
 class RunConfig:
     """Run a stack file: the robot pursues one goal of a skill, or stands and does what you ask for in the live view.
 
-    The goal's fields follow the options: golem run stand --skill walk --x 1. To see them: golem run --skill walk --help.
+    The goal follows the options: golem run stand --skill walk --x 1. Its fields: golem run --skill walk --help.
     """
 
     stack: Positional[str] = "tether"
@@ -65,52 +64,43 @@ class RunConfig:
     """Serve a skill to Foxglove on port 8765, paced by the wall clock."""
 
 
-def read_run(words: list[str]) -> tuple[RunConfig, Stack, dict[str, Any]]:
-    """Return what the words after `golem run` say: the options, the stack, and the fields of the skill's goal.
-
-    Raises:
-        ConfigError: the stack file or an option is wrong.
-    """
+def read_run(words: list[str]) -> tuple[RunConfig, list[str]]:
+    """Return what the words after `golem run` say: the options, and what is left for the skill's goal."""
     named = any(word.partition("=")[0] == "--skill" for word in words)
     helps = [word for word in words if word in HELP and named]  # about the goal
     rest = [word for word in words if word not in helps]
     config, goal = tyro.cli(RunConfig, prog="golem run", args=rest, return_unknown_args=True)
+    return config, [*goal, *helps]
+
+
+def run_stack(config: RunConfig, goal_words: Sequence[str] = ()) -> SkillResult:
+    """Run the episode and print what happens; `goal_words` say the skill's goal, see `parse_goal`.
+
+    Raises:
+        ConfigError: the stack file, the goal or an option is wrong.
+        ModuleFault: a module broke its contract.
+    """
     stack = load_stack(config.stack, profile=config.profile)
     if config.world is not None:
         robot = replace(stack.robot, options={**stack.robot.options, "world": config.world})
         stack = replace(stack, robot=robot)
-    if config.skill is None:
-        operate = config.operate or stack.on_ground
-        config = replace(config, operate=operate, skill=None if operate else "pick")
-    elif config.operate:
+    if config.operate and config.skill is not None:
         raise ConfigError("--operate lets you start skills by hand; give it or --skill, not both.")
-    if config.skill is None:
-        if goal:
-            options = [f"--{f.name}" for f in fields(RunConfig)]
-            raise unknown_name("option of golem run without --skill NAME", goal[0], options)
+    options = [field.name for field in fields(RunConfig)]
+    if config.operate or (config.skill is None and stack.on_ground):
+        if goal_words:
+            raise unknown_name(
+                "option of golem run without --skill", goal_words[0], [f"--{name}" for name in options]
+            )
         if config.record is not None or config.foxglove:
             raise ConfigError(
                 "--record and --foxglove are for a skill: add --skill pick. A robot that is operated lives on a "
                 "domain: golem twin, and beside it golem record or golem view."
             )
-        return config, stack, {}
-    specs = SkillTable(stack).specs
-    if config.skill not in specs:
-        raise unknown_name("skill", config.skill, specs)
-    prog, taken = f"golem run {config.stack} --skill {config.skill}", [f.name for f in fields(RunConfig)]
-    return config, stack, parse_goal(specs[config.skill], [*goal, *helps], prog, taken)
-
-
-def run_stack(config: RunConfig, stack: Stack, goal_fields: dict[str, Any]) -> SkillResult:
-    """Run the episode that `read_run` has read, and print what happens.
-
-    Raises:
-        ConfigError: the goal makes no sense, or an option is wrong.
-        ModuleFault: a module broke its contract.
-    """
-    if config.skill is None:
         return _operate(config, stack)
-    goal = SkillTable(stack).goal(config.skill, goal_fields)
+    name, skills = config.skill or "pick", SkillTable(stack)
+    prog = f"golem run {config.stack} --skill {name}"
+    goal = skills.goal(name, parse_goal(skills.spec(name), list(goal_words), prog, options))
     running, robot = build(stack, config.seed)
     narrator = Narrator(running)
     with ExitStack() as closing:
@@ -124,9 +114,9 @@ def run_stack(config: RunConfig, stack: Stack, goal_fields: dict[str, Any]) -> S
         if config.view:
             view = closing.enter_context(LiveView(running, shown(running, robot), config.port))
             print(f"Live view: {view.url}   (Ctrl-C ends it)")
-            result = view.run(config.skill, goal, watch=watch)
+            result = view.run(name, goal, watch=watch)
         else:
-            result = running.execute(config.skill, goal, realtime=config.foxglove, watch=watch)
+            result = running.execute(name, goal, realtime=config.foxglove, watch=watch)
     print(
         f"{'Done' if result.success else 'Failed'} after {running.executor.t:.1f} s of robot time: {result.reason}"
     )

@@ -18,7 +18,6 @@ from golem.errors import ConfigError, GolemError, unknown_name
 from golem.middleware.unitree_api import LOCO_API, LocoApi, loco_api
 from golem.options import check_values, read_yaml
 
-
 SKILLS = "skills"
 """Key of the skills in a stack file."""
 _SKILLS_EXAMPLE = "{pick: {force: 8}, mine: {use: my_skill.py:Mine}}"

@@ -12,11 +12,10 @@ import numpy as np
 import pytest
 from tests.runtime.test_lower_body_node import Drive
 
-from golem.capabilities.navigation.goto import GoTo
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState
 from golem.runtime.lockstep import LockstepRunner, build
-from golem.skills.walk import Stand, StandGoal, Walk, WalkGoal
+from golem.skills.walk import StandGoal, WalkGoal
 from golem.stack import Choice, load_stack
 from golem.types import Twist
 
@@ -83,7 +82,7 @@ def assert_it_stands_on(running: LockstepRunner, robot: Any, fallback: str) -> N
 def test_legs_that_die_while_they_stand(tmp_path: Path) -> None:
     text = DYING.format(module="wbc", name="Wbc", end=3.0)
     with standing(tmp_path / "dying.py", text, "wbc") as (running, robot):
-        result = running.execute(Stand(), StandGoal(10.0), timeout=12.0)
+        result = running.execute("stand", StandGoal(10.0), timeout=12.0)
         assert (result.stage, result.slot) == ("fault", "lower_body")
         assert "Dying failed: RuntimeError: gone" in result.reason
         assert_it_stands_on(running, robot, "wbc")
@@ -93,7 +92,7 @@ def test_legs_that_die_while_they_stand(tmp_path: Path) -> None:
 def test_legs_that_die_in_the_middle_of_a_step(tmp_path: Path) -> None:
     text = DYING.format(module="almi", name="Almi", end=4.13)
     with standing(tmp_path / "dying.py", text, "almi") as (running, robot):
-        assert running.execute(Stand(), StandGoal(2.5), timeout=5.0).success
+        assert running.execute("stand", StandGoal(2.5), timeout=5.0).success
         result = running.execute(Drive(Twist(0.5), seconds=6.0), None, timeout=10.0)
         assert (result.stage, result.slot) == ("fault", "lower_body")
         assert robot.data.qpos[0] > 0.2
@@ -105,8 +104,8 @@ def test_a_robot_whose_estimate_goes_stale_while_it_walks_is_damped_and_says_why
     path = tmp_path / "lost.py"
     path.write_text(LOST)
     with on_open_ground(Choice("almi"), "almi", Choice(f"{path}:Lost")) as (running, _):
-        assert running.execute(Stand(), StandGoal(2.5), timeout=5.0).success
-        result = running.execute(Walk(GoTo()), WalkGoal(2.0, 0.0, frame="base", timeout=30.0), timeout=35.0)
+        assert running.execute("stand", StandGoal(2.5), timeout=5.0).success
+        result = running.execute("walk", WalkGoal(2.0, 0.0, frame="base_link", timeout=30.0), timeout=35.0)
         assert (result.success, result.stage, result.slot) == (False, "safety", "safety")
         assert "base_estimate_stale" in result.reason and 4.0 < running.executor.t < 4.6
         assert running.safety is not None and running.safety.state is GateState.STOP1
@@ -122,12 +121,12 @@ def test_it_walks_with_the_robots_own_controller_and_stands_with_another() -> No
         "stand": {"use": "policy", "options": {"file": "almi_stand"}},
     }
     with on_open_ground(Choice("handover", parts), "almi") as (running, robot):
-        assert running.execute(Stand(), StandGoal(2.5), timeout=5.0).success
+        assert running.execute("stand", StandGoal(2.5), timeout=5.0).success
         assert running.execute(Drive(Twist(0.3), seconds=4.0), None, timeout=6.0).success
         assert robot.data.qpos[0] > 0.5
-        assert running.execute(Stand(), StandGoal(3.0), timeout=5.0).success
+        assert running.execute("stand", StandGoal(3.0), timeout=5.0).success
         stood = robot.data.qpos[:2].copy()
-        assert running.execute(Stand(), StandGoal(2.0), timeout=5.0).success
+        assert running.execute("stand", StandGoal(2.0), timeout=5.0).success
         assert np.hypot(*(robot.data.qpos[:2] - stood)) < 0.05
         assert_it_stands_on(running, robot, "handover")
 
@@ -135,8 +134,8 @@ def test_it_walks_with_the_robots_own_controller_and_stands_with_another() -> No
 @pytest.mark.slow
 def test_a_pose_is_reached_with_legs_that_have_no_gait_clock_of_ours() -> None:
     with on_open_ground(Choice("vendor"), "almi") as (running, robot):
-        assert running.execute(Stand(), StandGoal(3.0), timeout=5.0).success
+        assert running.execute("stand", StandGoal(3.0), timeout=5.0).success
         start = robot.data.qpos[:2].copy()
-        result = running.execute(Walk(GoTo()), WalkGoal(1.0, 0.0, frame="base", timeout=30.0), timeout=35.0)
+        result = running.execute("walk", WalkGoal(1.0, 0.0, frame="base_link", timeout=30.0), timeout=35.0)
         assert result.success, result.reason
         assert np.hypot(*(robot.data.qpos[:2] - start)) == pytest.approx(1.0, abs=0.1)

@@ -8,12 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from golem.capabilities.grasping.base import GraspMethod
+from golem.capabilities.grasping.visual_servo import VisualServo
+from golem.capabilities.legs.base import Envelope
+from golem.capabilities.navigation.goto import GoTo
 from golem.interfaces import topics
 from golem.interfaces.payloads import Detections, GripState, HandStatus
 from golem.middleware.bus import Bus
 from golem.robots.model.kinematics import Kinematics
-from golem.skills.context import Context
+from golem.runtime.skill_table import SkillTable
+from golem.skills.context import Context, Modules
 from golem.skills.runner import SkillRun
+from golem.stack import Stack
 from golem.types import SIDES, Array, Detection, LocalizedObject, Side
 
 PERIOD = 0.01
@@ -27,6 +33,18 @@ def seen(label: str, position: Array, t: float, score: float = 0.9) -> Localized
     """Return an object at `position` (3,) as a localizer reports it, without a cloud."""
     detection = Detection(label, score, np.array([0.0, 0.0, 10.0, 10.0]), np.array([5.0, 5.0]))
     return LocalizedObject(detection, t, np.array(position, dtype=float), np.zeros((0, 3)))
+
+
+def modules(**given: Any) -> Modules:
+    """Return the modules of a stack whose legs walk, some of them given."""
+    navigator = GoTo()
+    default: dict[str, Any] = {
+        "grasp_method": VisualServo,
+        "navigator": lambda: navigator,
+        "envelope": lambda: Envelope((-0.3, 0.8), (-0.3, 0.3), (-1.0, 1.0)),
+        "skill": SkillTable(Stack()).make,
+    }
+    return Modules(**default | given)
 
 
 class Ideal(Kinematics):
@@ -66,7 +84,8 @@ class World:
     def __init__(self) -> None:
         self.bus = Bus()
         self.kinematics = Ideal(self.bus)
-        self.context = Context(self.bus, self.kinematics, PERIOD)
+        self.method: GraspMethod = VisualServo()
+        self.context = Context(self.bus, self.kinematics, PERIOD, modules(grasp_method=lambda: self.method))
         self.objects: dict[str, Callable[[], list[LocalizedObject]]] = {}
         self.grips: list[bool] = []
         self.holds = False

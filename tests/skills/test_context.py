@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.skills.conftest import modules
 
 from golem.capabilities.arms.base import TargetError
 from golem.interfaces import topics
@@ -37,7 +38,7 @@ class Still(Kinematics):
 
 
 def context() -> Context:
-    return Context(Bus(), Still(), DT)
+    return Context(Bus(), Still(), DT, modules())
 
 
 def at(*position: float) -> Array:
@@ -190,7 +191,7 @@ def test_arms_that_are_released_start_from_where_they_are() -> None:
 
 
 def test_the_pose_of_a_gripper_is_base_times_kinematics() -> None:
-    c = Context(Bus(), Kinematics(), DT)
+    c = Context(Bus(), Kinematics(), DT, modules())
     T = at(0.01, 0.02, 0.03)
     q = np.zeros(NUM_JOINTS)
     q[12] = 0.5

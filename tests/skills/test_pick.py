@@ -44,7 +44,8 @@ def picked(
     world: Any, method: GraspMethod | None = None, side: Side = "right", config: PickConfig = CONFIG
 ) -> SkillResult:
     """Run a pick to its end."""
-    run = world.run(Pick(method or VisualServo(), config).run(world.context, PickGoal(side=side)))
+    world.method = method or VisualServo()
+    run = world.run(Pick(config).run(world.context, PickGoal(side=side)))
     assert run.result is not None
     return run.result
 
@@ -245,7 +246,7 @@ def test_a_screw_lost_on_the_way(full: Any) -> None:
 def test_a_pick_can_be_cancelled_at_any_time(share: float, world: Any, thing: Any) -> None:
     stocked(world, thing)
     # A whole pick takes about 9 s in this world.
-    run = world.run(Pick(VisualServo(), CONFIG).run(world.context, PickGoal()), ticks=int(share * 850) + 1)
+    run = world.run(Pick(CONFIG).run(world.context, PickGoal()), ticks=int(share * 850) + 1)
     assert run.result is None
     held = world.holds
     sent = world.context.arms["right"].commanded.copy()

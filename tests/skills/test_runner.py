@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Coroutine
 from typing import Any
 
 import pytest
 
-from golem.errors import MissingSystemLibrary, ModuleFault
+from golem.errors import ConfigError, MissingSystemLibrary, ModuleFault
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed, Tick
 from golem.skills.runner import SkillRun
 
@@ -112,7 +113,9 @@ def ended(coroutine: Coroutine[None, None, SkillResult]) -> SkillResult:
 def test_what_a_skill_raises_becomes_a_result_that_names_it() -> None:
     result = ended(_raises(ZeroDivisionError("by zero")))
     assert (result.success, result.stage, result.slot) == (False, "fault", "skill")
-    assert result.reason == "Module skill: mine failed: ZeroDivisionError: by zero"
+    assert re.fullmatch(
+        r"Module skill: mine failed: ZeroDivisionError: by zero \(test_runner.py, line \d+\)", result.reason
+    )
 
 
 def test_what_a_module_raises_under_a_skill_is_blamed_on_the_module() -> None:
@@ -126,9 +129,56 @@ def test_a_stage_that_failed_keeps_its_stage_and_slot() -> None:
     assert result == SkillResult(False, "grasp", "hand", "Nothing held.")
 
 
-def test_what_the_machine_lacks_is_no_result() -> None:
-    with pytest.raises(MissingSystemLibrary):
-        ended(_raises(MissingSystemLibrary("no EGL")))
+@pytest.mark.parametrize("error", [SystemExit(1), GeneratorExit(), RecursionError("deep"), MemoryError()])
+def test_whatever_a_skill_raises_is_kept_from_its_runner(error: BaseException) -> None:
+    run = SkillRun("mine", _raises(error))
+    run.step()
+    run.step()
+    assert run.result is not None and run.result.stage == "fault" and run.error is error
+
+
+def test_an_interrupt_is_nobodys_result() -> None:
+    with pytest.raises(KeyboardInterrupt):
+        ended(_raises(KeyboardInterrupt()))
+
+
+def test_what_the_machine_lacks_is_kept_for_whoever_can_mend_it() -> None:
+    run = SkillRun("mine", _raises(MissingSystemLibrary("no EGL")))
+    run.step()
+    run.step()
+    assert run.result is not None and run.result.reason == "no EGL"
+    assert isinstance(run.error, MissingSystemLibrary)
+
+
+def test_a_goal_that_is_refused_is_no_fault() -> None:
+    result = ended(_raises(ConfigError("No such place.")))
+    assert result == SkillResult(False, "refused", None, "No such place.")
+
+
+def test_a_skill_that_never_lets_go_is_ended_all_the_same() -> None:
+    async def clings() -> SkillResult:
+        for _ in range(4):
+            try:
+                await Tick()
+            except BaseException:
+                pass
+        raise AssertionError
+
+    run = SkillRun("clings", clings())
+    run.step()
+    run.fail("localizer", "It saw nothing.")
+    assert run.result == SkillResult(False, "fault", "localizer", "It saw nothing.")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [(1, "done", None, ""), (True, None, None, ""), (True, "done", 3, ""), (True, "done", None, None)],
+)
+def test_a_result_of_other_types_is_refused_where_it_is_made(arguments: tuple[Any, ...]) -> None:
+    with pytest.raises(TypeError, match="of a result is a"):
+        SkillResult(*arguments)
+    with pytest.raises(TypeError, match="timing 'x'"):
+        SkillResult(True, "done", None, "", {"x": float("nan")})
 
 
 @pytest.mark.parametrize("value", [None, True, (True, "done")])

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.skills.conftest import modules
 
-from golem.capabilities.navigation.goto import GoTo
+from golem.capabilities.legs.base import Envelope
+from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.interfaces.payloads import LegStatus, Odometry
 from golem.middleware.bus import Bus
@@ -41,10 +43,11 @@ class Ground:
     reason: str = ""
     offset: float | None = None
     silent: float = math.inf
+    envelope: Envelope = field(default_factory=lambda: Envelope((-0.3, 0.8), (-0.3, 0.3), (-1.0, 1.0)))
 
     def __post_init__(self) -> None:
         self.bus = Bus()
-        self.context = Context(self.bus, Kinematics(), PERIOD)
+        self.context = Context(self.bus, Kinematics(), PERIOD, modules(envelope=lambda: self.envelope))
         self.pose = self.start
         self.stages: list[str] = []
         self._tick = 0
@@ -104,7 +107,7 @@ def outcome(run: SkillRun) -> SkillResult:
 
 def test_it_walks_to_a_pose_in_odom_and_stands() -> None:
     ground = Ground(PlanarPose(0.3, -0.2, 0.5))
-    result = outcome(ground.run(Walk(GoTo()).run(ground.context, WalkGoal(1.5, 1.0, -0.4))))
+    result = outcome(ground.run(Walk().run(ground.context, WalkGoal(1.5, 1.0, -0.4, frame="odom"))))
     assert (result.success, result.stage) == (True, "done")
     assert result.timings["walk"] > 3.0
     left = ground.pose.to(PlanarPose(1.5, 1.0, -0.4))
@@ -116,22 +119,20 @@ def test_it_walks_to_a_pose_in_odom_and_stands() -> None:
 
 def test_a_goal_in_the_base_frame_is_seen_from_where_the_robot_stands() -> None:
     ground = Ground(PlanarPose(2.0, 1.0, math.pi / 2))
-    assert outcome(
-        ground.run(Walk(GoTo()).run(ground.context, WalkGoal(1.0, 0.0, 0.0, frame="base")))
-    ).success
+    assert outcome(ground.run(Walk().run(ground.context, WalkGoal(1.0, 0.0, 0.0, frame="base_link")))).success
     left = ground.pose.to(PlanarPose(2.0, 2.0, math.pi / 2))
     assert math.hypot(left.x, left.y) < 0.035
 
 
 def test_an_odometry_counts_more_than_the_base_estimate() -> None:
     ground = Ground(offset=0.5)
-    assert outcome(ground.run(Walk(GoTo()).run(ground.context, WalkGoal(1.0, 0.0)))).success
+    assert outcome(ground.run(Walk().run(ground.context, WalkGoal(1.0, 0.0)))).success
     assert ground.pose.x == pytest.approx(1.0, abs=0.035)
 
 
 def test_a_robot_that_does_not_get_there_gives_up_and_stands() -> None:
     ground = Ground(stuck=True)
-    result = outcome(ground.run(Walk(GoTo()).run(ground.context, WalkGoal(1.0, 0.0, timeout=2.0))))
+    result = outcome(ground.run(Walk().run(ground.context, WalkGoal(1.0, 0.0, timeout=2.0))))
     assert (result.success, result.stage, result.slot) == (False, "walk", "navigator")
     assert "Not at the goal after 2 s: 1.00 m and 0 deg are left." in result.reason
     assert ground.twist == Twist()
@@ -139,20 +140,20 @@ def test_a_robot_that_does_not_get_there_gives_up_and_stands() -> None:
 
 def test_legs_that_do_not_move_are_named_with_their_reason() -> None:
     ground = Ground(stuck=True, reason="the commanded twist is outside the envelope")
-    result = outcome(ground.run(Walk(GoTo()).run(ground.context, WalkGoal(1.0, 0.0, timeout=2.0))))
+    result = outcome(ground.run(Walk().run(ground.context, WalkGoal(1.0, 0.0, timeout=2.0))))
     assert (result.success, result.stage, result.slot) == (False, "walk", "lower_body")
     assert "The legs do not move: the commanded twist is outside the envelope." in result.reason
 
 
 def test_legs_that_do_not_report_are_named() -> None:
     ground = Ground(reports=False)
-    result = outcome(ground.run(Walk(GoTo()).run(ground.context, WalkGoal(1.0, 0.0))))
+    result = outcome(ground.run(Walk().run(ground.context, WalkGoal(1.0, 0.0))))
     assert (result.success, result.stage, result.slot) == (False, "walk", "lower_body")
 
 
 def test_a_cancelled_walk_stands() -> None:
     ground = Ground()
-    run = ground.run(Walk(GoTo()).run(ground.context, WalkGoal(3.0, 0.0)), seconds=2.0)
+    run = ground.run(Walk().run(ground.context, WalkGoal(3.0, 0.0)), seconds=2.0)
     assert ground.twist.vx > 0.1
     run.cancel()
     assert outcome(run).stage == "cancelled"
@@ -170,7 +171,34 @@ def test_it_stands_for_as_long_as_it_is_told() -> None:
 
 def test_an_odometry_that_falls_silent_stops_the_robot() -> None:
     ground = Ground(offset=0.5, silent=1.0)
-    result = outcome(ground.run(Walk(GoTo()).run(ground.context, WalkGoal(3.0, 0.0))))
+    result = outcome(ground.run(Walk().run(ground.context, WalkGoal(3.0, 0.0))))
     assert (result.success, result.stage, result.slot) == (False, "walk", "odometry")
     assert "silent for 0.5 s" in result.reason and ground.twist == Twist()
     assert ground.pose.x < 1.0
+
+
+def test_legs_that_do_not_walk_are_named_before_anything_moves() -> None:
+    ground = Ground(envelope=Envelope())
+    result = outcome(ground.run(Walk().run(ground.context, WalkGoal(1.0))))
+    assert (result.stage, result.slot) == ("refused", None)
+    assert "The legs, 'almi', do not walk" in result.reason and ground.stages == []
+
+
+@pytest.mark.parametrize("x", [1e9, 60.0, -1e300])
+def test_a_place_that_nobody_can_walk_to_in_time_is_refused(x: float) -> None:
+    ground = Ground()
+    result = outcome(ground.run(Walk().run(ground.context, WalkGoal(x))))
+    assert (result.success, result.stage) == (False, "refused")
+    assert "m away; at 0.85 m/s the legs get 51.3 m within 60 s" in result.reason
+
+
+@pytest.mark.parametrize("timeout", [-5.0, 0.0, math.nan, math.inf, 1e6])
+def test_a_walk_takes_some_time(timeout: float) -> None:
+    with pytest.raises(ConfigError, match="timeout"):
+        WalkGoal(1.0, timeout=timeout)
+
+
+@pytest.mark.parametrize("seconds", [-0.1, math.nan, math.inf])
+def test_nobody_stands_for_less_than_no_time_or_for_ever(seconds: float) -> None:
+    with pytest.raises(ConfigError, match="zero or more seconds"):
+        StandGoal(seconds)

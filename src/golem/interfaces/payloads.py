@@ -113,7 +113,8 @@ class LegStatus:
 
     Attributes:
         t: time [s].
-        commanded: the newest twist, as it came: it may be far outside what is possible, or not finite.
+        commanded: the newest twist, as it came: it may be far outside what is possible; zero for one that is not
+            finite, of which `reason` then tells.
         applied: the twist the robot shall move at; the controller is given a corrected one.
         clamped: whether `commanded` lies outside the controller's envelope.
         reason: why `applied` is not on its way to `commanded`; empty where it is.

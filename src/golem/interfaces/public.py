@@ -230,7 +230,7 @@ SERVICES: tuple[ServiceRow, ...] = (
 
 ACTIONS: tuple[ActionRow, ...] = (
     ActionRow("/skill/run", "golem_interfaces/action/RunSkill", "stack",
-           "Any skill of the stack, by name, with a goal in JSON; those below are the same with goals of their own type."),
+           "Any skill of the stack, by name, with a goal in JSON; those below have goals of their own types."),
     ActionRow("/skill/pick", "golem_interfaces/action/Pick", "stack",
            "Find an object, grasp it, pull it straight out and drop it in a container."),
     ActionRow("/skill/walk", "golem_interfaces/action/Walk", "stack", "Walk to a pose and stand there."),

@@ -15,7 +15,6 @@ from golem.errors import ConfigError
 from golem.middleware.bus import Bus
 from golem.types import TICK
 
-
 FOREVER = 1e9
 """A time that no robot sees [s]."""
 

@@ -25,7 +25,7 @@ from golem.runtime.executor import FOREVER, Executor, in_order
 from golem.runtime.node_groups import RobotNodes, SafetyNodes, StackNodes
 from golem.runtime.perception_nodes import LATENCY, detection_requested
 from golem.runtime.skill_table import SkillTable
-from golem.skills.base import Skill, SkillResult
+from golem.skills.base import Routine, SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
 from golem.stack import Stack
@@ -79,7 +79,9 @@ class LockstepRunner:
         """Ask something of the safety gate as an operator does: activate, stop, reset; it decides."""
         self._safety.request(request)
 
-    def start(self, skill: str | Skill[Context, Any], goal: object, timeout: float | None = None) -> SkillRun:
+    def start(
+        self, skill: str | Routine[Context, Any], goal: object, timeout: float | None = None
+    ) -> SkillRun:
         """Start a skill; see `StackNodes.start`."""
         return self._stack.start(skill, goal, timeout)
 
@@ -93,7 +95,7 @@ class LockstepRunner:
 
     def execute(
         self,
-        skill: str | Skill[Context, Any],
+        skill: str | Routine[Context, Any],
         goal: object,
         timeout: float | None = None,
         realtime: bool = False,
@@ -104,7 +106,7 @@ class LockstepRunner:
         Args:
             skill: name of one of the stack's, or one that the stack does not know.
             goal: its goal.
-            timeout: robot time after which it is given up [s]; by default what the skill itself allows.
+            timeout: robot time after which it is given up [s]; see `StackNodes.start`.
             realtime: pace by the wall clock.
             watch: called after every tick, for judges and viewers.
 

@@ -5,6 +5,7 @@ In lock-step they share one process, one bus and one clock; live, each has its o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -37,8 +38,9 @@ from golem.runtime.gantry_release import GantryReleaseNode
 from golem.runtime.lower_body_node import CheckedLowerBody, LowerBodyNode
 from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode
 from golem.runtime.skill_table import SkillTable
-from golem.skills.base import Skill
+from golem.skills.base import Routine
 from golem.skills.context import Context, Modules
+from golem.skills.pursuit import pursue, pursue_routine
 from golem.skills.runner import SkillRun
 from golem.skills.spec import check_goal
 from golem.stack import Choice, Stack
@@ -176,18 +178,22 @@ class StackNodes:
             ModuleFault: a module's constructor raised, or the module lacks a part of its contract.
         """
         self.stack, self.bus = stack, bus
-        self._workshop = ModuleFactory(stack)
-        make = self._workshop.make
+        make = ModuleFactory(stack).make
         self.skills = SkillTable(stack)
         navigator: Navigator = CheckedNavigator(*make("navigator"))
-        modules = Modules(self._grasp_method, lambda: navigator, lambda: self.envelope, self.skills.make)
-        self.context = Context(bus, Kinematics(), nodes.SkillNode.period, modules)
-        self.running = nodes.SkillNode(self.context)
         estimator, estimator_contract = make("estimator")
         localizer, contract = make("localizer")
         lower_body = make("lower_body", onboard=None if real else BusOnboard(bus))
         reserve = make("lower_body", stack.legs_in_reserve, onboard=None if real else BusOnboard(bus))
-        self.legs = LowerBodyNode(bus, CheckedLowerBody(*lower_body), CheckedLowerBody(*reserve))
+        legs = self.legs = LowerBodyNode(bus, CheckedLowerBody(*lower_body), CheckedLowerBody(*reserve))
+        modules = Modules(
+            grasp_method=lambda: CheckedGraspMethod(*make("grasp_method")),
+            navigator=lambda: navigator,
+            envelope=lambda: legs.envelope,
+            skill=self.skills.make,
+        )
+        self.context = Context(bus, Kinematics(), nodes.SkillNode.period, modules)
+        self.running = nodes.SkillNode(self.context)
         self.nodes: list[Placed] = [
             (Phase.ESTIMATE, nodes.EstimatorNode(bus, estimator, estimator_contract)),
             (Phase.PERCEIVE, perception_nodes.ImagePoseNode(bus, calibration, latency)),
@@ -209,9 +215,6 @@ class StackNodes:
                 (Phase.OPERATE, GantryReleaseNode(bus, gantry, robot_contract, estimator_contract))
             )
 
-    def _grasp_method(self) -> GraspMethod:
-        return CheckedGraspMethod(*self._workshop.make("grasp_method"))
-
     @property
     def safety(self) -> GateStatus | None:
         """The newest verdict of the safety gate."""
@@ -228,13 +231,16 @@ class StackNodes:
         """The twists that the leg controller in charge can follow."""
         return self.legs.envelope
 
-    def start(self, skill: str | Skill[Context, Any], goal: object, timeout: float | None = None) -> SkillRun:
+    def start(
+        self, skill: str | Routine[Context, Any], goal: object, timeout: float | None = None
+    ) -> SkillRun:
         """Start a skill; it advances with the executor.
 
         Args:
             skill: name of one of the stack's, or one that the stack does not know.
             goal: its goal.
-            timeout: robot time after which it is cancelled [s]; by default what the skill itself allows.
+            timeout: robot time after which it is cancelled [s]; by default what the skill itself allows, and for one
+                that the stack does not know without end.
 
         Raises:
             GolemError: another skill is still running.
@@ -243,12 +249,15 @@ class StackNodes:
         """
         if self.busy:
             raise GolemError("Another skill is running; cancel it first.")
-        name = skill if isinstance(skill, str) else type(skill).__name__.lower()
         if isinstance(skill, str):
-            skill = self.skills.make(skill)
-            check_goal(name, skill.Goal, goal)
+            made = self.skills.make(skill)
+            check_goal(skill, made.Goal, goal)
+            name, coroutine = skill, pursue(self.context, skill, made, goal, timeout)
+        else:
+            name = type(skill).__name__.lower()
+            coroutine = pursue_routine(self.context, name, skill, goal, timeout or math.inf)
         self.context.release_arms()
-        self.running.run = SkillRun(name, self.context.pursue(name, skill, goal, timeout))
+        self.running.run = SkillRun(name, coroutine)
         return self.running.run
 
     @property

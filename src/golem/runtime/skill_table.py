@@ -8,7 +8,7 @@ from typing import Any
 from golem import registry
 from golem.errors import ModuleFault, unknown_name
 from golem.runtime.contract_check import ContractCheck
-from golem.skills.base import Skill
+from golem.skills.base import Routine, Skill
 from golem.skills.context import Context
 from golem.skills.spec import SkillSpec, read_goal, schema_of, summary
 from golem.stack import Choice, Stack
@@ -33,6 +33,16 @@ class SkillTable:
         for name in self._choices:
             self.make(name)
 
+    def spec(self, name: str) -> SkillSpec:
+        """Return what others may know of the skill called `name`.
+
+        Raises:
+            ConfigError: there is none of that name.
+        """
+        if name not in self.specs:
+            raise unknown_name("skill", name, self.specs)
+        return self.specs[name]
+
     def make(self, name: str) -> Skill[Context, Any]:
         """Return a new instance of the skill called `name`.
 
@@ -40,11 +50,10 @@ class SkillTable:
             ConfigError: there is none of that name.
             ModuleFault: its constructor raised.
         """
-        if name not in self._choices:
-            raise unknown_name("skill", name, self._choices)
-        choice = self._choices[name]
-        skill = registry.create(registry.SKILL, choice.use, choice.options)
-        ContractCheck(registry.SKILL, choice.use).satisfies(skill, Skill)
+        use = self.spec(name).use
+        skill = registry.create(registry.SKILL, use, self._choices[name].options)
+        for contract in (Routine, Skill):
+            ContractCheck(registry.SKILL, use).satisfies(skill, contract)
         return skill
 
     def goal(self, name: str, fields: Mapping[str, object]) -> Any:
@@ -54,9 +63,7 @@ class SkillTable:
             ConfigError: there is no such skill, or they say none; see `read_goal`.
             ModuleFault: its class raised.
         """
-        if name not in self._choices:
-            raise unknown_name("skill", name, self._choices)
-        return read_goal(name, registry.load(registry.SKILL, self._choices[name].use).Goal, fields)
+        return read_goal(name, registry.load(registry.SKILL, self.spec(name).use).Goal, fields)
 
 
 def _spec(name: str, choice: Choice) -> SkillSpec:

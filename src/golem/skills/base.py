@@ -92,7 +92,23 @@ class Tick(Awaitable[None]):
         yield
 
 
-class Skill(Protocol, Generic[C, G]):
+class Routine(Protocol, Generic[C, G]):
+    """What runs as a skill does; a skill is one that others can call by name."""
+
+    def run(self, context: C, goal: G) -> Coroutine[None, None, SkillResult]:
+        """Pursue `goal` with what `context` offers.
+
+        Failures are results, not exceptions. `SkillCancelled` is let through after the robot was left in a state
+        that is safe to stay in.
+
+        Raises:
+            ConfigError: this robot cannot pursue this goal; nothing has moved. The result is then `REFUSED`.
+            StageFailed: the result is then of that stage.
+        """
+        ...
+
+
+class Skill(Routine[C, G], Protocol[C, G]):
     """A capability with a goal, feedback and a result (a ROS 2 action at the edge).
 
     An instance pursues one goal. Its options are those of its constructor, as of any module. The first line of its
@@ -109,16 +125,4 @@ class Skill(Protocol, Generic[C, G]):
 
     def timeout(self, goal: G) -> float:
         """Return the robot time [s] after which the pursuit of `goal` is cancelled from outside."""
-        ...
-
-    def run(self, context: C, goal: G) -> Coroutine[None, None, SkillResult]:
-        """Pursue `goal` with what `context` offers.
-
-        Failures are results, not exceptions. `SkillCancelled` is let through after the robot was left in a state
-        that is safe to stay in.
-
-        Raises:
-            ConfigError: this robot cannot pursue this goal; nothing has moved. The result is then `REFUSED`.
-            StageFailed: the result is then of that stage.
-        """
         ...

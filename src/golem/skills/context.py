@@ -13,7 +13,6 @@ from golem.capabilities.arms.line import Line
 from golem.capabilities.grasping.base import GraspMethod
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.navigation.base import Navigator
-from golem.errors import ModuleFault
 from golem.interfaces import topics
 from golem.interfaces.payloads import (
     DetectionRequest,
@@ -25,26 +24,14 @@ from golem.interfaces.payloads import (
 )
 from golem.middleware.bus import Bus, Topic
 from golem.robots.model.kinematics import Kinematics
-from golem.skills.base import (
-    FAULT,
-    TIMEOUT,
-    Skill,
-    SkillCancelled,
-    SkillResult,
-    StageFailed,
-    Tick,
-    expect,
-)
-from golem.skills.runner import LACKS, SLOT, SkillRun
-from golem.skills.spec import check_goal
+from golem.skills.base import Skill, SkillResult, StageFailed, Tick, expect
+from golem.skills.pursuit import call
 from golem.types import Array, PalmTargets, Side, Twist
 
 T = TypeVar("T")
 
 ODOMETRY_TIMEOUT = 0.5
 """Age of the newest odometry from which on it says nothing about where the robot is [s]."""
-CLEANUP = 10.0
-"""Time a cancelled skill gets to leave the robot in a state that is safe to stay in [s] [own: an arm goes home in 5]."""
 
 
 @dataclass(frozen=True)
@@ -303,55 +290,7 @@ class Context:
         Raises:
             ConfigError: there is no such skill, or the goal is none of it.
         """
-        skill = self.modules.skill(name)
-        check_goal(name, skill.Goal, goal)
-        return await self._pursue(name, skill, goal, timeout, called=True)
-
-    async def pursue(
-        self, name: str, skill: Skill[Context, Any], goal: object, timeout: float | None = None
-    ) -> SkillResult:
-        """Pursue `goal` with `skill`, called `name`, which no other skill calls; see `run`."""
-        return await self._pursue(name, skill, goal, timeout, called=False)
-
-    async def _pursue(
-        self, name: str, skill: Skill[Context, Any], goal: object, timeout: float | None, called: bool
-    ) -> SkillResult:
-        allowed = skill.timeout(goal) if timeout is None else timeout
-        if not allowed > 0.0:
-            raise ModuleFault(SLOT, name, f"its timeout is {allowed}, not a positive time")
-        caller, self.skill = self.skill, name
-        run, end = SkillRun(name, skill.run(self, goal)), self.t + allowed
-        late = cancelled = False
-        try:
-            run.step()
-            while run.result is None:
-                try:
-                    await self.tick()
-                except SkillCancelled:
-                    end, cancelled = self.t + CLEANUP, True
-                    run.cancel()
-                    continue
-                if self.t < end:
-                    run.step()
-                elif run.cancelled:
-                    run.fail(
-                        SLOT, f"The skill '{name}' did not end within {CLEANUP:g} s of its cancellation."
-                    )
-                else:
-                    end, late = self.t + CLEANUP, True
-                    run.cancel()
-            result = run.result
-        finally:
-            run.close()
-            self.skill = caller
-        if run.error is not None and (not called or isinstance(run.error, LACKS)):
-            raise run.error
-        if cancelled and called:
-            raise SkillCancelled
-        if late and result.stage != FAULT:
-            text = f"Not done after {allowed:g} s of robot time."
-            return SkillResult(False, TIMEOUT, None, text, result.timings)
-        return result
+        return await call(self, name, goal, timeout)
 
     def say(self, stage: str, text: str, **data: object) -> None:
         """Give feedback: the stage, one line for a person, and numbers for a viewer."""

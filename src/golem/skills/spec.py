@@ -135,7 +135,7 @@ def check_goal(name: str, kind: type[Any], goal: object) -> None:
 
 
 def _check(what: str, value: Any, depth: int = 0) -> None:
-    """Check that `value` is finite and of a sensible size: it may be a stranger's, and this process balances a robot."""
+    """Check that `value` is finite and of a sensible size: it may be a stranger's, in the process that balances."""
     if isinstance(value, str):
         if len(value) > MAX_TEXT:
             raise ConfigError(f"The {what} has {len(value)} characters; at most {MAX_TEXT} are read.")

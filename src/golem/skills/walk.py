@@ -126,9 +126,8 @@ def check_reach(context: Context, target: PlanarPose, timeout: float) -> None:
         math.hypot(*(max(map(abs, v)) for v in (envelope.vx, envelope.vy))),
     )
     if distance > speed * timeout + SLACK:
-        raise ConfigError(
-            f"It is {distance:.3g} m away; at {speed:.2g} m/s the legs get {speed * timeout:.3g} m within {timeout:g} s."
-        )
+        reach = f"{speed * timeout:.3g} m within {timeout:g} s"
+        raise ConfigError(f"It is {distance:.3g} m away; at {speed:.2g} m/s the legs get {reach}.")
 
 
 @dataclass(frozen=True, slots=True)

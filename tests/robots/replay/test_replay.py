@@ -32,7 +32,7 @@ from golem.robots.sensors.cameras import HEAD
 from golem.runtime.live.broadcast import broadcast
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import SkillResult
-from golem.skills.pick import Pick, PickGoal
+from golem.skills.pick import PickGoal
 from golem.stack import Choice, Stack, load_stack
 from golem.types import SIDES, HandState, Imu, LowCommand, LowState
 
@@ -181,7 +181,7 @@ def pick(stack: Stack, seconds: float, bag: Path | None) -> Seen:
                 if (sightings := news.read()) is not None:
                     seen.sightings[sightings.camera, sightings.t] = sightings
 
-        seen.result = running.execute(Pick(running.method), PickGoal(), seconds, watch=watch)
+        seen.result = running.execute("pick", PickGoal(), seconds, watch=watch)
         watch()  # the last tick
     robot.close()
     return seen

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -17,6 +18,7 @@ from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs.geometry_msgs import PoseStamped
 from golem.middleware.ros.msgs.golem_interfaces import (
     Pick_Goal,
+    RunSkill_Goal,
     SetForce_Request,
     SetGap_Request,
     Stand_Goal,
@@ -24,8 +26,11 @@ from golem.middleware.ros.msgs.golem_interfaces import (
 )
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.ros.node import DdsNode
+from golem.runtime.live.skill_messages import read_list
 from golem.runtime.live.velocity import LET_GO
-from golem.skills.base import SkillResult
+from golem.skills.spec import schema_of
+from golem.skills.walk import WalkGoal
+from golem.stack import Choice
 from golem.types import TICK, Twist
 
 
@@ -191,9 +196,11 @@ def test_a_robot_that_is_started_anew_aborts_its_skill(client: Client) -> None:
 @pytest.mark.parametrize(
     ("action", "goal", "reason"),
     [
-        ("/skill/pick", Pick_Goal("screw", "tray", "middle"), "'left' or 'right'"),
-        ("/skill/pick", Pick_Goal("", "tray", "left"), "names a label"),
-        ("/skill/walk", Walk_Goal(PoseStamped(convert.header(0.0, "map"))), "odom or base_link"),
+        ("/skill/pick", Pick_Goal("screw", "tray", "middle"), "'middle'; valid: left, right"),
+        ("/skill/pick", Pick_Goal("", "tray", "left"), "names the class"),
+        ("/skill/pick", Pick_Goal(), "valid: left, right"),
+        ("/skill/walk", Walk_Goal(PoseStamped(convert.header(0.0, "base_link"))), "'hold', do not walk"),
+        ("/skill/walk", Walk_Goal(PoseStamped(convert.header(0.0, "map"))), "'map'; valid: base_link, odom"),
     ],
 )
 def test_a_goal_without_sense_is_refused_with_the_reason(
@@ -226,24 +233,217 @@ def test_hands_obey_services_while_the_gate_is_open(client: Client) -> None:
     assert not answer.success and "gate is shut" in answer.message
 
 
-def test_a_skill_that_outlives_its_goal_is_ended(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    from golem.runtime.live import skill_action_server
+MINE = '''
+"""Skills of a user."""
+import sys
+from dataclasses import dataclass, field
+import numpy as np
+from golem.errors import ConfigError
+from golem.skills.base import SkillResult
 
-    class Forever:
-        name = "forever"
 
-        async def run(self, context: Any, goal: Any) -> SkillResult:
-            await context.sleep(1e6)
-            return SkillResult(True, "done", None, "")
+@dataclass(frozen=True)
+class CountGoal:
+    """How far to count.
 
-    offer = skill_action_server.OFFERS["/skill/stand"]
-    hangs = replace(offer, make=lambda stack: Forever(), allowance=lambda goal: 0.1)
-    monkeypatch.setitem(skill_action_server.OFFERS, "/skill/stand", hangs)
-    client.live.leave("up")
-    client.live.start_up()
-    client.live.run(0.1)
-    client.live.ask("reset")
-    client.live.ask("activate")
-    client.live.run(0.02)
-    status, result = client.outcome(client.send("/skill/stand", stand(1.0)))
-    assert (status, result.stage) == (GoalStatus.ABORTED, "timeout")
+    Attributes:
+        to: the last number.
+    """
+
+    to: int
+    by: float = 1.0
+
+    def __post_init__(self):
+        if self.to > 1000:
+            raise ValueError("too far")
+
+
+@dataclass
+class Options:
+    fails: str = ""
+
+
+@dataclass
+class Numbers:
+    numbers: list[int] = field(default_factory=list)
+
+
+class Count:
+    """Count, and do what no skill should."""
+
+    Goal = CountGoal
+
+    def __init__(self, config: Options = Options()):
+        self.fails = config.fails
+
+    def timeout(self, goal):
+        if self.fails == "timeout":
+            raise KeyError("timeout")
+        return 0.1
+
+    async def run(self, context, goal):
+        await context.tick()
+        match self.fails:
+            case "run":
+                raise ZeroDivisionError("by zero")
+            case "exit":
+                sys.exit(3)
+            case "text":
+                context.say("count", None)
+            case "half":
+                context.say("count", "\\ud800", data=object())
+            case "result":
+                return SkillResult(True, "done", None, 5)
+            case "value":
+                return SkillResult(True, "done", None, "Counted.", value=np.zeros(3))
+            case "nothing":
+                return None
+            case "hangs":
+                await context.sleep(1e6)
+            case "refuses":
+                raise ConfigError("Nobody counts on Sundays.")
+            case "calls":
+                return await context.run("walk", goal)
+        return SkillResult(True, "done", None, "Counted.", {}, Numbers(list(range(goal.to))))
+
+
+class Asleep:
+    """Is no coroutine."""
+
+    Goal = CountGoal
+
+    def timeout(self, goal):
+        return 1.0
+
+    def run(self, context):
+        return 3
+'''
+
+
+@pytest.fixture
+def mine(live: Live, tmp_path: Any) -> Callable[[str], Client]:
+    """Makes somebody on the domain of a robot whose stack has the skills `count`, which fails so, and `asleep`."""
+    (tmp_path / "mine.py").write_text(MINE)
+
+    def make(fails: str) -> Client:
+        live.leave("up")
+        count = Choice(f"{tmp_path / 'mine.py'}:Count", {"fails": fails})
+        live.stack = replace(
+            live.stack, skills={"count": count, "asleep": Choice(f"{tmp_path}/mine.py:Asleep")}
+        )
+        live.start_up()
+        live.activate()
+        live.run(0.02)
+        return Client(live, live.member("client")[1])
+
+    return make
+
+
+def run(client: Client, skill: str, goal: str) -> tuple[GoalStatus, Any]:
+    """Have a goal pursued by /skill/run; return its status and the action's result."""
+    future = client.send("/skill/run", RunSkill_Goal(skill, goal)).result()
+    client.until(lambda: future.done)
+    return future.result().status, future.result().result
+
+
+def test_a_skill_of_ones_own_is_run_by_its_name_and_its_value_comes_back(
+    mine: Callable[[str], Client],
+) -> None:
+    status, answer = run(mine(""), "count", '{"to": 3}')
+    assert (status, answer.result.reason) == (GoalStatus.SUCCEEDED, "Counted.")
+    assert json.loads(answer.value) == {"numbers": [0, 1, 2]}
+
+
+def test_the_skills_and_their_goals_are_on_a_latched_topic(mine: Callable[[str], Client]) -> None:
+    client, row = mine(""), public.topic("/skill/list")
+    listed = client.node.subscription(row.name, row.type, None, row.qos)
+    client.until(lambda: listed.latest() is not None)
+    specs = read_list(listed.latest())
+    assert list(specs) == ["pick", "stand", "walk", "count", "asleep"]
+    assert specs["count"].summary == "Count, and do what no skill should"
+    assert specs["count"].goal["properties"]["to"] == {"type": "integer", "description": "the last number."}
+    assert specs["walk"].goal == schema_of(WalkGoal)
+
+
+@pytest.mark.parametrize(
+    ("skill", "goal", "words"),
+    [
+        (
+            "cuont",
+            "{}",
+            "Unknown skill 'cuont'; valid: asleep, count, pick, stand, walk. Did you mean 'count'?",
+        ),
+        ("", "", "Unknown skill ''"),
+        ("count", "", "'to' has no default"),
+        ("count", '{"two": 1}', "Unknown goal field of count 'two'; valid: by, to. Did you mean 'to'?"),
+        ("count", '{"to": "three"}', "'to' is an integer, not 'three'"),
+        ("count", '{"to": 5000}', "its goal raised ValueError: too far"),
+        ("count", '{"to": 1, "by": NaN}', "is a finite number"),
+        ("count", '{"to": 1', "The goal is no JSON"),
+        ("count", "[" * 60_000, "The goal is no JSON"),
+        ("count", '"' + "x" * 10_000_000 + '"', "10000002 characters"),
+        ("count", "[1]", "a JSON object of its fields"),
+        ("walk", '{"x": 1}', "The legs, 'hold', do not walk; give the stack a lower_body that does"),
+        ("walk", '{"x": 1, "timeout": -5}', "The timeout of a walk is a positive time"),
+        ("stand", '{"seconds": -1}', "zero or more seconds, not -1"),
+    ],
+)
+def test_a_goal_that_no_skill_can_pursue_is_refused_with_the_reason(
+    mine: Callable[[str], Client], skill: str, goal: str, words: str
+) -> None:
+    status, answer = run(mine(""), skill, goal)
+    assert (status, answer.result.stage) == (GoalStatus.ABORTED, "refused")
+    assert words in answer.result.reason and len(answer.result.reason) < 300
+
+
+@pytest.mark.parametrize(
+    ("fails", "stage", "words"),
+    [
+        ("timeout", "fault", "Module skill: count failed: KeyError: 'timeout' (mine.py, line"),
+        ("run", "fault", "Module skill: count failed: ZeroDivisionError: by zero (mine.py, line"),
+        ("exit", "fault", "SystemExit: 3"),
+        ("text", "fault", "TypeError: the text of the feedback is a str, not a NoneType"),
+        ("result", "fault", "TypeError: the reason of a result is a str, not a int"),
+        ("value", "fault", "The result failed: TypeError: Object of type ndarray is not JSON serializable"),
+        ("nothing", "fault", "it returned NoneType, not SkillResult"),
+        ("refuses", "refused", "Nobody counts on Sundays."),
+        ("calls", "refused", "The skill 'walk' takes a WalkGoal, not a CountGoal."),
+        ("hangs", "timeout", "Not done after 0.1 s of robot time."),
+    ],
+)
+def test_whatever_a_skill_does_ends_its_goal_and_nothing_else(
+    mine: Callable[[str], Client], fails: str, stage: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    client = mine(fails)
+    status, answer = run(client, "count", '{"to": 3}')
+    assert (status, answer.result.stage) == (GoalStatus.ABORTED, stage) and words in answer.result.reason
+    assert ("Traceback" in capsys.readouterr().out) == (stage == "fault" and fails != "nothing")
+    assert client.outcome(client.send("/skill/stand", stand(0.05)))[0] is GoalStatus.SUCCEEDED
+
+
+def test_half_a_character_in_what_a_skill_says_is_replaced(mine: Callable[[str], Client]) -> None:
+    client = mine("half")
+    status, _ = run(client, "count", '{"to": 3}')
+    assert status is GoalStatus.SUCCEEDED and client.said == ["?"]
+
+
+def test_a_skill_that_is_no_coroutine_is_at_fault(mine: Callable[[str], Client]) -> None:
+    status, answer = run(mine(""), "asleep", '{"to": 3}')
+    assert (status, answer.result.stage) == (GoalStatus.ABORTED, "fault")
+    assert "Module skill: asleep failed: TypeError" in answer.result.reason
+
+
+def test_a_label_that_nobody_knows_is_refused_with_those_that_are_known(live: Live) -> None:
+    live.leave("twin")
+    live.leave("up")
+    live.stack = replace(live.stack, localizer=Choice("onnx"), robot=Choice("mujoco"))
+    live.start_twin()
+    live.start_up()
+    live.run(0.2)
+    live.ask("reset")
+    live.activate()
+    live.run(0.02)
+    client = Client(live, live.member("client")[1])
+    status, result = client.outcome(client.send("/skill/pick", Pick_Goal("banana", "tray", "right")), 4.0)
+    assert (status, result.stage, result.slot) == (GoalStatus.ABORTED, "refused", "")
+    assert result.reason == "Unknown label 'banana'; valid: bus_bar, nut, screw, screw_hole, tray."

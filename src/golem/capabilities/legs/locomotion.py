@@ -62,7 +62,7 @@ class Locomotion:
 
     Attributes:
         config: options.
-        commanded: the newest twist, as it came.
+        commanded: the newest twist, as it came; zero for one that is not finite.
         applied: the twist the robot shall move at; the controller gets it with the trim's correction.
         clamped: whether the commanded twist lies outside the controller's envelope.
         reason: why the controller does not get the commanded twist; empty where it does, slewing aside.
@@ -165,7 +165,7 @@ class Locomotion:
         self._trim.reset()
         self.clamped = False
         self.reason = ""
-        self._held = False
+        self._held, self._finite = False, True
         self._age = math.inf
         self._until_gate = self._since_gate = 0.0
 
@@ -173,14 +173,15 @@ class Locomotion:
         self._age += dt
         self._held = self._held and self._age <= self.config.timeout
         if twist is not None:
-            self.commanded, self._age = twist, 0.0
-            self._held = self._held and not _size(twist) < self.config.dead_band
+            self._finite = all(map(math.isfinite, _values(twist)))
+            self.commanded, self._age = twist if self._finite else ZERO, 0.0
+            self._held = self._held and not (self._finite and _size(twist) < self.config.dead_band)
 
     def _wanted(self) -> Twist:
         """Return the commanded twist as far as it can be followed; note why it cannot."""
         self.clamped = False
         asked = self.commanded
-        if not all(map(math.isfinite, (asked.vx, asked.vy, asked.wz))):
+        if not self._finite:
             self.reason = "the commanded twist is not finite"
             return ZERO
         if asked == ZERO:

@@ -13,7 +13,7 @@ from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.shoves import Push, Pusher
 from golem.runtime.lockstep import LockstepRunner, build
-from golem.skills.base import FAULT, Skill, SkillResult
+from golem.skills.base import FAULT, Routine, SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
 from golem.stack import Choice, Stack, load_stack
@@ -145,7 +145,7 @@ class Episode:
         self._skill: SkillRun | None = None
         self._hangs = False
 
-    def start(self, skill: str | Skill[Context, Any], goal: object = None) -> None:
+    def start(self, skill: str | Routine[Context, Any], goal: object = None) -> None:
         """Begin a skill; it advances while the episode runs."""
         self._skill = self.running.start(skill, goal)
 

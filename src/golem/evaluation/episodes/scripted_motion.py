@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -40,22 +39,16 @@ class ArmMotion:
 
 
 class ScriptedMotion:
-    """A skill that runs until it is cancelled; see `golem.skills.base.Skill`.
+    """A routine that runs until it is cancelled; see `golem.skills.base.Routine`.
 
     Attributes:
         twist: what is commanded at time t [s] since the skill began; None commands nothing.
     """
 
-    Goal = type(None)
-
     def __init__(self, arms: ArmMotion | None = None, twist: Callable[[float], Twist] | None = None) -> None:
         """Move the hands as `arms` says, None leaves them alone, and command `twist`."""
         self._arms = arms
         self.twist = twist
-
-    def timeout(self, goal: None) -> float:
-        """Return infinity; see `Skill`."""
-        return math.inf
 
     async def run(self, context: Context, goal: None) -> SkillResult:
         """Move until cancelled."""
