@@ -127,9 +127,11 @@ def test_a_file_is_read(tmp_path: Path) -> None:
     assert load_stack(path) == Stack(profile="ideal")
 
 
-CHANGED: dict[str, Any] = {
-    slot: Choice(Stack().choice(slot).use, {"option": 1}) for slot in registry.slots()
-} | {"fallback": Choice("hold"), "onboard": Choice("hold"), "profile": "field", "limits": "paper"}
+CHANGED: dict[str, Any] = (
+    {slot: Choice(Stack().choice(slot).use, {"option": 1}) for slot in registry.slots()}
+    | {"fallback": Choice("hold"), "onboard": Choice("hold"), "profile": "field", "limits": "paper"}
+    | {"skills": {"pick": Choice("pick", {"force": 8.0})}}
+)
 
 
 @pytest.mark.parametrize("key", [f.name for f in fields(Stack)])
@@ -188,3 +190,41 @@ def test_the_twin_answers_the_calls_that_the_stack_makes() -> None:
     for wrong in ("h3", "[1]"):
         with pytest.raises(ConfigError, match="loco service .*h1"):
             _ = parse_stack(f"lower_body: {{use: vendor, robot: {wrong}}}", "x").loco_api
+
+
+def test_a_stack_file_lists_skills_and_their_options() -> None:
+    stack = parse_stack(
+        "skills: {pick: {force: 8}, gentle: {use: pick, force: 4}, mine: my.py:Mine}", "x.yaml"
+    )
+    assert stack.skills == {
+        "pick": Choice("pick", {"force": 8}),
+        "gentle": Choice("pick", {"force": 4}),
+        "mine": Choice("my.py:Mine"),
+    }
+    assert list(stack.all_skills) == ["pick", "stand", "walk", "gentle", "mine"]
+    assert Stack().all_skills["pick"] == Choice("pick")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("skills: pick", "'skills' wants '{NAME: {option: value, ...}, ...}'"),
+        (
+            "skills: {pik: {force: 8}}",
+            "Unknown skill in x.yaml 'pik'; valid: pick, stand, walk. Did you mean 'pick'",
+        ),
+        ("skills: {Mine: {use: my.py:Mine}}", "a skill's name is a word of a-z, 0-9 and _"),
+        ("skills: {mine: {use: 3}}", "'skills: mine' wants '{use: NAME"),
+        ("skills: {pick: }", "'skills: pick' wants"),
+        ("skills: {pick: {force: .nan}}", "x.yaml: skills: pick.force: a number that is none"),
+    ],
+)
+def test_wrong_skills_are_answered_with_what_would_work(text: str, words: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        parse_stack(text, "x.yaml")
+    assert words in str(error.value)
+
+
+def test_skills_are_added_to_those_of_a_stack() -> None:
+    stack = Stack(skills={"gentle": Choice("pick")}).with_choice("skills", "{pick: {force: 8}}")
+    assert stack.skills == {"gentle": Choice("pick"), "pick": Choice("pick", {"force": 8})}

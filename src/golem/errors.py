@@ -53,7 +53,7 @@ class RobotGone(GolemError):
     """The robot is no longer there, through no fault of its module: the recording that stands in for it is over."""
 
 
-def shorten(text: str, limit: int = 80) -> str:
+def shorten(text: str, limit: int = 120) -> str:
     """Return `text`, cut to `limit` characters: an error never repeats megabytes that a stranger sent."""
     return text if len(text) <= limit else f"{text[:limit]}..."
 

@@ -17,6 +17,8 @@ from golem.interfaces.payloads import Feedback, GateState, Reason
 from golem.robots.mujoco.balance import PERIOD
 from golem.robots.mujoco.spectator import BodyMesh, SpectatorView
 from golem.runtime.lockstep import LockstepRunner, build
+from golem.skills.pick import PickGoal
+from golem.skills.walk import StandGoal
 from golem.stack import Stack
 from golem.types import Twist
 
@@ -109,17 +111,54 @@ def test_pause_lets_time_stand_still(twin: tuple[LockstepRunner, Any], view: Liv
     assert time.perf_counter() - begin >= 0.3 + 0.1 - 0.05
 
 
-def test_a_pick_can_be_asked_for_only_when_none_runs(
+def test_a_skill_can_be_started_only_when_none_runs(twin: tuple[LockstepRunner, Any], view: LiveView) -> None:
+    running, _ = twin
+    until_state(view, running, GateState.ACTIVE)
+    view.panel.skill.fill("stand", seconds=3.0)
+    run = running.start("stand", StandGoal())
+    view.panel.press(Button.START)
+    view._serve_buttons()
+    assert view._wanted is None
+    run.cancel()
+    view.panel.press(Button.START)
+    assert view.wait_for_skill() == ("stand", StandGoal(3.0))
+    assert view._wanted is None  # taken
+
+
+def test_the_form_has_a_field_for_each_of_the_goal(view: LiveView) -> None:
+    panel = view.panel.skill
+    panel.fill("pick", label="bolt", side="left")
+    assert panel.chosen == ("pick", {"label": "bolt", "container": "tray", "side": "left"})
+    panel.fill("walk", x=1.5)
+    goal = {"x": 1.5, "y": 0.0, "yaw": 0.0, "frame": "base_link", "timeout": 60.0}
+    assert panel.chosen == ("walk", goal)
+
+
+def test_a_goal_without_sense_is_said_and_not_started(
     twin: tuple[LockstepRunner, Any], view: LiveView
 ) -> None:
-    view._busy = True
-    view.panel.press(Button.PICK)
+    view.panel.skill.fill("stand", seconds=-1.0)
+    view.panel.press(Button.START)
     view._serve_buttons()
-    assert not view._wanted
-    view._busy = False
-    view.panel.press(Button.PICK)
-    view.wait_for_pick()
-    assert not view._wanted  # taken
+    assert view._wanted is None and "zero or more seconds" in view._note
+
+
+def test_a_skill_can_be_cancelled_and_the_robot_stays_up(
+    twin: tuple[LockstepRunner, Any], view: LiveView
+) -> None:
+    running, _ = twin
+    until_state(view, running, GateState.ACTIVE)
+    enabled: list[bool] = []
+
+    def cancel() -> None:
+        enabled.append(not view.panel.skill.cancel.disabled)
+        if running.executor.t > 0.5:
+            view.panel.press(Button.CANCEL)
+
+    result = view.run("pick", PickGoal(), watch=cancel)
+    assert (result.success, result.stage) == (False, "cancelled") and running.executor.t < 0.7
+    assert running.safety is not None and running.safety.state is GateState.ACTIVE
+    assert enabled[-1] and view.panel.skill.cancel.disabled
 
 
 @pytest.fixture
@@ -216,7 +255,7 @@ def test_starting_over_shows_the_new_episode(
 ) -> None:
     run(walk, walker[0], 0.3)
     walk.panel.press(Button.RESTART)
-    assert not walk.wait_for_pick()
+    assert walk.wait_for_skill() is None
     running, robot = build(standing, 0)
     walk.attach(running, robot)
     run(walk, running, 0.1)

@@ -230,5 +230,6 @@ def test_a_bad_twist_is_clamped_or_refused_and_reported(
         assert running.execute(Drive(twist, 1.5), None, timeout=5.0).success
         end = status(running)
         assert (end.applied, end.clamped, end.fault) == (applied, clamped, None)
+        assert end.commanded == (twist if clamped else Twist())
         assert reason in end.reason
         assert running.safety is not None and running.safety.state is GateState.ACTIVE

@@ -271,7 +271,7 @@ class LiveView:
         """Take up the skill and the goal that the panel shows, unless a skill runs or they make no sense."""
         name, fields = self._panel.skill.chosen
         try:
-            self._wanted = None if self._busy else (name, self._skills.goal(name, fields))
+            self._wanted = None if self._running.busy else (name, self._skills.goal(name, fields))
         except GolemError as error:
             self._note = str(error)
 

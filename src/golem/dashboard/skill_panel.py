@@ -31,29 +31,34 @@ class SkillPanel:
             self._form = gui.add_folder("goal")
             self.start = gui.add_button("Start", icon=viser.Icon.PLAYER_PLAY)
             self.cancel = gui.add_button("Cancel", color="gray", icon=viser.Icon.PLAYER_STOP, disabled=True)
-        self._fields: dict[str, Input] = {}
+        self._shown: tuple[str, dict[str, Input]] = "", {}
         self._name.on_update(lambda _: self._show())
         self._show()
 
     @property
     def chosen(self) -> tuple[str, dict[str, Any]]:
         """The skill that is chosen, and the fields of the goal that the form says."""
-        schema = self._skills[self._name.value].goal["properties"]
-        return self._name.value, {
-            name: _read(schema[name], field.value) for name, field in self._fields.items()
-        }
+        name, fields = self._shown  # at once: a thread of the server may be about to show another
+        schema = self._skills[name].goal["properties"]
+        return name, {key: _read(schema[key], field.value) for key, field in fields.items()}
 
-    def choose(self, name: str) -> None:
-        """Choose the skill called `name`, as a click does."""
+    def fill(self, name: str, **values: Any) -> None:
+        """Choose the skill called `name`, and fill in some fields, as clicks and keys do."""
         self._name.value = name
+        if self._shown[0] != name:
+            self._show()
+        for key, value in values.items():
+            self._shown[1][key].value = value
 
     def _show(self) -> None:
         """Build the form of the skill that is chosen."""
-        for field in self._fields.values():
-            field.remove()
-        schema = self._skills[self._name.value].goal
+        name, before = self._name.value, self._shown[1]
+        schema = self._skills[name].goal
         with self._form:
-            self._fields = {name: self._add(name, of) for name, of in schema["properties"].items()}
+            fields = {key: self._add(key, of) for key, of in schema["properties"].items()}
+        self._shown = name, fields
+        for field in before.values():
+            field.remove()
 
     def _add(self, name: str, of: Schema) -> Input:
         """Add the input of one field; what is neither a number nor a word is written as JSON."""

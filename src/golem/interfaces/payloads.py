@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, NamedTuple
@@ -125,6 +126,7 @@ class LegStatus:
         phase: (2,) gait phase of the left and the right leg, 0 to 1.
         controller: the implementation in charge, as the stack names it.
         fault: how the stack's own controller failed, once the fallback is in charge; else None.
+        speed: greatest speed over the ground that the controller in charge follows [m/s]; 0: it does not walk.
     """
 
     t: float
@@ -138,6 +140,7 @@ class LegStatus:
     phase: Array
     controller: str
     fault: str | None = None
+    speed: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,6 +85,11 @@ class LockstepRunner:
         """Start a skill; see `StackNodes.start`."""
         return self._stack.start(skill, goal, timeout)
 
+    @property
+    def busy(self) -> bool:
+        """Whether a skill is running; one that was cancelled may still be leaving the robot safe."""
+        return self._stack.busy
+
     def cancel(self) -> None:
         """Cancel the skill that runs; see `StackNodes.cancel`."""
         self._stack.cancel()

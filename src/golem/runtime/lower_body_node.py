@@ -165,5 +165,6 @@ class LowerBodyNode:
             locomotion.gait.phases,
             self._legs.contract.use,
             None if self._fault is None else str(self._fault),
+            self.envelope.speed,
         )
         self._bus.publish(topics.LEG_STATUS, status, t)

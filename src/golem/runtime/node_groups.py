@@ -185,11 +185,10 @@ class StackNodes:
         localizer, contract = make("localizer")
         lower_body = make("lower_body", onboard=None if real else BusOnboard(bus))
         reserve = make("lower_body", stack.legs_in_reserve, onboard=None if real else BusOnboard(bus))
-        legs = self.legs = LowerBodyNode(bus, CheckedLowerBody(*lower_body), CheckedLowerBody(*reserve))
+        self.legs = LowerBodyNode(bus, CheckedLowerBody(*lower_body), CheckedLowerBody(*reserve))
         modules = Modules(
             grasp_method=lambda: CheckedGraspMethod(*make("grasp_method")),
             navigator=lambda: navigator,
-            envelope=lambda: legs.envelope,
             skill=self.skills.make,
         )
         self.context = Context(bus, Kinematics(), nodes.SkillNode.period, modules)

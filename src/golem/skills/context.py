@@ -11,7 +11,6 @@ import numpy as np
 from golem.capabilities.arms.base import check_pose
 from golem.capabilities.arms.line import Line
 from golem.capabilities.grasping.base import GraspMethod
-from golem.capabilities.legs.base import Envelope
 from golem.capabilities.navigation.base import Navigator
 from golem.interfaces import topics
 from golem.interfaces.payloads import (
@@ -41,13 +40,11 @@ class Modules:
     Attributes:
         grasp_method: makes a new one.
         navigator: returns the stack's; one for all goals, since it may learn how these legs stop.
-        envelope: returns the twists that the leg controller in charge can follow.
         skill: makes a new skill, by its name in the stack.
     """
 
     grasp_method: Callable[[], GraspMethod]
     navigator: Callable[[], Navigator]
-    envelope: Callable[[], Envelope]
     skill: Callable[[str], Skill[Context, Any]]
 
 
@@ -188,11 +185,6 @@ class LegsInterface:
         if status is None:
             raise StageFailed("walk", "lower_body", "The legs do not report.")
         return status
-
-    @property
-    def envelope(self) -> Envelope:
-        """The twists that they can follow."""
-        return self._context.modules.envelope()
 
     @property
     def pose(self) -> Array:

@@ -15,8 +15,6 @@ from golem.types import PlanarPose, Twist
 ZERO = Twist()
 MAX_TIMEOUT = 3600.0
 """Longest walk [s] [own: what is given more time is a mistake, or needs a map]."""
-SLACK = 0.1
-"""Distance that a robot which only turns in place may be off [m] [own]."""
 MARGIN = 10.0
 """Time a skill of this file gets on top of what its goal says [s]: it ends by itself unless it hangs."""
 
@@ -114,20 +112,17 @@ def check_reach(context: Context, target: PlanarPose, timeout: float) -> None:
         ConfigError: they cannot.
         StageFailed: they do not report, or nobody knows where the robot is.
     """
-    envelope = context.legs.envelope
-    if not any(envelope.axes):
-        legs = context.legs.status.controller
+    legs = context.legs.status
+    if legs.speed == 0.0:
         raise ConfigError(
-            f"The legs, '{legs}', do not walk; give the stack a lower_body that does, such as almi."
+            f"The legs, '{legs.controller}', do not walk; give the stack a lower_body that does, such as almi."
         )
     left = PlanarPose.of(context.legs.pose).to(target)
-    distance, speed = (
-        math.hypot(left.x, left.y),
-        math.hypot(*(max(map(abs, v)) for v in (envelope.vx, envelope.vy))),
-    )
-    if distance > speed * timeout + SLACK:
-        reach = f"{speed * timeout:.3g} m within {timeout:g} s"
-        raise ConfigError(f"It is {distance:.3g} m away; at {speed:.2g} m/s the legs get {reach}.")
+    distance, reach = math.hypot(left.x, left.y), legs.speed * timeout
+    if distance > reach:
+        raise ConfigError(
+            f"It is {distance:.3g} m away; at {legs.speed:.2g} m/s the legs get {reach:.3g} m within {timeout:g} s."
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -358,7 +358,9 @@ def test_the_skills_and_their_goals_are_on_a_latched_topic(mine: Callable[[str],
     client, row = mine(""), public.topic("/skill/list")
     listed = client.node.subscription(row.name, row.type, None, row.qos)
     client.until(lambda: listed.latest() is not None)
-    specs = read_list(listed.latest())
+    message = listed.latest()
+    assert message is not None
+    specs = read_list(message)
     assert list(specs) == ["pick", "stand", "walk", "count", "asleep"]
     assert specs["count"].summary == "Count, and do what no skill should"
     assert specs["count"].goal["properties"]["to"] == {"type": "integer", "description": "the last number."}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
+from math import hypot, inf
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -37,6 +37,11 @@ class Envelope:
     def axes(self) -> tuple[bool, bool, bool]:
         """Which of vx, vy and wz the controller follows at all."""
         return self.vx != (0.0, 0.0), self.vy != (0.0, 0.0), self.wz != (0.0, 0.0)
+
+    @property
+    def speed(self) -> float:
+        """Greatest speed over the ground [m/s]; 0 for a controller that does not walk."""
+        return hypot(*(max(-low, high) for low, high in (self.vx, self.vy)))
 
     def clamp(self, twist: Twist) -> Twist:
         """Return the nearest twist inside, each component by itself."""
