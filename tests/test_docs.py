@@ -9,8 +9,12 @@ from pathlib import Path
 import pytest
 
 from golem import registry
+from golem.errors import ConfigError
 from golem.evaluation.push_bench import Trial
 from golem.evaluation.subject import Subject
+from golem.run import RunConfig, run_stack
+from golem.runtime.goal_parser import parse_goal
+from golem.runtime.skill_table import SkillTable
 from golem.stack import Stack, load_stack, parse_stack
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -44,6 +48,51 @@ def test_the_stack_of_write_a_module_is_valid() -> None:
     (text,) = blocks("how-to/write-a-module.md", "yaml")
     choice = parse_stack(text, "my_stack.yaml").grasp_method
     assert choice.options == {"least_score": 0.8}
+
+
+@pytest.fixture
+def skilled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A folder with the files of write-a-skill, where one stands; the page's own test."""
+    wave, greet, usage = blocks("how-to/write-a-skill.md", "python")
+    (text,) = blocks("how-to/write-a-skill.md", "yaml")
+    (tmp_path / "wave.py").write_text(wave)
+    (tmp_path / "greet.py").write_text(greet)
+    (tmp_path / "my_stack.yaml").write_text(f"{text}  greet: {{use: greet.py:Greet}}\n")
+    monkeypatch.chdir(tmp_path)
+    return usage
+
+
+def test_the_skill_of_write_a_skill_waves(skilled: str) -> None:
+    exec(compile(skilled, "how-to/write-a-skill.md", "exec"), {})
+
+
+def test_the_skill_of_write_a_skill_has_the_options_that_the_page_says(
+    skilled: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    specs = SkillTable(load_stack("my_stack.yaml")).specs
+    assert specs["wave"].summary == "Raise a hand and wave it"
+    assert parse_goal(specs["wave"], ["right", "--times", "3"], "golem skill wave") == {
+        "side": "right",
+        "times": 3,
+    }
+    with pytest.raises(ConfigError, match="1 to 10 times, not 11"):
+        run_stack(RunConfig("my_stack.yaml", skill="wave"), ["--times", "11"])
+    with pytest.raises(SystemExit):
+        run_stack(RunConfig("my_stack.yaml", skill="wave"), ["--tims", "3"])
+    assert "--times" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_skill_that_runs_skills_of_write_a_skill_waves_and_picks(
+    skilled: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run_stack(RunConfig("my_stack.yaml", skill="greet", profile="ideal")).success
+    said = capsys.readouterr().out
+    assert (
+        said.index("Wave 1 of 1.")
+        < said.index("Looking for a screw")
+        < said.index("The screw is in the tray.")
+    )
 
 
 def test_the_quickstart_shows_the_shipped_stack_and_the_defaults() -> None:

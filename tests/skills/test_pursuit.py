@@ -132,6 +132,13 @@ def test_a_skill_gets_the_result_and_the_value_of_the_one_it_calls() -> None:
     assert bench.said == [("counter", "count", "0"), ("counter", "count", "1"), ("caller", "called", "done")]
 
 
+def test_a_goal_may_be_given_by_its_fields() -> None:
+    bench = Bench()
+    _, run = bench.begin(lambda context: context.run("counter", {"to": 2}))
+    result = bench.run(run)
+    assert result is not None and result.value == Found(2)
+
+
 def test_a_cancellation_reaches_the_inner_skill_first_which_may_clean_up() -> None:
     bench = Bench()
     bench.counter.cleanup = 3
@@ -227,6 +234,7 @@ def test_what_the_machine_lacks_goes_through_every_caller() -> None:
         ("countr", Count(), "Unknown skill 'countr'; valid: counter. Did you mean 'counter'?"),
         ("counter", Found(1), "The skill 'counter' takes a Count, not a Found."),
         ("counter", Count(2**70), "is a finite number"),
+        ("counter", {"too": 1}, "Unknown goal field of counter 'too'; valid: to. Did you mean 'to'?"),
     ],
 )
 def test_a_call_without_sense_is_refused(name: str, goal: Any, words: str) -> None:

@@ -110,7 +110,7 @@ class LockstepRunner:
 
         Args:
             skill: name of one of the stack's, or one that the stack does not know.
-            goal: its goal.
+            goal: its goal, or the fields of one of the stack's skills.
             timeout: robot time after which it is given up [s]; see `StackNodes.start`.
             realtime: pace by the wall clock.
             watch: called after every tick, for judges and viewers.

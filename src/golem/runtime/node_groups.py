@@ -42,7 +42,7 @@ from golem.skills.base import Routine
 from golem.skills.context import Context, Modules
 from golem.skills.pursuit import pursue, pursue_routine
 from golem.skills.runner import SkillRun
-from golem.skills.spec import check_goal
+from golem.skills.spec import as_goal
 from golem.stack import Choice, Stack
 from golem.types import SIDES, Array, Side
 
@@ -237,7 +237,7 @@ class StackNodes:
 
         Args:
             skill: name of one of the stack's, or one that the stack does not know.
-            goal: its goal.
+            goal: its goal, or the fields of one of the stack's skills.
             timeout: robot time after which it is cancelled [s]; by default what the skill itself allows, and for one
                 that the stack does not know without end.
 
@@ -250,7 +250,7 @@ class StackNodes:
             raise GolemError("Another skill is running; cancel it first.")
         if isinstance(skill, str):
             made = self.skills.make(skill)
-            check_goal(skill, made.Goal, goal)
+            goal = as_goal(skill, made.Goal, goal)
             name, coroutine = skill, pursue(self.context, skill, made, goal, timeout)
         else:
             name = type(skill).__name__.lower()

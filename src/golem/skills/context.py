@@ -276,7 +276,7 @@ class Context:
 
         Args:
             name: of the skill.
-            goal: of its kind.
+            goal: of its kind, or its fields by name, as `{"times": 2}`.
             timeout: robot time after which it is cancelled [s]; by default what the skill itself allows.
 
         Raises:

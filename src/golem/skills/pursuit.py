@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from golem.errors import ModuleFault
 from golem.skills.base import FAULT, TIMEOUT, Routine, Skill, SkillCancelled, SkillResult
 from golem.skills.runner import LACKS, SLOT, SkillRun
-from golem.skills.spec import check_goal
+from golem.skills.spec import as_goal
 
 if TYPE_CHECKING:
     from golem.skills.context import Context
@@ -19,7 +19,7 @@ CLEANUP = 10.0
 async def call(context: Context, name: str, goal: object, timeout: float | None) -> SkillResult:
     """Pursue `goal` with the skill of the stack called `name`, for the skill that runs; see `Context.run`."""
     skill = context.modules.skill(name)
-    check_goal(name, skill.Goal, goal)
+    goal = as_goal(name, skill.Goal, goal)
     run, cancelled, result = await _pursue(context, name, skill, goal, _allowed(name, skill, goal, timeout))
     if isinstance(run.error, LACKS):
         raise run.error

@@ -122,16 +122,20 @@ def read_goal(name: str, kind: type[K], fields: Mapping[str, object]) -> K:
         raise ModuleFault("skill", name, f"its goal raised {type(error).__name__}: {error}") from error
 
 
-def check_goal(name: str, kind: type[Any], goal: object) -> None:
-    """Check the `goal` of the skill `name`, whose goals are of `kind`.
+def as_goal(name: str, kind: type[K], goal: object) -> K:
+    """Return `goal`, a `kind` or the fields of one, as a goal of the skill `name`.
 
     Raises:
-        ConfigError: it is none, or holds a number that is not finite, or far too much.
+        ConfigError: it is neither, holds a number that is not finite or far too much, or makes no sense.
+        ModuleFault: its class raised something else.
     """
+    if isinstance(goal, Mapping):
+        return read_goal(name, kind, cast("Mapping[str, object]", goal))
     if not isinstance(goal, kind):
         raise ConfigError(f"The skill '{name}' takes a {kind.__name__}, not a {type(goal).__name__}.")
     for key, value in plain(goal).items():
         _check(f"goal field of {name} '{key}'", value)
+    return goal
 
 
 def _check(what: str, value: Any, depth: int = 0) -> None:

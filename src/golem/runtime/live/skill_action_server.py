@@ -63,7 +63,7 @@ class SkillActionServer:
         try:
             stack = self._ready()
             name, fields = action.goal(goal.request)
-            run = stack.start(name, stack.skills.goal(name, fields))
+            run = stack.start(name, fields)
         except Exception as error:  # the goal is a stranger's, and its skill a user's
             reason = self._guard.caught("The goal", error)
             goal.abort(action.result(SkillResult(False, REFUSED, None, reason)))
