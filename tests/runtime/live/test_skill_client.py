@@ -17,7 +17,7 @@ from golem.middleware.ros.future import RosError
 from golem.middleware.ros.msgs.golem_interfaces import RunSkill_Goal
 from golem.middleware.ros.node import DdsNode
 from golem.runtime.live import skill_client
-from golem.runtime.live.skill_client import CANCELED, DONE, FAILED, SkillClientConfig, compose, read_words
+from golem.runtime.live.skill_client import BAD_INPUT, CANCELED, DONE, SkillClientConfig, compose, read_words
 from golem.stack import Choice
 from golem.types import TICK
 
@@ -149,7 +149,7 @@ def node(waving: Live) -> Impatient:
     ("goal", "code", "said"),
     [
         (RunSkill_Goal("wave", '{"times": 2}'), DONE, "succeeded: Waved 2 times."),
-        (RunSkill_Goal("walk", '{"x": 2}'), FAILED, "aborted: The legs, 'hold', do not walk"),
+        (RunSkill_Goal("walk", '{"x": 2}'), BAD_INPUT, "refused: The legs, 'hold', do not walk"),
     ],
 )
 def test_a_goal_is_pursued_to_its_end(

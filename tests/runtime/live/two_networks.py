@@ -33,20 +33,19 @@ LATE = ("state_stale", "command_stale", "gate_stalled")
 HERE = f"{sys.executable} -m golem"
 DESK = """
 import contextlib, json, sys, time
-from golem.middleware import public
+from golem.interfaces import public
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.wire import convert
-from golem.runtime.live.skill_client import propose, read_errand
+from golem.runtime.live.skill_client import compose, propose, read_words
 from golem.runtime.live.node_setup import member
 from golem.runtime.live.operator import ask
 
 def pursue(words):
-    action, errand = read_errand(words)
     with contextlib.redirect_stdout(sys.stderr):
-        result = propose(node, action, errand.goal, "start it").result()
+        result = propose(node, compose(node, *read_words(words), "start it"), "start it").result()
         while not result.done:
             node.spin_once(0.1)
     outcome = result.result()

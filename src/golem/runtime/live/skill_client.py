@@ -24,10 +24,11 @@ from golem.runtime.goal_parser import HELP, parse_goal
 from golem.runtime.live.node_setup import ANSWER, SEARCH, find, log_line, member, until
 from golem.runtime.live.skill_messages import RUN, read_list
 from golem.runtime.skill_table import SkillTable
+from golem.skills.base import REFUSED
 from golem.skills.spec import SkillSpec
 from golem.stack import Choice, Stack, load_stack
 
-DONE, FAILED, CANCELED = 0, 1, 130
+DONE, FAILED, BAD_INPUT, CANCELED = 0, 1, 2, 130
 """Exit codes."""
 Specs = Mapping[str, SkillSpec]
 """What is known of skills, by name."""
@@ -177,13 +178,16 @@ def pursue(node: RosNode, goal: RunSkill_Goal, remedy: str, stop: threading.Even
         asked = pursued.cancel()
     outcome = result.result()
     ended = outcome.result.result
-    log_line(f"{GoalStatus(outcome.status).name.lower()}: {ended.reason}")
+    refused = ended.stage == REFUSED
+    log_line(f"{'refused' if refused else GoalStatus(outcome.status).name.lower()}: {ended.reason}")
     for timing in ended.timings:
         log_line(f"  {timing.name} {timing.seconds:.1f} s")
     if outcome.result.value:
         log_line(f"  {outcome.result.value}")
     if outcome.status is GoalStatus.SUCCEEDED:
         return DONE
+    if refused:
+        return BAD_INPUT
     return CANCELED if outcome.status is GoalStatus.CANCELED else FAILED
 
 
