@@ -7,20 +7,22 @@ import sys
 import webbrowser
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
+from typing import get_type_hints
 
 import tyro
 from tyro.conf import Positional
 
 from golem.dashboard.live import LiveView
-from golem.errors import ConfigError, unknown_name
+from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.robots.base import Robot
 from golem.robots.mujoco.config import World
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.goal_parser import HELP, parse_goal
+from golem.runtime.goal_parser import parse_goal
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.runtime.skill_table import SkillTable
 from golem.skills.base import SkillResult
@@ -64,13 +66,28 @@ class RunConfig:
     """Serve a skill to Foxglove on port 8765, paced by the wall clock."""
 
 
+OPTIONS = get_type_hints(RunConfig)
+"""Type of each option of `golem run`, by its name."""
+
+
 def read_run(words: list[str]) -> tuple[RunConfig, list[str]]:
-    """Return what the words after `golem run` say: the options, and what is left for the skill's goal."""
-    named = any(word.partition("=")[0] == "--skill" for word in words)
-    helps = [word for word in words if word in HELP and named]  # about the goal
-    rest = [word for word in words if word not in helps]
-    config, goal = tyro.cli(RunConfig, prog="golem run", args=rest, return_unknown_args=True)
-    return config, [*goal, *helps]
+    """Return what the words after `golem run` say: the options, and what is left for the skill's goal.
+
+    The goal's words stand behind `--skill NAME`, options of `golem run` among them or before.
+    """
+    at = next((i for i, word in enumerate(words) if word.partition("=")[0] == "--skill"), len(words))
+    end = at + (1 if "=" in "".join(words[at : at + 1]) else 2)
+    own, goal = words[:end], []
+    rest = iter(words[end:])
+    for word in rest:
+        name = word.partition("=")[0].removeprefix("--no-").removeprefix("--")
+        if not word.startswith("--") or name not in OPTIONS:
+            goal.append(word)
+        elif "=" in word or OPTIONS[name] is bool:
+            own.append(word)
+        else:
+            own += [word, *islice(rest, 1)]
+    return tyro.cli(RunConfig, prog="golem run", args=own), goal
 
 
 def run_stack(config: RunConfig, goal_words: Sequence[str] = ()) -> SkillResult:
@@ -86,12 +103,7 @@ def run_stack(config: RunConfig, goal_words: Sequence[str] = ()) -> SkillResult:
         stack = replace(stack, robot=robot)
     if config.operate and config.skill is not None:
         raise ConfigError("--operate lets you start skills by hand; give it or --skill, not both.")
-    options = [field.name for field in fields(RunConfig)]
     if config.operate or (config.skill is None and stack.on_ground):
-        if goal_words:
-            raise unknown_name(
-                "option of golem run without --skill", goal_words[0], [f"--{name}" for name in options]
-            )
         if config.record is not None or config.foxglove:
             raise ConfigError(
                 "--record and --foxglove are for a skill: add --skill pick. A robot that is operated lives on a "
@@ -100,7 +112,7 @@ def run_stack(config: RunConfig, goal_words: Sequence[str] = ()) -> SkillResult:
         return _operate(config, stack)
     name, skills = config.skill or "pick", SkillTable(stack)
     prog = f"golem run {config.stack} --skill {name}"
-    goal = skills.goal(name, parse_goal(skills.spec(name), list(goal_words), prog, options))
+    goal = skills.goal(name, parse_goal(skills.spec(name), list(goal_words), prog, OPTIONS))
     running, robot = build(stack, config.seed)
     narrator = Narrator(running)
     with ExitStack() as closing:
