@@ -175,6 +175,11 @@ class LegsInterface:
         self._context = context
 
     @property
+    def reporting(self) -> bool:
+        """Whether they have said anything yet."""
+        return self._context.bus.latest(topics.LEG_STATUS) is not None
+
+    @property
     def status(self) -> LegStatus:
         """What the base layer of the legs reports now.
 

@@ -15,6 +15,8 @@ from golem.types import PlanarPose, Twist
 ZERO = Twist()
 MAX_TIMEOUT = 3600.0
 """Longest walk [s] [own: what is given more time is a mistake, or needs a map]."""
+FIRST_REPORT = 0.1
+"""Time the legs get to report at all [s]."""
 MARGIN = 10.0
 """Time a skill of this file gets on top of what its goal says [s]: it ends by itself unless it hangs."""
 
@@ -74,6 +76,8 @@ class Walk:
 
     async def _pursue(self, context: Context, goal: WalkGoal) -> SkillResult:
         start = context.t
+        # Of a robot that was built a moment ago they do so at its first tick.
+        await context.until(lambda: context.legs.reporting, FIRST_REPORT)
         target = PlanarPose(goal.x, goal.y, goal.yaw)
         if goal.frame == "base_link":
             target = PlanarPose.of(context.legs.pose) @ target
