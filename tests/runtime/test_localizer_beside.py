@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from golem.errors import MissingExtra
+from golem.errors import MissingExtra, unknown_name
 from golem.interfaces import topics
 from golem.interfaces.payloads import DetectionRequest, ModuleFaultMsg
 from golem.middleware.bus import Bus
@@ -93,3 +93,17 @@ def test_what_this_machine_lacks_ends_the_look_and_not_the_process() -> None:
         node.step(1.002)
     fault = bus.latest(topics.MODULE_FAULT)
     assert fault is not None and fault.slot == "localizer" and "torch" in fault.reason
+
+
+def test_a_label_that_it_does_not_know_is_the_users_error() -> None:
+    class Picky(Eyes):
+        def locate(self, frame: RgbdImage, labels: Sequence[str]) -> list[LocalizedObject]:
+            raise unknown_name("label", labels[0], ["screw"])
+
+    bus = Bus()
+    bus.publish(topics.detection_request("head"), DetectionRequest(("screws",)), 0.0)
+    node = LocalizerNode(bus, Picky(), "head", ContractCheck("localizer", "eyes"))
+    bus.publish(topics.rgbd_images("head"), frame(1.0), 1.0)
+    node.step(1.0)
+    said = "Unknown label 'screws'; valid: screw. Did you mean 'screw'?"
+    assert bus.latest(topics.MODULE_FAULT) == ModuleFaultMsg(None, said, "refused")

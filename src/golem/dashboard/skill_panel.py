@@ -64,18 +64,15 @@ class SkillPanel:
         """Add the input of one field; what is neither a number nor a word is written as JSON."""
         hint, value = of.get("description"), of.get("default")
         if "enum" in of:
-            return self._gui.add_dropdown(
-                name,
-                list(map(str, of["enum"])),
-                initial_value=None if value is None else str(value),
-                hint=hint,
-            )
+            names = [str(each) for each in of["enum"]]
+            first = str(value) if "default" in of else names[0]
+            return self._gui.add_dropdown(name, names, initial_value=first, hint=hint)
         match of.get("type"):
             case "boolean":
                 return self._gui.add_checkbox(name, bool(value), hint=hint)
             case "integer" | "number":
                 step = 1 if of["type"] == "integer" else 0.01
-                return self._gui.add_number(name, value or 0 * step, step=step, hint=hint)
+                return self._gui.add_number(name, value or 0 * step, step=step, hint=hint)  # 0, or 0.0
             case "string":
                 return self._gui.add_text(name, value or "", hint=hint)
             case _:

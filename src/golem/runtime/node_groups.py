@@ -40,7 +40,7 @@ from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode
 from golem.runtime.skill_table import SkillTable
 from golem.skills.base import Routine
 from golem.skills.context import Context, Modules
-from golem.skills.pursuit import pursue, pursue_routine
+from golem.skills.pursuit import pursue
 from golem.skills.runner import SkillRun
 from golem.skills.spec import as_goal
 from golem.stack import Choice, Stack
@@ -249,14 +249,12 @@ class StackNodes:
         if self.busy:
             raise GolemError("Another skill is running; cancel it first.")
         if isinstance(skill, str):
-            made = self.skills.make(skill)
-            goal = as_goal(skill, made.Goal, goal)
-            name, coroutine = skill, pursue(self.context, skill, made, goal, timeout)
+            name, routine = skill, self.skills.make(skill)
+            goal = as_goal(name, routine.Goal, goal)
         else:
-            name = type(skill).__name__.lower()
-            coroutine = pursue_routine(self.context, name, skill, goal, timeout or math.inf)
+            name, routine, timeout = type(skill).__name__.lower(), skill, timeout or math.inf
         self.context.release_arms()
-        self.running.run = SkillRun(name, coroutine)
+        self.running.run = SkillRun(name, pursue(self.context, name, routine, goal, timeout))
         return self.running.run
 
     @property

@@ -137,14 +137,7 @@ class LocalizerNode:
             self._bus.publish(topics.detections(self._camera), found(), t, self._latency)
         except ModuleFault as fault:
             if labels == self._wanted():
-                refusal = fault.__cause__  # a label it does not know is the user's error, by the contract
-                refused = isinstance(refusal, ConfigError)
-                message = (
-                    ModuleFaultMsg(None, str(refusal), "refused")
-                    if refused
-                    else ModuleFaultMsg(fault.slot, str(fault))
-                )
-                self._bus.publish(topics.MODULE_FAULT, message, t)
+                self._bus.publish(topics.MODULE_FAULT, _message(fault), t)
         except (MissingExtra, MissingSystemLibrary) as lack:
             if self._pool is None:
                 raise
@@ -157,6 +150,13 @@ class LocalizerNode:
             self._contract.array("position", o.position, 3)
             self._contract.array("points", o.points, None, 3)
         return Detections(frame.t, self._camera, objects)
+
+
+def _message(fault: ModuleFault) -> ModuleFaultMsg:
+    """Return what a localizer did; a label that it does not know is the user's error, by the contract."""
+    if isinstance(fault.__cause__, ConfigError):
+        return ModuleFaultMsg(None, str(fault.__cause__), "refused")
+    return ModuleFaultMsg(fault.slot, str(fault))
 
 
 def detection_requested(bus: Bus, camera: str) -> Callable[[], bool]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from golem.errors import ModuleFault
 from golem.skills.base import FAULT, TIMEOUT, Routine, Skill, SkillCancelled, SkillResult
@@ -20,7 +20,7 @@ async def call(context: Context, name: str, goal: object, timeout: float | None)
     """Pursue `goal` with the skill of the stack called `name`, for the skill that runs; see `Context.run`."""
     skill = context.modules.skill(name)
     goal = as_goal(name, skill.Goal, goal)
-    run, cancelled, result = await _pursue(context, name, skill, goal, _allowed(name, skill, goal, timeout))
+    run, cancelled, result = await _pursue(context, name, skill, goal, timeout)
     if isinstance(run.error, LACKS):
         raise run.error
     if cancelled:
@@ -29,36 +29,25 @@ async def call(context: Context, name: str, goal: object, timeout: float | None)
 
 
 async def pursue(
-    context: Context, name: str, skill: Skill[Context, Any], goal: object, timeout: float | None
+    context: Context, name: str, routine: Routine[Context, Any], goal: object, timeout: float | None
 ) -> SkillResult:
-    """Pursue `goal` with `skill`, called `name`, which no other skill calls, and return how that ended.
+    """Pursue `goal` with `routine`, called `name`, which no other skill calls, and return how that ended.
 
-    A `timeout` of None is what the skill itself allows [s]. What the skill raises that no skill should goes further.
+    A `timeout` of None is what a skill itself allows [s]. What the routine raises that no skill should goes further.
     """
-    return await pursue_routine(context, name, skill, goal, _allowed(name, skill, goal, timeout))
-
-
-async def pursue_routine(
-    context: Context, name: str, routine: Routine[Context, Any], goal: object, allowed: float
-) -> SkillResult:
-    """Do as `pursue` with what allows itself no time."""
-    run, _, result = await _pursue(context, name, routine, goal, allowed)
+    run, _, result = await _pursue(context, name, routine, goal, timeout)
     if run.error is not None:
         raise run.error
     return result
 
 
-def _allowed(name: str, skill: Skill[Context, Any], goal: object, timeout: float | None) -> float:
-    allowed = skill.timeout(goal) if timeout is None else timeout
-    if not allowed > 0.0:
-        raise ModuleFault(SLOT, name, f"its timeout is {allowed}, not a positive time")
-    return allowed
-
-
 async def _pursue(
-    context: Context, name: str, routine: Routine[Context, Any], goal: object, allowed: float
+    context: Context, name: str, routine: Routine[Context, Any], goal: object, timeout: float | None
 ) -> tuple[SkillRun, bool, SkillResult]:
     """Return the run, whether it was cancelled from above, and how it ended."""
+    allowed = cast("Skill[Context, Any]", routine).timeout(goal) if timeout is None else timeout
+    if not allowed > 0.0:
+        raise ModuleFault(SLOT, name, f"its timeout is {allowed}, not a positive time")
     caller, context.skill = context.skill, name
     run, end = SkillRun(name, routine.run(context, goal)), context.t + allowed
     late = cancelled = False

@@ -164,10 +164,9 @@ def summary(kind: type[Any]) -> str:
 
 
 def _doc(kind: type[Any]) -> str:
+    """Return what somebody wrote about a class; a dataclass without a docstring is given its signature as one."""
     text = inspect.cleandoc(vars(kind).get("__doc__") or "")
-    return (
-        "" if text.startswith(f"{kind.__name__}(") else text
-    )  # the signature, which dataclasses write there
+    return "" if text.startswith(f"{kind.__name__}(") else text
 
 
 def _notes(kind: type[Any]) -> dict[str, str]:
