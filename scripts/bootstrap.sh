@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # Usage: scripts/bootstrap.sh GROUP...     GROUP is the name of a lock in requirements/: cluster, core, dds, dev, docs, pink, record, report, train
 #
-# Creates .venv with the locked packages of every GROUP and this package itself, and sees to it that they find their
-# system libraries. Needs Python 3.11-3.13 and a network to the package index; brings everything else: uv goes to .uv/
-# unless it is installed, and what the operating system lacks is installed where that is allowed (root on Debian or
-# Ubuntu) or named with the line to type. Does nothing when .venv already is what the locks say.
+# Creates .venv, or $VENV, with the locked packages of every GROUP and this package itself, and sees to it that they find
+# their system libraries. Needs Python 3.11-3.13 and a network to the package index; brings everything else: uv goes to
+# .uv/ unless it is installed, and what the operating system lacks is installed where that is allowed (root on Debian or
+# Ubuntu) or named with the line to type. Does nothing when the environment already is what the locks say.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+venv=${VENV:-.venv}
 
 die() {
     printf 'golem: %s\n' "$@" >&2
@@ -61,11 +62,11 @@ find_uv() {
 
 # Asks golem itself whether native code loads and MuJoCo can draw; its answer names the line to type.
 see_to_system() {
-    local doctor=".venv/bin/python -m golem.doctor"
+    local doctor="$venv/bin/python -m golem.doctor"
     $doctor 2> /dev/null && return
     if [ "$(id -u)" = 0 ] && command -v apt-get > /dev/null; then
         # shellcheck disable=SC2046
-        apt "system libraries are missing" $(.venv/bin/python -c "import golem.doctor as d; print(*d.DEBIAN_PACKAGES)")
+        apt "system libraries are missing" $("$venv/bin/python" -c "import golem.doctor as d; print(*d.DEBIAN_PACKAGES)")
     fi
     $doctor || exit 2
 }
@@ -75,24 +76,24 @@ export UV_PYTHON_DOWNLOADS=never UV_NO_PROGRESS=1
 locks=()
 for group in "$@"; do
     [ -f "requirements/$group.txt" ] || die "no lock requirements/$group.txt; groups: cluster, core, dds, dev, docs, pink, record, report, train"
-    stamp=".venv/.golem-$group"
+    stamp="$venv/.golem-$group"
     sum=$(cat "requirements/$group.txt" pyproject.toml | cksum)
-    if [ ! -x .venv/bin/golem ] || [ "$sum" != "$(cat "$stamp" 2> /dev/null)" ]; then
+    if [ ! -x "$venv/bin/golem" ] || [ "$sum" != "$(cat "$stamp" 2> /dev/null)" ]; then
         locks+=("$group")
     fi
 done
 [ "${#locks[@]}" -gt 0 ] || exit 0
 
 find_uv "$python"
-if ! .venv/bin/python -c 'import sys' 2> /dev/null; then
-    "$uv" venv --quiet --clear --python "$python" .venv
+if ! "$venv/bin/python" -c 'import sys' 2> /dev/null; then
+    "$uv" venv --quiet --clear --python "$python" "$venv"
 fi
-echo "golem: installing the locked packages (${locks[*]}) into .venv" >&2
+echo "golem: installing the locked packages (${locks[*]}) into $venv" >&2
 for group in "${locks[@]}"; do
-    "$uv" pip install --quiet --python .venv/bin/python --require-hashes -r "requirements/$group.txt"
+    "$uv" pip install --quiet --python "$venv/bin/python" --require-hashes -r "requirements/$group.txt"
 done
-"$uv" pip install --quiet --python .venv/bin/python --no-deps --editable .
+"$uv" pip install --quiet --python "$venv/bin/python" --no-deps --editable .
 see_to_system
 for group in "${locks[@]}"; do
-    cat "requirements/$group.txt" pyproject.toml | cksum > ".venv/.golem-$group"
+    cat "requirements/$group.txt" pyproject.toml | cksum > "$venv/.golem-$group"
 done

@@ -45,7 +45,7 @@ def cable() -> Iterator[tuple[End, End]]:
     """
     if shutil.which("ip") is None:
         raise NoNamespaces("needs the program ip (iproute2)")
-    number = os.getpid() % 10000
+    number = os.getpid()
     ends = End(f"golema{number}", f"vea{number}"), End(f"golemb{number}", f"veb{number}")
     made = subprocess.run(["ip", "netns", "add", ends[0].space], capture_output=True, text=True, check=False)
     if made.returncode != 0:

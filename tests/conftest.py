@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from tests.domains import free_domain
 
 # MuJoCo reads this at its first import, so it must be set before any test module is collected.
 if sys.platform == "linux" and not os.environ.get("DISPLAY"):
@@ -31,3 +33,10 @@ def shared() -> Path:
     if not path.is_dir():
         pytest.skip("needs the reference material in ../shared, which is not part of this repository")
     return path
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """A DDS domain that belongs to this test alone."""
+    with free_domain() as number:
+        yield number

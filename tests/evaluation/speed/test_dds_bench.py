@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -48,15 +47,14 @@ def test_bad_options_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.alone
-def test_a_short_bench_loses_no_state_and_no_command(capsys: pytest.CaptureFixture[str]) -> None:
-    domain = 20 + os.getpid() % 180
+def test_a_short_bench_loses_no_state_and_no_command(capsys: pytest.CaptureFixture[str], domain: int) -> None:
     loops = run_dds_bench(DdsBenchConfig(seconds=1.0, domain=domain))
     assert [(loop.states, loop.lost_states, loop.lost_commands) for loop in loops] == [(500, 0, 0)] * 2
     assert "lost states" in capsys.readouterr().out
 
 
 @pytest.mark.slow
-def test_a_process_that_fails_is_named(tmp_path: Path) -> None:
+def test_a_process_that_fails_is_named(tmp_path: Path, domain: int) -> None:
     (tmp_path / "unitree_sdk2py").mkdir()
     with pytest.raises(BenchFailed, match="controller's process"):
-        run_dds_bench(DdsBenchConfig(seconds=0.1, domain=20 + os.getpid() % 180, sdk=tmp_path))
+        run_dds_bench(DdsBenchConfig(seconds=0.1, domain=domain, sdk=tmp_path))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import json
-import os
 import re
 import signal
 import subprocess
@@ -33,13 +31,7 @@ from golem.middleware.ros.msgs.std_msgs import Header, String
 from golem.middleware.wire.convert import decode_low_state, encode_low_state
 from golem.types import Imu, LowState
 
-_used = itertools.count()
 DESCRIPTION, COLOR, STATE = "/robot_description", "/realsense/head/color/image_raw", "/lowstate"
-
-
-@pytest.fixture
-def domain() -> int:
-    return 20 + (os.getpid() * 7 + 90 + next(_used)) % 180
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -35,9 +34,9 @@ class Clock:
 class World:
     """Makes nodes, each with its own participant, and spins them."""
 
-    def __init__(self, join: Callable[[], Participant] | None, pause: float) -> None:
-        """Take participants from `join`, or nodes from rclpy; `pause` [s] between looks at the network."""
-        self._join, self._pause = join, pause
+    def __init__(self, join: Callable[[], Participant] | None, pause: float, domain: int = 0) -> None:
+        """Take participants from `join`, or nodes of rclpy on `domain`; `pause` [s] between looks at the network."""
+        self._join, self._pause, self._domain = join, pause, domain
         self._participants: dict[DdsNode, Participant | None] = {}
         self._clock = Clock()
 
@@ -56,7 +55,7 @@ class World:
     def node(self, name: str, namespace: str = "/") -> DdsNode:
         """A new node; over rclpy it only looks like one of ours."""
         if self._join is None:
-            node: Any = RclpyNode(name, namespace, domain_id())
+            node: Any = RclpyNode(name, namespace, self._domain)
             self._participants[node] = None
             return node
         participant = self._join()
@@ -114,7 +113,7 @@ TRANSPORTS = ("local", "cyclone", "rclpy") if importlib.util.find_spec("rclpy") 
 
 
 @pytest.fixture(params=TRANSPORTS)
-def world(request: pytest.FixtureRequest) -> Iterator[World]:
+def world(request: pytest.FixtureRequest, domain: int) -> Iterator[World]:
     """Nodes on each transport."""
     if request.param == "local":
         world = World(LocalDomain().participant, 0.0)
@@ -123,17 +122,9 @@ def world(request: pytest.FixtureRequest) -> Iterator[World]:
         from golem.middleware.dds.connect import connect
         from golem.middleware.dds.domain import DdsConfig
 
-        config = DdsConfig(domain=domain_id())
+        config = DdsConfig(domain=domain)
         world = World(lambda: connect(config, PARTICIPANT_USER_DATA), 0.005)
     else:
-        world = World(None, 0.005)
+        world = World(None, 0.005, domain)
     yield world
     world.close()
-
-
-def domain_id(foreign: bool = False) -> int:
-    """Return the DDS domain of this test process; another one for tests that put `foreign` software on it, too.
-
-    What that leaves open would else keep later tests from opening the domain their own way.
-    """
-    return 20 + (os.getpid() + 90 * foreign) % 181

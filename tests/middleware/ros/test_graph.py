@@ -18,7 +18,7 @@ from golem.middleware.ros.codec import dds_name, type_hash
 from golem.middleware.ros.graph import INFO, PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import DdsNode
 
-from .conftest import PICK, SET_BOOL, STRING, domain_id
+from .conftest import PICK, SET_BOOL, STRING
 
 
 class Handler:
@@ -91,17 +91,17 @@ def test_an_unknown_distro_is_refused() -> None:
         DdsNode(LocalDomain().participant(), "twin", distro="noetic")
 
 
-def test_peers_are_told_hashes_and_identities() -> None:
+def test_peers_are_told_hashes_and_identities(domain: int) -> None:
     pytest.importorskip("cyclonedds")
     from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
 
-    participant = connect(DdsConfig(domain=domain_id(foreign=True)), PARTICIPANT_USER_DATA)
+    participant = connect(DdsConfig(domain=domain), PARTICIPANT_USER_DATA)
     node = DdsNode(participant, "twin")
     node.publisher("chatter", STRING)
     node.service("set", SET_BOOL, lambda request: request)
     node.client("set", SET_BOOL)
-    told = user_data(domain_id(foreign=True))
+    told = user_data(domain)
     node.close()
     participant.close()
     assert told["rt/chatter", "writer"] == {"typehash": type_hash(STRING)}

@@ -18,7 +18,7 @@ from golem.middleware.ros.goals import CancelCode, GoalStatus
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import DdsNode
 
-from .conftest import PICK, SET_BOOL, domain_id
+from .conftest import PICK, SET_BOOL
 
 pytest.importorskip("cyclonedds")
 
@@ -31,9 +31,9 @@ Pick, SetBool = action(PICK), service(SET_BOOL)
 class Peer:
     """The other process."""
 
-    def __init__(self) -> None:
+    def __init__(self, domain: int) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, str(PEER), str(domain_id())],
+            [sys.executable, str(PEER), str(domain)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -52,11 +52,11 @@ class Peer:
 
 
 @pytest.fixture
-def node() -> Iterator[DdsNode]:
+def node(domain: int) -> Iterator[DdsNode]:
     from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
 
-    participant = connect(DdsConfig(domain=domain_id()), PARTICIPANT_USER_DATA)
+    participant = connect(DdsConfig(domain=domain), PARTICIPANT_USER_DATA)
     node = DdsNode(participant, "here")
     yield node
     node.close()
@@ -71,8 +71,8 @@ def reach(node: DdsNode, client: DdsActionClient) -> None:
     raise AssertionError("the peer was not found")
 
 
-def test_a_service_and_an_action_between_two_processes(node: DdsNode) -> None:
-    peer = Peer()
+def test_a_service_and_an_action_between_two_processes(node: DdsNode, domain: int) -> None:
+    peer = Peer(domain)
     setter, picker = node.client("set", SET_BOOL), node.action_client("pick", PICK)
     reach(node, picker)
     assert setter.ready()
@@ -99,18 +99,18 @@ def test_a_service_and_an_action_between_two_processes(node: DdsNode) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("at_once", [False, True], ids=["after its lease", "within its lease"])
-def test_a_killed_server_is_missed_and_its_successor_found(node: DdsNode, at_once: bool) -> None:
-    peer = Peer()
+def test_a_killed_server_is_missed_and_its_successor_found(node: DdsNode, domain: int, at_once: bool) -> None:
+    peer = Peer(domain)
     picker = node.action_client("pick", PICK)
     reach(node, picker)
     goal = node.wait(picker.send_goal(Pick.Goal("forever")), TIMEOUT)
     outcome = goal.result()
     peer.kill()
-    successor = Peer() if at_once else None
+    successor = Peer(domain) if at_once else None
     # Nothing said goodbye: it is missed once its lease has run out, 10 s in ROS 2.
     with pytest.raises(RosError, match="has gone"):
         node.wait(outcome, TIMEOUT)
-    successor = successor or Peer()
+    successor = successor or Peer(domain)
     reach(node, picker)
     again = node.wait(picker.send_goal(Pick.Goal("screw")), TIMEOUT)
     assert node.wait(again.result(), TIMEOUT).status is GoalStatus.SUCCEEDED

@@ -21,7 +21,7 @@ from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.node import DdsNode
 from golem.middleware.ros.service import Header, pack, unpack
 
-from .conftest import SET_BOOL, World, domain_id
+from .conftest import SET_BOOL, World
 
 SetBool = service(SET_BOOL)
 
@@ -82,12 +82,12 @@ def test_a_reply_waits_until_its_reader_is_known(world: World) -> None:
 
 
 @pytest.fixture
-def cyclone() -> Iterator[DdsNode]:
+def cyclone(domain: int) -> Iterator[DdsNode]:
     pytest.importorskip("cyclonedds")
     from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
 
-    participant = connect(DdsConfig(domain=domain_id(foreign=True)))
+    participant = connect(DdsConfig(domain=domain))
     yield DdsNode(participant, "here")
     participant.close()
 
@@ -101,22 +101,22 @@ def until(node: DdsNode, condition: Callable[[], object]) -> Any:
     raise AssertionError("nothing happened for too long")
 
 
-def test_another_implementation_is_answered(cyclone: DdsNode) -> None:
+def test_another_implementation_is_answered(cyclone: DdsNode, domain: int) -> None:
     from .typed_peer import Endpoints, Request
 
     cyclone.service("set", SET_BOOL, lambda request: SetBool.Response(request.data, "here"))
-    client = Endpoints(domain_id(foreign=True), server=False)
+    client = Endpoints(domain, server=False)
     until(cyclone, client.matched)
     client.writer.write(Request(2**63 + 5, 77, True))
     (reply,) = until(cyclone, lambda: client.reader.take(1))
     assert (reply.guid, reply.seq, reply.success, reply.message) == (2**63 + 5, 77, True, "here")
 
 
-def test_another_implementation_answers(cyclone: DdsNode) -> None:
+def test_another_implementation_answers(cyclone: DdsNode, domain: int) -> None:
     from .typed_peer import Endpoints, Response
 
     client = cyclone.client("set", SET_BOOL)
-    server = Endpoints(domain_id(foreign=True), server=True)
+    server = Endpoints(domain, server=True)
     until(cyclone, lambda: client.ready() and server.matched())
     answer = client.call(SetBool.Request(True))
     (request,) = until(cyclone, lambda: server.reader.take(1))

@@ -1,12 +1,12 @@
 from __future__ import annotations
 
-import os
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import pytest
+from tests.domains import free_domain
 from tests.middleware.wire.rpc import call, reach, serve
 
 from golem.middleware.dds.base import DEFAULT, Participant
@@ -34,15 +34,17 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[], Participant]]:
     from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
 
-    def joined() -> Participant:
-        members.append(connect(DdsConfig(20 + (os.getpid() * 3 + 1) % 180)))
-        return members[-1]
+    with free_domain() as number:
 
-    try:
-        yield joined
-    finally:
-        for member in members:
-            member.close()
+        def joined() -> Participant:
+            members.append(connect(DdsConfig(number)))
+            return members[-1]
+
+        try:
+            yield joined
+        finally:
+            for member in members:
+                member.close()
 
 
 @contextmanager

@@ -18,12 +18,6 @@ Started = Callable[..., subprocess.Popen[str]]
 
 
 @pytest.fixture
-def domain() -> int:
-    """A DDS domain for this test."""
-    return 20 + os.getpid() % 180
-
-
-@pytest.fixture
 def sdk() -> Iterator[Started]:
     """Starts a script of this folder with arguments; all are killed in the end."""
     pytest.importorskip("cyclonedds")

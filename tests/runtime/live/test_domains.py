@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import os
 import subprocess
 import sys
 import threading
@@ -28,14 +26,13 @@ from golem.runtime.live.process import TwinConfig, run_twin
 from golem.runtime.live.topic_stats import survey
 
 ROBOT = DdsConfig(domain=0, interface="eth7", robot=True)
-_used = itertools.count()
 
 
 @pytest.fixture
-def here() -> DdsConfig:
-    """A domain that no other test of this run uses."""
+def here(domain: int) -> DdsConfig:
+    """A domain that no other test uses."""
     pytest.importorskip("cyclonedds")
-    return DdsConfig(domain=20 + (os.getpid() * 7 + next(_used)) % 180)
+    return DdsConfig(domain=domain)
 
 
 def test_domain_0_is_refused_unless_the_robot_is_meant() -> None:

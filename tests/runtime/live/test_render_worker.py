@@ -9,7 +9,6 @@ import time
 
 import numpy as np
 import pytest
-from tests.middleware.ros.conftest import domain_id
 
 from golem.interfaces import public, topics
 from golem.middleware.bus import Bus
@@ -63,14 +62,14 @@ def test_nothing_is_rendered_unless_somebody_listens() -> None:
 
 @pytest.mark.slow
 def test_time_waits_for_a_late_image_and_once_for_one_that_does_not_come(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, domain: int
 ) -> None:
     pytest.importorskip("cyclonedds")
     monkeypatch.setattr(live_darkroom, "PATIENCE", 0.5)
     stack = Stack(profile="ideal")
     robot = build_robot(stack, 0)
     assert isinstance(robot, Restorable)
-    render_worker = RenderWorker(stack, 0, robot, DdsConfig(domain=domain_id()))
+    render_worker = RenderWorker(stack, 0, robot, DdsConfig(domain=domain))
     (process,) = multiprocessing.active_children()
     assert process.pid is not None
 
