@@ -34,7 +34,9 @@ def test_sweeping_arms_cost_margin() -> None:
     assert 2.0 * quiet["base_range"] < arms["base_range"] < 2 * 0.023
 
 
-@pytest.mark.parametrize("index", range(3))  # backwards, sideways, turning: the first three of the envelope's ends
+@pytest.mark.parametrize(
+    "index", range(3)
+)  # backwards, sideways, turning: the first three of the envelope's ends
 def test_the_twist_is_tracked(index: int) -> None:
     figures = measured("tracking", index)
     assert any(figures[axis] for axis in ("vx", "vy", "wz"))
