@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from golem import registry
-from golem.evaluation.push_bench import Trial
-from golem.evaluation.subject import Subject
+from golem.evaluation.base import RUNGS, TrialSpec
+from golem.evaluation.rungs.push_limit import PushLimit
 from golem.stack import Stack, load_stack, parse_stack
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -35,9 +36,27 @@ def test_the_legs_of_write_a_module_stand_by_its_estimator(tmp_path: Path) -> No
     file, mine = tmp_path / "my_legs.py", tmp_path / "my_estimator.py"
     file.write_text(legs)
     mine.write_text(estimator)
-    subject = Subject(f"{file}:Stiff", "ideal", use={"estimator": f"{mine}:Smooth"})
-    trial = Trial(subject, "shove", "standing", ("front",), 5.0, index=0, seed=0)
-    assert trial.run() == {"front": None}
+    case = {"terms": "stack", "phase": "standing", "direction": "front", "level": 5.0}
+    use = {"estimator": f"{mine}:Smooth"}
+    trial = TrialSpec("push-limit", f"{file}:Stiff", "ideal", seed=0, index=0, overrides=use, case=case)
+    assert PushLimit().run(trial, None).success
+
+
+def test_the_rung_of_compare_modules_judges() -> None:
+    (code,) = blocks("how-to/compare.md", "python")
+    space: dict[str, Any] = {}
+    exec(compile(code, "how-to/compare.md", "exec"), space)
+    stiff = f"{Path(__file__).parent / 'evaluation' / 'leg_methods.py'}:Stiff"
+    outcome = space["StandStill"]().run(TrialSpec("stand-still", stiff, "ideal", 0, 0), None)
+    assert outcome.success and outcome.series["margin_min"] > 0.05
+
+
+def test_the_table_of_rungs_is_complete() -> None:
+    page = (DOCS / "how-to/compare.md").read_text(encoding="utf-8")
+    shown = [
+        name for row in re.findall(r"^\| (`.*?`) \|", page, re.M) for name in re.findall(r"`([\w-]+)`", row)
+    ]
+    assert sorted(shown) == sorted(RUNGS)
 
 
 def test_the_stack_of_write_a_module_is_valid() -> None:

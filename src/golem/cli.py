@@ -45,12 +45,16 @@ def _run(words: list[str]) -> int:
 def _ladder(words: list[str]) -> int:
     """Compare methods on one rung of the capability ladder, on the same seeds."""
     _prepare_graphics()
-    from golem.evaluation.harness.ladder import LadderConfig, run_ladder
+    from golem.evaluation.harness.ladder import read_ladder, run_ladder
 
-    config = _parse(LadderConfig, "ladder", words)
+    config = read_ladder(words)
+    if config.show is not None:
+        from golem.run import show_trial
+
+        return 0 if show_trial(config).success else FAILED
     result = run_ladder(config)
-    print(result.summary.text())
-    print(f"Report: {result.report}")
+    print(result.text())
+    print(f"Report: {result.report}" if result.report else result.note)
     if config.json:
         print(result.summary.json())
     return 0
@@ -61,6 +65,14 @@ def _compare(words: list[str]) -> int:
     from golem.evaluation.metrics.compare import CompareConfig, run_compare
 
     run_compare(_parse(CompareConfig, "compare", words))
+    return 0
+
+
+def _results(words: list[str]) -> int:
+    """Write the tables of run folders as Markdown, as they stand in the documentation."""
+    from golem.evaluation.metrics.results import ResultsConfig, run_results
+
+    run_results(_parse(ResultsConfig, "results", words))
     return 0
 
 
@@ -89,21 +101,9 @@ def _model(words: list[str]) -> int:
 
 
 def _bench(words: list[str]) -> int:
-    """Print every performance figure beside its reference; `bench push|legs|estimation|dds` test one thing each."""
+    """Print every performance figure beside its reference; `bench dds`: the loop between two processes."""
     _prepare_graphics()
-    if words[:1] == ["push"]:
-        from golem.evaluation.push_bench import PushBenchConfig, run_push_bench
-
-        run_push_bench(_parse(PushBenchConfig, "bench push", words[1:]))
-    elif words[:1] == ["legs"]:
-        from golem.evaluation.leg_bench import LegBenchConfig, run_leg_bench
-
-        run_leg_bench(_parse(LegBenchConfig, "bench legs", words[1:]))
-    elif words[:1] == ["estimation"]:
-        from golem.evaluation.estimation import EstimationConfig, run_estimation
-
-        run_estimation(_parse(EstimationConfig, "bench estimation", words[1:]))
-    elif words[:1] == ["dds"]:
+    if words[:1] == ["dds"]:
         from golem.evaluation.speed.dds_bench import DdsBenchConfig, run_dds_bench
 
         run_dds_bench(_parse(DdsBenchConfig, "bench dds", words[1:]))
@@ -239,6 +239,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "run": _run,
     "ladder": _ladder,
     "compare": _compare,
+    "results": _results,
     "model": _model,
     "bench": _bench,
     "train": _train,

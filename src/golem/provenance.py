@@ -7,10 +7,12 @@ import hashlib
 import importlib.util
 import json
 import platform
+import re
+import shlex
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import MISSING, asdict, fields, is_dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any, cast
@@ -30,6 +32,48 @@ def digest(data: Mapping[str, Any]) -> str:
     """Return 16 hex digits that identify JSON-like `data`, whatever the order of its keys."""
     text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def command_line(start: str, config: Any, always: Collection[str] = ()) -> str:
+    """Return the command that runs a configuration.
+
+    Args:
+        start: its first words.
+        config: dataclass of its options, as tyro reads it; a dataclass within it has no prefix. What is the default
+            is left out.
+        always: names of options that are said all the same.
+    """
+    words = [start]
+    for option in fields(config):
+        value, name = getattr(config, option.name), option.name.replace("_", "-")
+        default = option.default if option.default_factory is MISSING else option.default_factory()
+        if is_dataclass(value):
+            words.append(command_line("", value))
+        elif option.name in always or value != default:
+            values = value if isinstance(value, tuple) else () if isinstance(value, bool) else (value,)
+            dashes = "-" if len(name) == 1 else "--no-" if value is False else "--"
+            words += [dashes + name, *(shlex.quote(str(v)) for v in values)]
+    return " ".join(word for word in words if word)
+
+
+def changes(where: str, old: object, new: object) -> list[str]:
+    """Return in words in what JSON-like `new` differs from `old`, each found at `where`."""
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        before, after = cast("Mapping[str, object]", old), cast("Mapping[str, object]", new)
+        names = dict.fromkeys([*before, *after])
+        prefix = f"{where}." if where else ""
+        return [
+            line
+            for name in names
+            for line in changes(f"{prefix}{name}", before.get(name, "absent"), after.get(name, "absent"))
+        ]
+    if json.dumps(old) == json.dumps(new):
+        return []
+    hashes = all(isinstance(value, str) and _HASH.fullmatch(value) for value in (old, new))
+    return [f"{where} has changed" if hashes else f"{where} was {old} and is {new}"]
+
+
+_HASH = re.compile("[0-9a-f]{16,64}|absent")
 
 
 def stack_facts(stack: Stack) -> dict[str, Any]:
@@ -92,14 +136,13 @@ def versions() -> dict[str, str]:
 
 
 @functools.cache
-def code_digest() -> str:
-    """Return 16 hex digits that identify the files of the package `golem`, committed or not."""
+def code_files() -> dict[str, str]:
+    """Return, for every file of the package `golem`, committed or not, 16 hex digits that identify its content."""
     root = _package()
-    total = hashlib.sha256()
-    for path in sorted(_package_files()):
-        total.update(path.relative_to(root).as_posix().encode() + b"\0")
-        total.update(hashlib.sha256(path.read_bytes()).digest())
-    return total.hexdigest()[:16]
+    return {
+        path.relative_to(root).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+        for path in sorted(_package_files())
+    }
 
 
 class Unchanged:

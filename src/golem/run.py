@@ -15,6 +15,10 @@ from tyro.conf import Positional
 
 from golem.dashboard.live import LiveView
 from golem.errors import ConfigError
+from golem.evaluation.base import TrialOutcome
+from golem.evaluation.harness.ladder import LadderConfig, find_trial, prepare
+from golem.evaluation.harness.records import trial_name
+from golem.evaluation.harness.trials import run_trial
 from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.robots.base import Robot
@@ -123,6 +127,40 @@ def _operate(config: RunConfig, stack: Stack) -> SkillResult:
     return SkillResult(True, "done", None, "Ended by the operator.")
 
 
+def show_trial(config: LadderConfig) -> TrialOutcome:
+    """Run one trial of a ladder in the live view, paced by the wall clock, and say how it ended.
+
+    Raises:
+        ConfigError: an option is wrong, or there is no such trial.
+    """
+    config = config.whole()
+    request, _ = prepare(config)
+    spec, record = find_trial(config, request)
+    views: list[LiveView] = []
+
+    def onlooker(running: LockstepRunner, robot: MujocoRobot) -> None:
+        views.append(LiveView(running, robot, passive=True))
+
+    print(f"Trial {trial_name(spec)} of rung {spec.rung}, paced by the wall clock.")
+    request.rung.onlooker = onlooker
+    try:
+        outcome = run_trial(request.rung, spec, leaving=(SystemExit,))
+    finally:
+        for view in views:
+            view.close()
+    print("A success." if outcome.success else f"Lost in {outcome.stage}, {outcome.module}: {outcome.detail}")
+    if outcome.trace:
+        print(outcome.trace)
+    if record is not None:
+        same = (record.success, record.stage, record.detail) == (
+            outcome.success,
+            outcome.stage,
+            outcome.detail,
+        )
+        print(f"It {'ended as' if same else 'did not end as'} its record in {config.out} says.")
+    return outcome
+
+
 def on_air(
     running: LockstepRunner, robot: Robot, bag: Path | None, foxglove: bool = False
 ) -> AbstractContextManager[Callable[[], None]]:
@@ -162,4 +200,4 @@ class Narrator:
         feedback = self._news.read()
         if feedback is not None and (feedback.stage != self._stage or feedback.data.get("failed")):
             self._stage = feedback.stage
-            print(f"{feedback.t:7.2f} s  {feedback.stage:9s} {feedback.text}")
+            print(f"{feedback.t:7.2f} s  {feedback.stage:9s} {feedback.text}", flush=True)

@@ -13,7 +13,7 @@ from golem.capabilities.legs.base import STANDING, Envelope, LowerBody
 from golem.capabilities.legs.mpc.controller import FAILURES, MPC, MPCConfig, PlanningError
 from golem.capabilities.legs.mpc.planner import Method, PlannerConfig
 from golem.errors import ConfigError
-from golem.evaluation.harness.pool import CAN_COPY, in_a_copy
+from golem.evaluation.harness.copies import CAN_COPY, in_a_copy
 from golem.types import Array
 
 QUICK = MPCConfig(threads=0, plan_rate=25.0)

@@ -87,6 +87,19 @@ def test_a_robot_that_fell_before_the_push_is_not_blamed_on_it() -> None:
     assert outcome.stage == "settle" and outcome.series == {} and "not pushed yet" in outcome.detail
 
 
+def test_a_controller_that_fails_in_its_band_is_lost_by_its_fault(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "from golem.capabilities.legs.hold import JointHold\n"
+        "class Mine(JointHold):\n"
+        "    def step(self, *inputs):\n"
+        "        raise ValueError('my bug')\n"
+    )
+    outcome = PushRung().run(spec(f"{mine}:Mine"), None)
+    assert (outcome.stage, outcome.module) == ("fault", f"lower_body: {mine}:Mine")
+    assert outcome.detail.endswith("my bug. It was not pushed yet.")
+
+
 def test_the_ramp_grows_until_the_balance_is_lost_and_lets_go(tmp_path: Path) -> None:
     outcome = PushRampRung().run(replace(spec(), rung="push-ramp"), tmp_path)
     assert not outcome.success and outcome.stage in ("fall", "safety")  # it is stiff

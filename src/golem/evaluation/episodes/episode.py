@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from golem.errors import ConfigError
+from golem.evaluation.base import Onlooker
 from golem.evaluation.episodes.odometry import SimulatedOdometry
 from golem.interfaces import topics
 from golem.robots.mujoco.balance import BalanceRecorder
@@ -90,10 +91,12 @@ class Loss:
         stage: `settle` (it never carried its weight), `fall`, `safety` (its gate stopped it, as an operator's e-stop
             would) or `fault` (the leg controller broke its contract, and the fallback took over).
         detail: one sentence.
+        trace: where in its code a module raised, as Python prints it; None where none did.
     """
 
     stage: str
     detail: str
+    trace: str | None = None
 
 
 HANGS = Loss("settle", f"The robot did not carry its weight within {READY:g} s.")
@@ -110,7 +113,7 @@ def lost(running: LockstepRunner, recorder: BalanceRecorder | None) -> Loss | No
     t, safety = running.executor.t, running.safety
     legs = running.bus.latest(topics.LEG_STATUS)
     if legs is not None and legs.fault is not None:
-        return Loss(FAULT, legs.fault)
+        return Loss(FAULT, legs.fault, getattr(legs, "trace", None))
     if recorder is not None and recorder.fallen:
         return Loss("fall", f"The robot fell at {t:.1f} s.")
     if safety is not None and safety.stopped:
@@ -126,8 +129,8 @@ class Episode:
         recorder: samples the twin's balance after every tick.
     """
 
-    def __init__(self, stack: Stack, seed: int) -> None:
-        """Build `stack` for the twin's seed.
+    def __init__(self, stack: Stack, seed: int, onlooker: Onlooker | None = None) -> None:
+        """Build `stack` for the twin's seed, and show it to `onlooker`.
 
         Raises:
             ConfigError: the stack's robot is not the twin, or a name or an option is wrong.
@@ -139,6 +142,8 @@ class Episode:
                 f"Balance is judged on the simulator's truth; robot: {stack.robot.use} is not 'mujoco'."
             )
         self.robot = robot
+        if onlooker is not None:
+            onlooker(self.running, robot)
         self.recorder = BalanceRecorder(robot)
         self._pusher = Pusher(robot)
         self._odometry: SimulatedOdometry | None = None
@@ -176,7 +181,9 @@ class Episode:
     @property
     def loss(self) -> Loss | None:
         """How the robot was lost; None while it was not."""
-        return HANGS if self._hangs else lost(self.running, self.recorder)
+        loss = lost(self.running, self.recorder)
+        # A controller that failed in its band never got to carry the weight.
+        return HANGS if self._hangs and (loss is None or loss.stage != FAULT) else loss
 
     def stand(self, seconds: float) -> None:
         """Let the robot take over its weight, then let `seconds` pass; one that never does so is lost."""

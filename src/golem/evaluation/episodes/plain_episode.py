@@ -20,6 +20,7 @@ from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
 from golem.capabilities.legs.velocity_integrator import VelocityIntegratorConfig
 from golem.errors import ConfigError, ModuleFault
 from golem.evaluation.episodes.episode import Loss, with_legs
+from golem.evaluation.harness.culprit import trace_of
 from golem.hardware.servo.gains import default_gains
 from golem.interfaces.payloads import LegCommand
 from golem.robots.model.limits import load_limits
@@ -66,9 +67,7 @@ class PlainEpisode:
             ConfigError: a name, an option or the MJCF is wrong, or the lower body needs the robot's own computer.
             ModuleFault: its constructor raised.
         """
-        choice = with_legs(Stack(), method).lower_body
-        if choice.use == "vendor":
-            raise ConfigError("vendor runs on the robot's own computer, which is not there on its own terms.")
+        choice = own_legs(method)
         self._contract = ContractCheck("lower_body", choice.use)
         controller = registry.create("lower_body", choice.use, choice.options)
         self._contract.satisfies(controller, LowerBody)
@@ -125,7 +124,7 @@ class PlainEpisode:
             command = self._contract.call(self._locomotion.step, state, base, self.twist, TICK)
             self._legs.check(command)
         except ModuleFault as fault:
-            self.loss = Loss(FAULT, fault.reason)
+            self.loss = Loss(FAULT, fault.reason, trace_of(fault))
             return
         self._robot.advance(self._motor_command(command))
         self.recorder(self.t, self._pusher.force)
@@ -140,6 +139,18 @@ class PlainEpisode:
             tau[LEGS] = legs.tau
         q[UPPER], (kp[UPPER], kd[UPPER]) = self._upper, self._gains
         return LowCommand(self.t, q, np.zeros(NUM_JOINTS), tau, kp, kd)
+
+
+def own_legs(method: str) -> Choice:
+    """Return the lower body `method` (see `with_legs`) as it can run on its own terms.
+
+    Raises:
+        ConfigError: it needs the robot's own computer.
+    """
+    choice = with_legs(Stack(), method).lower_body
+    if choice.use == "vendor":
+        raise ConfigError("vendor runs on the robot's own computer, which is not there on its own terms.")
+    return choice
 
 
 def _posture(choice: Choice) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 
 from golem import registry
 from golem.errors import ConfigError
-from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
+from golem.evaluation.base import DONE, NoOptions, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
 from golem.interfaces import topics
@@ -24,7 +24,6 @@ from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
-from golem.robots.sensors.profiles import PROFILES
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import SkillResult
 from golem.skills.pick import TIMEOUT, Pick, PickConfig, PickGoal
@@ -47,15 +46,14 @@ STRAIGHT = 0.087
 """Tilt beyond which an extraction counts as off axis [rad]: 5 deg."""
 
 
-class PickRung:
+class PickRung(Rung[NoOptions]):
     """One screw per trial: seen, approached, grasped, pulled out, dropped in the tray.
 
     Attributes:
         name: of the rung, and of the shipped stack it runs.
     """
 
-    name: str
-    profiles = tuple(PROFILES)
+    default_methods = ("centroid", "visual_servo")
 
     def methods(self) -> tuple[str, ...]:
         """Return the registered grasp methods."""
@@ -81,6 +79,8 @@ class PickRung:
         """Run one trial; see `Rung`."""
         stack = self._stack(spec.method, spec.profile, spec.overrides)
         running, robot = build(stack, episode_seed(spec.seed, spec.index))
+        if self.onlooker is not None:
+            self.onlooker(running, robot)
         oracle = Oracle(robot)
         try:
             if self.balances:
@@ -120,13 +120,13 @@ class PickRung:
 
 
 class TetherRung(PickRung):
-    """The robot hangs in its hoist: perception and manipulation without balance."""
+    """Pick a screw while the robot hangs in its hoist: perception and manipulation without balance."""
 
     name = "tether"
 
 
 class StandRung(PickRung):
-    """The robot balances while its arms work; the lower body can be replaced with `--use lower_body=...`."""
+    """Pick a screw while the robot balances; the lower body can be replaced with `--use lower_body=...`."""
 
     name = STANDING
 
@@ -170,7 +170,9 @@ def _judge(
     if loss is not None and result.stage not in ABORTED:
         module = f"lower_body: {stack.lower_body.use}" if stack.on_ground else None
         detail = f"{loss.detail} The errand itself: {result.reason}"
-        return TrialOutcome(False, loss.stage, module, detail, result.timings, series, oracle.picture())
+        return TrialOutcome(
+            False, loss.stage, module, detail, result.timings, series, oracle.picture(), loss.trace
+        )
     if oracle.screws_in_tray() and result.stage not in ABORTED:
         return TrialOutcome(True, DONE, None, result.reason, result.timings, series, watch.picture)
     # The skill may believe it succeeded: then the screw was lost between the pull and the tray.
@@ -183,7 +185,8 @@ def _judge(
         result.reason if result.stage != DONE else "The skill reports success, but no screw is in the tray."
     )
     picture = watch.picture or oracle.picture()
-    return TrialOutcome(False, stage, module, detail, result.timings, series, picture)
+    trace = getattr(result, "trace", None)
+    return TrialOutcome(False, stage, module, detail, result.timings, series, picture, trace)
 
 
 def balance(stood: BalanceTrace) -> dict[str, float]:

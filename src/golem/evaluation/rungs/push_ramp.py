@@ -19,7 +19,7 @@ MOST = 300.0
 
 
 class PushRampRung(PushRung):
-    """One push per trial, as long as the CoM is inside the support polygon; success is standing again afterwards.
+    """Stand again after the rod has pushed harder and harder until the CoM left the support polygon.
 
     The paper's robots were pushed so by hand: "until the robot loses balance", by a margin that becomes negative. Who
     steps is pushed on while the polygon follows, so `peak_force` says what a method takes, and the rest of the figures

@@ -133,6 +133,11 @@ class MujocoRobot:
         """
         self._pushes.set(force, body, point)
 
+    @property
+    def pushed(self) -> tuple[str, Array] | None:
+        """The link that is pushed, and the force (3,) on it in the world [N]; None while nobody pushes."""
+        return self._pushes.acting
+
     def advance(self, command: LowCommand, hands: dict[Side, HandCommand], dt: float) -> None:
         """Let time pass; see `Robot`."""
         step = FINE_STEP if self._delicate() else COARSE_STEP

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from golem.capabilities.legs.hold import STANCES
 from golem.errors import ConfigError
+from golem.evaluation.base import TrialSpec
 from golem.evaluation.episodes import walk_dataset as walks
 from golem.evaluation.episodes.walk_dataset import RecordedWalk, slipping, wrong_contacts
-from golem.evaluation.estimation import EstimationConfig, _longest, _way, run_estimation
+from golem.evaluation.harness.ladder import LadderConfig, run_ladder
+from golem.evaluation.rungs.base_estimation import BaseEstimation, _longest, _way, follow
 from golem.hardware.estimator.feet import Feet, FeetConfig
 from golem.hardware.estimator.random_walk import base_velocity
 from golem.robots.model.leg_dynamics import LegDynamics
@@ -83,20 +87,40 @@ def test_the_longest_spell_and_the_way() -> None:
     np.testing.assert_allclose(_way(T, 0, 2), [2.0, 1.0, 0.5])
 
 
-@pytest.mark.parametrize(
-    "config", [EstimationConfig(n=0), EstimationConfig(seed=-1), EstimationConfig(estimator=("ekf",))]
-)
-def test_bad_options_are_refused(config: EstimationConfig) -> None:
-    with pytest.raises(ConfigError):
-        run_estimation(config)
+def test_wrong_estimators_are_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="Unknown method 'ekf'; valid: invariant_ekf, random_walk_kf"):
+        run_ladder(LadderConfig(rung="base-estimation", method=("ekf",), out=tmp_path / "run"))
+
+
+def trial(method: str, condition: str = "nominal") -> TrialSpec:
+    return TrialSpec("base-estimation", method, "ideal", 0, 0, case={"condition": condition})
+
+
+def test_an_estimator_is_judged_on_the_velocity_and_what_depends_on_the_machine_is_kept_apart(
+    gliding: RecordedWalk,
+) -> None:
+    outcome = follow(trial("random_walk_kf"), gliding)
+    assert (outcome.success, outcome.stage, outcome.module) == (
+        False,
+        "velocity",
+        "estimator: random_walk_kf",
+    )
+    assert outcome.series["velocity_walking"] == pytest.approx(0.5, abs=0.05), (
+        "joints at rest hide the motion"
+    )
+    assert outcome.series["distance"] == pytest.approx(1.0, abs=0.05)
+    assert set(outcome.costs) == {"tick", "tick_p99"} and not set(outcome.costs) & set(outcome.series)
 
 
 @pytest.mark.slow
 def test_the_estimators_meet_their_target_on_a_short_walk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(walks, "TWISTS", walks.TWISTS[:1])
-    rows = run_estimation(EstimationConfig(n=1))
-    nominal = {row.estimator: row for row in rows if row.condition == "nominal"}
-    for row in nominal.values():
-        assert row.distance > 0.5
-        assert row.walking is not None and row.standing is not None and row.drift is not None
-        assert row.walking < 0.05 and row.standing < 0.02 and row.drift < 0.05
+    rung = BaseEstimation()
+    specs = [
+        TrialSpec("base-estimation", m, "field", 0, 0, case={"condition": "nominal"})
+        for m in rung.default_methods
+    ]
+    for outcome in rung.run_together(specs):
+        series = outcome.series
+        assert outcome.success and series["distance"] > 0.5
+        assert series["velocity_walking"] < 0.05 and series["velocity_standing"] < 0.02
