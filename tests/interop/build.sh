@@ -51,14 +51,15 @@ if [ "$sum" != "$(cat "$prefix/.interfaces" 2> /dev/null)" ]; then
     echo "geometry_msgs/TransformStamped[] transforms" > "$packages/tf2_msgs/msg/TFMessage.msg"
     for package in "$packages"/*; do
         name=$(basename "$package")
-        [ -f "$package/CMakeLists.txt" ] || cp "$here/CMakeLists.txt" "$package"
+        cp "$here/CMakeLists.txt" "$package"
         [ -f "$package/package.xml" ] ||
             sed "s/golem_interfaces/$name/" "$root/ros/golem_interfaces/package.xml" > "$package/package.xml"
         # The wheels' own start-up puts their libraries on the path of every Python of theirs.
         cmake -S "$package" -B "$prefix/build/$name" -DPACKAGE="$name" -DCMAKE_INSTALL_PREFIX="$prefix" \
             -DCMAKE_PREFIX_PATH="$prefix" -DPython3_EXECUTABLE="$prefix/bin/python" -DPython3_FIND_VIRTUALENV=ONLY \
-            -DPYTHON_EXECUTABLE="$prefix/bin/python" -DBUILD_TESTING=OFF -DCMAKE_CXX_FLAGS=-O0 -DCMAKE_C_FLAGS=-O0
-        cmake --build "$prefix/build/$name" --target install
+            -DPYTHON_EXECUTABLE="$prefix/bin/python" -DBUILD_TESTING=OFF \
+            -DCMAKE_CXX_FLAGS=-O0 -DCMAKE_C_FLAGS=-O0
+        cmake --build "$prefix/build/$name" --target install --parallel 2
     done
     echo "$sum" > "$prefix/.interfaces"
 fi

@@ -11,6 +11,7 @@ from golem.middleware.ros import codec
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.graph import DiscoveryInfo
 from golem.middleware.ros.waitset import Inbox, WaitSet
+from golem.middleware.rtps.service_link import ServiceLink, ServiceWriter
 
 
 class Attended(Protocol):
@@ -36,6 +37,9 @@ class NodeEndpoints:
         """Make endpoints of `participant` and announce them by `info`."""
         self.waitset = WaitSet()
         self._participant, self._info = participant, info
+        self._link: ServiceLink | None = None
+        if participant.network is not None:
+            self._link = ServiceLink(participant.network.domain, participant.network.address)
         self._open: list[Inbox | Writer] = []
         self._attended: list[Attended] = []
         self._number = itertools.count(1)
@@ -76,6 +80,26 @@ class NodeEndpoints:
         self._add(inbox)
         return inbox
 
+    def linked(
+        self, reply: str, request: str, type: str, qos: Qos, handle: Callable[[Sample], None]
+    ) -> tuple[ServiceWriter, Inbox] | None:
+        """Create the writer and the reader by which clients of Fast DDS are served; None where there is no network.
+
+        Args:
+            reply: name of the topic on the wire.
+            request: name of the topic on the wire.
+            type: ROS name of the service's type.
+            qos: how many requests are kept.
+            handle: is given the samples when the node is spun.
+        """
+        if self._link is None:
+            return None
+        sent, taken = f"{type}_Response", f"{type}_Request"
+        writer = self._link.writer(reply, codec.dds_name(sent), _hash(sent))
+        inbox = Inbox(self.waitset, handle, qos)
+        inbox.open(self._link, request, codec.dds_name(taken), qos, _hash(taken))
+        return writer, inbox
+
     def close(self, *endpoints: Inbox | Writer) -> None:
         """Close some endpoints; those that are closed already stay so."""
         for endpoint in endpoints:
@@ -109,6 +133,8 @@ class NodeEndpoints:
             for what in list(self._attended):
                 what.close()
             self.close(*self._open)
+            if self._link is not None:
+                self._link.close()
 
     def _check(self) -> None:
         if self._closed:

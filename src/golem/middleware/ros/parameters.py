@@ -1,7 +1,7 @@
 """The parameter services that every ROS 2 node has, for nodes that have no parameters.
 
-`ros2 param list` and its like wait for them at every node they see, until a timeout where there are none. The options of
-GOLEM's modules are in its stack files and hold for a whole run, so nothing can be set here, and the answer says so.
+`ros2 param list` and its like wait for them at every node they see, until a timeout where there are none. The options
+of GOLEM's modules are in its stack files and hold for a whole run: nothing can be set here, and the answer says so.
 """
 
 from __future__ import annotations
