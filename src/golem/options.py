@@ -169,7 +169,9 @@ def _convert(what: str, hint: Any, value: Any) -> Any:
         return hint(value)
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     if origin in (types.UnionType, typing.Union) and len(inner) == 2 and inner[1] is type(None):
-        return None if value is None else _convert(what, inner[0], value)
+        # `off` is how YAML spells false: it switches off what may be absent.
+        absent = value is None or (value is False and inner[0] is not bool)
+        return None if absent else _convert(what, inner[0], value)
     if origin is typing.Literal and value not in inner:
         raise unknown_name(f"value of {what}", str(value), map(str, inner))
     if origin in (tuple, list):

@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any, cast
 
 import golem
-from golem import registry
 from golem.capabilities.legs.description import load_description
 from golem.errors import ConfigError, OutputError
 from golem.robots.sensors.profiles import load_profile
+from golem.slots import KEYS
 from golem.stack import Stack
 
 PACKAGES = ("golem-humanoid", "numpy", "scipy", "mujoco", "pin", "daqp", "onnxruntime", "torch")
@@ -33,7 +33,12 @@ def digest(data: Mapping[str, Any]) -> str:
 
 
 def stack_facts(stack: Stack) -> dict[str, Any]:
-    """Return what a stack contributes to a trial's configuration: itself, its profile's numbers, its files' content."""
+    """Return what a stack contributes to a trial's configuration: itself, its profile's numbers, its files' content.
+
+    Raises:
+        ConfigError, ModuleFault: see `Stack.check`.
+    """
+    stack.check()
     return {
         "stack": asdict(stack),
         "profile": asdict(load_profile(stack.profile)),
@@ -44,12 +49,10 @@ def stack_facts(stack: Stack) -> dict[str, Any]:
 def user_files(stack: Stack) -> dict[str, str]:
     """Return, for what a stack names that is a file, `slot/name` -> hash of its content."""
     found: dict[str, str] = {}
-    chosen = {slot: stack.choice(slot) for slot in registry.slots()} | {
-        name: choice for name, choice in (("fallback", stack.fallback), ("onboard", stack.onboard)) if choice
-    }
-    for slot, choice in chosen.items():
+    for key in KEYS:
+        choice = stack.choice(key)
         for name, path in _named({"use": choice.use, **choice.options}).items():
-            found[f"{slot}/{name}"] = hashlib.sha256(path.read_bytes()).hexdigest()
+            found[f"{key}/{name}"] = hashlib.sha256(path.read_bytes()).hexdigest()
     return found
 
 

@@ -7,7 +7,7 @@ import sys
 import webbrowser
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -68,8 +68,7 @@ def run_stack(config: RunConfig) -> SkillResult:
     """
     stack = load_stack(config.stack, profile=config.profile)
     if config.world is not None:
-        robot = replace(stack.robot, options={**stack.robot.options, "world": config.world})
-        stack = replace(stack, robot=robot)
+        stack = stack.with_options("robot", world=config.world)
     if (config.task or ("operate" if stack.on_ground else "pick")) == "operate":
         if config.record is not None or config.foxglove:
             raise ConfigError(
@@ -145,7 +144,9 @@ def shown(running: LockstepRunner, robot: object) -> MujocoRobot:
         ConfigError: it is none.
     """
     if not isinstance(robot, MujocoRobot):
-        raise ConfigError(f"The live view shows the twin; robot: {running.stack.robot.use} is not 'mujoco'.")
+        raise ConfigError(
+            f"The live view shows the twin; robot: {running.stack.choice('robot').use} is not 'mujoco'."
+        )
     return robot
 
 

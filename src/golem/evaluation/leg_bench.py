@@ -105,7 +105,10 @@ def run_leg_bench(config: LegBenchConfig) -> list[dict[str, Any]]:
             raise ConfigError(f"--{option} names one of them twice.")
     if plans.__name__ in config.test and (config.j, config.test, len(config.method)) != (1, ("plans",), 1):
         raise ConfigError("The test plans times the machine: give it alone, with one --method and -j 1.")
-    if plans.__name__ in config.test and legs_stack(config.method[0], config.profile).lower_body.use != "mpc":
+    if (
+        plans.__name__ in config.test
+        and legs_stack(config.method[0], config.profile).choice("lower_body").use != "mpc"
+    ):
         raise ConfigError('The test plans is of the MPC: give --method mpc, or "{use: mpc, option: value}".')
     robot = {"latency": config.latency, **robot_options(config.robot)}
     use = replaced_modules(config.use)

@@ -12,7 +12,6 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import replace
 
 import numpy as np
 
@@ -26,7 +25,6 @@ from golem.evaluation.subject import Subject
 from golem.options import fill
 from golem.robots.mujoco.shoves import DIRECTIONS, shove
 from golem.skills.walk import Walk, WalkGoal
-from golem.stack import Choice
 from golem.types import PlanarPose, Twist
 
 Figures = dict[str, float]
@@ -192,9 +190,9 @@ def plans(subject: Subject, seed: int, index: int) -> Figures:
     """
     samples = SAMPLES[index % len(SAMPLES)]
     stack = subject.stack()
-    options = dict(stack.lower_body.options)
+    options = dict(stack.choice("lower_body").options)
     options["planner"] = {**options.get("planner", {}), "samples": samples}
-    stack = replace(stack, lower_body=Choice(stack.lower_body.use, options))
+    stack = stack.with_options("lower_body", planner=options["planner"])
     config: MPCConfig = fill("option of lower_body: mpc", MPCConfig, options)
     allowed = min(config.latency, 1.0 / config.plan_rate)
     with closing(Episode(stack, episode_seed(seed, index))) as episode:

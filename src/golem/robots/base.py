@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -60,6 +61,16 @@ class Robot(Protocol):
 
     def close(self) -> None:
         """Release what the robot holds: rendering contexts, connections. Closing twice does nothing."""
+        ...
+
+
+@runtime_checkable
+class Standing(Protocol):
+    """A class of robots that may stand on their feet; a robot whose class does not say so hangs in the hoist."""
+
+    @classmethod
+    def on_feet(cls, options: Mapping[str, object]) -> bool:
+        """Return whether a robot with these options of the stack file stands, once its band is let go."""
         ...
 
 

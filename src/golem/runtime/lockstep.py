@@ -167,7 +167,7 @@ def build_robot(stack: Stack, seed: int) -> Any:
     load_profile(stack.profile)
     if seed < 0:
         raise ConfigError(f"The seed is {seed}; it must be 0 or more.")
-    choice, posture = stack.robot, start_posture(stack.on_ground)
+    choice, posture = stack.choice("robot"), start_posture(stack.on_ground)
     robot = registry.create(
         "robot", choice.use, choice.options, profile=stack.profile, seed=seed, posture=posture
     )

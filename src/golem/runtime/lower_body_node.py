@@ -6,7 +6,7 @@ import time
 
 from golem.capabilities.legs.base import Envelope, LowerBody
 from golem.capabilities.legs.gait import GaitConfig
-from golem.capabilities.legs.locomotion import Locomotion
+from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
 from golem.errors import ModuleFault
 from golem.interfaces import topics
 from golem.interfaces.payloads import LegCommand, LegStatus
@@ -32,13 +32,13 @@ class CheckedLowerBody:
         rate: ticks per second [Hz].
     """
 
-    def __init__(self, controller: LowerBody, contract: ContractCheck) -> None:
-        """Take `controller`, watched by `guard`.
+    def __init__(self, controller: LowerBody, contract: ContractCheck, on_ground: bool = False) -> None:
+        """Take `controller`, watched by `contract`, of a robot that stands `on_ground` or hangs.
 
         Raises:
             ModuleFault: its rate, latency, envelope or gait is none.
         """
-        self.controller, self.contract = controller, contract
+        self.controller, self.contract, self._on_ground = controller, contract, on_ground
         contract.kind("envelope", controller.envelope, Envelope)
         contract.kind("gait", controller.gait, GaitConfig)
         self.rate = contract.number("rate", controller.rate, minimum=MIN_RATE)
@@ -57,13 +57,18 @@ class CheckedLowerBody:
         """Return the `command` that the controller returned.
 
         Raises:
-            ModuleFault: it is none, or not finite.
+            ModuleFault: it is none, not finite, or leaves the torque of a robot on the ground to the servo.
         """
         checked = self.contract.kind("the leg command", command, LegCommand)
         for name in ("q", "kp", "kd"):
             self.contract.array(name, getattr(checked, name), JOINTS)
         if checked.tau is not None:
             self.contract.array("tau", checked.tau, JOINTS)
+        elif self._on_ground:
+            raise self.contract.fault(
+                "tau is None, with which the servo carries legs that hang; on the ground the contract asks for a "
+                "torque, zero where there is none to add"
+            )
         return checked
 
 
@@ -78,10 +83,12 @@ class LowerBodyNode:
         realtime: whether the wall clock counts; in lock-step a controller pays by its declared latency.
     """
 
-    def __init__(self, bus: Bus, legs: CheckedLowerBody, fallback: CheckedLowerBody) -> None:
-        """Run `legs`, with `fallback` in reserve."""
+    def __init__(
+        self, bus: Bus, legs: CheckedLowerBody, fallback: CheckedLowerBody, config: LocomotionConfig
+    ) -> None:
+        """Run `legs`, with `fallback` in reserve, under a base layer with `config`."""
         self._bus, self._legs, self._fallback = bus, legs, fallback
-        self._locomotion = Locomotion(legs.controller)
+        self._locomotion = Locomotion(legs.controller, config)
         self._twists = News(bus, topics.TWIST)
         self._fault: ModuleFault | None = None
         self._failed_at = -RECOVERY

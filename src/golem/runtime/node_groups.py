@@ -11,17 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from golem import registry
-from golem.capabilities.arms.base import UpperBody
 from golem.capabilities.grasping.base import GraspMethod
-from golem.capabilities.legs.base import Envelope, LowerBody
+from golem.capabilities.legs.base import Envelope
 from golem.capabilities.navigation.base import Navigator
-from golem.capabilities.perception.base import Localizer
 from golem.errors import GolemError
-from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.base import EmergencyStop
-from golem.hardware.hands.base import HandController
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
-from golem.hardware.servo.base import MotorServo
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
@@ -35,24 +30,13 @@ from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Phase, Placed
 from golem.runtime.gantry_release import GantryReleaseNode
 from golem.runtime.lower_body_node import CheckedLowerBody, LowerBodyNode
-from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode
+from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode, stack_loco_api
 from golem.skills.base import Skill
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
-from golem.stack import Choice, Stack
+from golem.slots import KEYS
+from golem.stack import Stack
 from golem.types import SIDES, Array, Side
-
-CONTRACTS: dict[str, type[Any]] = {
-    "estimator": BaseEstimator,
-    "servo": MotorServo,
-    "hand": HandController,
-    "lower_body": LowerBody,
-    "upper_body": UpperBody,
-    "localizer": Localizer,
-    "grasp_method": GraspMethod,
-    "navigator": Navigator,
-}
-"""What the module in a slot must have."""
 
 
 @dataclass(frozen=True)
@@ -61,17 +45,17 @@ class ModuleFactory:
 
     stack: Stack
 
-    def make(self, slot: str, chosen: Choice | None = None, **context: object) -> tuple[Any, ContractCheck]:
-        """Return a new module for `slot`, by default the stack's choice, and its guard.
+    def make(self, key: str, **context: object) -> tuple[Any, ContractCheck]:
+        """Return a new module, what the stack chooses under `key`, and its guard.
 
         Raises:
             ConfigError: a name or an option is wrong.
             ModuleFault: the constructor raised, or the module lacks a part of its contract.
         """
-        choice = chosen or self.stack.choice(slot)
+        choice, slot = self.stack.choice(key), KEYS[key].slot
         contract = ContractCheck(slot, choice.use)
         module = registry.create(slot, choice.use, choice.options, **context)
-        contract.satisfies(module, CONTRACTS[slot])
+        contract.satisfies(module, registry.contract(slot))
         return module, contract
 
 
@@ -98,7 +82,7 @@ class RobotNodes:
         Raises:
             ConfigError, ModuleFault: see `ModuleFactory.make`; about the on-board legs.
         """
-        contract = ContractCheck("robot", stack.robot.use)
+        contract = ContractCheck("robot", stack.choice("robot").use)
         self.act = nodes.ActNode(bus, robot, contract)
         self.nodes: list[Placed] = [(Phase.MEASURE, nodes.SenseNode(bus, robot, contract))]
         if wanted is not None:
@@ -107,8 +91,8 @@ class RobotNodes:
                 self.nodes.append((Phase.EXPOSE, camera))
         loco: LocoServiceNode | None = None
         if stack.legs_on_board is not None:
-            legs = CheckedLowerBody(*ModuleFactory(stack).make("lower_body", stack.legs_on_board))
-            loco = LocoServiceNode(bus, stack.loco_api, legs)
+            legs = CheckedLowerBody(*ModuleFactory(stack).make("onboard"), stack.on_ground)
+            loco = LocoServiceNode(bus, stack_loco_api(stack), legs, stack.part("locomotion"))
             self.nodes.append((Phase.SERVE, loco))
         switcher = MotionSwitcher(None if loco is None else loco.service)
         self.nodes.append((Phase.SERVE, ServiceNode(bus, motion_switcher.SERVICE, switcher.answer)))
@@ -171,6 +155,7 @@ class StackNodes:
             ConfigError: a name or an option of the stack is wrong, or a module is to call a real robot's controller.
             ModuleFault: a module's constructor raised, or the module lacks a part of its contract.
         """
+        stack.check()
         self.stack, self.bus = stack, bus
         self._workshop = ModuleFactory(stack)
         make = self._workshop.make
@@ -180,9 +165,11 @@ class StackNodes:
         self.navigator: Navigator = CheckedNavigator(*make("navigator"))
         estimator, estimator_contract = make("estimator")
         localizer, contract = make("localizer")
-        lower_body = make("lower_body", onboard=None if real else BusOnboard(bus))
-        reserve = make("lower_body", stack.legs_in_reserve, onboard=None if real else BusOnboard(bus))
-        self.legs = LowerBodyNode(bus, CheckedLowerBody(*lower_body), CheckedLowerBody(*reserve))
+        legs, reserve = (
+            CheckedLowerBody(*make(key, onboard=None if real else BusOnboard(bus)), stack.on_ground)
+            for key in ("lower_body", "fallback")
+        )
+        self.legs = LowerBodyNode(bus, legs, reserve, stack.part("locomotion"))
         self.nodes: list[Placed] = [
             (Phase.ESTIMATE, nodes.EstimatorNode(bus, estimator, estimator_contract)),
             (Phase.PERCEIVE, perception_nodes.ImagePoseNode(bus, calibration, latency)),
@@ -199,7 +186,7 @@ class StackNodes:
             self.nodes.append((Phase.CONTROL, nodes.HandNode(bus, hand, side, hand_contract)))
         self.nodes.append((Phase.CONTROL, nodes.ServoNode(bus, *make("servo"))))
         if gantry is not None:
-            robot_contract = ContractCheck("robot", stack.robot.use)
+            robot_contract = ContractCheck("robot", stack.choice("robot").use)
             self.nodes.append(
                 (Phase.OPERATE, GantryReleaseNode(bus, gantry, robot_contract, estimator_contract))
             )

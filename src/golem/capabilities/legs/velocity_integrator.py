@@ -19,7 +19,7 @@ class VelocityIntegratorConfig:
     """Options of `VelocityIntegrator`.
 
     Attributes:
-        gain: correction per velocity error and time [1/s]; 0 corrects nothing.
+        gain: correction per velocity error and time [1/s].
         maximum: bound of the correction of vx, vy [m/s] and wz [rad/s]; by so much the twist may leave the envelope.
             Turning falls short most, where it is asked for beside full speed ahead and to a side.
         heed: bound of each error that is integrated: a push is not the controller's doing.

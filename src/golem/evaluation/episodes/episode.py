@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from golem.errors import ConfigError
@@ -45,8 +45,8 @@ def with_legs(stack: Stack, method: str) -> Stack:
         return stack.with_choice(SLOT, method)
     policy = Choice("policy", dict(zip(("file", "network"), files, strict=False)))
     if name == "vendor":
-        return replace(stack, lower_body=Choice(name), onboard=policy)
-    return replace(stack, lower_body=policy)
+        return stack.with_choice(SLOT, name).with_choice("onboard", policy)
+    return stack.with_choice(SLOT, policy)
 
 
 def legs_stack(
@@ -70,8 +70,7 @@ def legs_stack(
         if slot in (overrides or {}):
             raise ConfigError(f"The test of a lower body brings its own {slot}; leave out --use {slot}=...")
     stack = with_legs(load_stack(STACK, profile=profile), method)
-    options = {**stack.robot.options, "world": "open", **(robot or {})}
-    stack = replace(stack, robot=replace(stack.robot, options=options))
+    stack = stack.with_options("robot", **{"world": "open", **(robot or {})})
     for slot, use in (overrides or {}).items():
         stack = stack.with_choice(slot, use)
     return stack
@@ -136,7 +135,7 @@ class Episode:
         self.running, robot = build(stack, seed)
         if not isinstance(robot, MujocoRobot):
             raise ConfigError(
-                f"Balance is judged on the simulator's truth; robot: {stack.robot.use} is not 'mujoco'."
+                f"Balance is judged on the simulator's truth; robot: {stack.choice('robot').use} is not 'mujoco'."
             )
         self.robot = robot
         self.recorder = BalanceRecorder(robot)

@@ -15,9 +15,7 @@ import numpy as np
 from golem import registry
 from golem.capabilities.legs.base import Envelope, LowerBody
 from golem.capabilities.legs.description import load_description
-from golem.capabilities.legs.foot_separation import FootSeparationConfig
 from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
-from golem.capabilities.legs.velocity_integrator import VelocityIntegratorConfig
 from golem.errors import ConfigError, ModuleFault
 from golem.evaluation.episodes.episode import Loss, with_legs
 from golem.hardware.servo.gains import default_gains
@@ -38,8 +36,8 @@ START_NOISE = 0.02
 otherwise be one trial many times]."""
 BARE = LocomotionConfig(
     acceleration=(math.inf, math.inf, math.inf),
-    trim=VelocityIntegratorConfig(gain=0.0),
-    apart=FootSeparationConfig(minimum=0.0),
+    trim=None,
+    foot_separation=None,
 )
 """The base layer of a policy from outside: its gait clock and its dead band, as its authors deploy it, and no more."""
 
@@ -66,7 +64,7 @@ class PlainEpisode:
             ConfigError: a name, an option or the MJCF is wrong, or the lower body needs the robot's own computer.
             ModuleFault: its constructor raised.
         """
-        choice = with_legs(Stack(), method).lower_body
+        choice = with_legs(Stack(), method).choice("lower_body")
         if choice.use == "vendor":
             raise ConfigError("vendor runs on the robot's own computer, which is not there on its own terms.")
         self._contract = ContractCheck("lower_body", choice.use)

@@ -110,7 +110,11 @@ def judge(episode: Episode, method: str) -> TrialOutcome:
     module = f"lower_body: {method}"
     if loss is None and result is not None and not result.success:
         loss = Loss(result.stage, result.reason)
-        module = f"navigator: {episode.running.stack.navigator.use}" if result.slot == "navigator" else module
+        module = (
+            f"navigator: {episode.running.stack.choice('navigator').use}"
+            if result.slot == "navigator"
+            else module
+        )
     if loss is None and radial > TOLERANCE:
         loss = Loss("goal", f"It stands {radial:.2f} m beside the goal and believes to be there.")
         module = f"estimator: {episode.running.stack.choice('estimator').use}"

@@ -67,7 +67,8 @@ class PickRung:
         classes = {slot: registry.load(slot, stack.choice(slot).use) for slot in registry.slots()}
         if not issubclass(classes["robot"], MujocoRobot):
             raise ConfigError(
-                f"Rung {self.name} judges on the simulator's truth; robot: {stack.robot.use} is not the twin, 'mujoco'."
+                f"Rung {self.name} judges on the simulator's truth; robot: {stack.choice('robot').use} is not the "
+                "twin, 'mujoco'."
             )
         shared_context()
         return {
@@ -87,7 +88,7 @@ class PickRung:
                 running.executor.run(READY, lambda: not robot.on_gantry)
                 if robot.on_gantry:
                     return TrialOutcome(
-                        False, HANGS.stage, f"lower_body: {stack.lower_body.use}", HANGS.detail
+                        False, HANGS.stage, f"lower_body: {stack.choice('lower_body').use}", HANGS.detail
                     )
                 running.executor.run(running.executor.t + RELEASED)
             watch = _Watch(running, oracle, BalanceRecorder(robot) if self.balances else None)
@@ -168,7 +169,7 @@ def _judge(
     if watch.recorder is not None:
         series |= balance(watch.recorder.trace())
     if loss is not None and result.stage not in ABORTED:
-        module = f"lower_body: {stack.lower_body.use}" if stack.on_ground else None
+        module = f"lower_body: {stack.choice('lower_body').use}" if stack.on_ground else None
         detail = f"{loss.detail} The errand itself: {result.reason}"
         return TrialOutcome(False, loss.stage, module, detail, result.timings, series, oracle.picture())
     if oracle.screws_in_tray() and result.stage not in ABORTED:

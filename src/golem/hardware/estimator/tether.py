@@ -11,6 +11,8 @@ from golem.types import BaseEstimate, LowState
 class TetherEstimator:
     """Position fixed at the origin of odom, orientation from the IMU with the torso's yaw undone. Never stale."""
 
+    requires = ("hoist",)
+
     def __init__(self) -> None:
         """Start without a heading."""
         self._attitude = Attitude()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import mujoco
@@ -109,6 +110,11 @@ class MujocoRobot:
             hand.reset(self.data, START_GAP)
         mujoco.mj_forward(model, self.data)
         self.truth = Truth(model, self.data)
+
+    @classmethod
+    def on_feet(cls, options: Mapping[str, object]) -> bool:
+        """Return whether the option `support` has the robot stand; see `Standing`."""
+        return options.get("support") == "ground"
 
     @property
     def on_gantry(self) -> bool:

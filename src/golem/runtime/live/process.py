@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 from tyro.conf import OmitArgPrefixes, Positional
@@ -86,8 +86,7 @@ def twin_stack(config: TwinConfig) -> Stack:
     """
     stack = load_stack(config.stack, profile=config.profile)
     if config.world is not None:
-        options = {**stack.robot.options, "world": config.world}
-        stack = replace(stack, robot=replace(stack.robot, options=options))
+        stack = stack.with_options("robot", world=config.world)
     return stack
 
 

@@ -36,6 +36,7 @@ from golem.runtime.live.sim_sync import CATCH_UP, SILENCE
 from golem.runtime.live.skill_action_server import SkillActionServer
 from golem.runtime.live.stack_in import CameraIn, GateIn, RemoteGantry, listen
 from golem.runtime.node_groups import StackNodes
+from golem.runtime.onboard_nodes import stack_loco_api
 from golem.stack import Stack
 from golem.types import SIDES, Array
 
@@ -99,8 +100,8 @@ class StackProcess:
         self._gantry = RemoteGantry(node) if stack.on_ground and not real else None
         self._gate = GateIn(self._bus, endpoints, clock)
         self._cameras = [CameraIn(self._bus, endpoints, name) for name in public.CAMERAS]
-        service = stack.loco_api.service
-        requests, responses = request_topic(service), response_topic(service)
+        self._service = stack_loco_api(stack).service
+        requests, responses = request_topic(self._service), response_topic(self._service)
         self._calls = RpcClient(endpoints.writer(f"/{requests}"), endpoints.reader(f"/{responses}"))
         self._onboard = endpoints.reader("/onboard/lowcmd")
         self._skills = SkillActionServer(endpoints)
@@ -152,7 +153,7 @@ class StackProcess:
         )
         side.legs.realtime = self._real
         self._skills.attach(side, t)
-        service, identities = self._stack.loco_api.service, Identities()
+        service, identities = self._service, Identities()
         placed: list[Placed] = [
             (Phase.RECEIVE, Poll(self._node)),
             (Phase.RECEIVE, self._gate),

@@ -32,6 +32,7 @@ from golem.runtime.live.robot_out import (
 from golem.runtime.live.role_endpoints import Poll, RoleEndpoints
 from golem.runtime.live.sim_sync import PATIENCE
 from golem.runtime.node_groups import ModuleFactory, RobotNodes
+from golem.runtime.onboard_nodes import stack_loco_api
 from golem.stack import Stack
 from golem.types import SIDES
 
@@ -94,7 +95,7 @@ class Twin:
             *((Phase.SEND, camera) for camera in cameras.values()),
             *((Phase.SEND, HandOut(bus, endpoints, hand)) for hand in SIDES),
         ]
-        for service in (motion_switcher.SERVICE, stack.loco_api.service):
+        for service in (motion_switcher.SERVICE, stack_loco_api(stack).service):
             requests, responses = request_topic(service), response_topic(service)
             server = RpcServer(endpoints.reader(f"/{requests}"), endpoints.writer(f"/{responses}"))
             placed.append((Phase.RECEIVE, CallsIn(bus, service, server)))
