@@ -216,8 +216,7 @@ def test_no_module_holds_a_way_to_the_truth(inspected: Inspected) -> None:
 @pytest.mark.parametrize("legs", ["wbc", "mpc"])
 def test_no_module_of_a_standing_robot_does(legs: str, monkeypatch: pytest.MonkeyPatch) -> None:
     on_ground = Choice("mujoco", {"support": "ground"})
-    estimator = Choice("random_walk_kf")
-    stack = Stack(robot=on_ground, estimator=estimator, lower_body=Choice(legs), fallback=Choice("wbc"))
+    stack = Stack({"robot": on_ground, "lower_body": Choice(legs), "fallback": Choice("wbc")})
     inspected = Inspected(monkeypatch, stack)
     robot = inspected.robot
 

@@ -86,9 +86,9 @@ def test_a_users_policy_is_its_description_and_its_network(tmp_path: Path) -> No
         Choice("policy", {"file": str(mine)}),
         Choice("handover", {"walk": policy, "stand": policy}),
     ):
-        before = provenance.user_files(Stack(lower_body=legs))
+        before = provenance.user_files(Stack({"lower_body": legs}))
         network.write_bytes(network.read_bytes() + b"more")
-        after = provenance.user_files(Stack(lower_body=legs))
+        after = provenance.user_files(Stack({"lower_body": legs}))
         assert before.keys() == after.keys() and before != after
 
 
@@ -96,9 +96,9 @@ def test_a_part_that_a_class_of_a_users_file_plays_is_that_file(tmp_path: Path) 
     mine = tmp_path / "mine.py"
     mine.write_text("one = 1\n")
     legs = Choice("handover", {"walk": {"use": f"{mine}:Mine"}, "stand": {"use": "almi"}})
-    before = provenance.user_files(Stack(lower_body=legs))
+    before = provenance.user_files(Stack({"lower_body": legs}))
     mine.write_text("one = 2\n")
-    after = provenance.user_files(Stack(lower_body=legs))
+    after = provenance.user_files(Stack({"lower_body": legs}))
     assert before.keys() == after.keys() == {"lower_body/walk/use"} and before != after
 
 
@@ -115,7 +115,7 @@ def test_a_module_named_by_its_package_is_a_users_file_too(
     file = tmp_path / "my_package" / "legs.py"
     file.write_text("one = 1\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    stack = Stack(lower_body=Choice("my_package.legs:Mine"))
+    stack = Stack({"lower_body": Choice("my_package.legs:Mine")})
     before = provenance.user_files(stack)
     file.write_text("one = 2\n")
     assert before.keys() == {"lower_body/use"} and provenance.user_files(stack) != before

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -93,8 +92,7 @@ class Look:
 
 def running(slot: str, use: str, options: dict[str, Any] | None = None) -> LockstepRunner:
     """Return a stack with another module in one slot."""
-    changes: dict[str, Any] = {slot: Choice(use, options or {})}
-    return build(replace(Stack(profile="ideal"), **changes), seed=0)[0]
+    return build(Stack({slot: Choice(use, options or {})}, profile="ideal"), seed=0)[0]
 
 
 @pytest.fixture

@@ -193,7 +193,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Seen, Seen,
     bag = tmp_path_factory.mktemp("replay") / "bag"
     stack = load_stack("tether")
     live = pick(stack, 3.6, bag)
-    again = pick(replace(stack, robot=Choice("replay", {"file": str(bag)})), 10.0, None)
+    again = pick(stack.with_choice("robot", Choice("replay", {"file": str(bag)})), 10.0, None)
     yield live, again, bag
 
 

@@ -151,7 +151,8 @@ def live(tmp_path: Any) -> Iterator[Live]:
     """A hanging robot that sees nothing: twin, gate and stack."""
     (tmp_path / "blind.py").write_text(BLIND)
     robot = Choice("mujoco", {"world": "open"})
-    stack = Stack(robot, localizer=Choice(f"{tmp_path / 'blind.py'}:Blind"), profile="ideal")
+    choices = {"robot": robot, "localizer": Choice(f"{tmp_path / 'blind.py'}:Blind")}
+    stack = Stack(choices, profile="ideal")
     live = Live(stack)
     live.start_twin()
     live.start_gate()

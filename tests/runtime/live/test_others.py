@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -160,7 +159,7 @@ def test_the_real_robots_own_leg_controller_is_not_commanded_against(live: Live,
         Choice(f"{mine}:Mine"),
         Choice("handover", {"walk": {"use": f"{mine}:Mine"}, "stand": {"use": "almi"}}),
     ):
-        live.stack = replace(live.stack, lower_body=legs)
+        live.stack = live.stack.with_choice("lower_body", legs)
         with pytest.raises(ConfigError, match="moves its legs itself"):
             live.start_up(real=True)
 
@@ -172,7 +171,7 @@ def test_no_module_of_a_real_robots_stack_can_call_its_own_controller(live: Live
         "from golem.capabilities.legs.vendor import Vendor\n\n"
         "class Mine:\n    def __new__(cls, onboard): return Vendor(onboard=onboard)\n"
     )
-    live.stack = replace(live.stack, lower_body=Choice(f"{mine}:Mine"))
+    live.stack = live.stack.with_choice("lower_body", f"{mine}:Mine")
     live.start_twin()
     live.start_gate()
     live.start_up(real=True)

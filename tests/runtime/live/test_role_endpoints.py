@@ -91,14 +91,14 @@ def of_role(role: Role) -> Ends:
 def test_processes_offer_what_the_table_says(support: str, vendor: str, unread: str, tmp_path: Path) -> None:
     (tmp_path / "blind.py").write_text(BLIND)
     robot = Choice("mujoco", {"world": "open", "support": support})
-    stack = Stack(
-        robot,
-        lower_body=Choice("vendor", {"robot": vendor}),
-        localizer=Choice(f"{tmp_path / 'blind.py'}:Blind"),
-        fallback=Choice("hold"),
-        onboard=Choice("hold"),
-        profile="ideal",
-    )
+    choices = {
+        "robot": robot,
+        "lower_body": Choice("vendor", {"robot": vendor}),
+        "localizer": Choice(f"{tmp_path / 'blind.py'}:Blind"),
+        "fallback": Choice("hold"),
+        "onboard": Choice("hold"),
+    }
+    stack = Stack(choices, profile="ideal")
     live = Live(stack, SpyDomain())
     live.start_twin()
     live.start_gate()
@@ -130,7 +130,8 @@ def standing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Live, d
     (folder / "blind.py").write_text(BLIND)
     robot = Choice("mujoco", {"world": "open", "support": "ground"})
     eyes = Choice(f"{folder / 'blind.py'}:Blind")
-    live = Live(Stack(robot, localizer=eyes, fallback=Choice("hold"), profile="ideal"), SpyDomain())
+    choices = {"robot": robot, "localizer": eyes, "fallback": Choice("hold")}
+    live = Live(Stack(choices, profile="ideal"), SpyDomain())
     live.start_twin()
     live.start_gate()
     live.start_up()
@@ -195,7 +196,8 @@ def test_beside_the_real_robot_the_stack_shows_what_follows_from_its_state(tmp_p
     (tmp_path / "blind.py").write_text(BLIND)
     robot = Choice("mujoco", {"world": "open", "support": "ground"})
     eyes = Choice(f"{tmp_path / 'blind.py'}:Blind")
-    live = Live(Stack(robot, localizer=eyes, fallback=Choice("hold"), profile="ideal"), SpyDomain())
+    choices = {"robot": robot, "localizer": eyes, "fallback": Choice("hold")}
+    live = Live(Stack(choices, profile="ideal"), SpyDomain())
     live.start_twin()  # stands for the robot
     live.start_up(real=True)
     _, listener = live.member("listener")

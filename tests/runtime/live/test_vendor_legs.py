@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from tests.middleware.wire.rpc import reach
@@ -31,7 +29,8 @@ def test_the_onboard_controller_moves_the_legs_until_its_mode_is_released(live: 
     for node in ("up", "safety", "twin"):
         live.leave(node)
     onboard = Choice("hold", {"stance": "straight", "speed": 2.0})
-    live.stack = replace(live.stack, lower_body=Choice("vendor", {"robot": robot}), onboard=onboard)
+    vendor = Choice("vendor", {"robot": robot})
+    live.stack = live.stack.with_choice("lower_body", vendor).with_choice("onboard", onboard)
     live.start_twin()
     live.start_gate()
     live.start_up()
