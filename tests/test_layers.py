@@ -19,7 +19,7 @@ LAYERS = (
     ("capabilities",),
     ("skills",),
     ("stack", "runtime", "provenance"),
-    ("evaluation", "training", "dashboard", "doctor"),
+    ("evaluation", "training", "dashboard", "doctor", "option_list"),
     ("run", "demo", "cli", "__main__"),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

@@ -42,6 +42,15 @@ def _run(words: list[str]) -> int:
     return 0 if run_stack(_parse(RunConfig, "run", words)).success else FAILED
 
 
+def _options(words: list[str]) -> int:
+    """List what a stack file may set: slots, their implementations, the options of one."""
+    _prepare_graphics()
+    from golem.option_list import OptionsConfig, options_text
+
+    print(options_text(_parse(OptionsConfig, "options", words)))
+    return 0
+
+
 def _ladder(words: list[str]) -> int:
     """Compare methods on one rung of the capability ladder, on the same seeds."""
     _prepare_graphics()
@@ -237,6 +246,7 @@ class _NoOptions:
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "demo": _demo,
     "run": _run,
+    "options": _options,
     "ladder": _ladder,
     "compare": _compare,
     "model": _model,

@@ -29,7 +29,9 @@ class Driver:
 
     def __init__(self, controller: Recorder, trim: float = 0.0) -> None:
         self.controller, self.state, self.base = controller, crouching(), still()
-        self.layer = Locomotion(controller, LocomotionConfig(trim=VelocityIntegratorConfig(gain=trim) if trim else None))
+        self.layer = Locomotion(
+            controller, LocomotionConfig(trim=VelocityIntegratorConfig(gain=trim) if trim else None)
+        )
         self.layer.reset(self.state)
 
     def run(self, seconds: float, twist: Twist | None = None, dt: float = DT) -> None:
