@@ -269,7 +269,7 @@ def leg_status(status: LegStatus) -> golem_interfaces.LegStatus:
 
 
 def sightings(seen: Detections) -> golem_interfaces.Sightings:
-    """Return what a localizer found in one frame."""
+    """Return what a localizer found in one frame; masks stay inside."""
     objects = [
         golem_interfaces.LocalizedObject(
             o.label,

@@ -6,6 +6,8 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 
+import numpy as np
+
 from golem.capabilities.perception.base import Localizer
 from golem.errors import MissingExtra, MissingSystemLibrary, ModuleFault
 from golem.interfaces import topics
@@ -15,7 +17,7 @@ from golem.robots.base import STAMP_TOLERANCE, Robot
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.runtime.contract_check import ContractCheck
-from golem.types import TICK, Array, BaseEstimate, LocalizedObject, LowState, RgbdImage
+from golem.types import TICK, Array, BaseEstimate, LocalizedObject, LowState, Mask, RgbdImage
 
 LATENCY = 0.033
 """Time from exposure to the frame being available [s]: one frame period of a D400 at 30 Hz."""
@@ -149,7 +151,16 @@ class LocalizerNode:
             self._contract.kind("a located object", o, LocalizedObject)
             self._contract.array("position", o.position, 3)
             self._contract.array("points", o.points, None, 3)
+            if o.mask is not None:
+                self._check_mask(self._contract.kind("mask", o.mask, Mask), len(o.points))
         return Detections(frame.t, self._camera, objects)
+
+    def _check_mask(self, mask: Mask, points: int) -> None:
+        count = self._contract.call(np.count_nonzero, mask.pixels)
+        if count != points:
+            raise self._contract.fault(
+                f"mask has {count} pixels, the contract asks for one per point: {points}"
+            )
 
 
 def detection_requested(bus: Bus, camera: str) -> Callable[[], bool]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.robots.sensors.cameras import rays
-from golem.types import Array, Detection, LocalizedObject, RgbdImage
+from golem.types import Array, Detection, LocalizedObject, Mask, RgbdImage
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +81,8 @@ def lift(frame: RgbdImage, detection: Detection, config: LiftConfig) -> Localize
         config: how depth is read.
 
     Returns:
-        position: the surface point seen at the detection's centre; for a hole the centre of its mouth. points: all
-        valid depths in the grown box: the object and the ground around it.
+        position: the surface point seen at the detection's centre; for a hole the centre of its mouth. points and mask:
+        all valid depths in the grown box: the object and the ground around it.
     """
     low, high = detection.box[:2], detection.box[2:]
     cloud = _window(frame, low - config.grow * (high - low) - 0.5, high + config.grow * (high - low) + 0.5)
@@ -98,7 +98,19 @@ def lift(frame: RgbdImage, detection: Detection, config: LiftConfig) -> Localize
     x, y = detection.center
     ray = np.array([(x - info.cx) / info.fx, (y - info.cy) / info.fy, 1.0])
     position = _transform(frame.T_odom_optical, ray * depth)
-    return LocalizedObject(detection, frame.t, position, _points(frame, cloud))
+    rows, columns = cloud
+    inside = frame.depth[cloud]
+    mask = Mask(np.isfinite(inside) & (inside > 0), columns.start, rows.start)
+    return LocalizedObject(detection, frame.t, position, unproject(frame, mask), mask)
+
+
+def unproject(frame: RgbdImage, mask: Mask) -> Array:
+    """Return the (n, 3) points in odom of the n pixels of `mask`, whose depths are valid, row by row [m]."""
+    height, width = mask.pixels.shape
+    window = slice(mask.y, mask.y + height), slice(mask.x, mask.x + width)
+    depth = frame.depth[window][mask.pixels]
+    optical = rays(frame.info)[window][mask.pixels].astype(np.float64) * depth[:, None]
+    return _transform(frame.T_odom_optical, optical)
 
 
 def _window(frame: RgbdImage, low: Array, high: Array) -> tuple[slice, slice]:
@@ -107,13 +119,6 @@ def _window(frame: RgbdImage, low: Array, high: Array) -> tuple[slice, slice]:
     x0, y0 = np.ceil(np.maximum(low, 0.0)).astype(int)
     x1, y1 = np.floor(np.minimum(high, (width - 1, height - 1))).astype(int)
     return slice(int(y0), int(y1) + 1), slice(int(x0), int(x1) + 1)
-
-
-def _points(frame: RgbdImage, window: tuple[slice, slice]) -> Array:
-    depth = frame.depth[window]
-    valid = np.isfinite(depth) & (depth > 0)
-    optical = rays(frame.info)[window][valid].astype(np.float64) * depth[valid, None]
-    return _transform(frame.T_odom_optical, optical)
 
 
 def _transform(T: Array, points: Array) -> Array:
