@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from golem import registry
 from golem.errors import ConfigError
-from golem.middleware.unitree_api import LOCO_APIS
+from golem.interfaces.unitree_api import LOCO_APIS
 from golem.stack import Choice, Stack, load_stack, parse_stack, shipped
 
 

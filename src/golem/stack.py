@@ -14,7 +14,7 @@ from typing import Any
 from golem import registry
 from golem.capabilities.legs.vendor import Vendor
 from golem.errors import ConfigError, GolemError, unknown_name
-from golem.middleware.unitree_api import LOCO_API, LocoApi, loco_api
+from golem.interfaces.unitree_api import LOCO_API, LocoApi, loco_api
 from golem.options import check_values, read_yaml
 
 

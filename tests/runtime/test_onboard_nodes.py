@@ -14,15 +14,9 @@ import pytest
 from golem.capabilities.legs.hold import STANCES, JointHold
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, LegStatus
+from golem.interfaces.unitree_api import LOCO_APIS, encode
 from golem.middleware.bus import Bus
-from golem.middleware.unitree_api import (
-    LOCO_APIS,
-    ApiRequest,
-    Response,
-    encode,
-    request_topic,
-    response_topic,
-)
+from golem.middleware.wire.api import ApiRequest, Response, request_topic, response_topic
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.runtime.lower_body_node import CheckedLowerBody

@@ -21,7 +21,7 @@ from golem.interfaces.payloads import (
     Odometry,
 )
 from golem.middleware.bus import Topic
-from golem.middleware.unitree_api import ApiRequest, Response, request_topic, response_topic
+from golem.middleware.wire.api import ApiRequest, Response, request_topic, response_topic
 from golem.types import (
     BaseEstimate,
     HandCommand,

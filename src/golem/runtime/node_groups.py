@@ -27,8 +27,8 @@ from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
 from golem.robots.base import HasGantry, Robot
 from golem.robots.model.kinematics import Kinematics
-from golem.robots.onboard import motion_switcher
-from golem.robots.onboard.motion_switcher import MotionSwitcher
+from golem.robots.unitree import motion_switcher
+from golem.robots.unitree.motion_switcher import MotionSwitcher
 from golem.runtime import nodes, perception_nodes
 from golem.runtime.checked import CheckedGraspMethod, CheckedNavigator
 from golem.runtime.contract_check import ContractCheck

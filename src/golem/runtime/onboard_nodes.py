@@ -14,9 +14,10 @@ from golem.capabilities.legs.vendor import damp
 from golem.errors import ModuleFault
 from golem.interfaces import topics
 from golem.interfaces.payloads import LegCommand
+from golem.interfaces.unitree_api import LocoApi
 from golem.middleware.bus import Bus, News
-from golem.middleware.unitree_api import ApiRequest, LocoApi, Response
-from golem.robots.onboard.loco_service import LocoService
+from golem.middleware.wire.api import ApiRequest, Response
+from golem.robots.unitree.loco_service import LocoService
 from golem.runtime.lower_body_node import CheckedLowerBody
 from golem.types import LEGS, TICK, BaseEstimate, LowState
 

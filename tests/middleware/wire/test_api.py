@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from golem.middleware.unitree_api import ApiRequest, Response
 from golem.middleware.wire import api
+from golem.middleware.wire.api import ApiRequest, Response
 from golem.middleware.wire.struct_layout import WireError
 
 int32 = st.integers(-(2**31), 2**31 - 1)

@@ -18,12 +18,12 @@ from golem.interfaces import images, topics
 from golem.interfaces import ros_convert as convert
 from golem.interfaces.payloads import Detections, Exposure
 from golem.interfaces.public import CAMERA_INFO, COLOR, DEPTH, gripper, image, optical_frame
+from golem.middleware.bags.base import BagError, BagMessage, BagTopic
+from golem.middleware.bags.catalog import topic
+from golem.middleware.bags.reader import Bag
+from golem.middleware.bags.writer import BagWriter
 from golem.middleware.bus import News
 from golem.middleware.dds.base import LATCHED, SENSOR, Payload
-from golem.middleware.record.base import BagError, BagMessage, BagTopic
-from golem.middleware.record.catalog import topic
-from golem.middleware.record.reader import Bag
-from golem.middleware.record.writer import BagWriter
 from golem.middleware.ros import codec
 from golem.middleware.ros.message import NANO
 from golem.middleware.wire.convert import encode_low_state

@@ -20,8 +20,8 @@ from golem.middleware.dds import discovery
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.exclusive_writers import owner, refuse_second
 from golem.middleware.wire import hg
+from golem.runtime.live.exclusive_writers import owner, refuse_second
 from golem.runtime.live.launch import LaunchConfig, commands, run_launch
 from golem.runtime.live.node_setup import company, member
 from golem.runtime.live.process import TwinConfig, run_twin

@@ -7,13 +7,14 @@ from tests.middleware.wire.rpc import reach, serve
 from golem.capabilities.legs.hold import JointHold
 from golem.interfaces import topics
 from golem.interfaces.payloads import LegCommand
+from golem.interfaces.unitree_api import LOCO_APIS, OK, decode_int, encode
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import CALLS, DEFAULT
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.unitree_api import LOCO_APIS, OK, ApiRequest, Response, decode_int, encode
 from golem.middleware.wire import hg
-from golem.robots.onboard import motion_switcher
-from golem.robots.onboard.motion_switcher import CHECK_MODE, MotionSwitcher
+from golem.middleware.wire.api import ApiRequest, Response
+from golem.robots.unitree import motion_switcher
+from golem.robots.unitree.motion_switcher import CHECK_MODE, MotionSwitcher
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Executor
 from golem.runtime.live.onboard_bridge import (

@@ -12,8 +12,8 @@ from tests.runtime.live.conftest import Live
 from golem.capabilities.legs.hold import STANCES
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, LegStatus
-from golem.middleware.unitree_api import ApiRequest
-from golem.robots.onboard.motion_switcher import RELEASE_MODE, SERVICE
+from golem.middleware.wire.api import ApiRequest
+from golem.robots.unitree.motion_switcher import RELEASE_MODE, SERVICE
 from golem.stack import Choice
 from golem.types import LEGS
 

@@ -19,7 +19,8 @@ from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.errors import ConfigError, GolemError
 from golem.interfaces.payloads import LegCommand
-from golem.middleware.unitree_api import LOCO_API, OK, ApiRequest, Response, decode_int, encode, loco_api
+from golem.interfaces.unitree_api import LOCO_API, OK, decode_int, encode, loco_api
+from golem.middleware.wire.api import ApiRequest, Response
 from golem.options import require
 from golem.types import LEGS, Array, BaseEstimate, LowState, Twist
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from golem.interfaces import images, public
 from golem.interfaces import ros_convert as convert
-from golem.middleware.record.base import BagError, BagMessage
-from golem.middleware.record.reader import Bag
+from golem.middleware.bags.base import BagError, BagMessage
+from golem.middleware.bags.reader import Bag
 from golem.middleware.ros import codec
 from golem.middleware.ros.goal_info import from_time
 from golem.middleware.ros.message import NANO

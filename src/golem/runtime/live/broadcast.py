@@ -12,10 +12,10 @@ from pathlib import Path
 from golem.interfaces import topics
 from golem.interfaces.public import Role
 from golem.interfaces.recorded import public_topics
+from golem.middleware.bags.base import Sink
+from golem.middleware.bags.recorder import PERIOD, Recorder
 from golem.middleware.bus import Bus, News
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.record.base import Sink
-from golem.middleware.record.recorder import PERIOD, Recorder
 from golem.middleware.ros.node import DdsNode
 from golem.middleware.wire.convert import MODE_MACHINE, encode_low_command
 from golem.robots.base import Robot
@@ -156,12 +156,12 @@ def broadcast(
             stack.callback(casts[-1].close)
 
         if bag is not None:
-            from golem.middleware.record.writer import BagWriter
+            from golem.middleware.bags.writer import BagWriter
 
             every = public_topics()
             add(stack.enter_context(closing(BagWriter(bag))), lambda recorder: recorder.add(every))
         if foxglove is not None:
-            from golem.middleware.record.foxglove_server import FoxgloveServer, ServerConfig
+            from golem.middleware.bags.foxglove_server import FoxgloveServer, ServerConfig
 
             offered = public_topics()
             server = stack.enter_context(closing(FoxgloveServer(ServerConfig(port=foxglove))))

@@ -12,10 +12,10 @@ from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
-from golem.middleware.exclusive_writers import identity
 from golem.middleware.ros.base import ActionClient, Client, RosNode
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.node import DdsNode
+from golem.runtime.live.exclusive_writers import identity
 
 SEARCH = 5.0
 """How long is looked for whoever offers something [s]."""

@@ -16,8 +16,8 @@ from golem.interfaces import topics
 from golem.interfaces.payloads import LegCommand
 from golem.middleware.bus import Bus, News
 from golem.middleware.dds.base import Payload, Reader, Writer
-from golem.middleware.unitree_api import ApiRequest, Response
 from golem.middleware.wire import hg
+from golem.middleware.wire.api import ApiRequest, Response
 from golem.middleware.wire.convert import decode_low_command, encode_low_command
 from golem.middleware.wire.rpc import RpcClient, RpcServer
 from golem.middleware.wire.struct_layout import WireError

@@ -18,9 +18,9 @@ from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import GateState, GateStatus
 from golem.middleware.dds.domain import ROBOT_DOMAIN, DdsConfig
-from golem.middleware.exclusive_writers import owner, refuse_second
 from golem.middleware.interrupt import interrupted
 from golem.robots.base import Restorable
+from golem.runtime.live.exclusive_writers import owner, refuse_second
 from golem.runtime.live.node_setup import AsyncLogger, company, member
 from golem.runtime.live.render_worker import RenderWorker
 from golem.runtime.live.safety_process import SafetyProcess

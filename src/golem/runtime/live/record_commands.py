@@ -12,16 +12,16 @@ from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.errors import ConfigError
 from golem.interfaces.recorded import public_topics
+from golem.middleware.bags.catalog import offered
+from golem.middleware.bags.player import PlayConfig, Player
+from golem.middleware.bags.reader import Bag, repair
+from golem.middleware.bags.recorder import Recorder
+from golem.middleware.bags.writer import BagConfig, BagWriter, Compression
 from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.exclusive_writers import SOLE, identity, refuse_second
 from golem.middleware.interrupt import interrupted
-from golem.middleware.record.catalog import offered
-from golem.middleware.record.player import PlayConfig, Player
-from golem.middleware.record.reader import Bag, repair
-from golem.middleware.record.recorder import Recorder
-from golem.middleware.record.writer import BagConfig, BagWriter, Compression
+from golem.runtime.live.exclusive_writers import SOLE, identity, refuse_second
 
 
 @dataclass(frozen=True)

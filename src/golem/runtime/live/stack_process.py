@@ -18,8 +18,8 @@ from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant, Sample
 from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.waitset import WaitSet
-from golem.middleware.unitree_api import request_topic, response_topic
 from golem.middleware.wire import convert
+from golem.middleware.wire.api import request_topic, response_topic
 from golem.middleware.wire.rpc import RpcClient
 from golem.middleware.wire.struct_layout import WireError
 from golem.runtime.executor import Executor, Phase, Placed, in_order

@@ -13,8 +13,8 @@ from golem.middleware.dds.base import Qos, Reader
 from golem.middleware.dds.discovery import Endpoint
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
-from golem.middleware.exclusive_writers import DISCOVERY, owner
 from golem.middleware.ros import names
+from golem.runtime.live.exclusive_writers import DISCOVERY, owner
 from golem.runtime.live.node_setup import log_line, member
 
 EAR = Qos(reliable=False, depth=None)

@@ -10,10 +10,10 @@ from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant
 from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.msgs.std_srvs import Trigger_Response
-from golem.middleware.unitree_api import request_topic, response_topic
+from golem.middleware.wire.api import request_topic, response_topic
 from golem.middleware.wire.rpc import RpcServer
 from golem.robots.base import HasGantry, Robot
-from golem.robots.onboard import motion_switcher
+from golem.robots.unitree import motion_switcher
 from golem.runtime import nodes
 from golem.runtime.executor import Executor, Phase, Placed, in_order
 from golem.runtime.live.motor_bridge import CommandIn, StateOut

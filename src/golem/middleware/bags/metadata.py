@@ -13,8 +13,8 @@ from typing import Any
 
 import yaml
 
+from golem.middleware.bags.base import BagTopic
 from golem.middleware.dds.base import DEFAULT, Qos
-from golem.middleware.record.base import BagTopic
 
 VERSION = 8
 FOREVER = {"sec": 9223372036, "nsec": 854775807}

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import IO, Literal
 
 from golem.errors import ConfigError, OutputError
-from golem.middleware.record.base import BagMessage, BagTopic, missing
-from golem.middleware.record.metadata import Contents, dump, information, offered_qos
+from golem.middleware.bags.base import BagMessage, BagTopic, missing
+from golem.middleware.bags.metadata import Contents, dump, information, offered_qos
 from golem.middleware.ros.message import NANO
 
 try:

@@ -15,11 +15,11 @@ from rosbags.rosbag2 import Reader as RosbagsReader
 from rosbags.typesys import Stores, get_typestore
 
 from golem.errors import ConfigError, MissingExtra, OutputError
+from golem.middleware.bags.base import BagError, BagMessage, BagTopic
+from golem.middleware.bags.metadata import offered_qos, parse_qos
+from golem.middleware.bags.reader import Bag, repair
+from golem.middleware.bags.writer import BagConfig, BagWriter
 from golem.middleware.dds.base import DEFAULT, LATCHED, SENSOR, Qos
-from golem.middleware.record.base import BagError, BagMessage, BagTopic
-from golem.middleware.record.metadata import offered_qos, parse_qos
-from golem.middleware.record.reader import Bag, repair
-from golem.middleware.record.writer import BagConfig, BagWriter
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 
@@ -243,7 +243,7 @@ def test_what_a_user_can_do_wrong(tmp_path: Path) -> None:
 def test_a_missing_extra_is_named(
     monkeypatch: pytest.MonkeyPatch, module: str, absent: str, extra: str
 ) -> None:
-    name = f"golem.middleware.record.{module}"
+    name = f"golem.middleware.bags.{module}"
     monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setitem(sys.modules, absent, None)
     with pytest.raises(MissingExtra, match=rf"golem-humanoid\[{extra}\]"):

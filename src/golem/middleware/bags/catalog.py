@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterable
 from typing import Protocol
 
+from golem.middleware.bags.base import BagTopic
 from golem.middleware.dds.base import DEFAULT, Qos
-from golem.middleware.record.base import BagTopic
 from golem.middleware.ros import codec, names
 
 

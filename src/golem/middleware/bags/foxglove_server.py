@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from golem.errors import ConfigError, MissingExtra
-from golem.middleware.record.base import BagMessage, BagTopic
-from golem.middleware.record.recorder import Recorder
+from golem.middleware.bags.base import BagMessage, BagTopic
+from golem.middleware.bags.recorder import Recorder
 
 try:
     import foxglove

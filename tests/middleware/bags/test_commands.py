@@ -22,11 +22,11 @@ pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
 from golem.interfaces.public import topic
+from golem.middleware.bags.reader import Bag
 from golem.middleware.dds.base import Qos, Reader, Sample, Writer
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
-from golem.middleware.record.reader import Bag
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.msgs.sensor_msgs import Image
 from golem.middleware.ros.msgs.std_msgs import Header, String
@@ -155,8 +155,8 @@ def test_a_killed_recorder_leaves_what_it_had(robot: CycloneParticipant, domain:
 @pytest.mark.slow
 def test_a_bag_is_played_onto_a_domain(robot: CycloneParticipant, domain: int, tmp_path: Path) -> None:
     from golem.interfaces.recorded import public_topics
-    from golem.middleware.record.base import BagMessage
-    from golem.middleware.record.writer import BagWriter
+    from golem.middleware.bags.base import BagMessage
+    from golem.middleware.bags.writer import BagWriter
 
     (low,) = public_topics([STATE])
     bag = BagWriter(tmp_path / "bag")

@@ -8,8 +8,8 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from golem.middleware.bags.base import BagMessage, BagTopic, Sink
 from golem.middleware.dds.base import Participant, Payload, Qos, Reader, Sample
-from golem.middleware.record.base import BagMessage, BagTopic, Sink
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import dds_name
 from golem.middleware.ros.message import NANO

@@ -1,8 +1,4 @@
-"""The vendor's remote procedure calls: requests and responses with a JSON payload, and the loco service's numbers.
-
-On the robot they travel as `unitree_api::msg::dds_::Request_` and `Response_` on `rt/api/<service>/request` and
-`.../response`. A response repeats the identity (id, api_id) of its request and carries a status code, 0 for success.
-"""
+"""The vendor's services on the robot's own computer: status codes, JSON payloads, numbers of the loco service."""
 
 from __future__ import annotations
 
@@ -27,47 +23,6 @@ MEANING = {
     BAD_PARAMETER: "the parameter is wrong",
 }
 """What status codes of any service mean; numbers from unitree_sdk2_python, unitree_sdk2py/rpc/internal.py."""
-
-
-@dataclass(frozen=True, slots=True)
-class ApiRequest:
-    """A call.
-
-    Attributes:
-        id: tells the calls of one client apart.
-        api_id: the function that is called.
-        parameter: its argument, JSON; empty where it takes none.
-        lease: number of the lease it is made under; 0 without.
-        priority: a higher one goes first where the service has a queue for it.
-        noreply: whether no answer is wanted.
-        binary: an argument that is no JSON.
-    """
-
-    id: int
-    api_id: int
-    parameter: str = ""
-    lease: int = 0
-    priority: int = 0
-    noreply: bool = False
-    binary: bytes = b""
-
-
-@dataclass(frozen=True, slots=True)
-class Response:
-    """The answer to a call.
-
-    Attributes:
-        id, api_id: those of the request.
-        code: status, 0 for success.
-        data: the result, JSON; empty where there is none.
-        binary: a result that is no JSON.
-    """
-
-    id: int
-    api_id: int
-    code: int = OK
-    data: str = ""
-    binary: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,16 +91,6 @@ def loco_api(robot: object) -> LocoApi:
     if not isinstance(robot, str) or robot not in LOCO_APIS:
         raise unknown_name("robot with a loco service", str(robot), LOCO_APIS)
     return LOCO_APIS[robot]
-
-
-def request_topic(service: str) -> str:
-    """Return the topic of `ApiRequest` to a service."""
-    return f"api/{service}/request"
-
-
-def response_topic(service: str) -> str:
-    """Return the topic of `Response` from a service."""
-    return f"api/{service}/response"
 
 
 def encode(values: Mapping[str, object]) -> str:

@@ -6,16 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from golem.middleware.unitree_api import (
-    LOCO_APIS,
-    TIMEOUT,
-    decode,
-    decode_int,
-    decode_velocity,
-    encode,
-    request_topic,
-    response_topic,
-)
+from golem.interfaces.unitree_api import LOCO_APIS, TIMEOUT, decode, decode_int, decode_velocity, encode
+from golem.middleware.wire.api import request_topic, response_topic
 
 
 def test_topics_are_the_robots_without_the_domain_prefix() -> None:

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from golem.errors import ConfigError, unknown_name
+from golem.middleware.bags.base import BagMessage, BagTopic
+from golem.middleware.bags.catalog import topic as describe
+from golem.middleware.bags.reader import Bag
+from golem.middleware.bags.recorder import CLOCK, CLOCK_KIND
 from golem.middleware.dds.base import ENCAPSULATION, Participant, Payload, Qos, Writer
-from golem.middleware.record.base import BagMessage, BagTopic
-from golem.middleware.record.catalog import topic as describe
-from golem.middleware.record.reader import Bag
-from golem.middleware.record.recorder import CLOCK, CLOCK_KIND
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.message import NANO
 

@@ -15,14 +15,14 @@ pytest.importorskip("rosbags")
 
 from golem.errors import ConfigError
 from golem.interfaces.recorded import public_topics
+from golem.middleware.bags.base import BagMessage, BagTopic
+from golem.middleware.bags.catalog import offered, topic
+from golem.middleware.bags.player import PlayConfig, Player
+from golem.middleware.bags.reader import Bag
+from golem.middleware.bags.recorder import GONE, HOLD, MANY, Recorder, clock_time
+from golem.middleware.bags.writer import BagWriter
 from golem.middleware.dds.base import DEFAULT, LATCHED, Participant, Qos, Reader
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.record.base import BagMessage, BagTopic
-from golem.middleware.record.catalog import offered, topic
-from golem.middleware.record.player import PlayConfig, Player
-from golem.middleware.record.reader import Bag
-from golem.middleware.record.recorder import GONE, HOLD, MANY, Recorder, clock_time
-from golem.middleware.record.writer import BagWriter
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.builtin_interfaces import Time

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import IO, cast
 
 from golem.errors import OutputError
-from golem.middleware.record.base import BagError, BagMessage, BagTopic, missing
-from golem.middleware.record.metadata import Contents, parse_qos
-from golem.middleware.record.writer import CUSTOM, BagConfig, McapFile, write_metadata
+from golem.middleware.bags.base import BagError, BagMessage, BagTopic, missing
+from golem.middleware.bags.metadata import Contents, parse_qos
+from golem.middleware.bags.writer import CUSTOM, BagConfig, McapFile, write_metadata
 
 try:
     from mcap.exceptions import McapError

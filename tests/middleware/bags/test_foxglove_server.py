@@ -16,9 +16,9 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from golem.errors import ConfigError
+from golem.middleware.bags.base import BagMessage, BagTopic
+from golem.middleware.bags.foxglove_server import FoxgloveServer, ServerConfig
 from golem.middleware.dds.base import DEFAULT, LATCHED, Qos
-from golem.middleware.record.base import BagMessage, BagTopic
-from golem.middleware.record.foxglove_server import FoxgloveServer, ServerConfig
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 STRING = STORE.generate_msgdef("std_msgs/msg/String", ros_version=2)[0]
