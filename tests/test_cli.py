@@ -93,3 +93,41 @@ def test_the_model_is_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
             cli.main()
         assert end.value.code == 0
         assert "left_knee" in out.read_text()
+
+
+def test_a_modules_fault_ends_in_its_sentence_and_the_lines_that_led_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text("import golem\n1 / 0\n")
+    (tmp_path / "mine.yaml").write_text(f"upper_body: {tmp_path / 'mine.py'}:Arms\n")
+    monkeypatch.setattr(sys, "argv", ["golem", "run", str(tmp_path / "mine.yaml")])
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    sentence, *trace = capsys.readouterr().err.splitlines()
+    assert end.value.code == 2
+    assert sentence.endswith("importing it raised ZeroDivisionError: division by zero (mine.py:2)")
+    assert trace == [
+        f"{tmp_path / 'mine.py'}:2 in <module>",
+        "    1 / 0",
+        "ZeroDivisionError: division by zero",
+    ]
+
+
+def test_a_slow_module_is_told_in_one_line_and_other_warnings_as_ever(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def slow(words: list[str]) -> int:
+        warnings.warn("arms take 50 ms", SlowModule, stacklevel=1)
+        warnings.warn("something else", RuntimeWarning, stacklevel=1)
+        return 0
+
+    monkeypatch.setitem(cli.COMMANDS, "slow", slow)
+    monkeypatch.setattr(sys, "argv", ["golem", "slow"])
+    with warnings.catch_warnings(), pytest.raises(SystemExit):
+        warnings.simplefilter("always")
+        monkeypatch.setattr(cli, "_SHOW_WARNING", lambda message, *_: print(f"{message!r}", file=sys.stderr))
+        cli.main()
+    assert capsys.readouterr().err.splitlines() == [
+        "golem: arms take 50 ms",
+        "RuntimeWarning('something else')",
+    ]

@@ -11,7 +11,7 @@ SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
 
 # From the bottom up. A package may import from its own row and from every row below it.
 LAYERS = (
-    ("__init__", "types", "errors", "options", "registry"),
+    ("__init__", "types", "errors", "options", "traces", "registry"),
     ("middleware",),
     ("interfaces",),
     ("robots",),

@@ -8,14 +8,15 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import tyro
 
-from golem.errors import GolemError, unknown_name
+from golem.errors import GolemError, ModuleFault, SlowModule, unknown_name
 
 T = TypeVar("T")
 
@@ -258,10 +259,13 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
 
 def main() -> None:
     """Run the command line; what a user can cause ends in one sentence and exit code 2."""
+    warnings.showwarning = _show_warning
     try:
         code = _dispatch(sys.argv[1:])
     except GolemError as error:
         print(f"golem: {error}", file=sys.stderr)
+        if isinstance(error, ModuleFault) and error.trace:
+            print(error.trace, file=sys.stderr)
         code = BAD_INPUT
     except BrokenPipeError:  # whoever read what is printed has gone, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -270,6 +274,16 @@ def main() -> None:
         print(f"golem: {interrupt or 'interrupted'}", file=sys.stderr)
         code = INTERRUPTED
     sys.exit(code)
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+    if issubclass(category, SlowModule):
+        print(f"golem: {message}", file=sys.stderr)
+    else:
+        _SHOW_WARNING(message, category, *rest)
+
+
+_SHOW_WARNING = warnings.showwarning
 
 
 def _dispatch(words: list[str]) -> int:

@@ -120,8 +120,8 @@ def create(slot: str, use: str, options: Mapping[str, object], **context: object
         return cls(**arguments, **supplied)
     except GolemError:
         raise
-    except Exception as error:  # a user's constructor may raise anything
-        raise ModuleFault(slot, use, f"its constructor raised {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:  # a user's constructor may raise anything
+        raise ModuleFault.of(slot, use, error, "its constructor raised ") from error
 
 
 def _config_class(cls: type[Any]) -> type[Any] | None:
@@ -162,5 +162,5 @@ def _import(slot: str, use: str, location: str) -> ModuleType:
         raise ModuleFault(
             slot, use, f"it needs the package '{error.name}', which is not installed"
         ) from error
-    except Exception as error:  # a user's file may raise anything
-        raise ModuleFault(slot, use, f"importing it raised {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:  # a user's file may raise anything
+        raise ModuleFault.of(slot, use, error, "importing it raised ") from error

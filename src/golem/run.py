@@ -97,6 +97,7 @@ def run_stack(config: RunConfig) -> SkillResult:
     print(
         f"{'Done' if result.success else 'Failed'} after {running.executor.t:.1f} s of robot time: {result.reason}"
     )
+    _show_trace(result)
     return result
 
 
@@ -114,6 +115,7 @@ def _operate(config: RunConfig, stack: Stack) -> SkillResult:
                 if view.wait_for_pick():
                     result = view.run(Pick(running.method), PickGoal(), watch=Narrator(running))
                     print(result.reason, flush=True)
+                    _show_trace(result)
                 else:
                     robot.close()
                     running, robot = build(stack, config.seed)
@@ -121,6 +123,12 @@ def _operate(config: RunConfig, stack: Stack) -> SkillResult:
         except KeyboardInterrupt:
             print()
     return SkillResult(True, "done", None, "Ended by the operator.")
+
+
+def _show_trace(result: SkillResult) -> None:
+    """Print where a module failed, if one did."""
+    if result.trace:
+        print(result.trace, file=sys.stderr)
 
 
 def on_air(

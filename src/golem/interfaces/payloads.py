@@ -36,7 +36,8 @@ class ArmCommand:
 
     Attributes:
         q: (15,) joint targets, torso, left arm, right arm [rad]; inside the position limits, and no
-            further from the previous tick's targets than the velocity limits allow.
+            further from the previous tick's targets than the velocity limits of `robots.model.limits` allow. The first
+            ones after a reset start from the measured joints.
         error_position: (2,) distance of the left and right grasp frame from its target at `q` [m]; 0 for
             an arm without a target.
         error_rotation: (2,) angle between grasp frame and target at `q` [rad]; 0 for an arm without one.
@@ -318,7 +319,9 @@ class ModuleFaultMsg:
     Attributes:
         slot: its slot.
         reason: what it did, and its name.
+        trace: see `ModuleFault`.
     """
 
     slot: str
     reason: str
+    trace: str = ""

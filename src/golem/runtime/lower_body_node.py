@@ -9,7 +9,7 @@ from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.locomotion import Locomotion
 from golem.errors import ModuleFault
 from golem.interfaces import topics
-from golem.interfaces.payloads import LegCommand, LegStatus
+from golem.interfaces.payloads import LegCommand, LegStatus, ModuleFaultMsg
 from golem.middleware.bus import Bus, News
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import MIN_RATE, moving
@@ -42,7 +42,7 @@ class CheckedLowerBody:
         contract.kind("envelope", controller.envelope, Envelope)
         contract.kind("gait", controller.gait, GaitConfig)
         self.rate = contract.number("rate", controller.rate, minimum=MIN_RATE)
-        self.check_latency()
+        contract.times.allowed = 1.0 / self.rate + self.check_latency()
 
     def check_latency(self) -> float:
         """Return the latency at this moment [s]; a controller may measure its own.
@@ -111,7 +111,8 @@ class LowerBodyNode:
             if self._fault is not None:
                 raise self._both(fault) from fault
             # A copy: the one that was raised holds every frame it passed.
-            self._fault = ModuleFault(fault.slot, fault.use, fault.reason)
+            self._fault = ModuleFault(fault.slot, fault.use, fault.reason, fault.trace)
+            self._bus.publish(topics.MODULE_FAULT, ModuleFaultMsg(fault.slot, str(fault), fault.trace), t)
             self._failed_at = t
             self._legs, self._overruns = self._fallback, 0
             self._bus.withdraw(topics.LEG_COMMAND)  # what the failed one sent late shall not come any more
@@ -149,7 +150,9 @@ class LowerBodyNode:
         first = self._fault
         assert first is not None
         reason = f"{first.reason}; the fallback {second.use} failed too: {second.reason}"
-        return ModuleFault(first.slot, first.use, reason)
+        return ModuleFault(
+            first.slot, first.use, reason, "\n".join(filter(None, (first.trace, second.trace)))
+        )
 
     def _report(self, t: float) -> None:
         locomotion = self._locomotion

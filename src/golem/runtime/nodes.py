@@ -20,6 +20,7 @@ from golem.interfaces.payloads import (
 )
 from golem.middleware.bus import Bus, News
 from golem.robots.base import Robot
+from golem.runtime.arm_limits import ArmLimits
 from golem.runtime.contract_check import ContractCheck
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
@@ -95,6 +96,7 @@ class EstimatorNode:
     def __init__(self, bus: Bus, estimator: BaseEstimator, contract: ContractCheck) -> None:
         """Run `estimator`."""
         self._bus, self._estimator, self._contract = bus, estimator, contract
+        contract.times.allowed = self.period
         self._started = False
 
     def step(self, t: float) -> None:
@@ -126,6 +128,8 @@ class UpperBodyNode:
         self._bus, self._arms, self._contract = bus, arms, contract
         self._latency = contract.number("latency", arms.latency, minimum=0.0)
         self.period = 1.0 / contract.number("rate", arms.rate, minimum=MIN_RATE)
+        self._limits = ArmLimits(contract, self.period)
+        contract.times.allowed = self.period + self._latency
         self._stopped_at = 0.0
 
     def step(self, t: float) -> None:
@@ -137,6 +141,7 @@ class UpperBodyNode:
         if not moving(self._bus):
             self._stopped_at = t
             self._contract.call(self._arms.reset, state.q)
+            self._limits.reset(state.q)
         targets = self._bus.latest(topics.PALM_TARGETS)
         if targets is None or targets.t <= self._stopped_at:
             # A target from before a stop must not set the arms in motion when the robot is released.
@@ -145,7 +150,7 @@ class UpperBodyNode:
         left, right = (None if T is None else T_base_odom @ T for T in (targets.left, targets.right))
         command = self._contract.call(self._arms.step, left, right, state.q, self.period)
         self._contract.kind("the arm command", command, ArmCommand)
-        self._contract.array("q", command.q, UPPER.stop - UPPER.start)
+        self._limits.check(self._contract.array("q", command.q, UPPER.stop - UPPER.start))
         self._bus.publish(topics.ARM_COMMAND, command, t, self._latency)
 
 
@@ -157,6 +162,7 @@ class HandNode:
     def __init__(self, bus: Bus, hand: HandController, side: Side, contract: ContractCheck) -> None:
         """Run `hand` on `side`."""
         self._bus, self._hand, self._contract = bus, hand, contract
+        contract.times.allowed = self.period
         self._side: Side = side
         self._goals = 0
         self._frozen = False
@@ -208,6 +214,7 @@ class ServoNode:
     def __init__(self, bus: Bus, servo: MotorServo, contract: ContractCheck) -> None:
         """Run `servo`."""
         self._bus, self._servo, self._contract = bus, servo, contract
+        contract.times.allowed = self.period
 
     def step(self, t: float) -> None:
         """Publish the command that the safety gate shall judge."""
@@ -312,7 +319,7 @@ class SkillNode:
         if self.run is None:
             return
         if fault is not None:
-            self.run.fail(fault.slot, fault.reason)
+            self.run.fail(fault.slot, fault.reason, fault.trace)
         legs = self._context.bus.latest(topics.LEG_STATUS)
         if legs is not None and legs.fault is not None:
             self.run.fail("lower_body", legs.fault)

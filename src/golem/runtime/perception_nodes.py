@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -106,6 +107,7 @@ class LocalizerNode:
         """
         self._bus, self._localizer, self._camera, self._contract = bus, localizer, camera, contract
         self._latency = contract.number("latency", localizer.latency, minimum=0.0) if pool is None else 0.0
+        contract.times.allowed = math.inf if pool is not None else max(self._latency, self.period)
         self._frames = News(bus, topics.rgbd_images(camera))
         self._pool = pool
         self._job: tuple[Future[Detections], tuple[str, ...]] | None = None
@@ -137,7 +139,7 @@ class LocalizerNode:
             self._bus.publish(topics.detections(self._camera), found(), t, self._latency)
         except ModuleFault as fault:
             if labels == self._wanted():
-                self._bus.publish(topics.MODULE_FAULT, ModuleFaultMsg(fault.slot, str(fault)), t)
+                self._bus.publish(topics.MODULE_FAULT, ModuleFaultMsg(fault.slot, str(fault), fault.trace), t)
         except (MissingExtra, MissingSystemLibrary) as lack:
             if self._pool is None:
                 raise

@@ -26,6 +26,7 @@ class SkillResult:
         slot: the slot of the module that failed, by what the robot itself can tell; None on success.
         reason: one sentence.
         timings: seconds of robot time by name, e.g. `detect_to_grasp`.
+        trace: where a module failed, see `ModuleFault`; empty where none did.
     """
 
     success: bool
@@ -33,6 +34,7 @@ class SkillResult:
     slot: str | None
     reason: str
     timings: dict[str, float] = field(default_factory=dict[str, float])
+    trace: str = ""
 
 
 class StageFailed(GolemError):

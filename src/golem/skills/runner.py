@@ -38,12 +38,12 @@ class SkillRun:
         if self.result is None:
             self._guard(lambda: self._coroutine.throw(SkillCancelled()))
 
-    def fail(self, slot: str, reason: str) -> None:
+    def fail(self, slot: str, reason: str, trace: str = "") -> None:
         """End the skill because the module in `slot` broke its contract; the skill learns it as a cancellation."""
         if self.result is None:
             self._guard(lambda: self._coroutine.throw(SkillCancelled()))
             self._coroutine.close()
-            self.result = SkillResult(False, FAULT, slot, reason)
+            self.result = SkillResult(False, FAULT, slot, reason, trace=trace)
 
     def _guard(self, resume: Callable[[], object]) -> None:
         """Resume the skill; whatever ends it becomes its result."""
@@ -59,11 +59,15 @@ class SkillRun:
         except StageFailed as failure:
             self.result = SkillResult(False, failure.stage, failure.slot, str(failure))
         except ModuleFault as fault:
-            self.result = SkillResult(False, FAULT, fault.slot, str(fault))
+            self.result = _failed(fault)
         except (MissingExtra, MissingSystemLibrary):
             raise
-        except Exception as error:  # a user's skill may raise anything
-            self.result = self._fault(f"{type(error).__name__}: {error}")
+        except (Exception, SystemExit) as error:  # a user's skill may raise anything
+            self.result = _failed(ModuleFault.of(SLOT, self._name, error))
 
     def _fault(self, reason: str) -> SkillResult:
-        return SkillResult(False, FAULT, SLOT, str(ModuleFault(SLOT, self._name, reason)))
+        return _failed(ModuleFault(SLOT, self._name, reason))
+
+
+def _failed(fault: ModuleFault) -> SkillResult:
+    return SkillResult(False, FAULT, fault.slot, str(fault), trace=fault.trace)
