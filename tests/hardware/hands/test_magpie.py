@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from golem.hardware.hands.base import HandController
-from golem.hardware.hands.magpie import FORCE_STEP, MagpieHand, clamp_force
+from golem.hardware.hands.magpie import FORCE_STEP, MagpieConfig, MagpieHand, clamp_force
 from golem.interfaces.payloads import GripState
 from golem.robots.model.magpie_model import MAX_FORCE, MAX_GAP, MIN_FORCE
 from golem.types import HandCommand, HandState
@@ -147,15 +147,31 @@ def test_bad_or_old_reports_change_nothing() -> None:
     hand, fingers, _ = grasp(0.016)
     t, force = fingers.t, np.full(2, 3.0)
     for report in (
-        HandState(t + 1, math.nan, np.zeros(2), force),
-        HandState(t + 1, 0.016, np.zeros(2), np.array([math.nan, 3.0])),
+        HandState(t + 0.1, math.nan, np.zeros(2), force),
+        HandState(t + 0.1, 0.016, np.zeros(2), np.array([math.nan, 3.0])),
         HandState(math.nan, 0.016, np.zeros(2), force),
-        HandState(t + 1, 0.016, np.zeros(2), np.zeros(3)),
+        HandState(t + 0.1, 0.016, np.zeros(2), np.zeros(3)),
         HandState(t - 1, 0.0, np.zeros(2), np.zeros(2)),
     ):
-        command = hand.step(report, t + 1)
+        command = hand.step(report, t + 0.1)
         assert hand.status().holding
-        assert (command.t, command.gap) == (t + 1, 0.0)
+        assert (command.t, command.gap) == (t + 0.1, 0.0)
+
+
+def test_a_grip_of_which_nothing_is_heard_any_more_is_not_believed_in() -> None:
+    hand, fingers, _ = grasp(0.016)
+    last = HandState(fingers.t, 0.016, np.full(2, 0.008), np.full(2, 3.0))
+    assert hand.step(last, fingers.t + 0.19).gap == 0.0 and hand.status().holding
+    assert hand.step(last, fingers.t + 0.21).gap == 0.0  # the fingers go on pressing
+    assert hand.status().state is GripState.SLIPPED
+
+
+def test_a_hand_opens_no_further_than_it_can() -> None:
+    hand = MagpieHand(MagpieConfig(max_gap=0.104))
+    state = HandState(0.0, 0.0, np.zeros(2), np.zeros(2))
+    assert hand.step(state, 0.0).gap == 0.104
+    hand.open(0.05)
+    assert hand.step(state, 0.0).gap == 0.05
 
 
 def test_before_the_first_report_nothing_is_known() -> None:

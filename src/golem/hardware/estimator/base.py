@@ -11,7 +11,8 @@ from golem.types import BaseEstimate, LowState
 class BaseEstimator(Protocol):
     """Estimates the pose of base_link in odom.
 
-    odom is level, and base_link starts above its origin with heading zero.
+    odom is level, and base_link starts above its origin with heading zero. A class that takes the robot to hang or to
+    stand says so: `requires = ("hoist",)` or `("ground",)`; a stack whose robot does not is refused.
     """
 
     def reset(self, state: LowState) -> None:
@@ -24,5 +25,8 @@ class BaseEstimator(Protocol):
         Args:
             state: joints and IMU.
             dt: time since the previous measurement [s].
+
+        Raises:
+            GolemError: the measurement is not finite; it is refused rather than believed.
         """
         ...

@@ -28,7 +28,7 @@ class FeetConfig:
     Attributes:
         force: how forces come from torques.
         contact: how contacts come from forces.
-        least_force: force above which the centre of pressure is computed [N]; below, it is the middle of the sole.
+        min_force: force above which the centre of pressure is computed [N]; below, it is the middle of the sole.
         turning: angular rate of a foot at which it is believed half as much [rad/s]. A foot that rolls over its edge
             turns about a line that is not known well: 3 cm of doubt at this rate are the noise of a planted foot.
         sliding: speed of the feet relative to each other at which the less loaded one is believed half as much [m/s].
@@ -37,7 +37,7 @@ class FeetConfig:
 
     force: FootForceConfig = field(default_factory=FootForceConfig)
     contact: ContactConfig = field(default_factory=ContactConfig)
-    least_force: float = 50.0
+    min_force: float = 50.0
     turning: float = 1.67
     sliding: float = 0.1
 
@@ -123,7 +123,7 @@ class Feet:
 
     def _pressure(self, force: list[float], moment: list[float]) -> tuple[float, float, float]:
         normal = force[2]
-        if normal < self.config.least_force:
+        if normal < self.config.min_force:
             return 0.0, 0.0, 0.0
         x, y = -moment[1] / normal, moment[0] / normal
         return (

@@ -55,7 +55,7 @@ class InvariantConfig:
         heading_noise: the same of the IMU's own heading [rad]. Feet and accelerometer say nothing about heading,
             whose error would grow with the bias of the gyro.
         rest_noise: the same of the velocity of a robot whose feet have not carried it yet: it hangs [m/s].
-        least_weight: a foot of less weight is in the air.
+        min_weight: a foot of less weight is in the air.
         gate: squared Mahalanobis distance up to which a foot is believed as it is (chi-square, 3 degrees, 99 %).
         reject: squared distance beyond which a foot has slipped: it is put where it is now seen.
         tilt, velocity, gyro_bias, acc_bias: standard deviations at the reset [rad], [m/s], [rad/s], [m/s^2].
@@ -69,7 +69,7 @@ class InvariantConfig:
     foot_noise: float = 3e-3
     heading_noise: float = 0.02
     rest_noise: float = 0.3
-    least_weight: float = 0.05
+    min_weight: float = 0.05
     gate: float = 11.34
     reject: float = 113.4
     tilt: float = 0.01
@@ -151,7 +151,7 @@ class InvariantFilter:
         F[:15, _BIAS] = enter * -dt
         P = F @ self.P @ F.T
         P[:15, :15] += (enter * (self._noise * dt)) @ enter.T
-        left, right = np.maximum(weight, c.least_weight).tolist()
+        left, right = np.maximum(weight, c.min_weight).tolist()
         self._wander[_CONTACTS[0]], self._wander[_CONTACTS[1]] = (
             c.contact_noise**2 / left,
             c.contact_noise**2 / right,
@@ -188,7 +188,7 @@ class InvariantFilter:
         rows, nus, noises = [_SEE_HEADING], [[heading]], [c.heading_noise**2]
         believed = np.zeros(2, dtype=bool)
         for k, H in enumerate(_SEE_FEET):
-            if weight[k] < c.least_weight:
+            if weight[k] < c.min_weight:
                 self.planted[k] = False
                 continue
             nu = seen[k] - self.x[2 + k] + self.x[1]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from golem.finite import check_measured
 from golem.hardware.estimator.attitude import Attitude
 from golem.hardware.estimator.feet import Feet, FeetConfig, LevelFloor
 from golem.hardware.estimator.invariant import InvariantConfig, InvariantFilter
@@ -67,6 +68,7 @@ class InvariantEKF:
 
     def step(self, state: LowState, dt: float) -> BaseEstimate:
         """Fuse one measurement; see `BaseEstimator`."""
+        check_measured(state)
         filter, feet = self._filter, self._feet
         waist = _waist(state)
         up = waist @ filter.R[2]

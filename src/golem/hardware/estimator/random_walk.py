@@ -27,7 +27,7 @@ class RandomWalkConfig:
         walk: how far the velocity wanders in a second, standard deviation [m/s / sqrt(s)].
         foot_noise: standard deviation per axis of the velocity of a fully loaded foot [m/s]; a foot of weight w has
             `foot_noise / sqrt(w)`.
-        least_weight: a foot of less weight measures nothing.
+        min_weight: a foot of less weight measures nothing.
         gate: squared Mahalanobis distance up to which a foot is believed as it is: 11.34, the 99 % quantile of
             chi-square with three degrees of freedom. Beyond it the variance of the foot grows with the distance.
         reject: squared distance beyond which a foot is not believed at all.
@@ -36,7 +36,7 @@ class RandomWalkConfig:
 
     walk: float = 0.5
     foot_noise: float = 0.05
-    least_weight: float = 0.05
+    min_weight: float = 0.05
     gate: float = 11.34
     reject: float = 113.4
     start: float = 0.1
@@ -78,9 +78,9 @@ def fuse(
     """
     prior = variance + config.walk**2 * dt
     innovation = measured - velocity[..., None, :]
-    noise = config.foot_noise**2 / np.maximum(weight, config.least_weight)
+    noise = config.foot_noise**2 / np.maximum(weight, config.min_weight)
     distance = (innovation * innovation).sum(axis=-1) / (prior[..., None] + noise)
-    believed = (weight >= config.least_weight) & (distance <= config.reject)
+    believed = (weight >= config.min_weight) & (distance <= config.reject)
     information = believed / (noise * np.maximum(distance / config.gate, 1.0))
     posterior = prior / (1.0 + prior * information.sum(axis=-1))
     step = (information[..., None] * innovation).sum(axis=-2)

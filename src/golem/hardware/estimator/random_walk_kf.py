@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from golem.finite import check_measured
 from golem.hardware.estimator.attitude import Attitude, GyroBias
 from golem.hardware.estimator.feet import Feet, FeetConfig, LevelFloor
 from golem.hardware.estimator.random_walk import RandomWalk, RandomWalkConfig, base_velocity
@@ -56,6 +57,7 @@ class RandomWalkKF:
 
     def step(self, state: LowState, dt: float) -> BaseEstimate:
         """Fuse one measurement; see `BaseEstimator`."""
+        check_measured(state)
         R = self._attitude.rotation(state)
         feet = self._feet
         gyro = state.imu.gyro - self._bias.step(state, dt)

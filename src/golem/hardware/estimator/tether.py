@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from golem.finite import check_finite
 from golem.hardware.estimator.attitude import Attitude
 from golem.types import BaseEstimate, LowState
 
 
 class TetherEstimator:
     """Position fixed at the origin of odom, orientation from the IMU with the torso's yaw undone. Never stale."""
+
+    requires = ("hoist",)
 
     def __init__(self) -> None:
         """Start without a heading."""
@@ -21,6 +24,7 @@ class TetherEstimator:
 
     def step(self, state: LowState, dt: float) -> BaseEstimate:
         """Return the pose; see `BaseEstimator`."""
+        check_finite("the IMU's quaternion", state.imu.quat)
         T = np.eye(4)
         T[:3, :3] = self._attitude.rotation(state)
         return BaseEstimate(state.t, T)

@@ -11,7 +11,10 @@ class VirtualEstop:
     Attributes:
         period: time between frames [s]; the default is the rate of the Arduino board, 100 Hz.
         pressed: state of the button.
+        fault: empty: it cannot fail.
     """
+
+    fault = ""
 
     def __init__(self, period: float = 0.010) -> None:
         """Start released, with the first frame due at once."""

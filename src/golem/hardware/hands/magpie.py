@@ -34,7 +34,7 @@ class MagpieConfig:
 
     Attributes:
         contact_share: share of the commanded force both fingers must report for contact [DeliGrasp].
-        least_contact: force that is no contact yet [N]; the servo's load reads up to 0.25 N without one.
+        min_contact: force that is no contact yet [N]; the servo's load reads up to 0.25 N without one.
         closed_gap: gap below which nothing can be between the pads [m].
         rest_band: how far the gap may wander at rest [m]; one servo tick moves it by up to 0.23 mm.
         settle: how long it must stay within `rest_band` to be at rest [s].
@@ -42,10 +42,12 @@ class MagpieConfig:
         lost: how long the force may be gone while holding [s]; a jerk of the arm unloads a finger for a moment.
         tolerance: distance from the commanded gap that counts as open [m].
         open_force: force ceiling while opening [N].
+        max_gap: gap to which it opens at most [m]; the servos of a real hand need not reach that of the model.
+        silent: age of the newest report from which a grip is no longer believed in [s].
     """
 
     contact_share: float = 0.5
-    least_contact: float = 0.3
+    min_contact: float = 0.3
     closed_gap: float = 0.001
     rest_band: float = 0.0005
     settle: float = 0.10
@@ -53,6 +55,8 @@ class MagpieConfig:
     lost: float = 0.05
     tolerance: float = 0.002
     open_force: float = 4.0
+    max_gap: float = MAX_GAP
+    silent: float = 0.20
 
 
 class MagpieHand:
@@ -70,7 +74,7 @@ class MagpieHand:
 
     def open(self, gap: float = MAX_GAP) -> None:
         """Move the fingers to an opening of `gap` [m], clipped to what the hand can do."""
-        self._begin(min(max(gap, 0.0), MAX_GAP), self.config.open_force, GripState.OPENING)
+        self._begin(min(max(gap, 0.0), self.config.max_gap), self.config.open_force, GripState.OPENING)
 
     def close(self, force: float) -> None:
         """Close until each finger presses with `force` [N], clipped to what the servo can do."""
@@ -79,10 +83,14 @@ class MagpieHand:
     def step(self, state: HandState, t: float) -> HandCommand:
         """Take in what the hand reports and return what it is told at `t` [s].
 
-        A report that is not finite, or not newer than the previous one, changes nothing.
+        A report that is not finite, or not newer than the previous one, changes nothing. A grip of which no new report
+        comes counts as slipped: nobody knows what became of it.
         """
         if _sound(state) and (self._last is None or state.t > self._last.t):
             self._observe(state)
+        elif self._state is GripState.HOLDING and self._last is not None:
+            if t - self._last.t > self.config.silent:
+                self._state = GripState.SLIPPED
         return HandCommand(t=t, gap=self._goal, force=self._force)
 
     def status(self) -> HandStatus:
@@ -94,7 +102,7 @@ class MagpieHand:
 
     def _begin(self, gap: float, force: float, state: GripState) -> None:
         self._goal = gap
-        self._force = clamp_force(force)
+        self._aim = self._force = clamp_force(force)
         self._state = state
         self._rest_gap = math.inf
         self._rest_since = math.inf
@@ -113,21 +121,23 @@ class MagpieHand:
             self._state = self._grasped(state, at_rest)
             self._grip_gap = state.gap
         elif self._state is GripState.HOLDING:
-            gone = self._lost(state, self._least())
+            gone = self._lost(state, self._min_force())
             if gone or state.gap < max(self.config.closed_gap, self._grip_gap - self.config.slip):
                 self._state = GripState.SLIPPED
 
     def _grasped(self, state: HandState, at_rest: bool) -> GripState:
         if state.gap < self.config.closed_gap:
             return GripState.EMPTY if at_rest else self._state
-        # Fingers that stalled on something need not have reached the share of the force they were told.
-        share = 0.0 if at_rest else self.config.contact_share
-        if self._lost(state, max(self._least(), share * self._force)):
+        if self._lost(state, max(self._min_force(), self._share(at_rest) * self._aim)):
             return GripState.CLOSING
         return GripState.HOLDING if at_rest else GripState.CONTACT
 
-    def _least(self) -> float:
-        return min(self.config.least_contact, 0.9 * self._force)
+    def _share(self, at_rest: bool) -> float:
+        """Return the share of the force that makes a contact; fingers that stalled on something need not reach it."""
+        return 0.0 if at_rest else self.config.contact_share
+
+    def _min_force(self) -> float:
+        return min(self.config.min_contact, 0.9 * self._aim)
 
     def _lost(self, state: HandState, threshold: float) -> bool:
         if float(state.force.min()) >= threshold:

@@ -13,7 +13,7 @@ from golem.types import NUM_JOINTS, LowCommand, LowState
 
 # Arrays instead of numbers: numpy then skips a conversion, a third of such an operation's time.
 _ZERO = np.zeros(NUM_JOINTS)
-_LEAST_STIFFNESS = np.full(NUM_JOINTS, 1e-9)
+_MIN_STIFFNESS = np.full(NUM_JOINTS, 1e-9)
 
 
 def limit_command(
@@ -60,7 +60,7 @@ def limit_command(
     damp *= share
     tau = minimum(maximum(command.tau, negative), bound)
     rest = minimum(maximum(tau + damp, negative), bound)
-    soft = maximum(kp, _LEAST_STIFFNESS)
+    soft = maximum(kp, _MIN_STIFFNESS)
     reach = bound / soft
     center = state.q - rest / soft
     q = minimum(maximum(q, center - reach), center + reach)

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from golem.finite import check_finite, check_measured
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gains import default_gains
 from golem.hardware.servo.gravity import Gravity
@@ -85,6 +86,8 @@ class Servo:
         leg_tau: Array | None = None,
     ) -> LowCommand:
         """Return the command of this tick; see `MotorServo.step`."""
+        check_measured(state)
+        check_finite("the targets", q_cmd)
         self._elapsed += dt
         kp, kd = self.gains.kp.copy(), self.gains.kd.copy()
         if leg_gains is not None:

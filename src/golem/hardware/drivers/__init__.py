@@ -1,0 +1,1 @@
+"""Drivers: what speaks to a device by its own wires."""
