@@ -13,8 +13,13 @@ from golem.capabilities.arms.line import Line
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.arms.solve import downward
 from golem.capabilities.arms.task_space import TaskSpaceConfig
+from golem.capabilities.collision.collision_model import CollisionModel
+from golem.capabilities.collision.sphere_robot import load_spheres
 from golem.errors import ConfigError
-from golem.types import NUM_JOINTS, UPPER, Array
+from golem.hardware.safety.base import SafetyLimits
+from golem.robots.model.limits import load_limits
+from golem.robots.model.table import JOINT_NAMES
+from golem.types import NUM_JOINTS, SIDES, UPPER, Array
 
 DT = 0.01
 
@@ -80,7 +85,7 @@ def test_the_work_area_is_reached_at_servo_speed(side: str, ik: DiffIK) -> None:
                 goal = line.pose(k * DT)
                 pair = (goal, None) if side == "left" else (None, goal)
                 command = ik.step(*pair, whole(ik.q), DT)
-                assert command.error_position[row] < 5e-4
+                assert command.error_position[row] < 6e-4
                 assert command.error_rotation[row] < 5e-3
         assert abs(command.q[0]) < 0.25
 
@@ -141,9 +146,10 @@ def test_limits_hold_for_any_target(
     ik = SHARED
     ik.reset(np.array(start))
     before = ik.q.copy()
-    # Only the waist may begin outside the range it works in, and then it does not go further.
+    # A joint may begin outside the range it works in, up to its stop, and then it does not go further.
     lower, upper = np.minimum(ik.lower, before), np.maximum(ik.upper, before)
-    assert (lower[1:] == ik.lower[1:]).all() and (upper[1:] == ik.upper[1:]).all()
+    stops = ik.kinematics.stops
+    assert (before >= stops[0]).all() and (before <= stops[1]).all()
     for _ in range(15):
         command = ik.step(left, right, np.array(start), dt)
         assert np.isfinite(command.q).all()
@@ -165,7 +171,7 @@ def test_a_waist_that_was_turned_far_stays_until_a_hand_is_sent_and_then_comes_b
         command = ik.step(None, goal, q, DT)
         at_waist.append(command.q[0])
         # The hand does not wait for the waist.
-        assert k < 200 or command.error_position[1] < 0.05
+        assert k < 200 or command.error_position[1] < 0.08
     waist = np.array(at_waist)
     steps = np.diff(np.append(1.2, waist))
     assert np.abs(steps).max() <= ik.speed[0] * DT + 1e-12
@@ -244,3 +250,79 @@ def test_an_unsolved_program_holds_still(ik: DiffIK, monkeypatch: pytest.MonkeyP
 def test_options_out_of_range_are_named(options: dict[str, Any]) -> None:
     with pytest.raises(ConfigError, match=next(iter(options))):
         DiffIK(TaskSpaceConfig(**options))
+
+
+def test_nothing_is_planned_where_the_gate_does_not_let_the_arm_go(ik: DiffIK) -> None:
+    gate = SafetyLimits.from_profile()
+    lower, upper = gate.lower[UPPER], gate.upper[UPPER]
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        goal = downward(rng.uniform(0.1, 0.9), rng.uniform(-0.8, 0.8), rng.uniform(-0.4, 0.6), 0.0)
+        for _ in range(30):
+            q = ik.step(goal, None, whole(ik.q), DT).q
+            assert (q >= lower).all() and (q <= upper).all()
+
+
+def test_an_arm_beyond_the_gates_range_stays_until_it_has_a_target(ik: DiffIK) -> None:
+    start = posture("ready")
+    start[4] = load_limits().upper[UPPER][4]  # the left elbow at its stop
+    ik.reset(whole(start))
+    goal = ik.kinematics.pose("right", start)
+    assert ik.step(None, goal, whole(start), DT).q[4] == start[4]
+    after = ik.step(ik.kinematics.pose("left", start), goal, whole(start), DT).q
+    assert start[4] - after[4] == pytest.approx(ik.config.arm_speed * DT)
+
+
+def test_links_are_kept_apart_on_request() -> None:
+    # The right hand is sent to the left forearm.
+    nearest = {}
+    for rows in (0, 6):
+        ik = DiffIK(TaskSpaceConfig(collision_rows=rows, clearance=0.01))
+        ik.reset(whole(posture("ready")))
+        spheres = CollisionModel(load_spheres(), JOINT_NAMES[UPPER])
+        goal = ik.kinematics.pose("right", ik.q)
+        goal[:3, 3] = ik.kinematics.pose("left", ik.q)[:3, 3] - 0.02
+        distances = []
+        for _ in range(150):
+            command = ik.step(None, goal, whole(ik.q), DT)
+            distances.append((*spheres.nearest(command.q, 1, 0.2).distance, 0.2)[0])
+        nearest[rows] = min(distances)
+        if rows:
+            assert ik.report().clearance == pytest.approx(distances[-1])
+            assert command.error_position[1] > 0.02
+    assert nearest[0] < -0.005 and nearest[6] > 0.0
+
+
+def test_the_report_says_how_well_the_arms_stand(ik: DiffIK) -> None:
+    report = ik.report()
+    for i, side in enumerate(SIDES):
+        assert 0.0 < report.margin[i] < ik.kinematics.margin(side, ik.q)
+        assert report.manipulability[i] == pytest.approx(ik.kinematics.manipulability(side, ik.q), rel=1e-6)
+    assert report.clearance == np.inf
+
+
+def test_steps_are_damped_at_a_singularity() -> None:
+    straight = np.zeros(15)
+    straight[[1, 8]], straight[[4, 11]] = -1.2, 1.45  # the elbow is straight near 1.5
+
+    def largest(damping: float) -> float:
+        ik = DiffIK(TaskSpaceConfig(singular_damping=damping, singular_value=0.05, palm_speed=10.0))
+        ik.reset(whole(straight))
+        assert ik.report().manipulability[0] < 0.05
+        goal = ik.kinematics.pose("left", ik.q)
+        goal[:3, 3] += goal[:3, 2] * 0.003
+        return float(np.abs(ik.step(goal, None, whole(straight), 1.0).q - straight).max())
+
+    assert largest(1e-3) < 0.5 * largest(0.0)
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.30, 0.10), (0.36, 0.04), (0.42, 0.10), (0.45, -0.12)])
+def test_a_target_that_counts_as_reached_is_reached_through_the_gate(x: float, y: float, ik: DiffIK) -> None:
+    gate = SafetyLimits.from_profile()
+    goal = downward(x, y, -0.035, -np.pi / 2)
+    for z in (0.2, -0.035):
+        for _ in range(120):
+            command = ik.step(None, downward(x, y, z, -np.pi / 2), whole(ik.q), DT)
+    passed = np.clip(command.q, gate.lower[UPPER], gate.upper[UPPER])
+    off = np.linalg.norm(ik.kinematics.pose("right", passed)[:3, 3] - goal[:3, 3])
+    assert off == pytest.approx(command.error_position[1], abs=1e-9)

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from golem.capabilities.arms.base import ARM_COLUMNS, GRIPPER_FRAME
+from golem.hardware.safety.base import SafetyLimits
 from golem.robots.model import pinocchio_model
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
@@ -17,7 +18,8 @@ class UpperKinematics:
 
     Attributes:
         model, data: the reduced Pinocchio model, 15 joints in motor order, and its workspace.
-        lower, upper: (15,) position limits [rad].
+        lower, upper: (15,) range that the safety gate lets commands pass in [rad].
+        stops: (15,) and (15,), the model's full range [rad].
         frame: index of each side's grasp frame in the model.
     """
 
@@ -27,9 +29,11 @@ class UpperKinematics:
         legs = [full.getJointId(name) for name in JOINT_NAMES[LEGS]]
         self.model: pin.Model = pin.buildReducedModel(full, legs, pin.neutral(full))
         self.data: pin.Data = self.model.createData()
-        limits = load_limits()
-        self.lower: Array = limits.lower[UPPER].copy()
-        self.upper: Array = limits.upper[UPPER].copy()
+        # Every profile has the same positions; the gate may be told another one's torques.
+        gate, limits = SafetyLimits.from_profile(), load_limits()
+        self.lower: Array = gate.lower[UPPER].copy()
+        self.upper: Array = gate.upper[UPPER].copy()
+        self.stops: tuple[Array, Array] = limits.lower[UPPER].copy(), limits.upper[UPPER].copy()
         self.frame: dict[Side, int] = {side: self.model.getFrameId(GRIPPER_FRAME[side]) for side in SIDES}
 
     def update(self, q: Array) -> None:
@@ -60,8 +64,13 @@ class UpperKinematics:
         self.update(q)
         return float(np.linalg.svd(self.jacobian(side)[:, ARM_COLUMNS[side]], compute_uv=False)[-1])
 
+    def singular_value(self, side: Side) -> float:
+        """Return `manipulability` at the joints last updated, from the eigenvalues of J J^T: in half the time."""
+        J = self.jacobian(side)[:, ARM_COLUMNS[side]]
+        return float(np.sqrt(max(np.linalg.eigvalsh(J @ J.T)[0], 0.0)))
+
     def margin(self, side: Side, q: Array) -> float:
-        """Return the distance of the arm's joints from their nearest position limit at `q` (15,) [rad]."""
-        columns = ARM_COLUMNS[side]
-        gaps = np.minimum(q[columns] - self.lower[columns], self.upper[columns] - q[columns])
+        """Return the distance of the arm's joints from their nearest mechanical stop at `q` (15,) [rad]."""
+        columns, (lower, upper) = ARM_COLUMNS[side], self.stops
+        gaps = np.minimum(q[columns] - lower[columns], upper[columns] - q[columns])
         return float(gaps.min())

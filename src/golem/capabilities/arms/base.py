@@ -30,6 +30,9 @@ class UpperBody(Protocol):
     from the measured joints, so that servo lag and gravity sag do not feed back into the targets. It is
     passive (no clock, no bus), deterministic, and answers every tick with finite targets inside the limits.
 
+    Joint trajectories are no controller's business: `trajectory.TrajectoryFollower` follows them for all of them, and
+    the controller is reset to where one ended.
+
     Attributes:
         rate: ticks per second it wants to be run at [Hz].
         latency: time from reading the targets to the command being available, as the lock-step runner shall

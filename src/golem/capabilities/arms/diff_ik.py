@@ -5,7 +5,8 @@ The paper's Eq. (qp), written for the step dq = q_dot dt:
     min_dq  sum_i w_i | J_i(q) dq - alpha_i r_i(q) |^2 + lambda |dq|^2   s.t.   dq_min <= dq <= dq_max
 
 with four tasks: the 6-D poses of the two grasp frames, the posture of the arms, the torso. The box is the
-intersection of the velocity limits with what is left to the position limits, so neither can be violated.
+intersection of the velocity limits with what is left to the position limits, so neither can be violated. Rows for the
+nearest pairs of links, if wanted, bound how fast their distance d may shrink: grad d dq >= -gain max(d - d_min, 0).
 """
 
 from __future__ import annotations
@@ -21,8 +22,7 @@ from golem.capabilities.arms.task_space import Reach, TaskSpaceConfig, TaskSpace
 from golem.types import Array
 
 _DIAGONAL = np.diag_indices(NUM_UPPER)
-_NO_ROWS = np.zeros((0, NUM_UPPER))
-_ALL_INEQUALITIES = np.zeros(NUM_UPPER, dtype=np.int32)
+_FREE = 1e30
 
 
 class DiffIK(TaskSpaceController):
@@ -51,5 +51,8 @@ class DiffIK(TaskSpaceController):
         H[_DIAGONAL] += self.soft + damping
         pull = self.soft * min(1.0, c.posture_rate * dt) * (self.rest - self.q)
         f = -(np.concatenate(wanted) @ A + pull)
-        step, _, flag, _ = daqp.solve(H, f, _NO_ROWS, upper, lower, _ALL_INEQUALITIES)
+        rows_near, bounds = self.collision_bounds()
+        above = np.concatenate([upper, np.full(len(bounds), _FREE)])
+        below = np.concatenate([lower, bounds])
+        step, _, flag, _ = daqp.solve(H, f, rows_near, above, below, np.zeros(len(below), dtype=np.int32))
         return step if flag > 0 else None

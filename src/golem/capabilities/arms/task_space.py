@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +15,11 @@ from golem.capabilities.arms.base import ARM_COLUMNS, NUM_UPPER, check_dt, check
 from golem.capabilities.arms.postures import posture
 from golem.errors import ConfigError
 from golem.interfaces.payloads import ArmCommand
+from golem.robots.model.table import JOINT_NAMES
 from golem.types import SIDES, UPPER, Array, Side
+
+if TYPE_CHECKING:
+    from golem.capabilities.collision.collision_model import CollisionModel, NearPairs
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +46,14 @@ class TaskSpaceConfig:
             0.25 m/s needs up to 1.4 at the far end of the work area (x = 0.54 m), 0.8 within x <= 0.46 m.
         torso_speed: velocity limit of the torso [rad/s], the paper's code's.
         torso_range: the torso's own position limit, both ways [rad].
-        limit_margin: distance kept from the position limits [rad].
+        singular_value: smallest singular value of an arm's Jacobian below which its steps are damped, as `comfort` has
+            it: 0.12 is a well-placed arm.
+        singular_damping: added to lambda where that value is zero.
+        limit_margin: distance kept from the range that the safety gate allows [rad].
+        collision_rows: nearest pairs of links that may not come nearer than `clearance`; 0 looks at none.
+        clearance: distance between the conservative spheres of two links that is kept [m]; links that are nearer do
+            not come nearer still.
+        collision_gain: share of the distance above `clearance` that one tick may use up, in (0, 1].
         palm_speed: a target further away is approached at this speed [m/s].
         palm_turn: a target turned further away is approached at this rate [rad/s].
     """
@@ -60,7 +72,12 @@ class TaskSpaceConfig:
     arm_speed: float = 1.5
     torso_speed: float = 0.3
     torso_range: float = 0.5
-    limit_margin: float = 0.02
+    singular_value: float = 0.03
+    singular_damping: float = 1e-3
+    limit_margin: float = 0.002
+    collision_rows: int = 0
+    clearance: float = 0.005
+    collision_gain: float = 0.2
     palm_speed: float = 1.0
     palm_turn: float = 2.0
 
@@ -85,14 +102,19 @@ class TaskSpaceConfig:
             "torso_weight",
             "posture_rate",
             "error_damping",
+            "singular_value",
+            "singular_damping",
             "limit_margin",
+            "collision_rows",
+            "clearance",
         ):
             if not getattr(self, name) >= 0.0:
                 raise ConfigError(f"The arm controller's option {name} must not be negative.")
-        if not 0.0 < self.palm_gain <= 1.0:
-            raise ConfigError(
-                f"The arm controller's option palm_gain must lie in (0, 1], not {self.palm_gain}."
-            )
+        for name in ("palm_gain", "collision_gain"):
+            if not 0.0 < getattr(self, name) <= 1.0:
+                raise ConfigError(
+                    f"The arm controller's option {name} must lie in (0, 1], not {getattr(self, name)}."
+                )
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +133,21 @@ class Reach:
     residual: Array
 
 
+@dataclass(frozen=True, slots=True)
+class ArmReport:
+    """How well the arms stand.
+
+    Attributes:
+        margin: (2,) distance of the left and right arm's joints from the range that the gate allows [rad].
+        manipulability: (2,) smallest singular value of each arm's Jacobian [m and rad mixed].
+        clearance: distance of the nearest two links [m], infinite where none is near or none is looked at.
+    """
+
+    margin: Array
+    manipulability: Array
+    clearance: float
+
+
 class TaskSpaceController(ABC):
     """Integrates the joint steps that a subclass solves for; see `UpperBody` for the contract.
 
@@ -119,7 +156,7 @@ class TaskSpaceController(ABC):
         config: the options.
         kinematics: the model, always updated at the command state.
         lower, upper: (15,) position limits it keeps, margin and torso range included [rad]; a waist that starts outside
-            that range comes back to it.
+            that range comes back to it; so does an arm once it has a target.
         speed: (15,) velocity limits it keeps [rad/s].
         rest: (15,) the posture the redundant joints return to [rad].
         q: (15,) the command state [rad].
@@ -136,7 +173,7 @@ class TaskSpaceController(ABC):
         self.kinematics = UpperKinematics()
         self.lower: Array = self.kinematics.lower + c.limit_margin
         self.upper: Array = self.kinematics.upper - c.limit_margin
-        self._widest = self.lower.copy(), self.upper.copy()
+        self._widest = self.kinematics.stops
         self.lower[0] = max(self.lower[0], -c.torso_range)
         self.upper[0] = min(self.upper[0], c.torso_range)
         self.speed: Array = np.full(NUM_UPPER, c.arm_speed)
@@ -144,7 +181,10 @@ class TaskSpaceController(ABC):
         self.rest: Array = np.clip(posture(c.posture), self.lower, self.upper)
         self.soft: Array = np.full(NUM_UPPER, c.posture_weight)
         self.soft[0] = c.torso_weight
-        self._left_over = 0.0
+        self._left_over, self._singular, self._ticks = 0.0, 0.0, 0
+        self._near: NearPairs | None = None
+        # Here, not at the first tick: the kernel may have to be compiled.
+        self._spheres = _spheres() if c.collision_rows else None
         self._move(self.rest)
 
     @abstractmethod
@@ -161,9 +201,26 @@ class TaskSpaceController(ABC):
             dt: length of the tick [s].
         """
 
+    def report(self) -> ArmReport:
+        """Return how well the arms stand at the command state."""
+        k = self.kinematics
+        room = np.minimum(self.q - k.lower, k.upper - self.q)
+        return ArmReport(
+            np.array([room[ARM_COLUMNS[side]].min() for side in SIDES]),
+            np.array([k.singular_value(side) for side in SIDES]),
+            float(self._near.distance[0]) if self._near is not None and len(self._near.distance) else np.inf,
+        )
+
+    def collision_bounds(self) -> tuple[Array, Array]:
+        """Return rows (k, 15) and bounds (k,): a step dq keeps clear of collisions where rows @ dq >= bounds."""
+        c, near = self.config, self._near
+        if near is None:
+            return _NO_ROWS, _NO_BOUNDS
+        return near.gradient, -c.collision_gain * np.maximum(near.distance - c.clearance, 0.0)
+
     def reset(self, q: Array) -> None:
         """Start from the joints `q` (27,) [rad]; see `UpperBody.reset`."""
-        self._left_over = 0.0
+        self._left_over, self._singular, self._ticks = 0.0, 0.0, 0
         # Not into the range of the waist: a robot that was turned further while it was limp would swing back at once.
         self._move(np.clip(check_joints("The posture to start from", q)[UPPER], *self._widest))
 
@@ -199,8 +256,12 @@ class TaskSpaceController(ABC):
                 residual = share * residual
                 to_frame = pin.exp6(-residual)
             reaches.append(Reach(side, to_frame, residual))
+        if self._ticks % SINGULAR_TICKS == 0:
+            self._singular = sum(self._singular_damping(reach.side) for reach in reaches)
+        self._ticks += 1
+        damping += self._singular
         if reaches:
-            # A waist that starts outside its range comes back at its speed, and the arms make up for it.
+            # A joint that starts outside its range comes back at its speed, and the others make up for it.
             minimum, maximum = np.minimum, np.maximum  # np.clip takes three times as long
             lower = minimum(maximum(self.lower - self.q, -room), room)
             upper = minimum(maximum(self.upper - self.q, -room), room)
@@ -218,9 +279,18 @@ class TaskSpaceController(ABC):
         )
         return ArmCommand(self.q.copy(), position, rotation, limited)
 
+    def _singular_damping(self, side: Side) -> float:
+        c = self.config
+        if c.singular_value == 0.0:
+            return 0.0
+        lost = 1.0 - self.kinematics.singular_value(side) / c.singular_value
+        return c.singular_damping * max(0.0, lost) ** 2
+
     def _move(self, q: Array) -> None:
         self.q: Array = q.copy()
         self.kinematics.update(self.q)
+        if self._spheres is not None:
+            self._near = self._spheres.nearest(self.q, self.config.collision_rows, NEAR)
 
     def _errors(self, goals: tuple[pin.SE3 | None, pin.SE3 | None]) -> tuple[Array, Array]:
         position, rotation = np.zeros(2), np.zeros(2)
@@ -232,5 +302,21 @@ class TaskSpaceController(ABC):
         return position, rotation
 
 
+SINGULAR_TICKS = 5
+"""Every how many ticks the distance from singularities is looked at: it takes a fifth of a tick, and changes slowly."""
+NEAR = 0.10
+"""Pairs of links farther apart than this need no row [m]: no step of a tick closes it."""
+_NO_ROWS = np.zeros((0, NUM_UPPER))
+_NO_BOUNDS = np.zeros(0)
+
+
 def _norm(v: Array) -> float:
     return float(np.sqrt(v @ v))
+
+
+def _spheres() -> CollisionModel:
+    # Numba takes a second to import, and arms without collision rows do without it.
+    from golem.capabilities.collision.collision_model import CollisionModel
+    from golem.capabilities.collision.sphere_robot import load_spheres
+
+    return CollisionModel(load_spheres(), JOINT_NAMES[UPPER])

@@ -8,9 +8,8 @@ Who collides with whom (MuJoCo tests `contype` of one geom against `conaffinity`
 | body links        | `BODY` (2)  | `WORLD`       | the world; no link, no hand              |
 | hands, pads       | `HAND` (4)  | `WORLD`       | the world; no link, not the other finger |
 
-So the robot does not touch itself by default: in a hoist the legs rest, and it is the arm planner's job to keep the
-arms apart. Where legs step and arms swing while they do, `self_pairs` names the shapes that may meet. They are explicit
-pairs of the engine, so nothing else changes its partners. A geom that shall touch the hands alone takes contype 0 and
+So bits let no part of the robot touch another. `self_pairs` names the shapes that may meet. They are explicit pairs of
+the engine, so nothing else changes its partners. A geom that shall touch the hands alone takes contype 0 and
 conaffinity `HAND`.
 """
 

@@ -1,0 +1,1 @@
+"""Collision: the robot as spheres, the world as shapes and clouds, and what is near what."""

@@ -1,0 +1,158 @@
+"""Shapes and point clouds that a robot's spheres must not touch, in the base frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy import ndimage
+
+from golem.capabilities.collision import world_kernel
+from golem.capabilities.collision.world_kernel import Cells, Points
+from golem.errors import ConfigError, unknown_name
+from golem.types import Array
+
+ObstacleKind = Literal["box", "cylinder", "sphere", "half_space"]
+OBSTACLE_KINDS: tuple[ObstacleKind, ...] = ("box", "cylinder", "sphere", "half_space")
+"""A cylinder's axis is its z. A half-space is solid below the plane z = 0 of its frame."""
+SIZES = {"box": 3, "cylinder": 2, "sphere": 1, "half_space": 0}
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """A solid.
+
+    Attributes:
+        kind: one of `OBSTACLE_KINDS`.
+        T_base_obstacle: (4, 4) pose of its frame.
+        size: half extents of a box; radius and half height of a cylinder; radius of a sphere; nothing [m].
+        name: for messages.
+    """
+
+    kind: ObstacleKind
+    T_base_obstacle: Array
+    size: tuple[float, ...] = ()
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no solid.
+
+        Raises:
+            ConfigError: unknown kind, sizes that are not positive numbers, or a pose that is not finite.
+        """
+        if self.kind not in OBSTACLE_KINDS:
+            raise unknown_name("kind of obstacle", self.kind, OBSTACLE_KINDS)
+        if len(self.size) != SIZES[self.kind] or not all(0.0 < x < np.inf for x in self.size):
+            raise ConfigError(
+                f"A {self.kind} has {SIZES[self.kind]} positive sizes in metres, not {list(self.size)}."
+            )
+        if np.shape(self.T_base_obstacle) != (4, 4) or not np.isfinite(self.T_base_obstacle).all():
+            raise ConfigError(f"The pose of a {self.kind} is a finite 4x4 matrix.")
+
+
+@dataclass(frozen=True, slots=True)
+class CloudGrid:
+    """A point cloud as one ball per occupied cell of a grid, so that the balls hold every point.
+
+    Attributes:
+        balls: (k, 4) mean of the points of a cell, and the distance of the farthest from it [m].
+        cells: (x, y, z) index into `balls`, -1 where a cell is empty.
+        steps: (x, y, z) cells to the nearest occupied one, diagonals counting one.
+        frame: (4,) lower corner of the grid and size of a cell [m].
+        dropped: points that were not finite or outside the grid.
+    """
+
+    balls: Array
+    cells: Cells
+    steps: Cells
+    frame: Array
+    dropped: int
+
+
+REACH = np.array([[-0.5, -1.1, -0.9], [1.2, 1.1, 1.2]])
+"""Opposite corners of what the hands of the H1-2 can reach, in base_link [m]."""
+
+
+def cloud_grid(points: Points, cell: float = 0.02, bounds: Array = REACH) -> CloudGrid:
+    """Return the grid of a cloud; 10 million points take about half a second.
+
+    Args:
+        points: (n, 3) in the base frame [m]; those that are not finite are dropped.
+        cell: size of a cell [m].
+        bounds: (2, 3) opposite corners; points outside are dropped.
+
+    Raises:
+        ConfigError: `points` has another shape, or the grid no volume.
+    """
+    if np.ndim(points) != 2 or np.shape(points)[1] != 3:
+        raise ConfigError(f"A cloud is an (n, 3) array of points, not {np.shape(points)}.")
+    low, high = np.asarray(bounds, float)
+    if not cell > 0.0 or not (high - low > 0.0).all():
+        raise ConfigError("The grid of a cloud needs a positive cell and bounds with a volume.")
+    shape = np.ceil((high - low) / cell).astype(np.int64)
+    frame = np.append(low, cell)
+    if not points.flags.c_contiguous:
+        points = points.copy()
+    cells = np.full(tuple(shape), -1, np.int32)
+    count = world_kernel.number_cells(points, frame, cells)
+    balls = np.zeros((count, 4))
+    kept = world_kernel.fill_balls(points, frame, cells, balls)
+    steps = np.full(cells.shape, 255, np.int32)
+    if count:
+        ndimage.distance_transform_cdt(cells < 0, metric="chessboard", distances=steps)
+    return CloudGrid(balls, cells, steps, frame, len(points) - kept)
+
+
+class World:
+    """What stands around the robot: shapes, and at most one cloud.
+
+    Attributes:
+        obstacles: the shapes.
+        cloud: the cloud, if there is one.
+    """
+
+    def __init__(self, obstacles: Sequence[Obstacle] = (), cloud: CloudGrid | None = None) -> None:
+        """Lay the shapes out for the kernel."""
+        self.obstacles, self.cloud = tuple(obstacles), cloud
+        self.shapes: Array = np.zeros((len(self.obstacles), 16))
+        for row, obstacle in zip(self.shapes, self.obstacles, strict=True):
+            row[0] = OBSTACLE_KINDS.index(obstacle.kind)
+            row[1:10] = obstacle.T_base_obstacle[:3, :3].ravel()
+            row[10:13] = obstacle.T_base_obstacle[:3, 3]
+            row[13 : 13 + len(obstacle.size)] = obstacle.size
+        self._cloud = cloud or _NO_CLOUD
+
+    def distance(self, balls: Array, cutoff: float = 0.2) -> tuple[Array, Array]:
+        """Return how near balls are to the nearest solid.
+
+        Args:
+            balls: (n, 4) centre in the base and radius [m].
+            cutoff: distance beyond which nothing is looked for [m].
+
+        Returns:
+            (n,) distance between surfaces, negative inside, `cutoff` where nothing is near [m]; (n, 3) unit direction
+            in which it grows fastest, zero where nothing is near.
+        """
+        distance, direction = np.empty(len(balls)), np.empty((len(balls), 3))
+        c = self._cloud
+        world_kernel.ball_distances(
+            np.ascontiguousarray(balls, float), self.shapes, c.balls, c.cells, c.steps, c.frame, cutoff,
+            distance, direction,
+        )  # fmt: skip
+        return distance, direction
+
+    def arrays(self) -> tuple[Array, Array, Cells, Cells, Array]:
+        """Return shapes, balls, cells, steps and frame as `world_kernel` reads them."""
+        c = self._cloud
+        return self.shapes, c.balls, c.cells, c.steps, c.frame
+
+
+_NO_CLOUD = CloudGrid(
+    np.zeros((0, 4)),
+    np.zeros((0, 0, 0), np.int32),
+    np.zeros((0, 0, 0), np.int32),
+    np.array([0.0, 0.0, 0.0, 1.0]),
+    0,
+)
