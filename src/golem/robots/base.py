@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.interfaces.lidar import LidarImu, LidarScan
 from golem.types import Array, CameraInfo, HandCommand, HandState, Imu, LowCommand, Side
 
 STAMP_TOLERANCE = 5e-4
@@ -64,6 +66,16 @@ class Robot(Protocol):
 
 
 @runtime_checkable
+class Standing(Protocol):
+    """A class of robots that may stand on their feet; a robot whose class does not say so hangs in the hoist."""
+
+    @classmethod
+    def on_feet(cls, options: Mapping[str, object]) -> bool:
+        """Return whether a robot with these options of the stack file stands, once its band is let go."""
+        ...
+
+
+@runtime_checkable
 class HasGantry(Protocol):
     """A robot that is brought up standing, with a band that keeps it upright until its legs do.
 
@@ -75,6 +87,19 @@ class HasGantry(Protocol):
 
     def release(self) -> None:
         """Let the band go, smoothly; an operator's act. Without a band it does nothing."""
+        ...
+
+
+@runtime_checkable
+class HasLidar(Protocol):
+    """A robot with a LiDAR on its torso."""
+
+    def lidar(self, t: float) -> tuple[list[LidarImu], LidarScan | None]:
+        """Return the IMU's samples since the last call and the scan that has arrived, if one has; once per tick.
+
+        Args:
+            t: time [s].
+        """
         ...
 
 

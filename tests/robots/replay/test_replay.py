@@ -18,12 +18,12 @@ from golem.interfaces import images, topics
 from golem.interfaces import ros_convert as convert
 from golem.interfaces.payloads import Detections, Exposure
 from golem.interfaces.public import CAMERA_INFO, COLOR, DEPTH, gripper, image, optical_frame
+from golem.middleware.bags.base import BagError, BagMessage, BagTopic
+from golem.middleware.bags.catalog import topic
+from golem.middleware.bags.reader import Bag
+from golem.middleware.bags.writer import BagWriter
 from golem.middleware.bus import News
 from golem.middleware.dds.base import LATCHED, SENSOR, Payload
-from golem.middleware.record.base import BagError, BagMessage, BagTopic
-from golem.middleware.record.catalog import topic
-from golem.middleware.record.reader import Bag
-from golem.middleware.record.writer import BagWriter
 from golem.middleware.ros import codec
 from golem.middleware.ros.message import NANO
 from golem.middleware.wire.convert import encode_low_state
@@ -193,7 +193,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Seen, Seen,
     bag = tmp_path_factory.mktemp("replay") / "bag"
     stack = load_stack("tether")
     live = pick(stack, 3.6, bag)
-    again = pick(replace(stack, robot=Choice("replay", {"file": str(bag)})), 10.0, None)
+    again = pick(stack.with_choice("robot", Choice("replay", {"file": str(bag)})), 10.0, None)
     yield live, again, bag
 
 
@@ -212,18 +212,21 @@ def test_a_replayed_stack_sees_the_recorded_frames(runs: tuple[Seen, Seen, Path]
 
 @pytest.mark.slow
 def test_a_replayed_stack_detects_the_same(runs: tuple[Seen, Seen, Path]) -> None:
-    """The same objects at the same times and pixels; positions to what the millimetres of depth make of them."""
+    """The same objects at the same times and pixels; positions to what the millimetres of depth make of them.
+
+    Where head and cover are nearly as common in an object's window, a millimetre may choose the other one.
+    """
     live, again, _ = runs
     assert len(live.sightings) > 10 and again.sightings.keys() == live.sightings.keys()
-    compared = 0
+    apart: list[float] = []
     for key, sightings in live.sightings.items():
         for a, b in zip(again.sightings[key].objects, sightings.objects, strict=True):
             assert a.label == b.label and a.detection.score == b.detection.score
             np.testing.assert_array_equal(a.detection.box, b.detection.box)
             np.testing.assert_array_equal(a.detection.center, b.detection.center)
-            assert math.dist(a.position, b.position) < 0.003
-            compared += 1
-    assert compared > 20
+            apart.append(math.dist(a.position, b.position))
+    assert len(apart) > 20
+    assert np.quantile(apart, 0.9) < 0.001 and max(apart) < 0.010
 
 
 @pytest.mark.slow

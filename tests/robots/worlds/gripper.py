@@ -51,7 +51,7 @@ def build(draw: ScrewDraw) -> mujoco.MjModel:
         spec.add_material(name=name)
     plate = spec.worldbody.add_body(name="plate")
     screws.add_bore(plate, draw, (0, 0, 0))
-    screws.add_screw(spec, draw, (0, 0, 0))
+    screws.add_screw(spec, draw, (0, 0), np.eye(4))
     height = draw.protrusion + draw.head_height / 2
     spec.worldbody.add_body(name="anchor", mocap=True, pos=[0, 0, height])
     hand = spec.worldbody.add_body(name="hand", pos=[0, 0, height], gravcomp=1)

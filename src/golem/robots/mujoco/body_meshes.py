@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from trimesh.visual.material import PBRMaterial
 from trimesh.visual.texture import TextureVisuals
 
+from golem.robots.model.geom_mesh import geom_mesh, pose_matrix
 from golem.robots.mujoco.camera import SHOWN_GROUPS
-from golem.types import Array
 
 SMOOTH = np.radians(35.0)
 """Edges flatter than this are shaded smooth [rad]."""
@@ -53,47 +53,6 @@ def mean_colour(model: mujoco.MjModel, texture: int) -> tuple[float, float, floa
     pixels = model.tex_data[start : start + count * channels].reshape(count, channels)[:, :3]
     red, green, blue = (float(c) for c in pixels.mean(axis=0) / 255.0)
     return red, green, blue
-
-
-def geom_mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
-    """Return the surface of one geom in the geom's own frame [m].
-
-    Raises:
-        NotImplementedError: a kind of geom no world here uses.
-    """
-    kind = mujoco.mjtGeom(int(model.geom_type[geom]))
-    x, y, z = (float(v) for v in model.geom_size[geom])
-    if kind == mujoco.mjtGeom.mjGEOM_MESH:
-        mesh = int(model.geom_dataid[geom])
-        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-        start, number = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
-        vertices = model.mesh_vert[first : first + count].astype(float)
-        return trimesh.Trimesh(vertices, model.mesh_face[start : start + number].copy())
-    if kind == mujoco.mjtGeom.mjGEOM_PLANE:
-        corners = np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
-        return trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]])
-    if kind == mujoco.mjtGeom.mjGEOM_BOX:
-        return trimesh.creation.box(extents=(2 * x, 2 * y, 2 * z))
-    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        return trimesh.creation.icosphere(subdivisions=3, radius=x)
-    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-        sphere = trimesh.creation.icosphere(subdivisions=3)
-        return trimesh.Trimesh(sphere.vertices * (x, y, z), sphere.faces)
-    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        return trimesh.creation.cylinder(radius=x, height=2 * y, sections=24)
-    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        return trimesh.creation.capsule(radius=x, height=2 * y, count=(24, 12))
-    raise NotImplementedError(f"geom {geom} is a {kind.name}")
-
-
-def pose_matrix(position: Array, quaternion: Array) -> Array:
-    """Return the (4, 4) pose with `position` (3,) and `quaternion` (4,) wxyz."""
-    rotation = np.empty(9)
-    mujoco.mju_quat2Mat(rotation, quaternion)
-    T = np.eye(4)
-    T[:3, :3] = rotation.reshape(3, 3)
-    T[:3, 3] = position
-    return T
 
 
 def body_meshes(model: mujoco.MjModel, data: mujoco.MjData) -> dict[int, trimesh.Scene]:

@@ -10,10 +10,10 @@ from typing import Literal
 from golem.errors import ConfigError
 from golem.robots.model.contact_shapes import FOOT_FRICTION, Feet
 from golem.robots.mujoco.hoist import HoistConfig
-from golem.robots.worlds.layout import PackLayout
+from golem.robots.worlds.conditions import LayoutKind, check_condition
 
 Support = Literal["hoist", "ground"]
-World = Literal["pack", "open", "slope", "rubble"]
+World = Literal["pack", "open", "slope", "rubble", "furnished", "corridor"]
 
 
 @dataclass(frozen=True)
@@ -24,16 +24,20 @@ class MujocoConfig:
         support: `hoist`: it hangs, its feet clear of the floor. `ground`: it stands, and the hoist's spring keeps it
             upright until it is released.
         world: `pack`: the hall with the battery pack; `open`: the empty hall; `slope`: a ramp ahead; `rubble`: tiles
-            of uneven height all around. The floor is flat for a metre around the start in each.
-        layout: where the pack stands under a robot in the hoist; under one that stands, pack and tray are lowered
-            with it.
+            of uneven height all around. The floor is flat for a metre around the start in each. `furnished`: a hall
+            with walls, shelves, pillars, gantry and packs, drawn from the seed; `corridor`: two bare walls.
+        layout: `nominal`: pack and tray stand where `PackLayout` says, under a robot in the hoist; under one that
+            stands they are lowered with it. `varied`: places, light, finishes and clutter are drawn from the seed.
+        conditions: those of `worlds.conditions` that are not left to the layout, e.g. `{light: 0.3}`.
         hoist: how the robot is held.
-        reach_y: near-edge fasteners with |y| up to this are loosened [m].
+        reach_y: near-edge fasteners with |y| up to this are loosened [m]; a varied layout draws among those up to
+            `REACH_Y`.
         torque_profile: torque limits of the simulated motors (see `robots.model.limits`).
         near: distance of a finger from a screw below which physics runs at the fine step [m].
         slope: inclination of the ramp [rad].
         rubble: height of the highest tile [m]; the others are drawn from 0 to it.
-        self_collision: whether limbs stop each other; by default where the robot stands on the ground.
+        people: how many people walk about in the furnished hall.
+        self_collision: whether limbs stop each other; they do unless this is False.
         feet: what the soles are to the floor.
         cone: friction cone of the solver; by default the pack's bores need an elliptic one, other worlds do without.
         noslip: rounds of MuJoCo's no-slip solver, which ends what is left of the soles' creep under side load.
@@ -46,13 +50,15 @@ class MujocoConfig:
 
     support: Support = "hoist"
     world: World = "pack"
-    layout: PackLayout = field(default_factory=PackLayout)
+    layout: LayoutKind = "nominal"
+    conditions: dict[str, float | str] = field(default_factory=dict[str, "float | str"])
     hoist: HoistConfig = field(default_factory=HoistConfig)
     reach_y: float = 0.15
     torque_profile: str = "urdf"
     near: float = 0.12
     slope: float = math.radians(5.0)
     rubble: float = 0.03
+    people: int = 0
     self_collision: bool | None = None
     feet: Feet = "spheres"
     cone: Literal["pyramidal", "elliptic"] | None = None
@@ -71,6 +77,7 @@ class MujocoConfig:
         for name, value, minimum, maximum in (
             ("slope", self.slope, 0.0, 0.5),
             ("rubble", self.rubble, 0.0, 0.2),
+            ("people", self.people, 0, 20),
             ("noslip", self.noslip, 0, 100),
             ("friction", self.friction, 0.01, 5.0),
             ("payload", self.payload[0], 0.0, 20.0),
@@ -79,6 +86,14 @@ class MujocoConfig:
         ):
             if not minimum <= value <= maximum:
                 raise ConfigError(f"The twin's {name} is from {minimum:g} to {maximum:g}, not {value:g}.")
+        if not isinstance(self.conditions, dict):
+            raise ConfigError("The twin's conditions are a mapping, e.g. {light: 0.3}.")
+        for name, value in self.conditions.items():
+            check_condition(name, value)
+        if self.world != "pack" and (self.conditions or self.layout != "nominal"):
+            raise ConfigError(
+                f"The world '{self.world}' has no pack whose layout or conditions could differ."
+            )
         own = (self.feet, self.torque_profile, self.self_collision)
         if self.mjcf is not None and own != ("spheres", "urdf", None):
             raise ConfigError(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.interfaces.lidar import LidarImu, LidarScan
 from golem.robots.model import magpie_model
 from golem.robots.model.imu_mount import torso_motion
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
@@ -18,14 +20,18 @@ from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.external_forces import Pushes
 from golem.robots.mujoco.hand_servos import HandServos
 from golem.robots.mujoco.hoist import Hoist
+from golem.robots.mujoco.lidar_sensor import LidarMoment, LidarSensor
 from golem.robots.mujoco.motors import Motors
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP, Scene, build_scene
 from golem.robots.mujoco.truth import Truth
+from golem.robots.sensors.auto_exposure import AutoExposure
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import StereoDepth
 from golem.robots.sensors.imu import ImuModel
 from golem.robots.sensors.profiles import load_profile, sample_episode
 from golem.robots.sensors.streams import stream
+from golem.robots.worlds.dressing import mirror_geoms
+from golem.robots.worlds.layout import PackLayout
 from golem.types import LEGS, SIDES, Array, HandCommand, HandState, Imu, LowCommand, Side
 
 START_GAP = 0.060
@@ -61,7 +67,7 @@ class MujocoRobot:
         self.config = config or MujocoConfig()
         self.profile = load_profile(profile)
         self.cameras = CAMERAS
-        hoist, layout = self.config.hoist, self.config.layout
+        hoist, layout = self.config.hoist, PackLayout()
         if self.config.support == "ground":
             standing = standing_height(posture)
             layout = layout.raised(standing - hoist.height)
@@ -80,6 +86,11 @@ class MujocoRobot:
             name: StereoDepth(info, self.profile.depth, stream(seed, f"depth/{name}"))
             for name, info in CAMERAS.items()
         }
+        conditions = self.scene.conditions
+        self._exposure = {
+            name: AutoExposure(conditions.light, stream(seed, f"exposure/{name}")) for name in CAMERAS
+        }
+        self._mirrors = mirror_geoms(model, conditions) if self.config.layout == "varied" else None
         self._imu_model = ImuModel(self.profile.imu, self._errors.imu, stream(seed, "imu"))
         self._hoist = Hoist(model, hoist)
         self._pushes = Pushes(model)
@@ -90,6 +101,8 @@ class MujocoRobot:
             self.profile.actuator_delay + self.config.latency,
         )
         self._rig: CameraRig | None = None
+        self._seed = seed
+        self._lidar: LidarSensor | None = None
 
         self._hands = {side: HandServos(model, side) for side in SIDES}
         self._fingers = np.array(
@@ -107,8 +120,14 @@ class MujocoRobot:
         self._motors.place(self.data, posture)
         for hand in self._hands.values():
             hand.reset(self.data, START_GAP)
+        self.scene.move_people(self.data)
         mujoco.mj_forward(model, self.data)
         self.truth = Truth(model, self.data)
+
+    @classmethod
+    def on_feet(cls, options: Mapping[str, object]) -> bool:
+        """Return whether the option `support` has the robot stand; see `Standing`."""
+        return options.get("support") == "ground"
 
     @property
     def on_gantry(self) -> bool:
@@ -133,6 +152,11 @@ class MujocoRobot:
         """
         self._pushes.set(force, body, point)
 
+    @property
+    def pushed(self) -> tuple[str, Array] | None:
+        """The link that is pushed, and the force (3,) on it in the world [N]; None while nobody pushes."""
+        return self._pushes.acting
+
     def advance(self, command: LowCommand, hands: dict[Side, HandCommand], dt: float) -> None:
         """Let time pass; see `Robot`."""
         step = FINE_STEP if self._delicate() else COARSE_STEP
@@ -148,6 +172,7 @@ class MujocoRobot:
             self._pushes.clear(self.data)
             self._hoist.apply(self.data, sway)
             self._pushes.apply(self.data)
+            self.scene.move_people(self.data)
             mujoco.mj_step(self._model, self.data)
 
     def joints(self) -> tuple[Array, Array, Array]:
@@ -179,7 +204,17 @@ class MujocoRobot:
         mujoco.mj_kinematics(self._model, self.data)
         mujoco.mj_camlight(self._model, self.data)
         rgb, depth = self._rig.render(self.data, camera)
-        return rgb, self._depth[camera].measure(depth)
+        specular = None
+        if self._mirrors is not None and self.profile.depth.specular_loss > 0.0:
+            specular = self._mirrors[self._rig.segment(self.data, camera)]
+        return self._exposure[camera].expose(rgb), self._depth[camera].measure(depth, specular)
+
+    def lidar(self, t: float) -> tuple[list[LidarImu], LidarScan | None]:
+        """Return what the LiDAR said since the last call; see `HasLidar`. The first call switches it on."""
+        if self._lidar is None:
+            self._lidar = LidarSensor(self.scene, self.profile.name, self._seed)
+        self._lidar.observe(LidarMoment(t, self.data.qpos.copy(), self.data.qvel.copy()))
+        return self._lidar.read_imu(), self._lidar.read_scan(t)
 
     def save_state(self) -> bytes:
         """Return the present moment; see `Restorable`."""
@@ -192,10 +227,13 @@ class MujocoRobot:
         mujoco.mj_setState(self._model, self.data, np.frombuffer(save_state), _MOMENT)
 
     def close(self) -> None:
-        """Release the rendering context."""
+        """Release the rendering context and the LiDAR."""
         if self._rig is not None:
             self._rig.close()
             self._rig = None
+        if self._lidar is not None:
+            self._lidar.close()
+            self._lidar = None
 
     def _delicate(self) -> bool:
         """Return whether a screw moves, or a finger is so close that it may touch one."""

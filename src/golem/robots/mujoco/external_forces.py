@@ -32,6 +32,16 @@ class Pushes:
                 raise ConfigError("A push is a force of three finite numbers [N] at a point of three [m].")
         self._forces[self._model.body(body).id] = force, point
 
+    @property
+    def acting(self) -> tuple[str, Array] | None:
+        """The link with the largest force on it, and that force (3,) in the world [N]; None where there is none."""
+        body, (force, _) = max(
+            self._forces.items(),
+            key=lambda item: float(item[1][0] @ item[1][0]),
+            default=(0, (np.zeros(3), None)),
+        )
+        return (self._model.body(body).name, force) if force.any() else None
+
     def clear(self, data: mujoco.MjData) -> None:
         """Take the forces of the previous physics step off."""
         for body in self._forces:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
@@ -15,7 +15,11 @@ from golem.robots.model.table import BASE_LINK, JOINT_NAMES
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream
-from golem.robots.worlds import parts, terrain
+from golem.robots.worlds import furnished, parts, terrain
+from golem.robots.worlds.clutter import add_clutter
+from golem.robots.worlds.conditions import REACH_Y, Conditions, arranged, draw_conditions, draw_fasteners
+from golem.robots.worlds.dressing import dress
+from golem.robots.worlds.furnished import Person
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
 from golem.robots.worlds.screws import ScrewDraw, draw_screws
@@ -45,12 +49,21 @@ class Scene:
         names: what the pack added; nothing in a world without one.
         layout: where the pack stands.
         draws: the loosened screws.
+        people: those who walk about.
+        conditions: what of the work place differs from the nominal one.
     """
 
     model: mujoco.MjModel
     names: PackNames
     layout: PackLayout
     draws: tuple[ScrewDraw, ...]
+    people: tuple[Person, ...] = ()
+    conditions: Conditions = Conditions()
+
+    def move_people(self, data: mujoco.MjData) -> None:
+        """Put everybody where they are at the time of `data`."""
+        for person in self.people:
+            data.mocap_pos[self.model.body(person.name).mocapid[0]] = person.position(data.time)
 
 
 def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfile, seed: int) -> Scene:
@@ -58,7 +71,7 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
 
     Args:
         config: robot and world.
-        layout: where the pack stands; x, y from the robot's pelvis, z from the floor.
+        layout: where the pack nominally stands; x, y from the robot's pelvis, z from the floor.
         profile: ranges of the screws.
         seed: draws screws or terrain.
 
@@ -67,14 +80,21 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
     """
     spec = _robot(config)
     draws: list[ScrewDraw] = []
+    people: tuple[Person, ...] = ()
     names = PackNames((), np.zeros((0, 3)), "", ())
+    conditions = draw_conditions(config.layout, config.conditions, stream(seed, "world/conditions"))
     if config.world == "pack":
-        slots = [s for s in layout.reachable(config.reach_y) if s not in layout.empty_holes]
-        draws = draw_screws(stream(seed, "world/screws"), profile.screws, slots)
+        layout = arranged(layout, conditions)
+        reach_y = config.reach_y if config.layout == "nominal" else REACH_Y
+        places = draw_fasteners(layout, conditions, reach_y, stream(seed, "world/fasteners"))
+        layout = replace(layout, empty_holes=(*layout.empty_holes, *places.missing))
+        draws = draw_screws(stream(seed, "world/screws"), profile.screws, places.loose)
         names = add_pack(spec, layout, draws)
+        add_clutter(spec, layout, round(conditions.clutter), stream(seed, "world/clutter"))
+        dress(spec, conditions)
         _add_onlooker(spec, layout)
     else:
-        _add_terrain(spec, config, seed)
+        people = _add_terrain(spec, config, seed)
         _add_companion(spec)
     if config.cone is not None:
         spec.option.cone = mujoco.mjtCone.__members__[f"mjCONE_{config.cone.upper()}"]
@@ -83,7 +103,7 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
     spec.option.noslip_iterations = config.noslip
     spec.option.timestep = COARSE_STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    return Scene(spec.compile(), names, layout, tuple(draws))
+    return Scene(spec.compile(), names, layout, tuple(draws), people, conditions)
 
 
 def _robot(config: MujocoConfig) -> mujoco.MjSpec:
@@ -91,10 +111,9 @@ def _robot(config: MujocoConfig) -> mujoco.MjSpec:
     if config.mjcf is not None:
         spec = foreign_robot(config.mjcf)
     else:
-        limbs = config.self_collision
         spec = mjcf.robot_spec(
             torque=config.torque_profile,
-            self_collision=config.support == "ground" if limbs is None else limbs,
+            self_collision=config.self_collision is not False,
             feet=config.feet,
         )
     for side in SIDES:
@@ -169,13 +188,20 @@ def _add_payload(hand: mujoco.MjsBody, mass: float) -> None:
     parts.visual(body, mujoco.mjtGeom.mjGEOM_SPHERE, (radius,), material="", rgba=(0.9, 0.5, 0.1, 1.0))
 
 
-def _add_terrain(spec: mujoco.MjSpec, config: MujocoConfig, seed: int) -> None:
-    if config.world == "slope":
+def _add_terrain(spec: mujoco.MjSpec, config: MujocoConfig, seed: int) -> tuple[Person, ...]:
+    """Add the ground of a world without a pack to work on, and return the people on it."""
+    if config.world == "furnished":
+        furnished.add_furnished_hall(spec, stream(seed, "world/furniture"))
+        return furnished.add_people(spec, stream(seed, "world/people"), config.people)
+    if config.world == "corridor":
+        furnished.add_corridor(spec)
+    elif config.world == "slope":
         terrain.add_slope(spec, config.slope)
     elif config.world == "rubble":
         terrain.add_rubble(spec, config.rubble, stream(seed, "world/rubble"))
     else:
         terrain.add_open(spec)
+    return ()
 
 
 def _add_onlooker(spec: mujoco.MjSpec, layout: PackLayout) -> None:

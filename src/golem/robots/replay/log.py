@@ -13,17 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.interfaces import images, public
-from golem.interfaces import ros_convert as convert
-from golem.middleware.record.base import BagError, BagMessage
-from golem.middleware.record.reader import Bag
+from golem.middleware.bags.base import BagError, BagMessage
+from golem.middleware.bags.reader import Bag
 from golem.middleware.ros import codec
 from golem.middleware.ros.goal_info import from_time
 from golem.middleware.ros.message import NANO
-from golem.middleware.ros.msgs.golem_interfaces import HandState as HandMessage
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo as InfoMessage
 from golem.middleware.ros.msgs.sensor_msgs import Image
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
-from golem.middleware.wire.convert import decode_low_state
 from golem.robots.base import STAMP_TOLERANCE
 from golem.robots.sensors.calibration import calibrations
 from golem.robots.sensors.cameras import CAMERAS
@@ -35,7 +32,7 @@ STATE, STATIC = "/lowstate", "/tf_static"
 AHEAD = 0.5
 """How far the log is read ahead [s] [own]: an image is recorded when it arrives, up to so long after its exposure."""
 RESTART = 1.0
-"""Step back in time that means another robot, or one that was started anew [s] [own]."""
+"""Step back in time that means another robot, or one that was restarted [s] [own]."""
 
 Picture = tuple[NDArray[np.uint8], NDArray[np.float32]]
 """Colour (height, width, 3) and depth (height, width) [m] of one exposure."""
@@ -123,10 +120,10 @@ class Log:
 
     def _state(self, message: BagMessage) -> None:
         self._newest = self._time(message.log_time)
-        self.states.add(self._newest, decode_low_state(message.payload))
+        self.states.add(self._newest, public.topic(STATE).value(message.payload))
 
     def _hand(self, side: Side, message: BagMessage) -> None:
-        state = convert.to_hand_state(codec.deserialize(message.payload, HandMessage))
+        state: HandState = public.topic(message.topic.name).value(message.payload)
         self.hands[side].add(self._time(message.log_time), state)
 
     def _picture(self, camera: str, color: Image, depth: Image) -> None:

@@ -28,19 +28,19 @@ class ExtrinsicErrors:
     """Distribution of a camera's calibration error, constant over an episode.
 
     The rotation vector's length is normal about `rotation` with a fifth of it as deviation, the translation's length
-    uniform in `translation`; both directions are isotropic. With `least_error`, a draw that displaces the point
+    uniform in `translation`; both directions are isotropic. With `min_error`, a draw that displaces the point
     `reference` ahead of the camera by less is rejected.
 
     Attributes:
         rotation: mean rotation angle [rad].
         translation: range of the translation's length [m].
-        least_error: least displacement of the reference point [m].
+        min_error: smallest displacement of the reference point [m].
         reference: distance of the reference point on the optical axis [m].
     """
 
     rotation: float = 0.0
     translation: tuple[float, float] = (0.0, 0.0)
-    least_error: float = 0.0
+    min_error: float = 0.0
     reference: float = 1.0
 
 
@@ -126,7 +126,7 @@ PROFILES: dict[str, RealismProfile] = {
         # [paper] single-shot detection through head calibration and depth is off by 5 cm or more. [assumption] split
         # as 2 deg and 20 to 30 mm; their isotropic draws give 36 mm at 1 m (median, 17 % above 5 cm) [C], so the
         # paper's bound decides: draws below it are rejected, which leaves 55 mm (median; 95 % below 66 mm) [C].
-        head=ExtrinsicErrors(rotation=np.deg2rad(2.0), translation=(0.020, 0.030), least_error=0.05),
+        head=ExtrinsicErrors(rotation=np.deg2rad(2.0), translation=(0.020, 0.030), min_error=0.05),
         # [assumption] a printed bracket and a hand-eye calibration: 0.5 deg and 2 mm, 2.2 mm at 100 mm [C].
         palm=ExtrinsicErrors(rotation=np.deg2rad(0.5), translation=(0.001, 0.003), reference=0.1),
         depth=D400,
@@ -208,7 +208,7 @@ def _draw_extrinsic(errors: ExtrinsicErrors, rng: np.random.Generator) -> Array:
         T = np.eye(4)
         T[:3, :3] = Rotation.from_rotvec(angle * _direction(rng)).as_matrix()
         T[:3, 3] = rng.uniform(*errors.translation) * _direction(rng)
-        if np.linalg.norm(T[:3, :3] @ ahead + T[:3, 3] - ahead) >= errors.least_error:
+        if np.linalg.norm(T[:3, :3] @ ahead + T[:3, 3] - ahead) >= errors.min_error:
             return T
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from golem.robots.model.spatial import rotation_rpy, transform
 from golem.types import Array
 
 RIM_INSET = 0.022
@@ -32,8 +33,10 @@ class PackLayout:
         window_y: its right and left edge [m].
         window_depth: how far the modules lie below the rim [m].
         empty_holes: fastener indices whose screw is already gone.
+        yaw: heading of the pack [rad], turned about the middle of its near edge.
         tray_xy: centre of the parts tray [m].
         tray_z: height of the tray's underside [m].
+        tray_yaw: heading of the tray [rad].
         tray_size: outer size of the tray in x, y and z [m].
     """
 
@@ -49,14 +52,24 @@ class PackLayout:
     empty_holes: tuple[int, ...] = (5, 16, 24, 29, 62)
     tray_xy: tuple[float, float] = (0.48, -0.28)
     tray_z: float = 1.068
+    yaw: float = 0.0
+    tray_yaw: float = 0.0
     tray_size: tuple[float, float, float] = (0.18, 0.24, 0.045)
 
     def raised(self, by: float) -> PackLayout:
         """Return the layout with pack and tray `by` higher [m]."""
         return replace(self, top_z=self.top_z + by, tray_z=self.tray_z + by)
 
+    def pose(self) -> Array:
+        """Return the (4, 4) pose of the pack frame (origin: middle of the near edge, on the rim) in the world."""
+        return transform((self.near_edge, self.center_y, self.top_z), rotation_rpy(0.0, 0.0, self.yaw))
+
+    def tray_pose(self) -> Array:
+        """Return the (4, 4) pose of the tray in the world: the middle of its underside."""
+        return transform((*self.tray_xy, self.tray_z), rotation_rpy(0.0, 0.0, self.tray_yaw))
+
     def fasteners(self) -> Array:
-        """Return the (68, 2) x, y of the fasteners in the pack frame (origin: middle of the near edge, on the rim).
+        """Return the (68, 2) x, y of the fasteners in the pack frame.
 
         Index 0 is the near right corner (y < 0); the near edge comes first, from right to left, then the left
         side, the far edge from left to right, and the right side back to the start.
@@ -77,3 +90,8 @@ class PackLayout:
         """Return the indices of the near-edge fasteners with |y| <= `reach_y` [m], from right to left."""
         spots = self.fasteners()
         return [i for i in range(FASTENERS_Y + 1) if i < len(spots) and abs(spots[i, 1]) <= reach_y]
+
+
+def yaw_quat(yaw: float) -> list[float]:
+    """Return the quaternion (wxyz) of a turn by `yaw` [rad] about the vertical."""
+    return [float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2))]

@@ -7,14 +7,14 @@ rows. Head size, thread and bore are not published; `screws.ScrewRanges` gives w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
 from golem.errors import ConfigError
 from golem.robots.worlds import hall, parts, screws, tray
-from golem.robots.worlds.layout import HOLE_CELL, PackLayout
+from golem.robots.worlds.layout import HOLE_CELL, PackLayout, yaw_quat
 from golem.robots.worlds.screws import ScrewDraw
 from golem.types import Array
 
@@ -37,7 +37,7 @@ class PackPart:
         body: the body it belongs to.
         geoms: the visible geoms that make it up; empty for a hole, which is an absence.
         position: (3,) centre of its visible top in the world at the start [m]; a nut's top is under its stud's tip.
-        size: (3,) extent of its visible part in x, y and z [m].
+        size: (3,) extent of its visible part along the axes of pack or tray [m].
     """
 
     label: str
@@ -96,29 +96,29 @@ def add_pack(
     set_contact_options(spec)
     hall.add_materials(spec)
     hall.add_hall(spec)
-    origin = np.array([layout.near_edge, layout.center_y, layout.top_z])
-    body = spec.worldbody.add_body(name="pack", pos=origin.tolist())
+    T = layout.pose()
+    body = spec.worldbody.add_body(name="pack", pos=T[:3, 3].tolist(), quat=yaw_quat(layout.yaw))
     holes = {draw.slot: draw.bore_radius for draw in draws} | dict.fromkeys(layout.empty_holes, 0.003)
     _add_stand(body, layout)
     _add_rim(spec, body, layout, holes)
-    found = _add_window(spec, body, layout, origin)
-    found += _add_fasteners(spec, body, layout, set(slots), origin)
+    found = _add_window(spec, body, layout)
+    found += _add_fasteners(spec, body, layout, set(slots))
     for draw in draws:
         screws.add_bore(body, draw, (*spots[draw.slot], 0.0))
-    mouths = np.array([[*spots[s], 0.0] for s in slots]).reshape(-1, 3) + origin
-    names = tuple(
-        screws.add_screw(spec, draw, mouth, sleep=sleep) for draw, mouth in zip(draws, mouths, strict=True)
-    )
-    for draw, name, mouth in zip(draws, names, mouths, strict=True):
+    names = tuple(screws.add_screw(spec, draw, spots[draw.slot], T, sleep=sleep) for draw in draws)
+    for draw, name in zip(draws, names, strict=True):
         reach = draw.protrusion + draw.head_height
         looks = (f"{name}_flange", f"{name}_thread") + ((f"{name}_hex",) if draw.hexagonal else ())
         size = np.array([draw.head_diameter, draw.head_diameter, reach])
-        found.append(PackPart("screw", name, looks, mouth + reach * draw.axis(), size))
+        top = np.array([*spots[draw.slot], 0.0]) + reach * draw.axis()
+        found.append(PackPart("screw", name, looks, top, size))
+    found = [replace(part, position=T[:3, :3] @ part.position + T[:3, 3]) for part in found]
     tray_name = tray.add_tray(spec, layout)
     tray_geoms = tuple(f"tray_part_{k}" for k in range(5)) + tuple(f"tray_rim_{k}" for k in range(4))
     top = np.array([*layout.tray_xy, layout.tray_z])
     found.append(PackPart("tray", tray_name, tray_geoms, top, np.array(layout.tray_size)))
-    return PackNames(names, mouths, tray_name, tuple(found))
+    mouths = np.array([[*spots[s], 0.0] for s in slots]).reshape(-1, 3)
+    return PackNames(names, mouths @ T[:3, :3].T + T[:3, 3], tray_name, tuple(found))
 
 
 def _add_stand(body: mujoco.MjsBody, layout: PackLayout) -> None:
@@ -247,10 +247,8 @@ def _strip(
     _slab(body, *((last, ys) if along == 0 else (xs, last)))
 
 
-def _add_window(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, origin: Array
-) -> list[PackPart]:
-    """Add modules, bus bars and nuts in the opened section."""
+def _add_window(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout) -> list[PackPart]:
+    """Add modules, bus bars and nuts in the opened section; where they are is in the pack frame."""
     (x0, x1), (y0, y1), depth = layout.window_x, layout.window_y, layout.window_depth
     floor = -depth
     cx, cy, hx, hy = (x0 + x1) / 2, (y0 + y1) / 2, (x1 - x0) / 2, (y1 - y0) / 2
@@ -291,9 +289,9 @@ def _add_window(
                     continue
                 bx = x0 + (0.27 + 0.46 * row) * (x1 - x0) + offset
                 name = f"bus_bar_{row}{col}{k}"
-                found += _add_bus_bar(body, (bx, by, top), name, (nut, washer), origin, along=1)
+                found += _add_bus_bar(body, (bx, by, top), name, (nut, washer), along=1)
     bx, by = cx, start + pitch * (columns - 0.5)
-    found += _add_bus_bar(body, (bx, by, top), "bus_bar_link", (nut, washer), origin, along=0)
+    found += _add_bus_bar(body, (bx, by, top), "bus_bar_link", (nut, washer), along=0)
     return found
 
 
@@ -302,7 +300,6 @@ def _add_bus_bar(
     pos: tuple[float, float, float],
     name: str,
     meshes: tuple[str, str],
-    origin: Array,
     *,
     along: int,
 ) -> list[PackPart]:
@@ -317,7 +314,7 @@ def _add_bus_bar(
     parts.visual(body, _BOX, sleeve, (x, y, z + 0.001), material="hv_orange", name=f"{name}_sleeve")
     parts.collider(body, _BOX, bar, (x, y, z))
     extent = np.array([2 * bar[0], 2 * bar[1], 2 * sleeve[2]])
-    centre = origin + np.array([x, y, z + 0.0055])
+    centre = np.array([x, y, z + 0.0055])
     found = [PackPart("bus_bar", "pack", (f"{name}_bar", f"{name}_sleeve"), centre, extent)]
     for end in (-1, 1):
         nx, ny = (x, y + end * STUD_PITCH / 2) if along else (x + end * STUD_PITCH / 2, y)
@@ -329,15 +326,15 @@ def _add_bus_bar(
                      name=f"{label}_stud")  # fmt: skip
         parts.collider(body, _CYLINDER, (0.0055, 0.006), (nx, ny, base + 0.006))
         geoms = (f"{label}_washer", f"{label}_hex", f"{label}_stud")
-        tip = origin + np.array([nx, ny, base + 0.0072])
+        tip = np.array([nx, ny, base + 0.0072])
         found.append(PackPart("nut", "pack", geoms, tip, np.array([0.017, 0.017, 0.012])))
     return found
 
 
 def _add_fasteners(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, loose: set[int], origin: Array
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, loose: set[int]
 ) -> list[PackPart]:
-    """Add the tight fasteners and list the empty holes."""
+    """Add the tight fasteners and list the empty holes; where they are is in the pack frame."""
     flats, height = FASTENER_HEAD
     head = parts.add_mesh(spec, "fastener_hex", *parts.hexagon(flats, height))
     flange = parts.add_mesh(
@@ -345,7 +342,7 @@ def _add_fasteners(
     )
     found: list[PackPart] = []
     for slot, (x, y) in enumerate(layout.fasteners()):
-        at = origin + np.array([x, y, 0.0])
+        at = np.array([x, y, 0.0])
         if slot in layout.empty_holes:
             found.append(PackPart("screw_hole", "pack", (), at, np.array([0.006, 0.006, 0.0])))
         elif slot not in loose:

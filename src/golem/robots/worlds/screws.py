@@ -159,7 +159,7 @@ def add_bore(parent: mujoco.MjsBody, draw: ScrewDraw, mouth: Sequence[float]) ->
 
 
 def add_screw(
-    spec: mujoco.MjSpec, draw: ScrewDraw, mouth_world: Sequence[float], *, sleep: bool = True
+    spec: mujoco.MjSpec, draw: ScrewDraw, spot: Sequence[float], T_world_pack: Array, *, sleep: bool = True
 ) -> str:
     """Add the free body of `draw`, standing in its bore.
 
@@ -168,15 +168,20 @@ def add_screw(
     Args:
         spec: the world.
         draw: the screw.
-        mouth_world: (3,) centre of the bore's mouth in the world [m]; the pack is not rotated against the world.
+        spot: x, y of the bore's mouth in the pack frame [m].
+        T_world_pack: (4, 4) pose of the pack frame.
         sleep: let MuJoCo put the undisturbed screw to sleep (takes effect when the sleep flag is on).
 
     Returns:
         The name of body and joint.
     """
     name = screw_name(draw.slot)
-    pos = np.asarray(mouth_world) + draw.protrusion * draw.axis()
-    body = spec.worldbody.add_body(name=name, pos=pos.tolist(), quat=draw.quat())
+    mouth = T_world_pack @ (*spot, 0.0, 1.0)
+    pos = mouth[:3] + draw.protrusion * (T_world_pack[:3, :3] @ draw.axis())
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, T_world_pack[:3, :3].ravel())
+    mujoco.mju_mulQuat(quat, quat.copy(), np.array(draw.quat()))
+    body = spec.worldbody.add_body(name=name, pos=pos.tolist(), quat=quat.tolist())
     body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_ALLOWED if sleep else mujoco.mjtSleepPolicy.mjSLEEP_NEVER
     body.add_freejoint(name=name)
     head_volume = draw.head_diameter**2 * draw.head_height

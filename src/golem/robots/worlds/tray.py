@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import mujoco
+import numpy as np
 
 from golem.robots.worlds import parts
-from golem.robots.worlds.layout import PackLayout
+from golem.robots.worlds.layout import PackLayout, yaw_quat
 
 WALL = 0.003
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
@@ -18,7 +19,9 @@ def add_tray(spec: mujoco.MjSpec, layout: PackLayout) -> str:
         The name of the body.
     """
     sx, sy, sz = layout.tray_size
-    body = spec.worldbody.add_body(name="tray", pos=[*layout.tray_xy, layout.tray_z])
+    body = spec.worldbody.add_body(
+        name="tray", pos=[*layout.tray_xy, layout.tray_z], quat=yaw_quat(layout.tray_yaw)
+    )
     hx, hy, hz = sx / 2, sy / 2, sz / 2
     walls = [
         ((hx, hy, WALL / 2), (0.0, 0.0, WALL / 2)),
@@ -40,10 +43,8 @@ def add_tray(spec: mujoco.MjSpec, layout: PackLayout) -> str:
         ]
     ):
         parts.visual(body, _BOX, size, pos, material="tray_teal", name=f"tray_rim_{k}")
-    over_cover = (
-        layout.near_edge < layout.tray_xy[0] < layout.near_edge + layout.size_x
-        and abs(layout.tray_xy[1] - layout.center_y) < layout.size_y / 2
-    )
+    x, y, _, _ = np.linalg.inv(layout.pose()) @ (*layout.tray_xy, layout.tray_z, 1.0)
+    over_cover = 0.0 < x < layout.size_x and abs(y) < layout.size_y / 2
     foot = layout.top_z if over_cover else 0.0
     if layout.tray_z - foot > 0.005:
         post = (layout.tray_z - foot) / 2

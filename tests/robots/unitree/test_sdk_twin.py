@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.robots.onboard.conftest import Started
-from tests.robots.onboard.test_sdk_example import EXAMPLE, PERIOD
+from tests.robots.unitree.conftest import Started
+from tests.robots.unitree.test_sdk_example import EXAMPLE, PERIOD
 
 from golem.middleware.dds.base import Qos
 from golem.middleware.wire import convert, hg

@@ -2,19 +2,11 @@ from __future__ import annotations
 
 import pytest
 
-from golem.middleware.unitree_api import (
-    GET_VERSION,
-    LOCO_APIS,
-    NOT_IMPLEMENTED,
-    OK,
-    ApiRequest,
-    Response,
-    decode,
-    encode,
-)
-from golem.robots.onboard import motion_switcher
-from golem.robots.onboard.loco_service import LocoService
-from golem.robots.onboard.motion_switcher import CHECK_MODE, RELEASE_MODE, SELECT_MODE, MotionSwitcher
+from golem.interfaces.unitree_api import GET_VERSION, LOCO_APIS, NOT_IMPLEMENTED, OK, decode, encode
+from golem.middleware.wire.api import ApiRequest, Response
+from golem.robots.unitree import motion_switcher
+from golem.robots.unitree.loco_service import LocoService
+from golem.robots.unitree.motion_switcher import CHECK_MODE, RELEASE_MODE, SELECT_MODE, MotionSwitcher
 
 API = LOCO_APIS["h1"]
 

@@ -9,18 +9,17 @@ from __future__ import annotations
 
 import math
 
-from golem.middleware.unitree_api import (
+from golem.interfaces.unitree_api import (
     BAD_PARAMETER,
     GET_VERSION,
     NOT_IMPLEMENTED,
     OK,
-    ApiRequest,
     LocoApi,
-    Response,
     decode_int,
     decode_velocity,
     encode,
 )
+from golem.middleware.wire.api import ApiRequest, Response
 from golem.types import Twist
 
 

@@ -1,6 +1,6 @@
 """Remote calls with the vendor's SDK: its clients of the motion switcher and the H1's loco service, or its server.
 
-GOLEM_UNITREE_SDK=<checkout> python tests/robots/onboard/sdk_rpc.py client|server DOMAIN
+GOLEM_UNITREE_SDK=<checkout> python tests/robots/unitree/sdk_rpc.py client|server DOMAIN
 """
 
 # pyright: reportMissingImports=false

@@ -10,16 +10,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from golem.middleware.unitree_api import (
-    GET_VERSION,
-    NOT_IMPLEMENTED,
-    OK,
-    ApiRequest,
-    Response,
-    decode,
-    encode,
-)
-from golem.robots.onboard.loco_service import LocoService
+from golem.interfaces.unitree_api import GET_VERSION, NOT_IMPLEMENTED, OK, decode, encode
+from golem.middleware.wire.api import ApiRequest, Response
+from golem.robots.unitree.loco_service import LocoService
 
 SERVICE: Final = "motion_switcher"
 VERSION: Final = "1.0.0.1"

@@ -7,12 +7,12 @@ import time
 import numpy as np
 import pytest
 from tests.middleware.wire.rpc import serve
-from tests.robots.onboard.conftest import Started
+from tests.robots.unitree.conftest import Started
 
 from golem.middleware.dds.base import Qos
 from golem.middleware.wire import convert, hg
-from golem.robots.onboard import motion_switcher
-from golem.robots.onboard.motion_switcher import CHECK_MODE, RELEASE_MODE, MotionSwitcher
+from golem.robots.unitree import motion_switcher
+from golem.robots.unitree.motion_switcher import CHECK_MODE, RELEASE_MODE, MotionSwitcher
 from golem.types import NUM_JOINTS, Array, Imu, LowCommand, LowState
 
 EXAMPLE = "h1_2/low_level/h1_2_low_level_example.py"

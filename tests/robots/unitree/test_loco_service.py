@@ -1,17 +1,16 @@
 from __future__ import annotations
 
-from golem.middleware.unitree_api import (
+from golem.interfaces.unitree_api import (
     BAD_PARAMETER,
     GET_VERSION,
     LOCO_APIS,
     NOT_IMPLEMENTED,
     OK,
-    ApiRequest,
-    Response,
     decode_int,
     encode,
 )
-from golem.robots.onboard.loco_service import LocoService
+from golem.middleware.wire.api import ApiRequest, Response
+from golem.robots.unitree.loco_service import LocoService
 from golem.types import Twist
 
 API = LOCO_APIS["h1"]

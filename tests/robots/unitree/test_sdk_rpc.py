@@ -7,14 +7,14 @@ import time
 
 import pytest
 from tests.middleware.wire.rpc import call, reach, serve
-from tests.robots.onboard.conftest import Started
-from tests.robots.onboard.sdk_rpc import ECHO, FAIL
+from tests.robots.unitree.conftest import Started
+from tests.robots.unitree.sdk_rpc import ECHO, FAIL
 
 from golem.capabilities.legs.hold import JointHold
+from golem.interfaces.unitree_api import LOCO_APIS, NOT_IMPLEMENTED, OK
 from golem.middleware.bus import Bus
-from golem.middleware.unitree_api import LOCO_APIS, NOT_IMPLEMENTED, OK
-from golem.robots.onboard import motion_switcher
-from golem.robots.onboard.motion_switcher import UNKNOWN_MODE, MotionSwitcher
+from golem.robots.unitree import motion_switcher
+from golem.robots.unitree.motion_switcher import UNKNOWN_MODE, MotionSwitcher
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Executor
 from golem.runtime.live.onboard_bridge import AnswersOut, CallsIn

@@ -1,6 +1,6 @@
 """Runs a program of the vendor's SDK, unchanged, on a DDS domain of one's choice.
 
-    GOLEM_UNITREE_SDK=<checkout> python tests/robots/onboard/sdk_example.py 1 h1_2/low_level/h1_2_low_level_example.py
+    GOLEM_UNITREE_SDK=<checkout> python tests/robots/unitree/sdk_example.py 1 h1_2/low_level/h1_2_low_level_example.py
 
 The program itself joins domain 0, which is the robot's. The SDK joins one domain per process: the first one asked for.
 """

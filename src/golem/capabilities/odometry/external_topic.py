@@ -1,0 +1,109 @@
+"""Odometry from outside of this stack: whatever somebody publishes as nav_msgs/Odometry, FAST-LIO for one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.capabilities.odometry.base import (
+    NO_COVARIANCE,
+    Ignores,
+    OdometryEstimate,
+    OdomOrigin,
+    Source,
+    lidar_in_base,
+)
+from golem.errors import ConfigError
+from golem.interfaces.lidar import ExternalOdometry, LegOdometry
+from golem.robots.model.spatial import transform
+from golem.robots.sensors.mid360 import P_LIDAR_IMU
+from golem.types import Array
+
+CHILDREN = ("base_link", "lidar", "lidar_imu")
+"""What an odometry may follow."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExternalTopicConfig:
+    """Options of `ExternalTopic`.
+
+    Attributes:
+        child: what it follows: base_link, lidar, or the IMU inside the LiDAR (lidar_imu), as FAST-LIO does.
+        level: whether its frame is level. That of FAST-LIO is the frame in which its IMU began, which is not: its first
+            pose is then taken for that of a robot that stands upright.
+        silent_after: age of the newest message, by the legs' clock, at which it is silent [s].
+    """
+
+    child: str = "lidar_imu"
+    level: bool = False
+    silent_after: float = 0.5
+
+
+class ExternalTopic(Ignores):
+    """What is published on /Odometry; see `LidarOdometry`."""
+
+    sources: tuple[Source, ...] = ("external",)
+
+    def __init__(self, config: ExternalTopicConfig | None = None) -> None:
+        """Wait for the first message.
+
+        Raises:
+            ConfigError: `child` is none of `CHILDREN`.
+        """
+        self.config = config or ExternalTopicConfig()
+        if self.config.child not in CHILDREN:
+            raise ConfigError(
+                f"The child of odometry topic is one of {', '.join(CHILDREN)}, not '{self.config.child}'."
+            )
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything; see `LidarOdometry`."""
+        self._origin = OdomOrigin()
+        self._T_level_frame: Array | None = None
+        self._waist, self._now = 0.0, -np.inf
+        self._newest: OdometryEstimate | None = None
+
+    @property
+    def why(self) -> str:
+        """See `LidarOdometry`."""
+        if self._newest is None:
+            return "Nothing has come on /Odometry."
+        age = self._now - self._newest.t
+        return f"Nothing has come on /Odometry for {age:.1f} s." if age > self.config.silent_after else ""
+
+    def add_legs(self, legs: LegOdometry) -> None:
+        """Take the time and the angle of the waist; see `LidarOdometry`."""
+        if np.isfinite([legs.t, legs.waist]).all():
+            self._waist, self._now = legs.waist, legs.t
+
+    def add_external(self, odometry: ExternalOdometry) -> None:
+        """Take a message; see `LidarOdometry`."""
+        numbers = (odometry.T_frame_child.ravel(), odometry.velocity, odometry.rate, [odometry.t])
+        if not np.isfinite(np.concatenate(numbers)).all():
+            return
+        if self._newest is not None and odometry.t <= self._newest.t:
+            return
+        T_base_child = self._child()
+        if self._T_level_frame is None:
+            upright = T_base_child @ np.linalg.inv(odometry.T_frame_child)
+            self._T_level_frame = np.eye(4) if self.config.level else upright
+        T = self._origin(self._T_level_frame @ odometry.T_frame_child @ np.linalg.inv(T_base_child))
+        R = T_base_child[:3, :3]
+        rate = R @ odometry.rate
+        velocity = R @ odometry.velocity - np.cross(rate, T_base_child[:3, 3])
+        self._newest = OdometryEstimate(
+            odometry.t, T, T[:3, :3] @ velocity, rate, NO_COVARIANCE, lidar_in_base(self._waist)
+        )
+
+    def estimate(self) -> OdometryEstimate | None:
+        """Return where the robot is; see `LidarOdometry`."""
+        return None if self.why else self._newest
+
+    def _child(self) -> Array:
+        """Return the (4, 4) pose in base_link of what the odometry follows."""
+        if self.config.child == "base_link":
+            return np.eye(4)
+        T = lidar_in_base(self._waist)
+        return T if self.config.child == "lidar" else T @ transform(P_LIDAR_IMU)

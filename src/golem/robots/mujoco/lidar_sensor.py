@@ -1,0 +1,249 @@
+"""The MID-360 on the twin: rays from where it was at each point's own time, cast beside the control loop."""
+
+from __future__ import annotations
+
+import copy
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from golem.interfaces.lidar import LidarImu, LidarScan
+from golem.robots.model.imu_mount import torso_motion
+from golem.robots.model.table import BASE_LINK, FRAMES
+from golem.robots.mujoco.scene import Scene
+from golem.robots.sensors.imu import ImuModel
+from golem.robots.sensors.mid360 import (
+    IMU_PERIOD,
+    P_LIDAR_IMU,
+    POINT_RATE,
+    SCAN,
+    directions,
+    draw_mount,
+    lidar_errors,
+)
+from golem.robots.sensors.streams import stream
+from golem.robots.worlds.parts import COLLISION_GROUP
+from golem.types import Array
+
+LATENCY = 0.02
+"""Time from the end of a scan to its arrival [s]; the rays of one are cast meanwhile."""
+HOUSING = "head"
+"""The shape of the robot in which the sensor sits; it would see nothing else."""
+
+_SEEN, _ROBOT, _HIDDEN = 1, 0, 5
+_GROUPS: NDArray[np.uint8] = np.array([1, 1, 0, 0, 0, 0], dtype=np.uint8)
+
+
+@dataclass(frozen=True, slots=True)
+class LidarMoment:
+    """One instant of a simulation, as far as the LiDAR sees it.
+
+    Attributes:
+        t: time [s].
+        qpos, qvel: state of the twin's model.
+    """
+
+    t: float
+    qpos: Array
+    qvel: Array
+
+
+class LidarSensor:
+    """The sensor of one twin; it is told every moment of the simulation, and read like a device.
+
+    The results depend on seed and moments alone: a scan arrives `LATENCY` after its end, and whoever reads it then
+    waits for the worker if it has not finished.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        profile: str,
+        seed: int,
+        *,
+        mount: Array | None = None,
+        dropout: float | None = None,
+    ) -> None:
+        """Hang the sensor on the torso of the robot in `scene`.
+
+        Args:
+            scene: world and robot; a copy is kept.
+            profile: realism profile.
+            seed: draws mounting error, bias and noise.
+            mount: (4, 4) pose of the real lidar_link in the nominal one instead of the draw.
+            dropout: share of lost points instead of the profile's.
+
+        Raises:
+            ConfigError: there is no such profile.
+        """
+        errors = lidar_errors(profile)
+        self.errors = errors if dropout is None else replace(errors, dropout=dropout)
+        self.mount = draw_mount(profile, seed) if mount is None else mount
+        self._model = model = visible(scene.model)
+        self._data = mujoco.MjData(model)
+        self._people = [(model.body(p.name).mocapid[0], p) for p in scene.people]
+        self._torso = model.body("torso_link").id
+        base, waist = model.joint("base"), model.joint("torso_joint")
+        self._q, self._v = int(base.qposadr[0]), int(base.dofadr[0])
+        self._waist, self._waist_v = int(waist.qposadr[0]), int(waist.dofadr[0])
+        self._T_torso_lidar = FRAMES["lidar_link"].T_parent_frame @ self.mount
+        self._gravity: Array = model.opt.gravity.copy()
+        self._imu_model = ImuModel(
+            errors.imu, errors.imu.draw_bias(stream(seed, "lidar/bias")), stream(seed, "lidar/imu")
+        )
+        self._rng = stream(seed, "lidar/points")
+        self._moments: deque[LidarMoment] = deque()
+        self._next_imu: float | None = None
+        self._next_scan = 0.0
+        self._before: tuple[Array, Array] | None = None
+        self._imu: list[LidarImu] = []
+        self._scans: deque[tuple[float, Future[LidarScan]]] = deque()
+        self._worker = ThreadPoolExecutor(1, "lidar")
+
+    def observe(self, moment: LidarMoment) -> None:
+        """Take the next moment of the simulation, later than the one before."""
+        if self._next_imu is None:
+            self._next_imu = self._next_scan = moment.t
+        self._moments.append(moment)
+        while len(self._moments) > 1 and self._next_imu <= moment.t + 1e-9:
+            self._sample(self._next_imu)
+            self._next_imu = round(self._next_imu + IMU_PERIOD, 6)
+        if moment.t >= self._next_scan + SCAN - 1e-9:
+            start = self._next_scan
+            # One moment more than the scan is long: each stands for the time around it.
+            track = [m for m in self._moments if m.t > start - 1e-9]
+            self._scans.append((start + SCAN, self._worker.submit(self._scan, start, track, self._draw())))
+            self._next_scan = round(self._next_scan + SCAN, 6)
+            while len(self._moments) > 2 and self._moments[1].t <= self._next_scan:
+                self._moments.popleft()
+
+    def read_imu(self) -> list[LidarImu]:
+        """Return the IMU samples since the last call."""
+        news, self._imu = self._imu, []
+        return news
+
+    def read_scan(self, t: float) -> LidarScan | None:
+        """Return the oldest scan that has arrived by time `t` [s] and was not read; None if there is none."""
+        if not self._scans or self._scans[0][0] + LATENCY > t + 1e-9:
+            return None
+        return self._scans.popleft()[1].result()
+
+    def close(self) -> None:
+        """End the worker. Closing twice does nothing."""
+        self._worker.shutdown(cancel_futures=True)
+
+    def _sample(self, t: float) -> None:
+        """Add the IMU's sample at time `t` [s], the mean since the one before."""
+        late, early = self._moments[-1], self._moments[-2]
+        share = (t - early.t) / (late.t - early.t)
+        (R0, v0), (R1, v1) = self._motion(early), self._motion(late)
+        turn = Rotation.from_matrix(R0.T @ R1).as_rotvec()
+        R = R0 @ Rotation.from_rotvec(share * turn).as_matrix()
+        v = v0 + share * (v1 - v0)
+        if self._before is not None:
+            R_before, v_before = self._before
+            rotvec = Rotation.from_matrix(R_before.T @ R).as_rotvec()
+            R_mid = R_before @ Rotation.from_rotvec(0.5 * rotvec).as_matrix()
+            force = R_mid.T @ ((v - v_before) / IMU_PERIOD - self._gravity)
+            told = self._imu_model.measure(_UPRIGHT, rotvec / IMU_PERIOD, force)
+            self._imu.append(LidarImu(t, told.gyro, told.acc))
+        self._before = R, v
+
+    def _motion(self, moment: LidarMoment) -> tuple[Array, Array]:
+        """Return rotation (3, 3) and velocity (3,) [m/s] of the sensor's IMU in the world."""
+        q, v = moment.qpos, moment.qvel
+        quat = q[self._q + 3 : self._q + 7]
+        torso, rate = torso_motion(
+            quat, v[self._v + 3 : self._v + 6], float(q[self._waist]), float(v[self._waist_v])
+        )
+        R = Rotation.from_quat(torso, scalar_first=True).as_matrix()
+        arm = self._T_torso_lidar[:3, 3] + self._T_torso_lidar[:3, :3] @ P_LIDAR_IMU
+        # base_link and torso have one origin, on the axis of the waist.
+        return R @ self._T_torso_lidar[:3, :3], v[self._v : self._v + 3] + R @ np.cross(rate, arm)
+
+    def _draw(self) -> tuple[Array, Array]:
+        """Draw the errors of one scan: (n, 3) of range and direction, and (n,) for the losses."""
+        n = round(SCAN * POINT_RATE)
+        return self._rng.standard_normal((n, 3)), self._rng.random(n)
+
+    def _scan(self, start: float, track: list[LidarMoment], draws: tuple[Array, Array]) -> LidarScan:
+        """Cast one scan; runs on the worker."""
+        noise, lost = draws
+        n, errors, data = len(noise), self.errors, self._data
+        offsets = np.arange(1, n + 1) / POINT_RATE
+        rays = directions(start + offsets)
+        if errors.direction_noise > 0.0:
+            shaken = rays + errors.direction_noise * np.cross(rays, noise)
+            rays_true = shaken / np.linalg.norm(shaken, axis=1, keepdims=True)
+        else:
+            rays_true = rays
+        distance, hit = np.empty(n), np.empty(n, dtype=np.int32)
+        times = np.array([m.t for m in track]) - start
+        edges = np.searchsorted(offsets, 0.5 * (times[1:] + times[:-1]))
+        edges = np.concatenate([[0], edges, [n]])
+        for i, moment in enumerate(track):
+            part = slice(edges[i], edges[i + 1])
+            count = part.stop - part.start
+            if count == 0:
+                continue
+            data.qpos[:] = moment.qpos
+            for mocap, person in self._people:
+                data.mocap_pos[mocap] = person.position(moment.t)
+            mujoco.mj_kinematics(self._model, data)
+            R_torso = data.xmat[self._torso].reshape(3, 3)
+            R = R_torso @ self._T_torso_lidar[:3, :3]
+            origin = data.xpos[self._torso] + R_torso @ self._T_torso_lidar[:3, 3]
+            # Directions turn with the sensor between the moments; its place is that of the nearest moment.
+            local = rays_true[part]
+            turned = local + np.cross(self._rate(moment), local) * (offsets[part] - times[i])[:, None]
+            world = (turned @ R.T).ravel()
+            mujoco.mj_multiRay(
+                self._model,
+                data,
+                origin,
+                world,
+                _GROUPS,
+                True,
+                -1,
+                hit[part],
+                distance[part],
+                None,
+                count,
+                errors.far,
+            )
+        ranges = distance + errors.range_noise * noise[:, 0]
+        kept = (hit >= 0) & (distance > errors.near) & (distance < errors.far) & (lost >= errors.dropout)
+        points = (rays[kept] * ranges[kept, None]).astype(np.float32)
+        return LidarScan(start + SCAN, points, offsets[kept].astype(np.float32), SCAN)
+
+    def _rate(self, moment: LidarMoment) -> Array:
+        """Return the (3,) angular rate of the sensor in its own axes [rad/s]."""
+        q, v = moment.qpos, moment.qvel
+        quat, rate = q[self._q + 3 : self._q + 7], v[self._v + 3 : self._v + 6]
+        turning = torso_motion(quat, rate, float(q[self._waist]), float(v[self._waist_v]))[1]
+        return self._T_torso_lidar[:3, :3].T @ turning
+
+
+_UPRIGHT: Array = np.array([1.0, 0.0, 0.0, 0.0])
+"""The IMU's orientation, which it does not report."""
+
+
+def visible(model: mujoco.MjModel) -> mujoco.MjModel:
+    """Return a copy of `model` in which rays meet what the LiDAR sees: the world's looks, the robot's contact shapes.
+
+    The robot's looks are meshes, which cost many times what its contact shapes do.
+    """
+    out = copy.copy(model)
+    robot = out.body_rootid[out.geom_bodyid] == out.body(BASE_LINK).id
+    shape = robot & (out.geom_group == COLLISION_GROUP)
+    shape[out.geom(HOUSING).id] = False
+    looks = ~robot & (out.geom_group < COLLISION_GROUP)
+    out.geom_group[:] = np.where(shape, _ROBOT, np.where(looks, _SEEN, _HIDDEN))
+    out.geom_rgba[shape, 3] = 1.0
+    out.geom_matid[shape] = -1
+    return out

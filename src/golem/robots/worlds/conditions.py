@@ -1,0 +1,235 @@
+"""What differs from one work place to the next: places, light, finishes, and what lies about; drawn from the seed.
+
+The nominal work place is the one that `PackLayout` describes. A varied one draws every condition anew, each from its
+range and in a fixed order, so that a condition that is given leaves the others as they were drawn. The ranges are
+assumptions: nobody publishes how packs stand in a plant.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Literal
+
+import numpy as np
+
+from golem.errors import ConfigError, unknown_name
+from golem.robots.worlds.layout import PackLayout
+from golem.types import SIDES, Side
+
+LayoutKind = Literal["nominal", "varied"]
+Finish = Literal["zinc", "black_oxide", "brass", "rust"]
+FINISHES: tuple[Finish, ...] = ("zinc", "black_oxide", "brass", "rust")
+Coat = Literal["grey", "black", "white", "blue", "green", "bare"]
+COATS: dict[Coat, tuple[float, float, float]] = {
+    "grey": (0.30, 0.33, 0.37),
+    "black": (0.08, 0.08, 0.09),
+    "white": (0.80, 0.81, 0.80),
+    "blue": (0.14, 0.24, 0.42),
+    "green": (0.16, 0.34, 0.22),
+    "bare": (0.62, 0.64, 0.66),
+}
+"""Colours of the pack's cover (r, g, b); `grey` is the nominal one."""
+TRAYS: dict[str, tuple[float, float, float]] = {
+    "teal": (0.05, 0.55, 0.50),
+    "red": (0.65, 0.10, 0.08),
+    "yellow": (0.90, 0.72, 0.08),
+    "grey": (0.45, 0.46, 0.48),
+    "black": (0.07, 0.07, 0.08),
+    "white": (0.88, 0.88, 0.86),
+}
+"""Colours of the tray (r, g, b); `teal` is the nominal one."""
+REACH_Y = 0.35
+"""Near-edge fasteners up to this far from the pack's middle may be loose in a varied work place [m]: what an arm at
+either side reaches."""
+
+ROOM = 0.04
+"""Room that a hand needs between a screw and the tray [m]."""
+
+Value = float | str
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """The conditions of one work place; the defaults are the nominal ones.
+
+    Attributes:
+        pack_x, pack_y: where the pack stands, from its nominal place [m].
+        pack_yaw: heading of the pack [rad].
+        height: of pack and tray, above the nominal one [m].
+        tray_side: of the robot, on which the tray stands.
+        tray_x, tray_y: where the tray stands on the cover, from its nominal place, in the pack frame [m]; y
+            counts away from the robot's middle.
+        tray_yaw: heading of the tray, from the pack's [rad].
+        loose: share of the reachable near-edge fasteners that are loose.
+        missing: share of the others that are gone.
+        light: level of the light, 1 is the nominal one.
+        light_azimuth: turn of the lamps about the robot's vertical [rad].
+        finish: of all screws.
+        cover: colour of the cover.
+        tray: colour of the tray.
+        clutter: things that lie on the cover.
+    """
+
+    pack_x: float = 0.0
+    pack_y: float = 0.0
+    pack_yaw: float = 0.0
+    height: float = 0.0
+    tray_side: Side = "right"
+    tray_x: float = 0.0
+    tray_y: float = 0.0
+    tray_yaw: float = 0.0
+    loose: float = 1.0
+    missing: float = 0.0
+    light: float = 1.0
+    light_azimuth: float = 0.0
+    finish: Finish = "zinc"
+    cover: Coat = "grey"
+    tray: str = "teal"
+    clutter: float = 0.0
+
+
+RANGES: dict[str, tuple[float, float]] = {
+    "pack_x": (-0.04, 0.05),
+    "pack_y": (-0.08, 0.08),
+    "pack_yaw": (-0.15, 0.15),
+    "height": (-0.05, 0.05),
+    "tray_x": (-0.03, 0.05),
+    "tray_y": (-0.04, 0.10),
+    "tray_yaw": (-0.5, 0.5),
+    "loose": (0.25, 0.75),
+    "missing": (0.0, 0.4),
+    "light": (0.15, 2.5),
+    "light_azimuth": (-math.pi, math.pi),
+    "clutter": (0.0, 6.0),
+}
+"""Ranges of a varied work place; uniform, the light's in its logarithm."""
+CHOICES: dict[str, tuple[str, ...]] = {
+    "tray_side": SIDES,
+    "finish": FINISHES,
+    "cover": tuple(COATS),
+    "tray": tuple(TRAYS),
+}
+BOUNDS: dict[str, tuple[float, float]] = {
+    "pack_x": (-0.2, 0.5),
+    "pack_y": (-0.5, 0.5),
+    "pack_yaw": (-0.8, 0.8),
+    "height": (-0.4, 0.3),
+    "tray_x": (-0.1, 0.6),
+    "tray_y": (-0.3, 0.6),
+    "tray_yaw": (-math.pi, math.pi),
+    "loose": (0.0, 1.0),
+    "missing": (0.0, 1.0),
+    "light": (0.01, 20.0),
+    "light_azimuth": (-math.pi, math.pi),
+    "clutter": (0.0, 40.0),
+}
+"""What may be asked for."""
+PLACES = ("pack_x", "pack_y", "pack_yaw", "tray_side", "tray_x", "tray_y", "tray_yaw")
+"""The conditions that move pack or tray sideways, or turn them."""
+NAMES = tuple(f.name for f in fields(Conditions))
+
+
+def check_condition(name: str, value: object) -> Value:
+    """Return a condition's value as it is used.
+
+    Raises:
+        ConfigError: there is no such condition, or it cannot have this value.
+    """
+    if name not in NAMES:
+        raise unknown_name("condition", name, NAMES)
+    if name in CHOICES:
+        if value not in CHOICES[name]:
+            raise unknown_name(f"value of {name}", str(value), CHOICES[name])
+        return str(value)
+    low, high = BOUNDS[name]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        raise ConfigError(f"The condition {name} is a number from {low:g} to {high:g}, not {value!r}.")
+    return float(value)
+
+
+def draw_conditions(kind: LayoutKind, given: Mapping[str, Value], rng: np.random.Generator) -> Conditions:
+    """Return the conditions of one work place.
+
+    Args:
+        kind: `nominal` draws nothing.
+        given: conditions that are not left to the draw.
+        rng: the same state draws the same.
+
+    Raises:
+        ConfigError: see `check_condition`.
+    """
+    values: dict[str, Value] = {}
+    if kind == "varied":
+        for name in NAMES:
+            if name in CHOICES:
+                values[name] = CHOICES[name][int(rng.integers(len(CHOICES[name])))]
+            else:
+                low, high = RANGES[name]
+                logarithmic = name == "light"
+                drawn = rng.uniform(math.log(low), math.log(high)) if logarithmic else rng.uniform(low, high)
+                values[name] = math.exp(drawn) if logarithmic else float(drawn)
+    values |= {name: check_condition(name, value) for name, value in given.items()}
+    return replace(Conditions(), **values)  # pyright: ignore[reportArgumentType]
+
+
+def arranged(layout: PackLayout, conditions: Conditions) -> PackLayout:
+    """Return where pack and tray stand under `conditions`; `layout` is the nominal place."""
+    c = conditions
+    moved = replace(
+        layout.raised(c.height),
+        near_edge=layout.near_edge + c.pack_x,
+        center_y=layout.center_y + c.pack_y,
+        yaw=c.pack_yaw,
+    )
+    if all(getattr(c, name) == getattr(Conditions(), name) for name in PLACES):
+        return moved  # to the last bit where it was
+    outwards = -1.0 if c.tray_side == "right" else 1.0
+    nominal = (layout.tray_xy[0], outwards * abs(layout.tray_xy[1]), layout.tray_z, 1.0)
+    on_cover = np.linalg.inv(layout.pose()) @ nominal + (c.tray_x, outwards * c.tray_y, 0.0, 0.0)
+    x, y, z, _ = moved.pose() @ on_cover
+    return replace(moved, tray_xy=(float(x), float(y)), tray_z=float(z), tray_yaw=c.pack_yaw + c.tray_yaw)
+
+
+@dataclass(frozen=True, slots=True)
+class Fasteners:
+    """What is in the places of the near edge.
+
+    Attributes:
+        loose: places of the loosened screws, from right to left.
+        missing: places that are empty beside the layout's own.
+    """
+
+    loose: tuple[int, ...]
+    missing: tuple[int, ...]
+
+
+def draw_fasteners(
+    layout: PackLayout, conditions: Conditions, reach_y: float, rng: np.random.Generator
+) -> Fasteners:
+    """Return which of the near-edge fasteners are loose and which are gone; the others are tight.
+
+    At least one is loose where any could be. What a hand cannot come to for the tray stays tight.
+
+    Args:
+        layout: has the places.
+        conditions: the shares.
+        reach_y: fasteners with |y| up to this take part [m].
+        rng: the same state draws the same.
+    """
+    spots = [
+        s for s in layout.reachable(reach_y) if s not in layout.empty_holes and not _under_tray(layout, s)
+    ]
+    luck = rng.random((len(spots), 2))
+    order = np.argsort(luck[:, 0])
+    count = max(1, round(conditions.loose * len(spots))) if spots else 0
+    chosen = set(order[:count].tolist())
+    rest = [k for k in range(len(spots)) if k not in chosen]
+    gone = [spots[k] for k in rest if luck[k, 1] < conditions.missing]
+    return Fasteners(tuple(spots[k] for k in sorted(chosen)), tuple(gone))
+
+
+def _under_tray(layout: PackLayout, slot: int) -> bool:
+    x, y, _, _ = np.linalg.inv(layout.tray_pose()) @ layout.pose() @ (*layout.fasteners()[slot], 0.0, 1.0)
+    return abs(x) < 0.5 * layout.tray_size[0] + ROOM and abs(y) < 0.5 * layout.tray_size[1] + ROOM

@@ -1,0 +1,45 @@
+"""How a work place looks under its conditions: finishes, coats and the turn of the lamps."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from golem.robots.model.spatial import rotation_rpy
+from golem.robots.worlds.conditions import COATS, TRAYS, Conditions, Finish
+
+SURFACES: dict[Finish, tuple[tuple[float, float, float], float, float]] = {
+    # colour, specular, shininess
+    "zinc": ((0.80, 0.81, 0.83), 0.9, 0.7),
+    "black_oxide": ((0.09, 0.09, 0.10), 0.5, 0.5),
+    "brass": ((0.72, 0.56, 0.24), 0.9, 0.6),
+    "rust": ((0.36, 0.20, 0.12), 0.1, 0.1),
+}
+MIRRORS = ("zinc", "steel", "copper", "aluminium")
+"""Materials that stereo depth loses in part: metals with a smooth surface."""
+BEAD = 0.04
+"""How much lighter the pressed beads are than the cover."""
+
+
+def dress(spec: mujoco.MjSpec, conditions: Conditions) -> None:
+    """Give the materials and lamps of a work place with a pack their looks."""
+    colour, specular, shininess = SURFACES[conditions.finish]
+    screws = spec.material("zinc")
+    screws.rgba, screws.specular, screws.shininess = [*colour, 1.0], specular, shininess
+    if conditions.finish == "rust":
+        spec.material("steel").rgba = [*colour, 1.0]
+    coat = COATS[conditions.cover]
+    spec.material("cover_coat").rgba = [*coat, 1.0]
+    spec.material("cover_bead").rgba = [*(min(value + BEAD, 1.0) for value in coat), 1.0]
+    spec.material("tray_teal").rgba = [*TRAYS[conditions.tray], 1.0]
+    turn = rotation_rpy(0.0, 0.0, conditions.light_azimuth)
+    for light in spec.lights:
+        light.pos = (turn @ light.pos).tolist()
+        light.dir = (turn @ light.dir).tolist()
+
+
+def mirror_geoms(model: mujoco.MjModel, conditions: Conditions) -> np.ndarray:
+    """Return (ngeom + 1,) whether each geom is mirror-like; the last entry, -1, is what has no geom."""
+    names = [name for name in MIRRORS if conditions.finish != "rust" or name in ("copper", "aluminium")]
+    smooth = [model.material(name).id for name in names]
+    return np.append(np.isin(model.geom_matid, smooth), False)

@@ -1,0 +1,209 @@
+"""A hall with what a hall has, drawn from a seed, a corridor without any feature, and people who walk about.
+
+The robot starts at the origin and heads along x. Nothing stands in the lane `LANE`, and nobody walks there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from golem.robots.worlds import hall, parts
+from golem.types import Array
+
+LANE = (-1.2, 7.0, -1.0, 3.4)
+"""x and y bounds of what is kept free for the robot [m]."""
+CORRIDOR = (120.0, 2.3)
+"""Length and width of the corridor [m]: its ends are out of a LiDAR's range."""
+HEIGHT = 3.5
+"""Height of the walls [m]."""
+PERSON = (0.20, 1.75)
+"""Radius and height of a person [m]."""
+SPEED = (0.6, 1.3)
+"""Range of a person's walking speed [m/s]."""
+
+_BOX = mujoco.mjtGeom.mjGEOM_BOX
+_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
+_CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
+_SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
+_WALL = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """Somebody who walks to and fro between two places.
+
+    Attributes:
+        name: of the mocap body.
+        places: (2, 2) x, y of both [m].
+        speed: mean speed [m/s].
+        phase: where the person is at time 0, as a share of the way there and back.
+    """
+
+    name: str
+    places: Array
+    speed: float
+    phase: float
+
+    def position(self, t: float) -> Array:
+        """Return the (3,) position of the person's feet at time `t` [s], in the world [m]."""
+        there = float(np.linalg.norm(self.places[1] - self.places[0]))
+        share = 0.5 - 0.5 * np.cos(2.0 * np.pi * (self.phase + self.speed * t / (2.0 * there)))
+        return np.append(self.places[0] + share * (self.places[1] - self.places[0]), 0.0)
+
+
+def add_furnished_hall(spec: mujoco.MjSpec, rng: np.random.Generator) -> None:
+    """Add a hall with walls, shelves, pillars, a gantry, two packs on stands and boxes.
+
+    Args:
+        spec: the world to extend.
+        rng: draws sizes and places.
+    """
+    _ground(spec, 14.0)
+    body = spec.worldbody.add_body(name="furniture")
+    back, front = -rng.uniform(2.5, 4.0), rng.uniform(10.0, 12.5)
+    right, left = -rng.uniform(4.0, 5.0), rng.uniform(5.5, 6.5)
+    _walls(body, (back, front, right, left))
+    for _ in range(rng.integers(3, 6)):
+        length, deep = rng.uniform(1.2, 3.0), rng.uniform(0.4, 0.6)
+        # Along the right or the left wall, beside the lane.
+        y = right + deep / 2 if rng.random() < 0.5 else left - deep / 2
+        _shelf(body, (float(rng.uniform(back + 2.0, front - 2.0)), y), (length, deep), rng)
+    for x, y in _along_lane(rng, int(rng.integers(2, 5)), (back, front, right, left)):
+        if rng.random() < 0.5:
+            _solid(body, (0.2, 0.2, HEIGHT / 2), (x, y, HEIGHT / 2))
+        else:
+            _solid(body, (0.18, HEIGHT / 2), (x, y, HEIGHT / 2), kind=_CYLINDER)
+    for x, y in _along_lane(rng, int(rng.integers(3, 8)), (back, front, right, left)):
+        size = rng.uniform((0.2, 0.2, 0.2), (0.5, 0.5, 0.7))
+        turn = rng.uniform(0.0, np.pi)
+        _solid(body, tuple(size), (x, y, size[2]), quat=(np.cos(turn / 2), 0.0, 0.0, np.sin(turn / 2)))
+    _pack(body, (float(rng.uniform(7.9, 8.6)), float(rng.uniform(-0.3, 0.3))))
+    _pack(body, (float(rng.uniform(2.0, 5.0)), left - 1.3), across=True)
+    _gantry(body, (float(rng.uniform(-0.1, 0.1)), float(rng.uniform(-0.1, 0.1))))
+
+
+def add_corridor(spec: mujoco.MjSpec) -> None:
+    """Add two parallel walls that tell a LiDAR nothing of how far along them it is; see `CORRIDOR`."""
+    length, width = CORRIDOR
+    _ground(spec, length / 2)
+    body = spec.worldbody.add_body(name="corridor")
+    for side in (-1, 1):
+        size = (length / 2, _WALL / 2, HEIGHT / 2)
+        _solid(body, size, (0.0, side * (width + _WALL) / 2, HEIGHT / 2))
+
+
+def add_people(spec: mujoco.MjSpec, rng: np.random.Generator, count: int) -> tuple[Person, ...]:
+    """Add `count` people who walk beside the lane of the furnished hall, and return them."""
+    people: list[Person] = []
+    radius, height = PERSON
+    for i in range(count):
+        name = f"person_{i}"
+        body = spec.worldbody.add_body(name=name, mocap=True)
+        trunk = height - 0.25 - radius
+        _solid(body, (radius, (trunk - 0.7) / 2), (0.0, 0.0, (trunk + 0.7) / 2), kind=_CAPSULE)
+        for side in (-1, 1):
+            _solid(body, (0.08, 0.35), (0.0, side * 0.1, 0.43), kind=_CAPSULE)
+        _solid(body, (0.11,), (0.0, 0.0, height - 0.11), kind=_SPHERE)
+        y = rng.uniform(-2.6, -1.5, size=2) if i % 2 == 0 else rng.uniform(3.6, 3.9, size=2)
+        x = np.array([rng.uniform(-0.5, 1.5), rng.uniform(4.0, 7.0)])
+        people.append(Person(name, np.column_stack([x, y]), rng.uniform(*SPEED), rng.random()))
+    return tuple(people)
+
+
+def _ground(spec: mujoco.MjSpec, half: float) -> None:
+    """Add floor, lights and materials, without the walls of `hall.add_hall`, which are seen only."""
+    hall.add_materials(spec)
+    world = spec.worldbody
+    world.add_geom(
+        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[half, half, 0.1], rgba=[0.56, 0.57, 0.58, 1.0],
+        contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1,
+        friction=[hall.FLOOR_FRICTION, 0.01, 0.001],
+    )  # fmt: skip
+    for x, y in ((0.0, 2.0), (6.0, -2.0)):
+        world.add_light(
+            pos=[x, y, HEIGHT], dir=[0.0, 0.0, -1.0], diffuse=[0.5] * 3, ambient=[0.15] * 3, castshadow=False
+        )
+
+
+def _walls(body: mujoco.MjsBody, bounds: tuple[float, float, float, float]) -> None:
+    x0, x1, y0, y1 = bounds
+    middle, half = ((x0 + x1) / 2, (y0 + y1) / 2), ((x1 - x0) / 2, (y1 - y0) / 2)
+    for x in (x0 - _WALL / 2, x1 + _WALL / 2):
+        _solid(body, (_WALL / 2, half[1] + _WALL, HEIGHT / 2), (x, middle[1], HEIGHT / 2))
+    for y in (y0 - _WALL / 2, y1 + _WALL / 2):
+        _solid(body, (half[0], _WALL / 2, HEIGHT / 2), (middle[0], y, HEIGHT / 2))
+
+
+def _along_lane(
+    rng: np.random.Generator, count: int, bounds: tuple[float, float, float, float]
+) -> Iterator[tuple[float, float]]:
+    """Yield `count` places that are in the hall, 0.8 m beside the lane and not among the people [m]."""
+    x0, x1, y0, y1 = bounds
+    while count:
+        x, y = rng.uniform((x0 + 0.6, y0 + 0.4), (x1 - 0.6, y1 - 0.4))
+        among = LANE[0] - 0.8 < x < LANE[1] + 1.0 and -3.0 < y < LANE[3] + 1.2
+        if not among:
+            count -= 1
+            yield float(x), float(y)
+
+
+def _shelf(
+    body: mujoco.MjsBody, at: tuple[float, float], size: tuple[float, float], rng: np.random.Generator
+) -> None:
+    """Add a shelf of four boards with boxes on them, its long side along x."""
+    (x, y), (length, deep) = at, size
+    for side in (-1, 1):
+        _solid(body, (0.02, deep / 2, 1.0), (x + side * length / 2, y, 1.0))
+    for z in (0.15, 0.75, 1.35, 1.95):
+        _solid(body, (length / 2, deep / 2, 0.02), (x, y, z))
+        for _ in range(rng.integers(1, 4)):
+            half = rng.uniform((0.10, 0.10, 0.08), (0.25, deep / 2, 0.22))
+            shift = rng.uniform(-length / 2 + half[0], length / 2 - half[0])
+            _solid(body, tuple(half), (x + shift, y, z + 0.02 + half[2]))
+
+
+def _pack(body: mujoco.MjsBody, at: tuple[float, float], across: bool = False) -> None:
+    """Add a battery pack of 1.2 x 2.0 m on its stand; `at` is the middle of the edge next to the robot.
+
+    Args:
+        body: what it belongs to.
+        at: x, y [m].
+        across: the robot comes along y instead of x.
+    """
+    frame = body.add_frame(
+        pos=[*at, 0.0], quat=[0.70710678, 0.0, 0.0, 0.70710678] if across else [1.0, 0.0, 0.0, 0.0]
+    )
+    blocks = [((0.6, 1.0, 0.075), (0.6, 0.0, 0.975)), ((0.25, 0.34, 0.02), (0.38, 0.0, 1.07))]
+    blocks += [((0.03, 0.03, 0.45), (x, y, 0.45)) for x in (0.12, 1.08) for y in (-0.7, 0.7)]
+    for size, pos in blocks:
+        _solid(body, size, pos).set_frame(frame)
+
+
+def _gantry(body: mujoco.MjsBody, at: tuple[float, float]) -> None:
+    """Add the frame whose band holds the robot at the start: two portals beside it and a beam across."""
+    x, y = at
+    for dx in (-0.9, 0.9):
+        for dy in (-1.25, 1.25):
+            _solid(body, (0.04, 0.04, 1.25), (x + dx, y + dy, 1.25))
+    for dy in (-1.25, 1.25):
+        _solid(body, (0.94, 0.04, 0.04), (x, y + dy, 2.5))
+    _solid(body, (0.04, 1.25, 0.06), (x, y, 2.54))
+
+
+def _solid(
+    body: mujoco.MjsBody,
+    size: tuple[float, ...],
+    pos: tuple[float, float, float],
+    *,
+    kind: mujoco.mjtGeom = _BOX,
+    quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
+) -> mujoco.MjsGeom:
+    """Add a shape that is seen and collides."""
+    geom = parts.collider(body, kind, size, pos, quat=quat)
+    geom.rgba = [0.66, 0.67, 0.70, 1.0]
+    geom.group = parts.VISUAL_GROUP
+    return geom
