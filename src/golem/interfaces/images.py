@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,6 +49,8 @@ def color_image(t: float, rgb: NDArray[np.uint8], frame: str) -> Image:
 
 def color_jpeg(t: float, rgb: NDArray[np.uint8], frame: str) -> CompressedImage:
     """Return a colour image (height, width, 3) as JPEG."""
+    import cv2
+
     bgr = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
     _, data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return CompressedImage(header(t, frame), COLOR_FORMAT, data.reshape(-1))
@@ -64,6 +65,8 @@ def depth_image(t: float, depth: NDArray[np.float32], frame: str) -> Image:
 
 def depth_png(t: float, depth: NDArray[np.float32], frame: str) -> CompressedImage:
     """Return a depth image (height, width) [m] as PNG of whole millimetres behind a header."""
+    import cv2
+
     # OpenCV's own choice, run lengths of differences to the left, is as cheap as zlib gets: it is the noise that costs.
     _, png = cv2.imencode(".png", millimetres(depth))
     data = np.concatenate((np.frombuffer(DEPTH_HEADER, np.uint8), png.reshape(-1)))

@@ -15,7 +15,7 @@ from golem.types import Array, CameraInfo, LocalizedObject, PlanarPose, Twist
 
 @dataclass(frozen=True, slots=True)
 class LegCommand:
-    """What the legs are told at one tick: tau_motor = kp (q - q_meas) - kd dq_meas + tau.
+    """Command of the legs for one tick: tau_motor = kp (q - q_meas) - kd dq_meas + tau.
 
     Attributes:
         q: (12,) joint targets in motor order, left leg then right leg [rad].
@@ -33,11 +33,12 @@ class LegCommand:
 
 @dataclass(frozen=True, slots=True)
 class ArmCommand:
-    """What the upper body is told at one tick.
+    """Command of the upper body for one tick.
 
     Attributes:
         q: (15,) joint targets, torso, left arm, right arm [rad]; inside the position limits, and no
-            further from the previous tick's targets than the velocity limits allow.
+            further from the previous tick's targets than the velocity limits of `robots.model.limits` allow. The first
+            ones after a reset start from the measured joints.
         error_position: (2,) distance of the left and right grasp frame from its target at `q` [m]; 0 for
             an arm without a target.
         error_rotation: (2,) angle between grasp frame and target at `q` [rad]; 0 for an arm without one.
@@ -49,6 +50,23 @@ class ArmCommand:
     error_position: Array
     error_rotation: Array
     limited: bool
+
+
+@dataclass(frozen=True, slots=True)
+class JointTrajectory:
+    """Where torso and arms are to be, and when.
+
+    Attributes:
+        t: time at which it begins [s].
+        times: (n,) times of its points after that [s], increasing. None at all: what is followed now is given up.
+        q: (n, 15) torso, left arm, right arm [rad].
+        dq: (n, 15) their velocities there [rad/s]; None goes straight from point to point.
+    """
+
+    t: float
+    times: Array
+    q: Array
+    dq: Array | None = None
 
 
 class GripState(StrEnum):
@@ -127,6 +145,7 @@ class LegStatus:
         controller: the implementation in charge, as the stack names it.
         fault: how the stack's own controller failed, once the fallback is in charge; else None.
         speed: greatest speed over the ground that the controller in charge follows [m/s]; 0: it does not walk.
+        trace: of that failure, see `ModuleFault`.
     """
 
     t: float
@@ -141,6 +160,7 @@ class LegStatus:
     controller: str
     fault: str | None = None
     speed: float = math.inf
+    trace: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,8 +343,10 @@ class ModuleFaultMsg:
         slot: its slot; None where it is the skill's goal that makes no sense to it.
         reason: what it did, and its name.
         stage: of the skill's result.
+        trace: see `ModuleFault`.
     """
 
     slot: str | None
     reason: str
     stage: str = "fault"
+    trace: str | None = None

@@ -7,86 +7,32 @@ compare both with what running processes really offer. Names are those of ROS 2;
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
+import numpy as np
+
+from golem.interfaces import images, lidar_convert, onboard_legs, ros_safety, topics
+from golem.interfaces import ros_convert as convert
+from golem.interfaces.payloads import Exposure
+from golem.interfaces.rows import ActionRow, Role, ServiceRow, TopicRow
 from golem.middleware.dds.base import CALLS, DEFAULT, LATCHED, SENSOR, Qos
-from golem.types import SIDES
-
-Role = Literal["robot", "safety", "stack", "user"]
-"""Who offers something: the robot (`golem twin`, or the H1-2 with its drivers), `golem safety`, `golem up`, anybody."""
+from golem.middleware.ros.msgs.rosgraph_msgs import Clock
+from golem.middleware.ros.msgs.sensor_msgs import CameraInfo
+from golem.middleware.ros.msgs.tf2_msgs import TFMessage
+from golem.middleware.wire.convert import decode_low_state, encode_low_state
+from golem.types import SIDES, BaseEstimate, LowState, Side
 
 CAMERAS = ("head", "left_hand", "right_hand")
+LIDAR = ("/livox/lidar", "/livox/pointcloud", "/livox/imu")
+"""What there is of the LiDAR: points in two forms, and the IMU inside it."""
 BASE_FRAME = "base_link"
 """Root of the robot in /tf; the link `pelvis` coincides with it."""
 NEWEST = Qos(depth=1)
 CLOUD = Qos(depth=20)
 LOW = Qos(depth=8)
 """Reliable, so that ROS subscriptions of either kind match; short, so that nobody who is slow holds the writer up."""
-VENDOR = ("unitree_hg", "unitree_api")
-"""Packages of the messages that are written as images, past the ROS codec."""
-
-
-@dataclass(frozen=True, slots=True)
-class TopicRow:
-    """A stream of messages.
-
-    Attributes:
-        name: in ROS 2.
-        type: of its messages.
-        by: who publishes it.
-        to: who of GOLEM's own processes reads it.
-        qos: what the publisher offers.
-        rate: messages per second of robot time [Hz]; None where something has to happen first.
-        frame: `frame_id` of its messages; empty where they have none.
-        text: what it carries.
-    """
-
-    name: str
-    type: str
-    by: Role
-    to: tuple[Role, ...]
-    qos: Qos
-    rate: float | None
-    frame: str
-    text: str
-
-    @property
-    def vendor(self) -> bool:
-        """Whether it is the vendor's own."""
-        return self.type.split("/")[0] in VENDOR
-
-
-@dataclass(frozen=True, slots=True)
-class ServiceRow:
-    """A call with an answer.
-
-    Attributes:
-        name, type: in ROS 2.
-        by: who answers.
-        text: what it does.
-    """
-
-    name: str
-    type: str
-    by: Role
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class ActionRow:
-    """A goal with feedback, a result, and a way to cancel it.
-
-    Attributes:
-        name, type: in ROS 2.
-        by: who pursues it.
-        text: what it does.
-    """
-
-    name: str
-    type: str
-    by: Role
-    text: str
 
 
 def optical_frame(camera: str) -> str:
@@ -111,71 +57,100 @@ IMAGES = (CAMERA_INFO, DEPTH_INFO, COLOR, COLOR_JPEG, DEPTH, DEPTH_PNG)
 """What there is of each camera; first what the others are read with."""
 
 
-def _camera(camera: str) -> tuple[TopicRow, ...]:
-    rows: tuple[tuple[str, str, tuple[Role, ...], str], ...] = (
-        (COLOR, "Image", ("stack",), "Colour, rgb8."),
-        (COLOR_JPEG, "CompressedImage", (), "The same as JPEG."),
-        (DEPTH, "Image", ("stack",), "Depth aligned to colour, 16UC1 [mm], 0 where there is none."),
-        (DEPTH_PNG, "CompressedImage", (), "The same as PNG, behind the 12 bytes of compressed_depth."),
-        (CAMERA_INFO, "CameraInfo", ("stack",), "Pinhole intrinsics, no distortion."),
-        (DEPTH_INFO, "CameraInfo", (), "The same: the depth is aligned to colour."),
-    )
-    frame = optical_frame(camera)
-    return tuple(
-        TopicRow(image(camera, what), f"sensor_msgs/msg/{kind}", "robot", to, SENSOR, 15, frame, text)
-        for what, kind, to, text in rows
-    )
-
-
 # fmt: off
+def _camera(camera: str) -> tuple[TopicRow, ...]:
+    frame = optical_frame(camera)
+
+    def info(e: Exposure) -> CameraInfo:
+        return images.camera_info(e.t, e.info, frame)
+
+    rows: tuple[tuple[str, str, tuple[Role, ...], str, Callable[[Exposure], Any]], ...] = (
+        (COLOR, "Image", ("stack",), "Colour, rgb8.", lambda e: images.color_image(e.t, e.rgb, frame)),
+        (COLOR_JPEG, "CompressedImage", (), "The same as JPEG.", lambda e: images.color_jpeg(e.t, e.rgb, frame)),
+        (DEPTH, "Image", ("stack",), "Depth aligned to colour, 16UC1 [mm], 0 where there is none.",
+         lambda e: images.depth_image(e.t, e.depth, frame)),
+        (DEPTH_PNG, "CompressedImage", (), "The same as PNG, behind the 12 bytes of compressed_depth.",
+         lambda e: images.depth_png(e.t, e.depth, frame)),
+        (CAMERA_INFO, "CameraInfo", ("stack",), "Pinhole intrinsics, no distortion.", info),
+        (DEPTH_INFO, "CameraInfo", (), "The same: the depth is aligned to colour.", info),
+    )
+    return tuple(
+        TopicRow(image(camera, what), f"sensor_msgs/msg/{kind}", "robot", to, SENSOR, 15, frame, text,
+                 topics.exposures(camera), encode, on_demand=True)
+        for what, kind, to, text, encode in rows
+    )
+
+
+def _clock(state: LowState) -> Clock:
+    return Clock(convert.time(state.t))
+
+
+def _base_link(estimate: BaseEstimate) -> TFMessage:
+    return convert.transforms(estimate.t, [("odom", BASE_FRAME)], estimate.T_odom_base[np.newaxis])
+
+
 def _loco(service: str, robots: str) -> tuple[TopicRow, ...]:
     return (
         TopicRow(f"/api/{service}/request", "unitree_api/msg/Request", "stack", ("robot",), CALLS, None, "",
               f"Calls of the on-board leg controller, state and velocity, as {robots} has them. "
-              "One of the two services is spoken to: see the option `robot` of `vendor`."),
+              "One of the two services is spoken to: see the option `robot` of `vendor`. The twin answers only where "
+              "the stack file says `lower_body: {use: vendor}`, and else reports that there is no server."),
         TopicRow(f"/api/{service}/response", "unitree_api/msg/Response", "robot", ("stack",), CALLS, None, "",
               "The answers."),
     )
 
 
-def _hand(side: str) -> tuple[TopicRow, ...]:
+def _hand(side: Side) -> tuple[TopicRow, ...]:
     own, frame = "golem_interfaces/msg/", f"{side}_gripper"
     return (
         TopicRow(gripper(side, "state"), own + "HandState", "robot", ("stack",), SENSOR, 100, frame,
-              "Opening, fingers and forces as the servos report them."),
+              "Opening, fingers and forces as the servos report them.",
+              topics.hand_state(side), partial(convert.hand_state, side=side), convert.to_hand_state,
+              on_demand=True, thinned=True),
         TopicRow(gripper(side, "command"), own + "HandCommand", "stack", ("robot",), SENSOR, 100, frame,
-              "Opening and force the servos are told."),
+              "Opening and force that the servos are commanded.",
+              topics.hand_command(side), partial(convert.hand_command, side=side), convert.to_hand_command),
         TopicRow(gripper(side, "status"), own + "HandStatus", "stack", (), DEFAULT, 10, frame,
-              "What the hand's controller found: open, closing, holding, slipped, ..."),
+              "What the hand's controller found: open, closing, holding, slipped, ...",
+              topics.hand_status(side), partial(convert.hand_status, side=side), on_demand=True, thinned=True),
     )
 
 
 TOPICS: tuple[TopicRow, ...] = (
     TopicRow("/lowstate", "unitree_hg/msg/LowState", "robot", ("safety", "stack"), LOW, 500, "",
           "Motors and torso IMU, with checksum; tick is robot time in ms and the clock of everything above the "
-          "robot."),
+          "robot.",
+          topics.LOW_STATE, encode_low_state, decode_low_state),
     TopicRow("/lowcmd", "unitree_hg/msg/LowCmd", "safety", ("robot", "safety"), LOW, 500, "",
-          "What the motors are told, with checksum; from the safety gate and nobody else. The twin's drives go "
-          "limp 0.1 s after the last one. reserve[0] as in /safety/lowcmd_in: a simulated robot waits for answers."),
+          "The motor commands, with checksum; only the safety gate sends them. The twin's drives go "
+          "limp 0.1 s after the last one. reserve[0] as in /safety/lowcmd_in: a simulated robot waits for answers.",
+          topics.LOW_CMD),
     TopicRow("/clock", "rosgraph_msgs/msg/Clock", "robot", (), NEWEST, 500, "",
-          "Robot time."),
+          "Robot time.",
+          topics.LOW_STATE, _clock, on_demand=True),
     TopicRow("/joint_states", "sensor_msgs/msg/JointState", "robot", (), DEFAULT, 100, "",
-          "The 27 joints in motor order, then the joints of the fingers."),
+          "The 27 joints in motor order, then the joints of the fingers.",
+          topics.LOW_STATE, on_demand=True, thinned=True),
     TopicRow("/tf", "tf2_msgs/msg/TFMessage", "robot", (), DEFAULT, 50, "",
-          "Every moving link in its parent."),
+          "Every moving link in its parent.",
+          topics.LOW_STATE, on_demand=True, thinned=True),
     TopicRow("/tf", "tf2_msgs/msg/TFMessage", "stack", (), DEFAULT, 50, "odom",
-          "base_link in odom, by the base estimate."),
+          "base_link in odom, by the base estimate.",
+          topics.BASE, _base_link, on_demand=True, thinned=True),
     TopicRow("/tf_static", "tf2_msgs/msg/TFMessage", "robot", ("stack",), LATCHED, None, "",
           "Sensor frames; those of the cameras are where their calibration claims them."),
     TopicRow("/robot_description", "std_msgs/msg/String", "robot", (), LATCHED, None, "",
           "The robot as URDF."),
     *(row for camera in CAMERAS for row in _camera(camera)),
     TopicRow("/livox/lidar", "livox_ros_driver2/msg/CustomMsg", "robot", (), CLOUD, 10, "lidar_link",
-          "Points of the LiDAR in the driver's own type. The twin has none yet: the publisher is silent."),
-    TopicRow("/livox/pointcloud", "sensor_msgs/msg/PointCloud2", "robot", (), CLOUD, 10, "lidar_link",
-          "The same points. Silent like /livox/lidar."),
-    TopicRow("/livox/imu", "sensor_msgs/msg/Imu", "robot", (), SENSOR, 200, "lidar_link",
-          "IMU inside the LiDAR. Silent like /livox/lidar: it is part of that device, not of the torso's IMU."),
+          "Points of the LiDAR in the driver's own type, each with its time.",
+          topics.LIDAR_SCAN, lidar_convert.custom, on_demand=True),
+    TopicRow("/livox/pointcloud", "sensor_msgs/msg/PointCloud2", "robot", ("stack",), CLOUD, 10, "lidar_link",
+          "The same points, in the layout of the driver. The stack reads them where its odometry goes by them.",
+          topics.LIDAR_SCAN, lidar_convert.cloud, lidar_convert.to_scan, on_demand=True),
+    TopicRow("/livox/imu", "sensor_msgs/msg/Imu", "robot", ("stack",), SENSOR, 200, "lidar_link",
+          "IMU inside the LiDAR, in its axes [rad/s], [m/s^2]. The vendor's driver says g: scale it before.",
+          topics.LIDAR_IMU, lidar_convert.imu, lidar_convert.to_imu, on_demand=True),
     *(row for side in SIDES for row in _hand(side)),
     TopicRow("/api/motion_switcher/request", "unitree_api/msg/Request", "safety", ("robot",), CALLS, None, "",
           "Calls 1001 check, 1002 select, 1003 release: which on-board controller runs."),
@@ -183,31 +158,43 @@ TOPICS: tuple[TopicRow, ...] = (
           "The answers."),
     *(row for service, robots in (("loco", "an H1"), ("sport", "a G1 or an H2")) for row in _loco(service, robots)),
     TopicRow("/safety/lowcmd_in", "unitree_hg/msg/LowCmd", "stack", ("safety",), LOW, 500, "",
-          "What the stack wants of the motors, for the gate to judge. reserve[0] repeats the tick of the state "
-          "it answers, 0 where unknown; the gate takes a command to be as old as that state."),
+          "Motor commands of the stack, for the gate to judge. The field reserve[0] repeats the tick of the state "
+          "it answers, 0 where unknown; the gate takes a command to be as old as that state.",
+          topics.LOW_CMD_REQUEST),
     TopicRow("/safety/status", "golem_interfaces/msg/SafetyStatus", "safety", ("stack",), LATCHED, 20, "",
-          "State of the gate, and why; at every change, and regularly."),
+          "State of the gate, and why; at every change, and regularly.",
+          topics.SAFETY, ros_safety.gate_status, ros_safety.to_gate_status),
     TopicRow("/estop", "golem_interfaces/msg/EstopFrame", "safety", (), SENSOR, 100, "",
-          "Frames of the emergency stop as the gate sees them."),
+          "Frames of the emergency stop as the gate sees them.",
+          topics.ESTOP, ros_safety.estop_frame, on_demand=True),
     TopicRow("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "safety", (), DEFAULT, 1, "",
           "State of the gate, ages of what it watches, rate of its loop."),
     TopicRow("/base_estimate", "golem_interfaces/msg/BaseEstimate", "stack", ("safety",), LOW, 500, "odom",
           "Pose, velocity, height and contacts of the base as the stack estimates them; the gate watches "
-          "`stale`."),
+          "`stale`.",
+          topics.BASE, convert.base_estimate, convert.to_base_estimate),
     TopicRow("/odom", "nav_msgs/msg/Odometry", "stack", (), DEFAULT, 50, "odom",
-          "Pose of base_link in odom and its velocity in base_link."),
+          "Pose of base_link in odom and its velocity in base_link.",
+          topics.BASE, on_demand=True, thinned=True),
+    TopicRow("/Odometry", "nav_msgs/msg/Odometry", "user", ("stack",), DEFAULT, None, "",
+          "An odometry from outside, as FAST-LIO names it; `odometry: {use: topic}` goes by it.",
+          topics.EXTERNAL_ODOMETRY, lidar_convert.odometry, lidar_convert.to_odometry),
     TopicRow("/cmd_vel", "geometry_msgs/msg/Twist", "user", ("stack",), DEFAULT, None, BASE_FRAME,
           "Velocity for the legs [m/s], [rad/s]; to be repeated at least every 0.5 s, or the robot stands. Ignored "
-          "while a skill runs or the gate is shut; who sent any then lets go first: zero, or nothing for 1 s."),
+          "while a skill runs or the gate is shut; who sent any then lets go first: zero, or nothing for 1 s.",
+          topics.TWIST, convert.twist, convert.to_twist),
     TopicRow("/legs/status", "golem_interfaces/msg/LegStatus", "stack", (), DEFAULT, 50, BASE_FRAME,
-          "What the lower body was told, what it does, and why not more."),
+          "The twist that the lower body was commanded, what it does, and why not more.",
+          topics.LEG_STATUS, convert.leg_status, on_demand=True, thinned=True),
     TopicRow("/onboard/lowcmd", "unitree_hg/msg/LowCmd", "robot", ("stack",), LOW, 500, "",
           "What the on-board leg controller wants of the 12 leg motors while it is on, the others off. Simulation "
-          "only: there it takes the way of every other command, through the gate."),
+          "only: there it takes the way of every other command, through the gate.",
+          topics.ONBOARD_LEGS, onboard_legs.encode_legs, onboard_legs.decode_legs),
     TopicRow("/skill/list", "golem_interfaces/msg/SkillList", "stack", (), LATCHED, None, "",
           "The skills of the stack, with the fields of their goals."),
     *(TopicRow(f"/objects/{camera}", "golem_interfaces/msg/Sightings", "stack", (), DEFAULT, None, "odom",
-            "Objects located in the frames that a skill asked for.") for camera in CAMERAS),
+            "Objects located in the frames that a skill asked for.",
+            topics.detections(camera), convert.sightings) for camera in CAMERAS),
 )
 
 TRIGGER = "std_srvs/srv/Trigger"

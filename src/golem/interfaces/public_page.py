@@ -5,9 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from textwrap import fill
 
 from golem.interfaces import public
-from golem.interfaces.public import Role
+from golem.interfaces.rows import Role, TopicRow
 from golem.middleware.dds.base import Qos
 
 WHO: dict[Role, str] = {
@@ -20,17 +21,16 @@ WHO: dict[Role, str] = {
 SHORT: dict[Role, str] = {"robot": "robot", "safety": "safety", "stack": "up", "user": "you"}
 INTRODUCTION = """# Interfaces
 
-Written by `python -m golem.interfaces.public_page docs/reference/topics.md` from `golem.interfaces.public`, which is
-what the processes create their endpoints from; tests compare this page with the table, and the table with what running
-processes offer. Names are those of ROS 2. On the wire the topic `/x` is `rt/x`: `/lowstate` is
-the vendor's `rt/lowstate`.
+`python -m golem.interfaces.public_page docs/reference/topics.md` writes this page from `golem.interfaces.public`.
+The processes create their endpoints from the same table, and tests compare the table with running processes. Names are
+those of ROS 2. On the wire the topic `/x` is `rt/x`: `/lowstate` is the vendor's `rt/lowstate`.
 
-- Time: messages from robot and stack are stamped with robot time, which is `/clock` and the tick of `/lowstate`; the
-  safety process stamps by a clock of its own, the time since boot. Goals of actions are stamped by the wall clock.
+- Time: messages from robot and stack are stamped with robot time, which is `/clock` and the tick of `/lowstate`. The
+  safety process stamps with its own clock, the time since boot. Goals of actions are stamped with the wall clock.
 - Frames: REP-103 and REP-105. `odom` coincides with the levelled `base_link` at the start; the link `pelvis` coincides
   with `base_link`; optical frames have z forward.
 - Units: SI. Quaternions on ROS topics are xyzw, in the vendor's messages wxyz.
-- Images, /tf, /joint_states and whatever else is volatile and costs much is made only while somebody subscribes.
+- What is sent "on demand" is made only while somebody subscribes.
 - QoS is what the writer offers. What you send is read best effort, so that you may offer either.
 - Types `golem_interfaces/...` are in `ros/golem_interfaces`, with units and frames in their comments.
 - `SafetyStatus.reason` is a value of `Reason` in `golem.hardware.safety.base`.
@@ -46,16 +46,16 @@ def page() -> str:
         parts.append(f"## Topics from {who}\n")
         parts.append(
             _table(
-                ("topic", "type", "QoS", "Hz", "frame", "read by", "what"),
+                ("topic", "what", "type", "QoS", "Hz", "frame", "read by"),
                 (
                     (
                         f"`{row.name}`",
+                        row.text,
                         f"`{row.type}`",
                         _qos(row.qos),
-                        "on event" if row.rate is None else f"{row.rate:g}",
+                        _rate(row),
                         f"`{row.frame}`" if row.frame else "",
                         ", ".join(SHORT[reader] for reader in row.to),
-                        row.text,
                     )
                     for row in rows
                 ),
@@ -65,20 +65,26 @@ def page() -> str:
     served = ((f"`{s.name}`", f"`{s.type}`", SHORT[s.by], s.text) for s in public.SERVICES)
     parts.append(_table(("service", "type", "by", "what"), served))
     parts.append(
-        "`golem launch` offers `/launch/restart_twin`, `/launch/restart_safety` and `/launch/restart_up` "
-        f"(`{public.TRIGGER}`) beside these: they are about processes, not about the robot.\n"
+        "`golem launch` also offers `/launch/restart_twin`, `/launch/restart_safety` and `/launch/restart_up`\n"
+        f"(`{public.TRIGGER}`). They restart processes and do not command the robot.\n"
     )
     parts.append("## Actions\n")
     acted = ((f"`{a.name}`", f"`{a.type}`", SHORT[a.by], a.text) for a in public.ACTIONS)
     parts.append(_table(("action", "type", "by", "what"), acted))
     parts.append("## Left out on purpose\n")
-    parts.append("\n".join(f"- `{name}`: {why}" for name, why in public.ABSENT.items()) + "\n")
+    absent = (f"- `{name}`: {why}" for name, why in public.ABSENT.items())
+    parts.append("\n".join(fill(line, 120, subsequent_indent="  ") for line in absent) + "\n")
     return "\n".join(parts)
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+def _rate(row: TopicRow) -> str:
+    rate = "on event" if row.rate is None else f"{row.rate:g}"
+    return f"{rate}, on demand" if row.on_demand else rate
 
 
 def _qos(qos: Qos) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from golem.interfaces import public
-from golem.middleware.record.base import BagTopic
-from golem.middleware.record.catalog import topic
+from golem.middleware.bags.base import BagTopic
+from golem.middleware.bags.catalog import topic
 
 COMPRESSED = "sensor_msgs/msg/CompressedImage"
 

@@ -9,9 +9,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from golem.interfaces.payloads import Detections, LegStatus
+from golem.interfaces.payloads import Detections, HandStatus, LegStatus
 from golem.middleware.ros.message import NANO, CodecError
 from golem.middleware.ros.msgs import diagnostic_msgs, geometry_msgs, golem_interfaces, sensor_msgs
 from golem.middleware.ros.msgs.builtin_interfaces import Duration, Time
@@ -65,7 +64,7 @@ def vector(v: Array) -> geometry_msgs.Vector3:
 
 def pose(T: Array) -> geometry_msgs.Pose:
     """Return the pose `T` (4, 4)."""
-    (xyzw,) = _xyzw(T[None])
+    xyzw = _xyzw(T.tolist())
     return geometry_msgs.Pose(
         geometry_msgs.Point(*np.asarray(T[:3, 3], float).tolist()), geometry_msgs.Quaternion(*xyzw)
     )
@@ -82,7 +81,7 @@ def matrix(pose: geometry_msgs.Pose) -> Array:
     if not np.isfinite(numbers).all() or not 1e-6 < np.abs(numbers[3:]).max() < 1e6:
         raise CodecError(f"{numbers.tolist()} is no position (x, y, z) and quaternion (x, y, z, w).")
     T = np.eye(4)
-    T[:3, :3] = Rotation.from_quat(numbers[3:]).as_matrix()
+    T[:3, :3] = _rotation(*(numbers[3:] / np.linalg.norm(numbers[3:])).tolist())
     T[:3, 3] = numbers[:3]
     return T
 
@@ -101,7 +100,7 @@ def transforms(t: float, links: Sequence[tuple[str, str]], T_parent_child: Array
         links: parent and child of each of n poses.
         T_parent_child: (n, 4, 4) pose of each child in its parent.
     """
-    positions, rotations = T_parent_child[:, :3, 3].tolist(), _xyzw(T_parent_child)
+    positions, rotations = T_parent_child[:, :3, 3].tolist(), map(_xyzw, T_parent_child.tolist())
     stamp = time(t)
     return TFMessage(
         [
@@ -251,6 +250,12 @@ def to_hand_command(message: golem_interfaces.HandCommand) -> HandCommand:
     return HandCommand(seconds(message.header.stamp), message.gap, message.force)
 
 
+def hand_status(status: HandStatus, side: str) -> golem_interfaces.HandStatus:
+    """Return what a hand's controller found."""
+    head, force = header(max(status.t, 0.0), f"{side}_gripper"), np.array(status.force, np.float64)
+    return golem_interfaces.HandStatus(head, status.state, status.gap, status.offset, force)
+
+
 def leg_status(status: LegStatus) -> golem_interfaces.LegStatus:
     """Return what the lower body does."""
     return golem_interfaces.LegStatus(
@@ -269,7 +274,7 @@ def leg_status(status: LegStatus) -> golem_interfaces.LegStatus:
 
 
 def sightings(seen: Detections) -> golem_interfaces.Sightings:
-    """Return what a localizer found in one frame."""
+    """Return what a localizer found in one frame; masks stay inside."""
     objects = [
         golem_interfaces.LocalizedObject(
             o.label,
@@ -290,6 +295,28 @@ def _sec_nanosec(t: float) -> tuple[int, int]:
     return divmod(round(t * NANO), NANO)
 
 
-def _xyzw(T: Array) -> list[list[float]]:
-    """Return the (n, 4) quaternions, xyzw with w >= 0, of (n, 4, 4) poses."""
-    return Rotation.from_matrix(T[:, :3, :3]).as_quat(canonical=True).tolist() if len(T) else []
+def _xyzw(R: list[list[float]]) -> list[float]:
+    """Return the unit quaternion xyzw, w >= 0, of a rotation (3, 3) or pose (4, 4).
+
+    It is scaled by its largest part (Shepperd 1978). Importing scipy for it would take a second of CPU time.
+    """
+    trace = R[0][0] + R[1][1] + R[2][2]
+    i = max(range(3), key=lambda axis: R[axis][axis])
+    j, k = (i + 1) % 3, (i + 2) % 3
+    q = [0.0] * 4
+    if trace > R[i][i]:
+        q[:] = R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1], 1.0 + trace
+    else:
+        q[i], q[j], q[k] = 1.0 - trace + 2.0 * R[i][i], R[j][i] + R[i][j], R[k][i] + R[i][k]
+        q[3] = R[k][j] - R[j][k]
+    norm = math.copysign(math.hypot(*q), q[3])
+    return [part / norm for part in q]
+
+
+def _rotation(x: float, y: float, z: float, w: float) -> list[list[float]]:
+    """Return the (3, 3) rotation of a unit quaternion."""
+    return [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+    ]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 
+from golem.interfaces.lidar import ExternalOdometry, LidarImu, LidarScan
+from golem.interfaces.nav_payloads import NavGoal, NavStep, OccupancyGrid, Scan
 from golem.interfaces.payloads import (
     ArmCommand,
     DetectionRequest,
@@ -15,13 +17,14 @@ from golem.interfaces.payloads import (
     GateStatus,
     HandGoal,
     HandStatus,
+    JointTrajectory,
     LegCommand,
     LegStatus,
     ModuleFaultMsg,
     Odometry,
 )
 from golem.middleware.bus import Topic
-from golem.middleware.unitree_api import ApiRequest, Response, request_topic, response_topic
+from golem.middleware.wire.api import ApiRequest, Response, request_topic, response_topic
 from golem.types import (
     BaseEstimate,
     HandCommand,
@@ -50,6 +53,8 @@ TRANSPORT_FAULT = Topic("safety/transport", Fault)
 """What the gate shall stop for: something is wrong with the way its frames come."""
 PALM_TARGETS = Topic("palm_targets", PalmTargets)
 """In odom, from the running skill."""
+ARM_TRAJECTORY = Topic("arm_trajectory", JointTrajectory)
+"""From the running skill; it holds until palm targets, or another one, come."""
 ARM_COMMAND = Topic("arm_command", ArmCommand)
 """From the upper-body controller."""
 LEG_COMMAND = Topic("leg_command", LegCommand)
@@ -62,6 +67,20 @@ LEG_STATUS = Topic("legs/status", LegStatus)
 """From the base layer of the lower body."""
 ODOMETRY = Topic("odometry", Odometry)
 """From whatever locates the robot better than its base estimate; a stack without it never sends any."""
+LIDAR_SCAN = Topic("lidar/scan", LidarScan)
+"""At 10 Hz, from the LiDAR while somebody listens; a robot without one never sends any."""
+LIDAR_IMU = Topic("lidar/imu", LidarImu)
+"""At 200 Hz, from the IMU inside it."""
+EXTERNAL_ODOMETRY = Topic("odometry/external", ExternalOdometry)
+"""From an odometry outside of this stack."""
+MAP = Topic("map", OccupancyGrid)
+"""From whatever maps; a stack without it never sends any."""
+SCAN = Topic("scan", Scan)
+"""From a LiDAR; a robot without one never sends any."""
+NAV_GOAL = Topic("navigation/goal", NavGoal)
+"""From the running skill, whenever it changes."""
+NAV_STEP = Topic("navigation/step", NavStep)
+"""From the navigator while it has a goal."""
 FEEDBACK = Topic("skill/feedback", Feedback)
 """Of the running skill."""
 ONBOARD_LEGS = Topic("onboard/legs", LegCommand)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -13,7 +12,6 @@ from golem.middleware.dds.base import Participant
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import DdsNode
-from golem.middleware.ros.rclpy_node import RclpyNode
 
 PICK = "golem_interfaces/action/Pick"
 SET_BOOL = "std_srvs/srv/SetBool"
@@ -34,43 +32,29 @@ class Clock:
 class World:
     """Makes nodes, each with its own participant, and spins them."""
 
-    def __init__(self, join: Callable[[], Participant] | None, pause: float, domain: int = 0) -> None:
-        """Take participants from `join`, or nodes of rclpy on `domain`; `pause` [s] between looks at the network."""
-        self._join, self._pause, self._domain = join, pause, domain
-        self._participants: dict[DdsNode, Participant | None] = {}
-        self._clock = Clock()
-
-    @property
-    def clock(self) -> Clock:
-        """The clock of all nodes."""
-        if self._join is None:
-            pytest.skip("rclpy has a clock of its own")
-        return self._clock
+    def __init__(self, join: Callable[[], Participant], pause: float) -> None:
+        """Take participants from `join`; `pause` [s] between looks at the network."""
+        self._join, self._pause = join, pause
+        self._participants: dict[DdsNode, Participant] = {}
+        self.clock = Clock()
 
     def participant(self, node: DdsNode) -> Participant:
         """The participant of a node, to do with it what no node does."""
-        participant = self._participants[node]
-        return participant if participant is not None else pytest.skip("rclpy hides its participant")
+        return self._participants[node]
 
     def node(self, name: str, namespace: str = "/") -> DdsNode:
-        """A new node; over rclpy it only looks like one of ours."""
-        if self._join is None:
-            node: Any = RclpyNode(name, namespace, self._domain)
-            self._participants[node] = None
-            return node
+        """A new node."""
         participant = self._join()
-        node = DdsNode(participant, name, namespace, now=self._clock)
+        node = DdsNode(participant, name, namespace, now=self.clock)
         self._participants[node] = participant
         return node
 
     def kill(self, node: DdsNode) -> None:
-        """Take a node away, over DDS without its doing anything about it."""
-        (self._participants.pop(node) or node).close()
+        """Take a node away without its doing anything about it."""
+        self._participants.pop(node).close()
 
     def unspun(self, condition: Callable[[], bool]) -> None:
         """Wait until `condition()` without spinning anything."""
-        if self._join is None:
-            pytest.skip("rclpy takes nothing in unless it is spun")
         end = time.monotonic() + TIMEOUT
         while not condition():
             assert time.monotonic() < end, "nothing happened for too long"
@@ -104,27 +88,21 @@ class World:
         """Take everything away."""
         for node, participant in self._participants.items():
             node.close()
-            if participant is not None:
-                participant.close()
+            participant.close()
         self._participants.clear()
 
 
-TRANSPORTS = ("local", "cyclone", "rclpy") if importlib.util.find_spec("rclpy") else ("local", "cyclone")
-
-
-@pytest.fixture(params=TRANSPORTS)
+@pytest.fixture(params=("local", "cyclone"))
 def world(request: pytest.FixtureRequest, domain: int) -> Iterator[World]:
     """Nodes on each transport."""
     if request.param == "local":
         world = World(LocalDomain().participant, 0.0)
-    elif request.param == "cyclone":
+    else:
         pytest.importorskip("cyclonedds")
         from golem.middleware.dds.connect import connect
         from golem.middleware.dds.domain import DdsConfig
 
         config = DdsConfig(domain=domain)
         world = World(lambda: connect(config, PARTICIPANT_USER_DATA), 0.005)
-    else:
-        world = World(None, 0.005, domain)
     yield world
     world.close()

@@ -331,6 +331,17 @@ def test_a_thousand_goals_at_once_and_nothing_is_left(pair: Pair) -> None:
     assert newest is not None and newest.status_list == []
 
 
+def test_a_flood_of_goals_does_not_repeat_their_status_at_every_goal(pair: Pair) -> None:
+    pair.handler.finish = True
+    told = pair.world.node("watch").subscription("/skill/pick/_action/status", STATUS_ARRAY)
+    pair.world.until(lambda: told.matched() > 0)
+    for i in range(300):
+        pair.client.send_goal(Pick.Goal(f"{i}"))
+        pair.world.spin()
+    pair.world.settle()
+    assert 0 < told.count() < 100
+
+
 def test_requests_that_are_none_do_no_harm(pair: Pair) -> None:
     stranger = pair.world.participant(pair.world.node("stranger"))
     parts = {

@@ -24,17 +24,17 @@ from golem.interfaces.ros_convert import (
     to_twist,
     transforms,
 )
+from golem.interfaces.ros_safety import to_gate_status
 from golem.middleware.ros import codec
 from golem.middleware.ros.message import CodecError
 from golem.robots.sensors.calibration import OPTICAL_FRAMES, calibrations
-from golem.runtime.live.safety_status import to_status
 
 READ: dict[str, tuple[Callable[[Any], object], ...]] = {
     "geometry_msgs/msg/Twist": (to_twist,),
     "golem_interfaces/msg/BaseEstimate": (to_base_estimate,),
     "golem_interfaces/msg/HandState": (to_hand_state,),
     "golem_interfaces/msg/HandCommand": (to_hand_command,),
-    "golem_interfaces/msg/SafetyStatus": (lambda message: to_status(message, 0.0),),
+    "golem_interfaces/msg/SafetyStatus": (to_gate_status,),
     "sensor_msgs/msg/CameraInfo": (lambda message: images.to_camera(message, "head", 0.1, 3.0, 15.0),),
     "sensor_msgs/msg/Image": (images.to_rgb, images.to_depth),
     "sensor_msgs/msg/PointCloud2": (images.to_points,),

@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 from golem.errors import ConfigError
 from golem.middleware.dds.base import LATCHED, Participant, Sample
 from golem.middleware.dds.local import LocalDomain
+from golem.middleware.ros import parameters
 from golem.middleware.ros.codec import dds_name, type_hash
 from golem.middleware.ros.graph import INFO, PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import DdsNode
@@ -54,8 +55,9 @@ def test_a_node_is_announced_in_the_layout_of_its_peers(distro: str, store: Stor
     assert list(info.gid.data) == gid(participant.guid, size)
     (entry,) = info.node_entities_info_seq
     assert (entry.node_namespace, entry.node_name) == ("/robot", "twin")
-    assert [list(g.data) for g in entry.writer_gid_seq] == [gid(publisher.writer.guid, size)]
-    assert [list(g.data) for g in entry.reader_gid_seq] == [gid(subscription.inbox.guid, size)]
+    assert list(entry.writer_gid_seq[-1].data) == gid(publisher.writer.guid, size)
+    assert list(entry.reader_gid_seq[-1].data) == gid(subscription.inbox.guid, size)
+    assert len(entry.writer_gid_seq) == len(entry.reader_gid_seq) == 1 + len(parameters.SERVICES)
     assert (
         bytes(types.serialize_cdr(info, INFO))
         == bytes(sample.payload)[: len(types.serialize_cdr(info, INFO))]
@@ -76,9 +78,10 @@ def test_what_is_closed_is_announced_no_more() -> None:
         (entry,) = info.node_entities_info_seq
         return len(entry.reader_gid_seq), len(entry.writer_gid_seq)
 
-    assert endpoints() == (3, 5)
+    own = len(parameters.SERVICES)
+    assert endpoints() == (own + 3, own + 5)
     server.close()
-    assert endpoints() == (0, 0)
+    assert endpoints() == (own, own)
     listener = domain.participant().reader("ros_discovery_info", dds_name(INFO), replace(LATCHED, depth=10))
     listener.take()
     node.close()
@@ -128,7 +131,7 @@ def user_data(domain: int) -> dict[tuple[str, str], dict[str, str]]:
     observer = DomainParticipant(domain)
     found: dict[tuple[str, str], dict[str, str]] = {}
     for kind, topic in (("writer", BuiltinTopicDcpsPublication), ("reader", BuiltinTopicDcpsSubscription)):
-        for sample in BuiltinDataReader(observer, topic).take(100):
+        for sample in BuiltinDataReader(observer, topic).take(1000):
             policy = sample.qos[Policy.Userdata]
             pairs = bytes(policy.data).decode().split(";")[:-1] if policy else ()
             found[sample.topic_name, kind] = dict(pair.split("=", 1) for pair in pairs)

@@ -14,8 +14,8 @@ from tests.middleware.ros.samples import random_message
 
 from golem.middleware.ros import codec
 from golem.middleware.ros.msgs import unitree_api
-from golem.middleware.unitree_api import ApiRequest, Response
 from golem.middleware.wire import api, go, hg
+from golem.middleware.wire.api import ApiRequest, Response
 from golem.middleware.wire.struct_layout import StructLayout
 
 IMU = ("quaternion", "gyroscope", "accelerometer", "rpy", "temperature")

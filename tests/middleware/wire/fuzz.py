@@ -24,13 +24,14 @@ if __name__ == "__main__":
 
 from tests.middleware.wire import random_images, samples
 
-from golem.middleware import unitree_api
-from golem.middleware.unitree_api import LOCO_APIS, ApiRequest, Response
+from golem.interfaces import unitree_api
+from golem.interfaces.unitree_api import LOCO_APIS
 from golem.middleware.wire import api, convert, go, hg
+from golem.middleware.wire.api import ApiRequest, Response
 from golem.middleware.wire.crc import Checksum
 from golem.middleware.wire.struct_layout import WireError
-from golem.robots.onboard.loco_service import LocoService
-from golem.robots.onboard.motion_switcher import CHECK_MODE, RELEASE_MODE, SELECT_MODE, MotionSwitcher
+from golem.robots.unitree.loco_service import LocoService
+from golem.robots.unitree.motion_switcher import CHECK_MODE, RELEASE_MODE, SELECT_MODE, MotionSwitcher
 
 WORDS = (b"\0\0\0\0", b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\0\0\xc0\x7f", b"\0\0\x80\xff", b"\1\0\0\0")
 """Lengths, NaN and infinity as they stand in a payload."""

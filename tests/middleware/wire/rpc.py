@@ -6,8 +6,8 @@ import math
 import time
 
 from golem.middleware.dds.base import CALLS, Participant
-from golem.middleware.unitree_api import ApiRequest, Response, request_topic, response_topic
 from golem.middleware.wire import api
+from golem.middleware.wire.api import ApiRequest, Response, request_topic, response_topic
 from golem.middleware.wire.rpc import RpcClient, RpcServer
 
 POLL = 0.0005

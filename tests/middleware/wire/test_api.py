@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from golem.middleware.unitree_api import ApiRequest, Response
 from golem.middleware.wire import api
+from golem.middleware.wire.api import ApiRequest, Response
 from golem.middleware.wire.struct_layout import WireError
 
 int32 = st.integers(-(2**31), 2**31 - 1)
@@ -65,7 +65,7 @@ def test_a_payload_of_another_length_is_refused() -> None:
     with pytest.raises(WireError, match="behind its end"):
         api.decode_request(GOOD + bytes(4))
     with pytest.raises(WireError, match="too long"):
-        api.decode_request(GOOD + bytes(api.MOST))
+        api.decode_request(GOOD + bytes(api.MAX_SIZE))
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_a_payload_of_another_length_is_refused() -> None:
         ApiRequest(1, 1, priority=2**31),
         ApiRequest(1, 1, "a\0b"),
         ApiRequest(1, 1, "\ud800"),
-        ApiRequest(1, 1, "x" * api.MOST),
+        ApiRequest(1, 1, "x" * api.MAX_SIZE),
     ],
 )
 def test_what_would_be_refused_is_not_sent(request_: ApiRequest) -> None:

@@ -9,10 +9,11 @@ import pytest
 from tests.domains import free_domain
 from tests.middleware.wire.rpc import call, reach, serve
 
+from golem.interfaces.unitree_api import OK
 from golem.middleware.dds.base import DEFAULT, Participant
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.unitree_api import OK, ApiRequest, Response
 from golem.middleware.wire import api
+from golem.middleware.wire.api import ApiRequest, Response
 from golem.middleware.wire.rpc import RpcServer
 
 SERVICE = "loco"

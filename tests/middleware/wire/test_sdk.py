@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from tests.middleware.wire import random_images, samples
 
-from golem.middleware.unitree_api import ApiRequest, Response
 from golem.middleware.wire import api, convert, hg
+from golem.middleware.wire.api import ApiRequest, Response
 
 COUNT = 1000
 HASHED = 20

@@ -162,14 +162,24 @@ class Reader(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class NetworkPlace:
+    """Where a domain is on a network: its id, and the IPv4 address that this machine has there."""
+
+    domain: int
+    address: str
+
+
 class Participant(Protocol):
     """Membership of a domain.
 
     Attributes:
         guid: 16 bytes, unique on the domain.
+        network: where it is; None in one process, and where this machine's address is not known.
     """
 
     guid: bytes
+    network: NetworkPlace | None
 
     def writer(self, topic: str, type_name: str, qos: Qos, user_data: str = "") -> Writer:
         """Create a writer.

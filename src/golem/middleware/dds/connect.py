@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
+from golem.middleware.dds.base import NetworkPlace
 from golem.middleware.dds.checks import self_test
 from golem.middleware.dds.domain import DdsConfig, close_domain, open_domain
+from golem.middleware.dds.interfaces import find_interface
 from golem.middleware.dds.library import cyclone
 from golem.middleware.dds.participant import CycloneParticipant
 
@@ -27,8 +29,10 @@ def connect(config: DdsConfig | None = None, user_data: str = "") -> CyclonePart
     self_test()
     open_domain(library, config)
     leave = partial(close_domain, library, config.domain)
+    address = find_interface(config.interface).address
+    network = NetworkPlace(config.domain, address) if address else None
     try:
-        return CycloneParticipant(library, config.domain, str(config), user_data, leave)
+        return CycloneParticipant(library, config.domain, str(config), user_data, leave, network)
     except BaseException:
         leave()
         raise

@@ -33,11 +33,11 @@ class DdsConfig:
     interface: str = "lo"
     """Network interface, by name; lo stays on this machine."""
     peers: tuple[str, ...] = ()
-    """Addresses of machines to look for besides those that multicast finds; for networks without multicast."""
+    """Addresses of further machines to look for; for networks without multicast."""
     robot: bool = False
     """Take part in the real robot's domain; its domain and interface have to be named as well."""
     distro: Distro = "jazzy"
-    """Whose `ros2 node list` shows our nodes: ROS 2 humble's, or jazzy's, which is that of all since iron."""
+    """The ROS 2 release whose `ros2 node list` shows our nodes: humble, or jazzy for all since iron."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.domain <= LAST_DOMAIN:
@@ -93,7 +93,7 @@ _NETWORK = """
 """On a network only discovery uses multicast: Wi-Fi and many switches carry multicast data badly."""
 _COMMON = """
 <Discovery>
-  <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>31</MaxAutoParticipantIndex>
+  <ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>119</MaxAutoParticipantIndex>
   <SPDPInterval>5s</SPDPInterval>
 </Discovery>
 <Internal><SocketReceiveBufferSize max="16MB"/><SocketSendBufferSize max="16MB"/></Internal>

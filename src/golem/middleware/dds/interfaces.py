@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import fcntl
 import socket
+import struct
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +14,8 @@ from golem.errors import unknown_name
 
 _UP, _LOOPBACK, _MULTICAST = 0x1, 0x8, 0x1000
 """Bits of an interface's flags: IFF_UP, IFF_LOOPBACK, IFF_MULTICAST of linux/if.h."""
+_GET_ADDRESS = 0x8915
+"""SIOCGIFADDR of linux/sockios.h."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +31,18 @@ class Interface:
     name: str
     loopback: bool
     multicast: bool
+
+    @property
+    def address(self) -> str:
+        """Its first IPv4 address; empty where it has none, or where this system is not asked for it."""
+        if self.loopback:
+            return "127.0.0.1"
+        if not sys.platform.startswith("linux"):
+            return ""
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket, suppress(OSError):
+            request = struct.pack("256s", self.name.encode())
+            return socket.inet_ntoa(fcntl.ioctl(any_socket, _GET_ADDRESS, request)[20:24])
+        return ""
 
 
 def interfaces() -> list[Interface]:

@@ -13,7 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from golem.middleware.dds.base import DdsError, Payload, Qos, Reader, Sample, Writer, as_sample
+from golem.middleware.dds.base import DdsError, NetworkPlace, Payload, Qos, Reader, Sample, Writer, as_sample
 
 
 class LocalDomain:
@@ -124,7 +124,10 @@ class LocalParticipant:
 
     Attributes:
         guid: 16 bytes, unique on the domain.
+        network: None.
     """
+
+    network: NetworkPlace | None = None
 
     def __init__(self, domain: LocalDomain) -> None:
         """Join `domain`."""

@@ -6,7 +6,7 @@ import atexit
 import threading
 from collections.abc import Callable
 
-from golem.middleware.dds.base import DdsError, Qos
+from golem.middleware.dds.base import DdsError, NetworkPlace, Qos
 from golem.middleware.dds.dispatcher import Dispatcher
 from golem.middleware.dds.endpoints import CycloneReader, CycloneWriter, entity_guid
 from golem.middleware.dds.library import Cyclone
@@ -22,14 +22,21 @@ class CycloneParticipant:
         entity: Cyclone's name for it.
         guid: 16 bytes, unique on the domain.
         where: the domain and how it is reached, in words.
+        network: the domain and this machine's address on it.
     """
 
     def __init__(
-        self, library: Cyclone, domain: int, where: str, user_data: str, on_close: Callable[[], None]
+        self,
+        library: Cyclone,
+        domain: int,
+        where: str,
+        user_data: str,
+        on_close: Callable[[], None],
+        network: NetworkPlace | None = None,
     ) -> None:
         """Join `domain`, which is open; `on_close` is called once it has been left."""
         self.library = library
-        self.where = where
+        self.where, self.network = where, network
         self._on_close = on_close
         with cyclone_qos(library, None, user_data) as handle:
             entity = library.blocking.dds_create_participant(domain, handle, None)

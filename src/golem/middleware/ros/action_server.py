@@ -7,6 +7,7 @@ nothing was granted is answered by ERROR_REJECTED. The status is published once 
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -32,6 +33,12 @@ from golem.middleware.ros.node_endpoints import NodeEndpoints
 from golem.middleware.ros.service import Origin, Responder
 from golem.middleware.ros.typed import check, serialize
 
+FEW = 10
+"""Goals whose status is published at every change."""
+SPACING = 0.001
+"""Beyond them, time from one status to the next for each goal that it lists [s].
+
+A client that floods us with goals then costs a small share of the time: the process may balance a robot."""
 MAX_WAITING = 100
 """Requests for the result of one goal that are remembered; beyond it the oldest stays unanswered."""
 
@@ -99,7 +106,7 @@ class DdsActionServer:
         self._active: dict[bytes, DdsServerGoal] = {}
         self._results: dict[bytes, bytes] = {}
         self._waiting: dict[bytes, deque[Origin]] = {}
-        self._news = False
+        self._news, self._next_status = False, 0.0
         parts = names.action(name)
         self._feedback = endpoints.writer(names.topic(parts.feedback), f"{type}_FeedbackMessage", DEFAULT)
         self._status = endpoints.writer(names.topic(parts.status), STATUS_ARRAY, LATCHED)
@@ -117,7 +124,7 @@ class DdsActionServer:
         for goal in self._table.expire(self._stamp()):
             del self._results[goal.id]
             self._news = True
-        if self._news:
+        if self._news and (len(self._table) <= FEW or time.monotonic() >= self._next_status):
             self._publish_status()
 
     def close(self) -> None:
@@ -230,3 +237,4 @@ class DdsActionServer:
         self._news = False
         goals = [StatusMessage(goal_info(g.id, g.stamp), int(g.status)) for g in self._table.reported()]
         self._status.write(codec.serialize(GoalStatusArray(goals)))
+        self._next_status = time.monotonic() + SPACING * len(goals)

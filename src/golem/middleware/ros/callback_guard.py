@@ -26,12 +26,13 @@ class CallbackGuard:
 
     Attributes:
         count: how often a callback raised.
+        log: writes a line.
     """
 
     def __init__(self, log: Callable[[str], None] = log_error) -> None:
         """Log lines by `log`, which shall not hold its caller up."""
         self.count = 0
-        self._log = log
+        self.log = log
         self._seen: set[tuple[object, ...]] = set()
 
     def call(self, where: str, callback: Callable[..., object], *arguments: Any) -> None:
@@ -57,5 +58,5 @@ class CallbackGuard:
         kind = (where, type(error), None if last is None else (last.tb_frame.f_code, last.tb_lineno))
         if kind not in self._seen and len(self._seen) < REMEMBERED:
             self._seen.add(kind)
-            self._log(f"{sentence}\n{''.join(traceback.format_exception(error)).rstrip()}")
+            self.log(f"{sentence}\n{''.join(traceback.format_exception(error)).rstrip()}")
         return sentence

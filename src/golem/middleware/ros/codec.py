@@ -161,7 +161,7 @@ class Codec:
         except CodecError:
             raise
         except Exception as error:  # a field may hold anything
-            raise CodecError(f"A {name} cannot be serialised: {_told(error)}.") from error
+            raise CodecError(f"A {name} cannot be serialised: {_reason(error)}.") from error
         return bytes(buffer)
 
     def deserialize(self, payload: Payload, kind: type[M]) -> M:
@@ -176,7 +176,7 @@ class Codec:
         try:
             return cast(M, self._store.deserialize_cdr(memoryview(payload).cast("B"), name))
         except Exception as error:  # the bytes are a stranger's
-            raise CodecError(f"{len(payload)} bytes are no {name}: {_told(error)}.") from error
+            raise CodecError(f"{len(payload)} bytes are no {name}: {_reason(error)}.") from error
 
     def type_hash(self, name: str) -> str:
         """Return the RIHS01 hash of a message, service or action (REP-2011).
@@ -284,7 +284,7 @@ def _described(value: object) -> str:
     return f"{type(value).__name__}"
 
 
-def _told(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     return f"{type(error).__name__}, {error}".rstrip(".")
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from golem.middleware.dds.base import DEFAULT, Participant, Qos
-from golem.middleware.ros import names
+from golem.middleware.ros import names, parameters
 from golem.middleware.ros.action_client import DdsActionClient
 from golem.middleware.ros.action_server import DdsActionServer
 from golem.middleware.ros.base import RESULT_TIMEOUT, ActionHandler
@@ -58,6 +58,8 @@ class DdsNode:
         self.guard = CallbackGuard(log)
         info = DiscoveryInfo(participant, namespace, name, distro)
         self._endpoints = NodeEndpoints(participant, info, self.guard)
+        for service, (kind, answer) in parameters.SERVICES.items():
+            self.service(f"~/{service}", f"rcl_interfaces/srv/{kind}", answer)
 
     def publisher(self, topic: str, type: str, qos: Qos = DEFAULT) -> DdsPublisher:
         """Publish messages of `type` on `topic`."""

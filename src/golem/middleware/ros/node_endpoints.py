@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from golem.middleware.dds.base import Participant, Qos, Sample, Writer
 from golem.middleware.ros import codec
@@ -12,6 +12,7 @@ from golem.middleware.ros.callback_guard import CallbackGuard
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.graph import DiscoveryInfo
 from golem.middleware.ros.waitset import Inbox, WaitSet
+from golem.middleware.rtps.service_link import ServiceEndpoint, ServiceLink, ServiceWriter
 
 
 class Attended(Protocol):
@@ -26,6 +27,21 @@ class Attended(Protocol):
         ...
 
 
+class Linked(NamedTuple):
+    """The endpoints by which one service answers clients of Fast DDS.
+
+    Attributes:
+        writer: sends replies.
+        inbox: takes requests.
+        second_reader, second_writer: never used; see `NodeEndpoints.linked`.
+    """
+
+    writer: ServiceWriter
+    inbox: Inbox
+    second_reader: ServiceEndpoint
+    second_writer: Writer
+
+
 class NodeEndpoints:
     """Makes and closes the endpoints of a node.
 
@@ -38,6 +54,7 @@ class NodeEndpoints:
         """Make endpoints of `participant` and announce them by `info`; call users' callbacks by `guard`."""
         self.waitset, self.guard = WaitSet(), guard
         self._participant, self._info = participant, info
+        self._link = _link(participant, guard)
         self._open: list[Inbox | Writer] = []
         self._attended: list[Attended] = []
         self._number = itertools.count(1)
@@ -73,10 +90,40 @@ class NodeEndpoints:
     ) -> Inbox:
         """Create a reader whose samples go to `handle` when the node is spun; see `writer` for the rest."""
         self._check()
-        inbox = Inbox(self.waitset, lambda sample: self.guard.call(f"Topic '{topic}'", handle, sample), qos)
+        inbox = self._inbox(topic, handle, qos)
         inbox.open(self._participant, topic, codec.dds_name(type), qos, owner + _hash(type))
         self._add(inbox)
         return inbox
+
+    def linked(
+        self, reply: str, request: str, type: str, qos: Qos, handle: Callable[[Sample], None], owner: str
+    ) -> Linked | None:
+        """Create the endpoints by which clients of Fast DDS are served; None where there is no network.
+
+        Such a client takes a server to be there once it has found as many writers of replies as readers of requests.
+        A writer more of the transport and a reader more of the link see to it that it has found the link by then.
+
+        Args:
+            reply: name of the topic on the wire.
+            request: name of the topic on the wire.
+            type: ROS name of the service's type.
+            qos: how many requests are kept.
+            handle: is given the samples when the node is spun.
+            owner: `serviceid=...;` of the server.
+        """
+        if self._link is None:
+            return None
+        sent, taken = f"{type}_Response", f"{type}_Request"
+        writer = self._link.writer(reply, codec.dds_name(sent), _hash(sent))
+        inbox = self._inbox(request, handle, qos)
+        inbox.open(self._link, request, codec.dds_name(taken), qos, _hash(taken))
+        second = self._link.second_reader(request, codec.dds_name(taken), _hash(taken))
+        return Linked(
+            writer,
+            inbox,
+            second,
+            self._participant.writer(reply, codec.dds_name(sent), qos, owner + _hash(sent)),
+        )
 
     def close(self, *endpoints: Inbox | Writer) -> None:
         """Close some endpoints; those that are closed already stay so."""
@@ -111,6 +158,11 @@ class NodeEndpoints:
             for what in list(self._attended):
                 what.close()
             self.close(*self._open)
+            if self._link is not None:
+                self._link.close()
+
+    def _inbox(self, topic: str, handle: Callable[[Sample], None], qos: Qos) -> Inbox:
+        return Inbox(self.waitset, lambda sample: self.guard.call(f"Topic '{topic}'", handle, sample), qos)
 
     def _check(self) -> None:
         if self._closed:
@@ -127,3 +179,14 @@ class NodeEndpoints:
 
 def _hash(type: str) -> str:
     return f"typehash={codec.type_hash(type)};"
+
+
+def _link(participant: Participant, guard: CallbackGuard) -> ServiceLink | None:
+    """Return the link to clients of Fast DDS, where there is a network on which it can be."""
+    if participant.network is None:
+        return None
+    try:
+        return ServiceLink(participant.network.domain, participant.network.address)
+    except OSError as error:
+        guard.log(f"Services do without clients of Fast DDS: its discovery cannot be listened to ({error}).")
+        return None

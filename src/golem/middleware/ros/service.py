@@ -1,14 +1,13 @@
 """Services over the transport contract: a request topic, a reply topic, and a header that pairs what travels on them.
 
-A payload is CDR of the header followed by the body: the 64-bit handle of the client's request writer and a 64-bit
-sequence number, echoed by the reply (`cdds_request_header`, ros2/rmw_cyclonedds, serdata.hpp). A client takes the
-replies that carry its handle. `clientid` and `serviceid` in USER_DATA, equal for the two endpoints of a client or a
-server, let a peer know which reader belongs to which writer (`rmw_init_cs`, rmw_node.cpp).
+A client takes the replies that carry its handle. `clientid` and `serviceid` in USER_DATA, equal for the two endpoints
+of a client or a server, let a peer know which reader belongs to which writer (`rmw_init_cs`, ros2/rmw_cyclonedds,
+rmw_node.cpp). Clients of Fast DDS send no header: a server reads their requests by a `rtps.ServiceLink`, which adds
+one, and not by the transport, which lets them pass without.
 """
 
 from __future__ import annotations
 
-import struct
 import time
 from collections import deque
 from collections.abc import Callable
@@ -19,7 +18,9 @@ from golem.middleware.ros import codec, names
 from golem.middleware.ros.future import Future, RosError
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.node_endpoints import NodeEndpoints
+from golem.middleware.ros.request_header import Header, pack, unpack
 from golem.middleware.ros.typed import serialize
+from golem.middleware.rtps.submessages import FAST_DDS
 
 SERVICES = Qos(depth=1000)
 """ROS's service profile keeps 10; the depth is nobody else's business, and a burst of goals is larger than that."""
@@ -31,48 +32,18 @@ HOLD = 0.1
 """How long a reply waits for the client's reader to be discovered [s]; that of `rmw_send_response`."""
 
 
-class Header(NamedTuple):
-    """Pairs a reply with its request.
-
-    Attributes:
-        client: handle of the client's request writer (uint64), as the client knows it.
-        sequence: number of the request, by its client (int64).
-    """
-
-    client: int
-    sequence: int
-
-
 class Origin(NamedTuple):
     """Where a request came from.
 
     Attributes:
         header: what its reply shall repeat.
         writer: handle of the client's request writer (uint64), as the server's participant knows it.
+        linked: whether it came by the service link.
     """
 
     header: Header
     writer: int
-
-
-def pack(header: Header, body: Payload) -> bytes:
-    """Return the payload that carries `body` (CDR with encapsulation header, little endian) behind `header`.
-
-    The header is 16 bytes long, so that the body keeps its alignment.
-    """
-    return b"".join((body[:4], struct.pack("<Qq", *header), body[4:]))
-
-
-def unpack(payload: Payload) -> tuple[Header, bytes]:
-    """Return header and body of a payload; the inverse of `pack`.
-
-    Raises:
-        CodecError: it is too short.
-    """
-    if len(payload) < 20:
-        raise CodecError(f"A service payload has at least 20 bytes, not {len(payload)}.")
-    order = "<" if payload[1] & 1 else ">"
-    return Header(*struct.unpack_from(f"{order}Qq", payload, 4)), b"".join((payload[:4], payload[20:]))
+    linked: bool = False
 
 
 class DdsClient:
@@ -111,14 +82,15 @@ class DdsClient:
         self._sequence += 1
         number = self._sequence
         future: Future[Any] = Future(lambda: self._forget(number))
-        if not self.ready():
-            future.fail(RosError(f"No server of '{self.name}' is there."))
+        servers = frozenset(self._writer.readers().values()) if self._inbox.matched() else frozenset[bytes]()
+        if all(server.startswith(FAST_DDS) for server in servers):
+            future.fail(RosError(_alien(self.name) if servers else f"No server of '{self.name}' is there."))
             return future
         if len(self._pending) >= MAX_PENDING:
             next(iter(self._pending.values())).cancel(
                 f"'{self.name}' left {MAX_PENDING} newer requests unanswered."
             )
-        self._pending[number], self._servers[number] = future, frozenset(self._writer.readers().values())
+        self._pending[number], self._servers[number] = future, servers
         self._writer.write(pack(Header(self._writer.handle, number), body))
         return future
 
@@ -174,15 +146,20 @@ class Responder:
         self._request = codec.service(type).Request
         self._held: deque[tuple[float, int, bytes]] = deque(maxlen=SERVICES.depth)
         self._reached: set[int] = set()
+        self._warned = False
         owner = f"serviceid={endpoints.identity()};"
-        self._writer = endpoints.writer(names.reply(name), f"{type}_Response", SERVICES, owner)
-        self._inbox = endpoints.inbox(names.request(name), f"{type}_Request", SERVICES, self._take, owner)
+        reply, request = names.reply(name), names.request(name)
+        self._writer = endpoints.writer(reply, f"{type}_Response", SERVICES, owner)
+        self._inbox = endpoints.inbox(request, f"{type}_Request", SERVICES, self._take, owner)
+        self._linked = endpoints.linked(reply, request, type, SERVICES, self._take_linked, owner)
         endpoints.attend(self)
 
     def reply(self, origin: Origin, response: Payload) -> None:
         """Answer the request that came from `origin` by `response` (CDR)."""
         payload = pack(origin.header, response)
-        if self._reaches(origin.writer):
+        if origin.linked and self._linked is not None:
+            self._linked.writer.write(payload)
+        elif self._reaches(origin.writer):
             self._writer.write(payload)
         else:
             self._held.append((time.monotonic() + HOLD, origin.writer, payload))
@@ -201,6 +178,8 @@ class Responder:
         """Stop."""
         self._endpoints.dismiss(self)
         self._endpoints.close(self._inbox, self._writer)
+        for endpoint in self._linked or ():
+            endpoint.close()
         self._held.clear()
 
     def _reaches(self, writer: int) -> bool:
@@ -215,13 +194,24 @@ class Responder:
         return True
 
     def _take(self, sample: Sample) -> None:
+        sender = self._inbox.writers().get(sample.writer, b"")
+        if not sender.startswith(FAST_DDS):
+            self._receive(sample, False)
+        elif self._linked is None and not self._warned:
+            self._warned = True
+            self._endpoints.guard.log(_deaf(self.name))
+
+    def _take_linked(self, sample: Sample) -> None:
+        self._receive(sample, True)
+
+    def _receive(self, sample: Sample, linked: bool) -> None:
         try:
             header, body = unpack(sample.payload)
             request = codec.deserialize(body, self._request)
         except CodecError:
             self.malformed += 1
             return
-        self._handle(Origin(header, sample.writer), request)
+        self._handle(Origin(header, sample.writer, linked), request)
 
 
 class DdsService:
@@ -256,3 +246,17 @@ class DdsService:
         if isinstance(getattr(response, "message", None), str):
             response.message = reason
         return response
+
+
+def _alien(name: str) -> str:
+    return (
+        f"The server of '{name}' speaks Fast DDS, which we cannot call: "
+        "start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp."
+    )
+
+
+def _deaf(name: str) -> str:
+    return (
+        f"A client of Fast DDS calls '{name}' and gets no answer: on this machine we cannot speak to it. "
+        "Start it with RMW_IMPLEMENTATION=rmw_cyclonedds_cpp."
+    )

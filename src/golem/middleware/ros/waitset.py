@@ -6,11 +6,22 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Protocol
 
-from golem.middleware.dds.base import Participant, Qos, Reader, Sample
+from golem.middleware.dds.base import Qos, Reader, Sample
 
 BATCH = 64
 """Samples taken from a reader at once."""
+
+
+class Source(Protocol):
+    """Where a reader can be had: a participant, or what stands beside it."""
+
+    def reader(
+        self, topic: str, type_name: str, qos: Qos, user_data: str, on_data: Callable[[], None]
+    ) -> Reader:
+        """Create a reader; see `dds.base.Participant.reader`."""
+        ...
 
 
 class WaitSet:
@@ -65,7 +76,7 @@ class Inbox:
         self._lock = threading.Lock()
         self._notified = False
 
-    def open(self, participant: Participant, topic: str, type: str, qos: Qos, user_data: str) -> None:
+    def open(self, participant: Source, topic: str, type: str, qos: Qos, user_data: str) -> None:
         """Create the reader of this inbox."""
         reader = participant.reader(topic, type, qos, user_data, self._fill)
         self._reader = reader

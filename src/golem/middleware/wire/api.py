@@ -1,22 +1,23 @@
-"""unitree_api: remote calls and their answers as CDR.
+"""unitree_api: remote calls and their answers, and both as CDR.
 
-Members and types: unitree_sdk2_python, unitree_sdk2py/idl/unitree_api/msg/dds_. Both end in a string and a sequence of
-bytes, so that their size varies. A length that a payload claims is compared with what is there before anything is done
-with it.
+Calls travel on `rt/api/<service>/request`, answers on `.../response`. An answer repeats the identity (id, api_id) of
+its call and carries a status code, 0 for success. Members and types: unitree_sdk2_python,
+unitree_sdk2py/idl/unitree_api/msg/dds_. Both end in a string and a sequence of bytes, so that their size varies. A
+length that a payload claims is compared with what is there before anything is done with it.
 """
 
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 from typing import Final
 
 from golem.middleware.dds.base import ENCAPSULATION, Payload
-from golem.middleware.unitree_api import ApiRequest, Response
 from golem.middleware.wire.struct_layout import WireError, check_encapsulation
 
 REQUEST: Final = "unitree_api::msg::dds_::Request_"
 RESPONSE: Final = "unitree_api::msg::dds_::Response_"
-MOST = 1 << 20
+MAX_SIZE = 1 << 20
 """Bytes of the largest payload that is accepted [own: the vendor's calls have some hundred]."""
 
 _REQUEST_HEADER = struct.Struct("<qqqiB")  # id, api_id, lease, priority, noreply
@@ -24,6 +25,57 @@ _RESPONSE_HEADER = struct.Struct("<qqi")  # id, api_id, code
 _LENGTH = struct.Struct("<I")
 _PADDING = 3
 """Bytes that may follow a message: payloads are multiples of four."""
+
+
+@dataclass(frozen=True, slots=True)
+class ApiRequest:
+    """A call.
+
+    Attributes:
+        id: tells the calls of one client apart.
+        api_id: the function that is called.
+        parameter: its argument, JSON; empty where it takes none.
+        lease: number of the lease it is made under; 0 without.
+        priority: a higher one goes first where the service has a queue for it.
+        noreply: whether no answer is wanted.
+        binary: an argument that is no JSON.
+    """
+
+    id: int
+    api_id: int
+    parameter: str = ""
+    lease: int = 0
+    priority: int = 0
+    noreply: bool = False
+    binary: bytes = b""
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """The answer to a call.
+
+    Attributes:
+        id, api_id: those of the request.
+        code: status, 0 for success.
+        data: the result, JSON; empty where there is none.
+        binary: a result that is no JSON.
+    """
+
+    id: int
+    api_id: int
+    code: int = 0
+    data: str = ""
+    binary: bytes = b""
+
+
+def request_topic(service: str) -> str:
+    """Return the topic of `ApiRequest` to a service."""
+    return f"api/{service}/request"
+
+
+def response_topic(service: str) -> str:
+    """Return the topic of `Response` from a service."""
+    return f"api/{service}/response"
 
 
 def encode_request(request: ApiRequest) -> bytes:
@@ -92,16 +144,16 @@ def _encode(header: bytes, text: str, binary: bytes, type_name: str) -> bytes:
     body = bytearray(ENCAPSULATION + header)
     for count, data in ((len(string) + 1, string + b"\0"), (len(binary), binary)):
         body += bytes(_align(len(body)) - len(body)) + _LENGTH.pack(count) + data
-    if len(body) > MOST:
-        raise WireError(f"A {type_name} of {len(body)} bytes is too long; the most is {MOST}.")
+    if len(body) > MAX_SIZE:
+        raise WireError(f"A {type_name} of {len(body)} bytes is too long; the most is {MAX_SIZE}.")
     return bytes(body)
 
 
 def _decode(payload: Payload, header: struct.Struct, type_name: str) -> tuple[tuple[int, ...], str, bytes]:
     """Return the numbers of the header, the string and the sequence of bytes."""
     check_encapsulation(payload, type_name)
-    if len(payload) > MOST:
-        raise WireError(f"A {type_name} of {len(payload)} bytes is too long; the most is {MOST}.")
+    if len(payload) > MAX_SIZE:
+        raise WireError(f"A {type_name} of {len(payload)} bytes is too long; the most is {MAX_SIZE}.")
     start = len(ENCAPSULATION)
     if len(payload) < start + header.size:
         raise WireError(f"A {type_name} of {len(payload)} bytes is too short.")

@@ -6,8 +6,8 @@ Everybody who calls a service reads the answers to everybody: an answer belongs 
 from __future__ import annotations
 
 from golem.middleware.dds.base import Reader, Sample, Writer
-from golem.middleware.unitree_api import ApiRequest, Response
 from golem.middleware.wire import api
+from golem.middleware.wire.api import ApiRequest, Response
 from golem.middleware.wire.struct_layout import WireError
 
 

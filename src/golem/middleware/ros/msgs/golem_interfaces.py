@@ -67,7 +67,7 @@ class Pick_Goal(Message):
     Attributes:
         label: class of the object, e.g. "screw"
         container: class of what it is dropped into, e.g. "tray"
-        side: which hand: "left" or "right"
+        side: which hand: "left", "right" or "either"
     """
 
     __msgtype__: ClassVar[str] = "golem_interfaces/action/Pick_Goal"
