@@ -12,11 +12,11 @@ from golem.evaluation.harness.ladder import LadderConfig
 
 @pytest.fixture
 def fake(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., LadderConfig]:
-    """Register the fake rung and return a maker of configurations for it; workers inherit sys.path."""
-    monkeypatch.syspath_prepend(Path(__file__).parent)
-    monkeypatch.setitem(base.RUNGS, "fake", "fake_rung:Fake")
+    """Register the fake rungs and return a maker of configurations for it."""
+    monkeypatch.setitem(base.RUNGS, "fake", "tests.evaluation.fake_rung:Fake")
+    monkeypatch.setitem(base.RUNGS, "climb", "tests.evaluation.fake_rung:Climb")
 
-    def make(*methods: str, n: int = 6, out: str = "run", **options: Any) -> LadderConfig:
-        return LadderConfig(rung="fake", method=methods, n=n, out=tmp_path / out, **options)
+    def make(*methods: str, n: int = 6, out: str = "run", rung: str = "fake", **options: Any) -> LadderConfig:
+        return LadderConfig(rung=rung, method=methods, n=n, out=tmp_path / out, **options)
 
     return make

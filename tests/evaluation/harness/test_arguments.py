@@ -1,4 +1,4 @@
-"""Words of the benches' command lines."""
+"""Words of the command line."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.evaluation.harness.arguments import replaced_modules, robot_options
-from golem.evaluation.subject import Subject
+from golem.evaluation.rungs.push import PushRung
 
 
 def test_options_of_the_robot_are_words_and_numbers() -> None:
@@ -32,14 +32,11 @@ def test_a_module_is_replaced_once() -> None:
 def test_a_lower_body_is_tested_beside_the_modules_that_were_asked_for(tmp_path: Path) -> None:
     mine = tmp_path / "mine.py"
     mine.write_text("class Mine: ...\n")
-    subjects = [
-        Subject.of("almi", "bench", {}, use)
-        for use in (None, {"estimator": "invariant_ekf"}, {"estimator": f"{mine}:Mine"})
-    ]
-    used = [subject.stack().choice("estimator").use for subject in subjects]
-    assert used == ["random_walk_kf", "invariant_ekf", f"{mine}:Mine"]
-    before = subjects[2]
+    rung, use = PushRung(), {"estimator": f"{mine}:Mine"}
+    used = [rung.stack("almi", "bench", u).choice("estimator").use for u in ({}, use)]
+    assert used == ["random_walk_kf", f"{mine}:Mine"]
+    before = rung.config("almi", "bench", use)
     mine.write_text("class Mine: changed = True\n")
-    assert Subject.of("almi", "bench", {}, before.use).files != before.files
+    assert rung.config("almi", "bench", use) != before
     with pytest.raises(ConfigError, match="brings its own lower_body"):
-        Subject.of("almi", "bench", {}, {"lower_body": "wbc"})
+        rung.config("almi", "bench", {"lower_body": "wbc"})

@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import norm
+from scipy.stats import binom, norm
 
-from golem.evaluation.metrics.statistics import PairedTable, holm, mcnemar, paired_difference, spread, wilson
+from golem.evaluation.metrics.statistics import (
+    PairedTable,
+    distribution,
+    holm,
+    mcnemar,
+    mean_interval,
+    paired_difference,
+    wilson,
+)
 
 
 @pytest.mark.parametrize(
@@ -102,8 +110,31 @@ def test_holm_steps_down_and_keeps_the_order() -> None:
     assert holm([]) == []
 
 
-def test_spread_of_values() -> None:
-    found = spread([4.0, 1.0, 3.0, 2.0, 5.0])
+def test_what_is_quoted_of_values() -> None:
+    found = distribution([4.0, 1.0, -3.0, 2.0, 5.0], scale=10.0)
     assert found is not None
-    assert (found.n, found.q1, found.median, found.q3) == (5, 2.0, 3.0, 4.0)
-    assert spread([]) is None
+    assert (found.n, found.q1, found.median, found.q3) == (5, 10.0, 20.0, 40.0)
+    assert (found.minimum, found.maximum, found.mean) == (-30.0, 50.0, pytest.approx(18.0))
+    assert found.rms == pytest.approx(math.sqrt(55.0 / 5) * 10.0)
+    assert found.median_interval is None, "five values bound no median with 95 %"
+    assert distribution([]) is None
+
+
+def test_the_interval_of_a_mean_is_students() -> None:
+    # Student 1908 (Biometrika 6:1), hours of sleep gained with the first drug: mean 0.75, 95 % interval -0.53 to 2.03.
+    gained = [0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0]
+    found = mean_interval(gained)
+    assert found is not None
+    assert (round(found.low, 2), round(found.high, 2)) == (-0.53, 2.03)
+    assert mean_interval([1.0]) is None
+
+
+@pytest.mark.parametrize("n", [6, 9, 10, 30, 101])
+def test_the_interval_of_a_median_covers_it_at_least_as_often_as_it_says(n: int) -> None:
+    found = distribution(list(range(1, n + 1)))
+    assert found is not None and found.median_interval is not None
+    rank = round(found.median_interval.low)
+    assert found.median_interval.high == n + 1 - rank
+    # It misses when fewer than `rank` of n values, each below the median with probability 1/2, are on one side.
+    missed = 2.0 * binom.cdf(rank - 1, n, 0.5)
+    assert missed <= 0.05 < 2.0 * binom.cdf(rank, n, 0.5)

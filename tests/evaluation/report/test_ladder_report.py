@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import base64
+import re
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -8,12 +10,16 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from golem.errors import MissingExtra
 from golem.evaluation.harness.ladder import LadderConfig, LadderResult, run_ladder
 from golem.evaluation.harness.records import artefacts
 from golem.evaluation.metrics.published import PAPER
+from golem.evaluation.metrics.summary import summarise
 from golem.evaluation.report.ladder_report import render
-from golem.evaluation.report.svg import ticks
 from golem.robots.mujoco.balance import TRACE, BalanceTrace
+
+pytest.importorskip("matplotlib", reason="the extra report is not installed")
+from golem.evaluation.report import html_page  # noqa: E402
 
 VOID = {"meta", "img", "br"}
 
@@ -34,6 +40,9 @@ class Page(HTMLParser):
         if tag not in VOID:
             self.open.append(tag)
 
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.append(tag)
+
     def handle_endtag(self, tag: str) -> None:
         assert self.open.pop() == tag
 
@@ -42,6 +51,7 @@ class Page(HTMLParser):
 
 
 def read(result: LadderResult) -> tuple[str, Page]:
+    assert result.report is not None
     html, page = result.report.read_text(encoding="utf-8"), Page()
     page.feed(html)
     assert page.open == []
@@ -59,15 +69,16 @@ def test_the_report_is_one_file_without_scripts(compared: LadderResult) -> None:
     assert "script" not in page.seen
     assert "link" not in page.seen
     assert all(source.startswith("data:image/png;base64,") for source in page.sources)
-    assert "url(" not in html
+    assert not re.search(r"url\((?!#)", html), "it loads nothing"
+    assert re.search(r"fill: ?#(?!f)", html.partition("</style>")[2]) is None, "colours follow light and dark"
 
 
 def test_the_report_says_what_was_run_and_found(compared: LadderResult) -> None:
     _, page = read(compared)
     assert compared.config.command() in page.words
-    for m in compared.summary.methods:
-        assert f"{100 * m.rate:.1f} %" in page.words
-        assert f"{100 * m.interval.low:.1f} to {100 * m.interval.high:.1f}" in page.words
+    for row in compared.summary.rows:
+        assert f"{100 * row.rate:.1f} %" in page.words
+        assert f"[{100 * row.interval.low:.3g}, {100 * row.interval.high:.3g}]" in page.words
     assert compared.records[0].commit in page.words
     assert "paper, screw, real robot: 29/30" in page.words
     assert "upper_body: my_ik.py:MyIk (10)" in page.words
@@ -80,7 +91,7 @@ def test_a_failure_and_a_success_of_each_method_are_shown(compared: LadderResult
         for success in (True, False):
             picture = next((r.picture for r in rows if r.success is success), None)
             if picture is not None:
-                data = (compared.config.out / picture).read_bytes()
+                data = (compared.out / picture).read_bytes()
                 assert base64.b64encode(data).decode() in html
     assert page.seen.count("img") >= 3
 
@@ -99,19 +110,6 @@ def test_a_run_of_one_method_without_failures_has_a_report(fake: Callable[..., L
     assert "What it looks like" not in page.words
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "expected"),
-    [
-        (0, 16.7, [0, 5, 10, 15, 20]),
-        (0, 0.9, [0, 0.2, 0.4, 0.6, 0.8, 1.0]),
-        (-3, 3, [-3, -2, -1, 0, 1, 2, 3]),
-        (0, 0, [0, 0.2, 0.4, 0.6, 0.8, 1.0]),
-    ],
-)
-def test_ticks_are_round_and_cover_the_values(low: float, high: float, expected: list[float]) -> None:
-    assert ticks(low, high) == pytest.approx(expected)
-
-
 def test_series_and_margins_are_shown_where_a_rung_has_them(
     fake: Callable[..., LadderConfig],
 ) -> None:
@@ -121,10 +119,37 @@ def test_series_and_margins_are_shown_where_a_rung_has_them(
     zeros = np.zeros((n, 3))
     t = 0.01 * np.arange(n, dtype=np.float64)
     trace = BalanceTrace(t, np.full(n, 0.1), zeros, zeros, np.zeros(n), zeros, np.ones((n, 2), bool), zeros)
-    trace.save(artefacts(result.config.out, kept) / TRACE)
-    html = render("golem ladder", [kept, *result.records[1:]], result.summary, result.config.out)
+    trace.save(artefacts(result.out, kept) / TRACE)
+    records = (kept, *result.records[1:])
+    html = render(replace(result, records=records, summary=summarise(records, ("sure", "good"))))
     page = Page()
     page.feed(html)
     assert page.open == []
-    assert "least CoM margin" in page.words and "-50" in page.words and "own figure" in page.words
-    assert html.count("<polyline") == 1
+    assert "minimum CoM margin" in page.words and "-50" in page.words and "own figure" in page.words
+    assert "CoM margin [mm]" in page.words
+
+
+def test_a_fault_is_shown_with_its_trace_and_how_to_watch_it(fake: Callable[..., LadderConfig]) -> None:
+    result = run_ladder(fake("leaves", n=2))
+    _, page = read(result)
+    trace = result.records[1].trace
+    assert trace is not None and trace in page.words
+    assert f"{result.config.command()} --show leaves-00001" in page.words
+
+
+def test_the_levels_of_an_adaptive_rung_have_a_report(fake: Callable[..., LadderConfig]) -> None:
+    _, page = read(run_ladder(fake(rung="climb", n=2)))
+    assert "Every level, 14 rows" in page.words and "Paired comparison" not in page.words
+
+
+def test_without_the_extra_the_run_ends_well_and_says_how_to_get_the_report(
+    fake: Callable[..., LadderConfig], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    result = run_ladder(fake("sure", n=1))
+    assert result.report is None and not (result.out / "report.html").exists()
+    assert "matplotlib" in result.note and "golem-humanoid[report]" in result.note
+    assert (result.out / "summary.json").exists()
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    with pytest.raises(MissingExtra, match="jinja2"):
+        html_page.render_page("demo.html", {})

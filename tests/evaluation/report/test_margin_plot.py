@@ -1,4 +1,4 @@
-"""Plots of the margin, and where the arrow of a push is drawn."""
+"""Plots of the CoM margin."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from golem.evaluation.episodes.film_strip import project
-from golem.evaluation.report.margin_plot import MarginCurve, margin_plot, push_start
 from golem.robots.mujoco.balance import PERIOD, BalanceTrace
-from golem.robots.mujoco.spectator import Shot
+
+pytest.importorskip("matplotlib", reason="the extra report is not installed")
+from golem.evaluation.report.margin_plot import MarginCurve, margin_plot, push_start  # noqa: E402
+from golem.evaluation.report.svg_figure import styled  # noqa: E402
 
 
 def trace() -> BalanceTrace:
@@ -27,29 +28,23 @@ def test_the_push_begins_where_there_is_force() -> None:
     assert push_start(replace(trace(), force=np.zeros((500, 3)))) == 0.0
 
 
+def plot(*curves: MarginCurve) -> str:
+    with styled():
+        return margin_plot(curves, 0)
+
+
 def test_a_plot_has_force_and_margin_of_every_trial_and_marks_the_lost() -> None:
-    plot = margin_plot([MarginCurve(trace(), True, "one"), MarginCurve(trace(), False, "two")], 0)
-    assert plot.count("<polyline") == 4
-    assert plot.count('class="course bold m0"') == 2
-    assert plot.count("lostmark") == 2
-    assert 'class="zero"' in plot and 'class="pushed"' in plot
+    drawn = plot(MarginCurve(trace(), True), MarginCurve(trace(), False))
+    assert drawn.startswith("<svg") and "force [N]" in drawn and "CoM margin [mm]" in drawn
+    assert drawn.count("stroke: var(--m0)") == 4 and "stroke: var(--lost)" in drawn
+    won = plot(MarginCurve(trace(), True), MarginCurve(trace(), True))
+    assert drawn.count("var(--lost)") > won.count("var(--lost)"), "a cross ends a lost one"
 
 
 def test_a_plot_without_a_push_has_no_force() -> None:
-    plot = margin_plot([MarginCurve(replace(trace(), force=np.zeros((500, 3))), True, "")], 1)
-    assert plot.count("<polyline") == 1 and "pushed" not in plot
+    drawn = plot(MarginCurve(replace(trace(), force=np.zeros((500, 3))), True))
+    assert drawn.count("stroke: var(--m0)") == 1 and "force" not in drawn
 
 
-@pytest.mark.parametrize(
-    ("point", "side"),
-    [((0.0, 0.0, 1.0), "middle"), ((0.0, -0.5, 1.0), "right"), ((0.0, 0.0, 1.5), "above")],
-)
-def test_points_are_projected_as_the_camera_sees_them(point: tuple[float, ...], side: str) -> None:
-    shot = Shot(look_at=(0.0, 0.0, 1.0), azimuth=0.0, elevation=-10.0, distance=4.0)  # looks along x
-    x, y = project(shot, (300, 400), np.array(point))
-    if side == "middle":
-        assert (x, y) == pytest.approx((150.0, 200.0))
-    elif side == "right":
-        assert x > 180.0 and y == pytest.approx(200.0, abs=1.0)
-    else:
-        assert y < 170.0 and x == pytest.approx(150.0)
+def test_nothing_is_drawn_of_nothing() -> None:
+    assert plot() == ""

@@ -10,8 +10,8 @@ import pytest
 
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.episodes.episode import Loss
-from golem.evaluation.rungs.push import LEAST_PEAK, PEAK, PushRung, judge
-from golem.evaluation.rungs.push_ramp import MOST, RATE, PushRampRung
+from golem.evaluation.rungs.push import MIN_PEAK, PEAK, PushRung, judge
+from golem.evaluation.rungs.push_ramp import MAX_FORCE, RATE, PushRampRung
 from golem.robots.mujoco.balance import TRACE, BalanceTrace
 from golem.robots.mujoco.shoves import DIRECTIONS, ROD_TIME, rod
 
@@ -28,7 +28,7 @@ def test_pushes_are_drawn_like_the_papers_and_not_by_the_method() -> None:
     peaks = np.array([push.peak for push, _ in draws])
     assert peaks.mean() == pytest.approx(PEAK[0], abs=0.6)
     assert peaks.std() == pytest.approx(PEAK[1], abs=0.5)
-    assert peaks.min() >= LEAST_PEAK
+    assert peaks.min() >= MIN_PEAK
     assert {push.direction for push, _ in draws} == set(DIRECTIONS)
     assert PushRung().draw(spec("other", 5).rng("push")) == PushRung().draw(spec(index=5).rng("push"))
 
@@ -87,6 +87,19 @@ def test_a_robot_that_fell_before_the_push_is_not_blamed_on_it() -> None:
     assert outcome.stage == "settle" and outcome.series == {} and "not pushed yet" in outcome.detail
 
 
+def test_a_controller_that_fails_in_its_band_is_lost_by_its_fault(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "from golem.capabilities.legs.hold import JointHold\n"
+        "class Mine(JointHold):\n"
+        "    def step(self, *inputs):\n"
+        "        raise ValueError('my bug')\n"
+    )
+    outcome = PushRung().run(spec(f"{mine}:Mine"), None)
+    assert (outcome.stage, outcome.module) == ("fault", f"lower_body: {mine}:Mine")
+    assert outcome.detail.endswith("my bug (mine.py:4). It was not pushed yet.")
+
+
 def test_the_ramp_grows_until_the_balance_is_lost_and_lets_go(tmp_path: Path) -> None:
     outcome = PushRampRung().run(replace(spec(), rung="push-ramp"), tmp_path)
     assert not outcome.success and outcome.stage in ("fall", "safety")  # it is stiff
@@ -96,12 +109,12 @@ def test_the_ramp_grows_until_the_balance_is_lost_and_lets_go(tmp_path: Path) ->
     assert np.diff(force[pushed]) / np.diff(trace.t[pushed]) == pytest.approx(RATE, rel=0.05)
     assert (trace.margin[pushed[:-1]] >= 0.0).all() and trace.margin[pushed[-1] + 1] < 0.0
     assert outcome.series["peak_force"] == pytest.approx(force.max())
-    assert 20.0 < force.max() < MOST
+    assert 20.0 < force.max() < MAX_FORCE
     assert len(trace.t) > pushed[-1] + 20
 
 
 def test_a_ramp_ends_at_its_peak() -> None:
     push, _ = PushRampRung().draw(spec().rng("push"))
-    assert np.linalg.norm(push.force(0.5 * push.duration, 0.3)) == pytest.approx(0.5 * MOST)
+    assert np.linalg.norm(push.force(0.5 * push.duration, 0.3)) == pytest.approx(0.5 * MAX_FORCE)
     assert not push.force(push.duration, 0.3).any()
-    assert push.impulse == pytest.approx(0.5 * MOST * push.duration)
+    assert push.impulse == pytest.approx(0.5 * MAX_FORCE * push.duration)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from golem.errors import ConfigError
-from golem.evaluation.episodes.odometry import SimulatedOdometry
+from golem.evaluation.base import Onlooker
+from golem.evaluation.episodes.simulated_odometry import SimulatedOdometry
+from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces import topics
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
@@ -45,8 +47,8 @@ def with_legs(stack: Stack, method: str) -> Stack:
         return stack.with_choice(SLOT, method)
     policy = Choice("policy", dict(zip(("file", "network"), files, strict=False)))
     if name == "vendor":
-        return replace(stack, lower_body=Choice(name), onboard=policy)
-    return replace(stack, lower_body=policy)
+        return stack.with_choice(SLOT, name).with_choice("onboard", policy)
+    return stack.with_choice(SLOT, policy)
 
 
 def legs_stack(
@@ -70,8 +72,7 @@ def legs_stack(
         if slot in (overrides or {}):
             raise ConfigError(f"The test of a lower body brings its own {slot}; leave out --use {slot}=...")
     stack = with_legs(load_stack(STACK, profile=profile), method)
-    options = {**stack.robot.options, "world": "open", **(robot or {})}
-    stack = replace(stack, robot=replace(stack.robot, options=options))
+    stack = stack.with_options("robot", **{"world": "open", **(robot or {})})
     for slot, use in (overrides or {}).items():
         stack = stack.with_choice(slot, use)
     return stack
@@ -90,10 +91,12 @@ class Loss:
         stage: `settle` (it never carried its weight), `fall`, `safety` (its gate stopped it, as an operator's e-stop
             would) or `fault` (the leg controller broke its contract, and the fallback took over).
         detail: one sentence.
+        trace: where in its code a module raised, as Python prints it; None where none did.
     """
 
     stage: str
     detail: str
+    trace: str | None = None
 
 
 HANGS = Loss("settle", f"The robot did not carry its weight within {READY:g} s.")
@@ -110,7 +113,7 @@ def lost(running: LockstepRunner, recorder: BalanceRecorder | None) -> Loss | No
     t, safety = running.executor.t, running.safety
     legs = running.bus.latest(topics.LEG_STATUS)
     if legs is not None and legs.fault is not None:
-        return Loss(FAULT, legs.fault)
+        return Loss(FAULT, legs.fault, legs.trace)
     if recorder is not None and recorder.fallen:
         return Loss("fall", f"The robot fell at {t:.1f} s.")
     if safety is not None and safety.stopped:
@@ -126,19 +129,23 @@ class Episode:
         recorder: samples the twin's balance after every tick.
     """
 
-    def __init__(self, stack: Stack, seed: int) -> None:
-        """Build `stack` for the twin's seed.
+    def __init__(
+        self, stack: Stack, seed: int, onlooker: Onlooker | None = None, limits: SafetyLimits | None = None
+    ) -> None:
+        """Build `stack` for the twin's seed, and show it to `onlooker`; its gate enforces `limits` if given.
 
         Raises:
             ConfigError: the stack's robot is not the twin, or a name or an option is wrong.
             ModuleFault: a constructor raised.
         """
-        self.running, robot = build(stack, seed)
+        self.running, robot = build(stack, seed, limits)
         if not isinstance(robot, MujocoRobot):
             raise ConfigError(
-                f"Balance is judged on the simulator's truth; robot: {stack.robot.use} is not 'mujoco'."
+                f"Balance is judged on the simulator's truth; robot: {stack.choice('robot').use} is not 'mujoco'."
             )
         self.robot = robot
+        if onlooker is not None:
+            onlooker(self.running, robot)
         self.recorder = BalanceRecorder(robot)
         self._pusher = Pusher(robot)
         self._odometry: SimulatedOdometry | None = None
@@ -176,7 +183,9 @@ class Episode:
     @property
     def loss(self) -> Loss | None:
         """How the robot was lost; None while it was not."""
-        return HANGS if self._hangs else lost(self.running, self.recorder)
+        loss = lost(self.running, self.recorder)
+        # A controller that failed in its band never got to carry the weight.
+        return HANGS if self._hangs and (loss is None or loss.stage != FAULT) else loss
 
     def stand(self, seconds: float) -> None:
         """Let the robot take over its weight, then let `seconds` pass; one that never does so is lost."""

@@ -46,12 +46,12 @@ class Oracle:
     def screws_in_tray(self) -> list[str]:
         """Return the names of the screws that lie inside the tray's walls."""
         layout = self._robot.scene.layout
-        half = 0.5 * np.array(layout.tray_size[:2])
+        half_x, half_y, height = 0.5 * layout.tray_size[0], 0.5 * layout.tray_size[1], layout.tray_size[2]
+        T_tray_world = np.linalg.inv(layout.tray_pose())
         found = []
         for name in self._robot.scene.names.screws:
-            x, y, z = self._robot.data.body(name).xpos
-            inside = np.abs(np.array([x, y]) - layout.tray_xy) <= half
-            if inside.all() and layout.tray_z - 0.01 <= z <= layout.tray_z + layout.tray_size[2]:
+            x, y, z, _ = T_tray_world @ (*self._robot.data.body(name).xpos, 1.0)
+            if abs(x) <= half_x and abs(y) <= half_y and -0.01 <= z <= height:
                 found.append(name)
         return found
 
@@ -83,7 +83,7 @@ class Oracle:
         )
 
     def picture(self) -> bytes:
-        """Return a PNG of the scene as it is now, from beside the pack."""
+        """Return a PNG of the scene as it is now, from a camera next to the pack."""
         if self._rig is None:
             self._rig = CameraRig(self._robot.scene.model, [ONLOOKER])
         rgb, _ = self._rig.render(self._robot.data, ONLOOKER.name)

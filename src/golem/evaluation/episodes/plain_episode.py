@@ -1,7 +1,7 @@
 """A lower body on its own terms: the robot alone in plain MuJoCo, the policy's own gains, the true state.
 
 No gate, no estimator, no latency, no hands; the upper body keeps still. What a policy survives here is its own doing;
-what it loses beside that on the stack's terms (`golem.evaluation.episodes.episode`) is the stack's and the robot's.
+what it loses in addition on the stack's terms (`golem.evaluation.episodes.episode`) is the stack's and the robot's.
 """
 
 from __future__ import annotations
@@ -15,9 +15,7 @@ import numpy as np
 from golem import registry
 from golem.capabilities.legs.base import Envelope, LowerBody
 from golem.capabilities.legs.description import load_description
-from golem.capabilities.legs.foot_separation import FootSeparationConfig
 from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
-from golem.capabilities.legs.velocity_integrator import VelocityIntegratorConfig
 from golem.errors import ConfigError, ModuleFault
 from golem.evaluation.episodes.episode import Loss, with_legs
 from golem.hardware.servo.gains import default_gains
@@ -38,8 +36,8 @@ START_NOISE = 0.02
 otherwise be one trial many times]."""
 BARE = LocomotionConfig(
     acceleration=(math.inf, math.inf, math.inf),
-    trim=VelocityIntegratorConfig(gain=0.0),
-    apart=FootSeparationConfig(minimum=0.0),
+    trim=None,
+    foot_separation=None,
 )
 """The base layer of a policy from outside: its gait clock and its dead band, as its authors deploy it, and no more."""
 
@@ -66,9 +64,7 @@ class PlainEpisode:
             ConfigError: a name, an option or the MJCF is wrong, or the lower body needs the robot's own computer.
             ModuleFault: its constructor raised.
         """
-        choice = with_legs(Stack(), method).lower_body
-        if choice.use == "vendor":
-            raise ConfigError("vendor runs on the robot's own computer, which is not there on its own terms.")
+        choice = own_legs(method)
         self._contract = ContractCheck("lower_body", choice.use)
         controller = registry.create("lower_body", choice.use, choice.options)
         self._contract.satisfies(controller, LowerBody)
@@ -125,7 +121,7 @@ class PlainEpisode:
             command = self._contract.call(self._locomotion.step, state, base, self.twist, TICK)
             self._legs.check(command)
         except ModuleFault as fault:
-            self.loss = Loss(FAULT, fault.reason)
+            self.loss = Loss(FAULT, fault.reason, fault.trace)
             return
         self._robot.advance(self._motor_command(command))
         self.recorder(self.t, self._pusher.force)
@@ -140,6 +136,18 @@ class PlainEpisode:
             tau[LEGS] = legs.tau
         q[UPPER], (kp[UPPER], kd[UPPER]) = self._upper, self._gains
         return LowCommand(self.t, q, np.zeros(NUM_JOINTS), tau, kp, kd)
+
+
+def own_legs(method: str) -> Choice:
+    """Return the lower body `method` (see `with_legs`) as it can run on its own terms.
+
+    Raises:
+        ConfigError: it needs the robot's own computer.
+    """
+    choice = with_legs(Stack(), method).choice("lower_body")
+    if choice.use == "vendor":
+        raise ConfigError("vendor runs on the robot's own computer, which is not there on its own terms.")
+    return choice
 
 
 def _posture(choice: Choice) -> Array:

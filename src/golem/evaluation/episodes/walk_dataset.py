@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.evaluation.base import TrialSpec
+from golem.evaluation.episodes.episode import Episode
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
-from golem.evaluation.subject import Subject
 from golem.interfaces import topics
 from golem.robots.model.leg_dynamics import LEG, LegDynamics
 from golem.robots.mujoco.shoves import DIRECTIONS, shove
@@ -70,15 +70,14 @@ def twist_at(t: float) -> Twist:
     return TWISTS[segment] if 0 <= segment < len(TWISTS) else Twist()
 
 
-def record(subject: Subject, spec: TrialSpec, pushed: bool) -> RecordedWalk:
-    """Let the robot of trial `spec` walk, its arms moving, and record it.
+def record(episode: Episode, spec: TrialSpec, pushed: bool) -> RecordedWalk:
+    """Let a robot walk, its arms moving, record and close it.
 
     Args:
-        subject: the lower body and its plant.
+        episode: the robot.
         spec: the draws.
         pushed: with one shove per segment, all directions in turn.
     """
-    episode = subject.episode(spec.seed, spec.index)
     truth = episode.robot.truth
     T_odom_world = np.linalg.inv(truth.T_world_odom)
     states: list[LowState] = []

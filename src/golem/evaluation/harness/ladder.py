@@ -1,26 +1,33 @@
-"""The ladder: every method of a rung on the same seeds, in parallel, resumable."""
+"""`golem ladder`: every method of a rung on the same seeds, in parallel, resumable."""
 
 from __future__ import annotations
 
-import contextlib
-import shlex
-from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
+import inspect
+import signal
+import threading
+from collections.abc import Generator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field, make_dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, cast
 
-from tqdm import tqdm
-from tyro.conf import arg
+import tyro
+from tyro.conf import Suppress, arg
 
-from golem.errors import ConfigError, GolemError, unknown_name
-from golem.evaluation.base import TrialSpec, make_rung, rung_target
+from golem.errors import ConfigError, MissingExtra, unknown_name
+from golem.evaluation.base import RUNGS, Rung, TrialSpec, case_name, make_rung, option_values, rung_class
 from golem.evaluation.harness.arguments import replaced_modules
-from golem.evaluation.harness.pool import Workers
-from golem.evaluation.harness.records import Provenance, RunFolder, TrialRecord, artefacts
-from golem.evaluation.harness.trials import Finished, Refused, run_trial
+from golem.evaluation.harness.records import Provenance, TrialRecord, read_records, trial_name
+from golem.evaluation.harness.run_folder import RunFolder, read_costs
+from golem.evaluation.harness.trial_executor import make_executor
+from golem.evaluation.harness.trial_runner import Request, Runner
+from golem.evaluation.harness.trials import facts
 from golem.evaluation.metrics.summary import Summary, summarise
-from golem.evaluation.report.ladder_report import render
-from golem.provenance import Unchanged, code_digest, commit, digest, versions
+from golem.evaluation.metrics.tables import comparisons, metrics, rates
+from golem.evaluation.metrics.text_table import TextTable
+from golem.provenance import code_files, command_line, commit, versions
+
+OPEN = "(default: the rung's)"
 
 
 @dataclass(frozen=True)
@@ -32,34 +39,53 @@ class LadderConfig:
     """
 
     rung: str = "tether"
-    """Rung of the ladder."""
-    method: tuple[str, ...] = ("centroid", "visual_servo")
+    """Rung of the ladder; with it, --help lists the rung's own options, too."""
+    method: Annotated[tuple[str, ...], arg(help_behavior_hint=OPEN)] = ()
     """Methods to compare: names, file.py:Class, or with options "{use: NAME, option: value}"; legs also as
     policy:DESCRIPTION:NETWORK."""
-    n: Annotated[int, arg(aliases=("-n",))] = 30
-    """Trials per method."""
-    profile: str = "field"
+    n: Annotated[int | None, arg(aliases=("-n",), metavar="INT", help_behavior_hint=OPEN)] = None
+    """Trials per method, and per case where the rung has several."""
+    profile: Annotated[str | None, arg(metavar="STR", help_behavior_hint=OPEN)] = None
     """Realism of sensors and world: ideal, bench or field."""
     seed: int = 0
     """Seed of the run; trial i of every method sees the same scene."""
-    out: Path = Path("runs/ladder")
+    out: Annotated[Path | None, arg(metavar="PATH", help_behavior_hint="(default: runs/RUNG)")] = None
     """Folder for the results."""
     j: Annotated[int, arg(aliases=("-j",))] = 1
     """Processes that run trials at the same time; the records do not depend on it."""
     use: tuple[str, ...] = ()
     """Replace other modules of the stack: slot=implementation, e.g. upper_body=my_ik.py:MyIk, or with options
     "localizer={use: onnx, threshold: 0.7}"."""
+    executor: str = "local"
+    """Where trials run: local, or dask:ADDRESS of a scheduler whose workers have the same code."""
+    limit: float = 600.0
+    """Wall-clock time after which a trial is ended and counts as lost [s]."""
+    show: Annotated[str | None, arg(metavar="TRIAL", help_behavior_hint="")] = None
+    """Run nothing but this trial, in the live view: INDEX, METHOD:INDEX, or its name in the report."""
     json: bool = False
     """Print the summary as a last line of JSON."""
+    options: Annotated[Any, Suppress] = None
+    """The rung's own options, see `Rung.Options`; None are its defaults."""
+
+    def whole(self) -> LadderConfig:
+        """Return the configuration with the rung's defaults in the place of what is left open.
+
+        Raises:
+            ConfigError: there is no such rung.
+        """
+        kind = rung_class(self.rung)
+        return replace(
+            self,
+            method=self.method or kind.default_methods,
+            n=kind.default_n if self.n is None else self.n,
+            profile=self.profile or kind.default_profile,
+            out=self.out or Path("runs") / self.rung,
+            options=kind.Options() if self.options is None else self.options,
+        )
 
     def command(self) -> str:
         """Return the command line that runs this configuration."""
-        words = ["golem", "ladder", "--rung", self.rung, "--method", *self.method, "-n", str(self.n)]
-        words += ["--profile", self.profile, "--seed", str(self.seed), "--out", str(self.out)]
-        words += ["-j", str(self.j)] if self.j != 1 else []
-        words += ["--use", *self.use] if self.use else []
-        words += ["--json"] if self.json else []
-        return shlex.join(words)
+        return command_line("golem ladder", self.whole(), always=("rung", "seed"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,20 +93,59 @@ class LadderResult:
     """What a finished ladder found.
 
     Attributes:
-        config: what was asked.
+        config: what was asked, with the rung's defaults.
+        out: the run folder.
         records: its trials, in canonical order.
         summary: rates, comparisons, failures and times.
-        report: path of the HTML report.
+        own: the tables of the rung's own.
+        report: path of the HTML report; None where what draws it is not installed.
+        note: why there is none.
     """
 
     config: LadderConfig
+    out: Path
     records: tuple[TrialRecord, ...]
     summary: Summary
-    report: Path
+    own: tuple[TextTable, ...]
+    report: Path | None
+    note: str = ""
+
+    def text(self) -> str:
+        """Return the tables for a terminal."""
+        s, adaptive = self.summary, rung_class(self.config.rung).adaptive
+        standard = [] if adaptive else [rates(s), comparisons(s), metrics(s)]
+        return "\n\n".join(table.markdown() for table in (*self.own, *standard) if table is not None)
 
 
 class LadderInterrupted(KeyboardInterrupt):
-    """The user pressed Ctrl-C; the message says how to go on. What had finished is kept."""
+    """The user pressed Ctrl-C, or the system asked to end; the message says how to go on. What finished is kept."""
+
+
+def read_ladder(words: list[str]) -> LadderConfig:
+    """Return the configuration that the words of a command line mean; the rung they name adds its own options.
+
+    Raises:
+        ConfigError: there is no such rung.
+    """
+    names = [b for a, b in zip(words, words[1:], strict=False) if a == "--rung"]
+    names += [word.partition("=")[2] for word in words if word.startswith("--rung=")]
+    kind = rung_class(names[-1] if names else LadderConfig.rung)
+    own = (Annotated[kind.Options, arg(name="")], field(default_factory=kind.Options))
+    parsed = make_dataclass("Ladder", [("options", *own)], bases=(LadderConfig,), frozen=True)
+    return cast(LadderConfig, tyro.cli(parsed, prog="golem ladder", args=words, description=_description()))
+
+
+def _description() -> str:
+    """Return what `golem ladder --help` says: the purpose, and every rung by what can be compared on it."""
+    rungs: dict[str, list[str]] = {}
+    for name in RUNGS:
+        kind = rung_class(name)
+        purpose = inspect.cleandoc(kind.__doc__ or "").partition("\n")[0]
+        rungs.setdefault(", ".join(sorted(kind().methods())), []).append(f"  {name:15s} {purpose}")
+    lines = [inspect.cleandoc(LadderConfig.__doc__ or "")]
+    for methods, names in rungs.items():
+        lines += ["", f"Rungs that compare {methods}, or yours:", *names]
+    return "\n".join(lines)
 
 
 def run_ladder(config: LadderConfig) -> LadderResult:
@@ -89,92 +154,118 @@ def run_ladder(config: LadderConfig) -> LadderResult:
     Raises:
         golem.errors.ConfigError: an option says nothing this software can do; nothing was written.
         golem.errors.OutputError: the folder cannot be written, or holds trials that cannot be mixed with these.
-        golem.errors.GolemError: a rung or a worker process cannot go on; finished trials are kept.
-        LadderInterrupted: Ctrl-C.
+        golem.errors.GolemError: a rung or the executor cannot go on; finished trials are kept.
+        LadderInterrupted: Ctrl-C or SIGTERM.
     """
-    code = Unchanged()
-    overrides = replaced_modules(config.use)
-    target, provenance = _check(config, overrides)
-    wanted = [
-        TrialSpec(config.rung, method, config.profile, config.seed, index, overrides)
-        for index in range(config.n)
-        for method in config.method
-    ]
-    with RunFolder(config.out) as folder:
-        records = folder.resume(config.rung, config.profile, config.seed, overrides, provenance)
-        held = {record.key for record in records}
-        todo = [spec for spec in wanted if (spec.method, spec.index) not in held]
-        kept = len(wanted) - len(todo)
-        progress = tqdm(total=len(wanted), initial=kept, unit="trial", disable=None)
-        with progress, contextlib.closing(_finished(target, todo, config.j, folder.path)) as finished:
-            try:
-                for spec, result in finished:
-                    code.check(config.out)
-                    record = provenance.record(spec, result.outcome)
-                    folder.append(record, result)
-                    records.append(record)
-                    kept += 1
-                    progress.update()
-            except KeyboardInterrupt:
-                raise LadderInterrupted(
-                    f"Stopped with {kept} of {len(wanted)} trials kept; continue with: {config.command()}"
-                ) from None
-        chosen = {(spec.method, spec.index) for spec in wanted}
-        records = [r for r in folder.finish(records, config.method) if r.key in chosen]
-        summary = summarise(records, config.method)
-        folder.write_text("summary.json", summary.json() + "\n")
-        report = folder.write_text("report.html", render(config.command(), records, summary, folder.path))
-    return LadderResult(config, tuple(records), summary, report)
+    config = config.whole()
+    request, provenance = prepare(config)
+    assert config.out is not None
+    command = config.command()
+    with (
+        _terminable(),
+        closing(make_executor(config.executor, config.j)) as executor,
+        RunFolder(config.out) as folder,
+    ):
+        held = folder.resume(request.example, provenance)
+        runner = Runner(request, provenance, folder, executor, command)
+        try:
+            records = runner.run(held)
+        except KeyboardInterrupt:
+            kept = len(runner.records)
+            raise LadderInterrupted(f"Stopped with {kept} trials kept; continue with: {command}") from None
+        rung = request.rung
+        cases = [] if rung.adaptive else [case_name(case) for case in rung.cases(lambda case: None)]
+        records = folder.finish(records, config.method, cases)
+        wanted = {spec.key for spec in request.wanted({r.key: r.outcome for r in records})}
+        records = tuple(r for r in records if r.key in wanted)
+        folder.state(command, provenance)
+        result = summed_up(config, folder.path, records, rung)
+        folder.write_text("summary.json", result.summary.json() + "\n")
+        try:
+            from golem.evaluation.report.ladder_report import render
+
+            report = folder.write_text("report.html", render(result))
+        except MissingExtra as missing:
+            return replace(result, note=f"No report was written: {missing}")
+    return replace(result, report=report)
 
 
-def _check(config: LadderConfig, overrides: Mapping[str, str]) -> tuple[str, Provenance]:
-    """Refuse what cannot run; return the rung's target and the provenance of its records."""
-    for option, value, minimum in (("-n", config.n, 1), ("-j", config.j, 1), ("--seed", config.seed, 0)):
+def summed_up(
+    config: LadderConfig, out: Path, records: tuple[TrialRecord, ...], rung: Rung[Any]
+) -> LadderResult:
+    """Return the figures of the `records` in the run folder `out`."""
+    summary = summarise(records, config.method, read_costs(out), compared=not rung.adaptive)
+    by_method = {
+        method: [(r.spec, r.outcome) for r in records if r.method == method] for method in config.method
+    }
+    return LadderResult(config, out, records, summary, tuple(rung.tables(by_method)), None)
+
+
+def prepare(config: LadderConfig) -> tuple[Request, Provenance]:
+    """Refuse what cannot run; return what a `whole` configuration asks for, and the provenance of its records.
+
+    Raises:
+        golem.errors.ConfigError: an option says nothing this software can do.
+    """
+    n, profile = config.n or 0, config.profile or ""
+    for option, value, minimum in (("-n", n, 1), ("-j", config.j, 1), ("--seed", config.seed, 0)):
         if value < minimum:
             raise ConfigError(f"{option} is {value}; it must be {minimum} or more.")
-    target = rung_target(config.rung)
-    rung = make_rung(target)
+    if config.limit <= 0.0:
+        raise ConfigError(f"--limit is {config.limit:g}; it must be more than 0.")
+    overrides, options = replaced_modules(config.use), option_values(config.options)
+    rung = make_rung(RUNGS[config.rung], options)
     if not config.method:
         raise ConfigError(f"--method names no method; valid: {', '.join(sorted(rung.methods()))}.")
     for method in config.method:
-        if method not in rung.methods() and ":" not in method:
+        if method not in rung.methods() and ":" not in method and not method.endswith(".py"):
             raise unknown_name("method", method, rung.methods())
         if config.method.count(method) > 1:
             raise ConfigError(f"--method names '{method}' more than once.")
-    if config.profile not in rung.profiles:
-        raise unknown_name("profile", config.profile, rung.profiles)
-    configs = {
-        method: digest({
-            "rung": config.rung,
-            "method": method,
-            "profile": config.profile,
-            "overrides": dict(overrides),
-            "config": dict(rung.config(method, config.profile, overrides)),
-        })
-        for method in config.method
-    }  # fmt: skip
-    return target, Provenance(configs, code_digest(), commit(), versions())
+    if profile not in rung.profiles:
+        raise unknown_name("profile", profile, rung.profiles)
+    if rung.timed and (config.j, config.executor) != (1, "local"):
+        raise ConfigError(f"Rung {rung.name} times this machine: leave out -j and --executor.")
+    resolved = {method: facts(rung, method, profile, overrides, options) for method in config.method}
+    example = TrialSpec(rung.name, config.method[0], profile, config.seed, 0, overrides, options)
+    request = Request(rung, RUNGS[config.rung], config.method, n, example, config.limit)
+    return request, Provenance(resolved, code_files(), commit(), versions())
 
 
-def _finished(
-    target: str, todo: Sequence[TrialSpec], jobs: int, out: Path
-) -> Generator[tuple[TrialSpec, Finished], None, None]:
-    """Run trials in `jobs` processes and yield them as they finish; closing it early kills what is in flight."""
-    if not todo:
+def find_trial(config: LadderConfig, request: Request) -> tuple[TrialSpec, TrialRecord | None]:
+    """Return the trial that `--show` names, and its record where the run folder has one.
+
+    Raises:
+        golem.errors.ConfigError: there is no such trial.
+    """
+    assert config.show is not None and config.out is not None
+    records = {record.key: record for record in read_records(config.out / "trials.jsonl")}
+    method, _, index = config.show.rpartition(":")
+    specs = [*(record.spec for record in records.values()), *request.wanted({})]
+    for spec in specs:
+        names = trial_name(spec), f"{spec.method}:{spec.index}"
+        if config.show in names or (not method and index == str(spec.index)):
+            return spec, records.get(spec.key)
+    if index.isdigit() and (not method or method in config.method):
+        return request.spec(
+            method or config.method[0], int(index), request.rung.cases(lambda case: None)[0]
+        ), None
+    shown = ", ".join(trial_name(spec) for spec in specs[:3])
+    raise unknown_name("trial", config.show, [f"0 to {(config.n or 1) - 1}", shown, "..."])
+
+
+@contextmanager
+def _terminable() -> Generator[None, None, None]:
+    """Let SIGTERM end the run as Ctrl-C does, with its processes."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
         return
-    workers: Workers[TrialSpec, Finished | Refused] = Workers(min(jobs, len(todo)))
-    with workers:
-        for spec in todo:
-            workers.submit(spec, run_trial, target, spec, artefacts(out, spec))
-        for spec, result in workers.finished():
-            yield spec, _trial(result)
 
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
 
-def _trial(result: Finished | Refused) -> Finished:
-    if isinstance(result, Finished):
-        return result
-    if result.trace is None:
-        raise GolemError(result.message)
-    raise RuntimeError(
-        f"The rung itself failed, which is a fault of its code, not of a module.\n{result.trace}"
-    )
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

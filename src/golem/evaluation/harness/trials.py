@@ -1,46 +1,54 @@
-"""One trial, as a worker process runs it."""
+"""A batch of trials, as a worker runs it, and how it can end."""
 
 from __future__ import annotations
 
 import functools
-import multiprocessing
-import os
-import threading
+import json
+import resource
+import tempfile
 import time
 import traceback
-from dataclasses import dataclass
-from multiprocessing.connection import wait
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from golem.errors import GolemError, ModuleFault
 from golem.evaluation.base import Rung, TrialOutcome, TrialSpec, make_rung
+from golem.evaluation.harness.copies import CopyDied
+from golem.evaluation.harness.culprit import culprit_of
+from golem.evaluation.harness.run_folder import Finished
+from golem.provenance import changes, code_files, commit, digest, versions
 from golem.skills.base import FAULT
-
-SINGLE_THREAD = {
-    name: "1"
-    for name in (
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-        "NUMEXPR_NUM_THREADS",
-    )
-}
-"""Environment of a worker: one thread each, so that `-j` alone sets the load and sums are in one order."""
 
 
 @dataclass(frozen=True, slots=True)
-class Finished:
-    """A trial that came to an outcome, with its cost in wall and CPU seconds of this machine."""
+class Batch:
+    """Trials that are run in one go, because they share a past; mostly one.
 
-    outcome: TrialOutcome
-    wall: float
-    cpu: float
+    Attributes:
+        target: `module:Class` of the rung.
+        specs: the trials, at least one, of the same rung, options and profile.
+        limit: wall-clock time that the batch may take [s].
+        configs: method -> hash of the configuration that the trial is meant to be of.
+        code, versions: of the package where the run was started; a worker that has another refuses.
+    """
+
+    target: str
+    specs: tuple[TrialSpec, ...]
+    limit: float
+    configs: Mapping[str, str]
+    code: str
+    versions: Mapping[str, str]
+
+    def split(self) -> list[Batch]:
+        """Return one batch per trial."""
+        return [replace(self, specs=(spec,)) for spec in self.specs]
 
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """A trial that could not be judged.
+    """A batch that could not be judged.
 
     Exceptions travel as text because not every exception survives pickling.
 
@@ -53,37 +61,131 @@ class Refused:
     trace: str | None = None
 
 
-def start_worker() -> None:
-    """Prepare a worker process: the death of its parent ends it."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_follow, args=(parent.sentinel,), daemon=True).start()
+@dataclass(frozen=True, slots=True)
+class Died:
+    """A batch whose process died.
+
+    Attributes:
+        how: in words, e.g. `"signal SIGSEGV"`.
+        trace: where it was, as far as it could still say; None where it could not.
+        again: whether it may be tried again; an executor that has tried says False.
+    """
+
+    how: str
+    trace: str | None = None
+    again: bool = True
 
 
-def _follow(sentinel: int) -> None:
-    # A pool worker holds both ends of its task queue, so it would wait for ever for a parent that was killed.
-    wait([sentinel])
-    os._exit(1)
+@dataclass(frozen=True, slots=True)
+class Overdue:
+    """A batch that took longer than its limit, and was ended.
+
+    Attributes:
+        module: who had control, `"slot: implementation"`; None where that is unknown.
+        place: file, line and function it was in, or empty.
+        trace: the frames.
+    """
+
+    module: str | None = None
+    place: str = ""
+    trace: str | None = None
+
+
+Ending = tuple[Finished, ...] | Refused | Died | Overdue
+"""How a batch ends: with one `Finished` per trial, or as a whole."""
+
+
+def facts(
+    rung: Rung[Any], method: str, profile: str, overrides: Mapping[str, str], options: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the resolved configuration of a method's trials on a rung, JSON-like; see `Rung.config`."""
+    return {
+        "rung": rung.name,
+        "method": method,
+        "profile": profile,
+        "overrides": dict(overrides),
+        "options": dict(options),
+        "config": json.loads(json.dumps(dict(rung.config(method, profile, overrides)))),
+    }
+
+
+def rung_of(batch: Batch) -> Rung[Any]:
+    """Return the rung of a batch, the same for all of one rung and options."""
+    return _rung(batch.target, json.dumps(dict(batch.specs[0].options)))
 
 
 @functools.cache
-def _rung(target: str) -> Rung:
-    return make_rung(target)
+def _rung(target: str, options: str) -> Rung[Any]:
+    return make_rung(target, json.loads(options))
 
 
-def run_trial(target: str, spec: TrialSpec, artefacts: Path) -> Finished | Refused:
-    """Run one trial of the rung at `target` (`module:Class`)."""
-    wall, cpu = time.perf_counter(), time.process_time()
+def run_batch(batch: Batch) -> tuple[Finished, ...] | Refused | Died:
+    """Run the trials of a batch in this process."""
+    wall, cpu = time.perf_counter(), _cpu()
+    first = batch.specs[0]
     try:
-        outcome = _rung(target).run(spec, artefacts)
-    except ModuleFault as fault:
-        outcome = TrialOutcome(False, FAULT, f"{fault.slot}: {fault.use}", fault.reason)
+        rung = rung_of(batch)
+        mismatch = _mismatch(batch, rung)
+        if mismatch:
+            return Refused(mismatch)
+        files: dict[str, bytes] = {}
+        if len(batch.specs) > 1:
+            found = rung.run_together(batch.specs)
+        else:
+            with tempfile.TemporaryDirectory(prefix="golem-trial-") as folder:
+                path = Path(folder) / "artefacts"
+                found = [run_trial(rung, first, path)]
+                files = {file.name: file.read_bytes() for file in path.glob("*")}
+    except (ModuleFault, CopyDied, *LEAVING) as error:
+        # `run_trial` lets none through: trials that were run together are run one by one.
+        return Died(f"{type(error).__name__}: {error}")
     except GolemError as error:
         return Refused(str(error))
     except OSError as error:
-        return Refused(
-            f"Cannot write what trial {spec.index} keeps to {artefacts}: {error.strerror or error}."
-        )
+        return Refused(f"Trial {first.index} cannot go on: {error}.")
     except Exception as error:
         return Refused(f"{type(error).__name__}: {error}", traceback.format_exc())
-    return Finished(outcome, time.perf_counter() - wall, time.process_time() - cpu)
+    share = 1.0 / len(batch.specs)
+    wall, cpu = share * (time.perf_counter() - wall), share * (_cpu() - cpu)
+    return tuple(Finished(outcome, wall, cpu, files) for outcome in found)
+
+
+def _mismatch(batch: Batch, rung: Rung[Any]) -> str | None:
+    """Return why this worker cannot run the batch as it is meant; None where it can."""
+    found = changes("", dict(batch.versions), versions())
+    if found:
+        return f"A worker has other packages: {'; '.join(found)}; give it the same locks."
+    if digest(code_files()) != batch.code:
+        return f"A worker runs other code of golem, commit {commit()}; give it the same."
+    for spec in batch.specs:
+        now = digest(facts(rung, spec.method, spec.profile, spec.overrides, spec.options))
+        if now != batch.configs[spec.method]:
+            return f"Files of {spec.method} changed while this ran, or a worker has others; choose another --out."
+    return None
+
+
+LEAVING = (SystemExit, KeyboardInterrupt)
+"""What a module raises that wants to end the process; Ctrl-C does not reach a worker."""
+
+
+def run_trial(
+    rung: Rung[Any],
+    spec: TrialSpec,
+    artefacts: Path | None = None,
+    leaving: tuple[type[BaseException], ...] = LEAVING,
+) -> TrialOutcome:
+    """Run one trial; a module that breaks its contract, or raises one of `leaving`, loses it."""
+    try:
+        return rung.run(spec, artefacts)
+    except ModuleFault as fault:
+        return TrialOutcome(False, FAULT, f"{fault.slot}: {fault.use}", fault.reason, trace=fault.trace)
+    except leaving as error:
+        by = culprit_of(error)
+        what = ": ".join(part for part in (type(error).__name__, str(error)) if part)
+        return TrialOutcome(False, FAULT, by.module, f"{what} ({by.place})", trace=by.trace)
+
+
+def _cpu() -> float:
+    """Return the CPU time of this process and of its copies that have ended [s]."""
+    copies = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + copies.ru_utime + copies.ru_stime

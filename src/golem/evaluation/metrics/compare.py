@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from tyro.conf import Positional
 
 from golem.errors import ConfigError
 from golem.evaluation.harness.records import TrialRecord, read_records
-from golem.evaluation.metrics.statistics import PairedTable, holm, mcnemar, paired_difference, wilson
+from golem.evaluation.metrics.summary import Summary, comparisons_of, row
+from golem.evaluation.metrics.tables import run_tables
+
+Key = tuple[str, str, int]
+"""Method, name of the case, and index of a trial."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +29,8 @@ class CompareConfig:
     """Print the figures as a last line of JSON."""
 
 
-def run_compare(config: CompareConfig) -> list[dict[str, Any]]:
-    """Print, per method of both runs, the success rates and the paired test on the trials that both have.
+def run_compare(config: CompareConfig) -> Summary:
+    """Print success and metrics of the trials that both runs have, per method and case, with the paired tests.
 
     Raises:
         ConfigError: a folder holds no trials, or the two have nothing in common that can be compared.
@@ -43,36 +45,26 @@ def run_compare(config: CompareConfig) -> list[dict[str, Any]]:
             )
     for difference in _differences(a[0], b[0]):
         print(difference)
-    methods = [m for m in dict.fromkeys(r.method for r in a) if m in {r.method for r in b}]
-    if not methods:
+    names = (a[0].rung, b[0].rung) if a[0].rung != b[0].rung else (config.first.name, config.second.name)
+    one, other = ({r.key: r for r in side} for side in (a, b))
+    if not {r.method for r in a} & {r.method for r in b}:
         raise ConfigError("The runs have no method in common.")
-    rungs = a[0].rung, b[0].rung
-    found = [_paired(method, rungs, a, b) for method in methods]
-    for row, adjusted in zip(found, holm([row["p"] for row in found]), strict=True):
-        row["p_holm"] = adjusted
-    print(text(found))
+    groups: dict[tuple[str, str], list[Key]] = {}
+    for key in sorted(one.keys() & other.keys(), key=lambda key: key[2]):
+        groups.setdefault(key[:2], []).append(key)
+    if not groups:
+        raise ConfigError("The runs have no trial in common.")
+    pairs = [(_named(one, keys, names[0]), _named(other, keys, names[1])) for keys in groups.values()]
+    summary = Summary(tuple(row(side) for pair in pairs for side in pair), comparisons_of(pairs))
+    print("\n\n".join(table.markdown() for table in run_tables(summary)))
     if config.json:
-        print(json.dumps(found))
-    return found
+        print(summary.json())
+    return summary
 
 
-def text(found: Sequence[dict[str, Any]]) -> str:
-    """Return a few lines for a terminal."""
-    lines: list[str] = []
-    for row in found:
-        sides = [
-            f"{rung} {row[key]['successes']}/{row['n']} {100 * row[key]['rate']:.1f} % "
-            f"[{100 * row[key]['interval'][0]:.1f}, {100 * row[key]['interval'][1]:.1f}]"
-            for rung, key in zip(row["rungs"], ("first", "second"), strict=True)
-        ]
-        low, high = row["interval"]
-        lines.append(
-            f"{row['method']}: {sides[0]}, {sides[1]}; difference {100 * row['difference']:+.1f} points "
-            f"[{100 * low:+.1f}, {100 * high:+.1f}], {row['only_first']} trials won only by the first, "
-            f"{row['only_second']} only by the second, exact McNemar p = {row['p']:.2g}, "
-            f"Holm-adjusted {row['p_holm']:.2g}"
-        )
-    return "\n".join(lines)
+def _named(side: Mapping[Key, TrialRecord], keys: Sequence[Key], name: str) -> list[TrialRecord]:
+    """Return records whose method says which run they are of."""
+    return [replace(side[key], method=f"{key[0]} on {name}") for key in keys]
 
 
 def _read(folder: Path) -> list[TrialRecord]:
@@ -83,7 +75,7 @@ def _read(folder: Path) -> list[TrialRecord]:
 
 
 def _differences(a: TrialRecord, b: TrialRecord) -> list[str]:
-    """Return what else differs between two runs, so that nobody takes it for the rung's or the method's doing."""
+    """Return what else differs between two runs, which must not be taken for an effect of the rung or the method."""
     found: list[str] = []
     if a.code != b.code:
         found.append(f"The runs are of different code, commits {a.commit} and {b.commit}.")
@@ -95,36 +87,3 @@ def _differences(a: TrialRecord, b: TrialRecord) -> list[str]:
         if one != other:
             found.append(f"The runs have different versions of {name}: {one} and {other}.")
     return found
-
-
-def _paired(
-    method: str, rungs: tuple[str, str], a: Sequence[TrialRecord], b: Sequence[TrialRecord]
-) -> dict[str, Any]:
-    one, other = ({r.index: r.success for r in side if r.method == method} for side in (a, b))
-    common = sorted(one.keys() & other.keys())
-    if not common:
-        raise ConfigError(f"The runs have no trial of method {method} in common.")
-    wins = [one[i] for i in common], [other[i] for i in common]
-    table = PairedTable.count(*wins)
-    difference = paired_difference(table)
-    return {
-        "method": method,
-        "rungs": list(rungs),
-        "n": table.n,
-        "first": _rate(wins[0]),
-        "second": _rate(wins[1]),
-        "only_first": table.only_a,
-        "only_second": table.only_b,
-        "difference": (table.only_a - table.only_b) / table.n,
-        "interval": [difference.low, difference.high],
-        "p": mcnemar(table),
-    }
-
-
-def _rate(wins: Sequence[bool]) -> dict[str, Any]:
-    interval = wilson(sum(wins), len(wins))
-    return {
-        "successes": sum(wins),
-        "rate": sum(wins) / len(wins),
-        "interval": [interval.low, interval.high],
-    }

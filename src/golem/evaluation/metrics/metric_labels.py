@@ -1,4 +1,4 @@
-"""What people call the series of a trial record, and the units they read them in; the records are in SI units."""
+"""Every metric: what people call a named scalar of a trial, and the unit they read it in; records are in SI units."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Measure:
-    """How one series is shown.
+class Metric:
+    """How one scalar is shown.
 
     Attributes:
         label: its name in words.
@@ -23,27 +23,66 @@ class Measure:
 
 _DEG = math.degrees(1.0)
 
-MEASURES: dict[str, Measure] = {
-    "grasp_aim": Measure("hand sent beside the screw", "mm", 1e3),
-    "grasp_reach": Measure("hand beside where it was sent", "mm", 1e3),
-    "grasp_miss": Measure("hand beside the screw", "mm", 1e3),
-    "grasp_depth": Measure("fingertips below the screw's head", "mm", 1e3),
-    "grasp_tilt": Measure("approach off vertical", "deg", _DEG),
-    "peak_force": Measure("peak force", "N"),
-    "peak_lean": Measure("peak lean (pitch)", "deg", _DEG),
-    "peak_tilt": Measure("peak tilt (any direction)", "deg", _DEG),
-    "margin_before": Measure("CoM margin before the push", "mm", 1e3),
-    "margin_min": Measure("least CoM margin", "mm", 1e3),
-    "margin_median": Measure("median CoM margin", "mm", 1e3),
-    "margin_final": Measure("final CoM margin", "mm", 1e3),
-    "below_zero": Measure("time with a negative margin", "s"),
-    "steps": Measure("steps taken"),
-    "displacement": Measure("base displaced", "mm", 1e3),
-    "sway": Measure("base sway, radial RMS", "mm", 1e3),
-    "goal_x": Measure("error at the goal along the line", "mm", 1e3),
-    "goal_y": Measure("error at the goal across the line", "mm", 1e3),
-    "goal_radial": Measure("error at the goal, radial", "mm", 1e3),
-    "odometry_error": Measure("odometry off the true pose", "mm", 1e3),
-    "goal_yaw": Measure("heading error at the goal", "deg", _DEG),
+METRICS: dict[str, Metric] = {
+    "detect_to_grasp": Metric("first look to closed grasp", "s"),
+    "recovery": Metric("first to last negative CoM margin", "s"),
+    "walk": Metric("walk to the goal", "s"),
+    "total": Metric("whole task", "s"),
+    "grasp_aim": Metric("horizontal distance, commanded hand to screw", "mm", 1e3),
+    "grasp_reach": Metric("horizontal distance, hand to where it was sent", "mm", 1e3),
+    "grasp_miss": Metric("horizontal distance, hand to screw", "mm", 1e3),
+    "grasp_depth": Metric("fingertips below the screw's head", "mm", 1e3),
+    "grasp_tilt": Metric("approach off vertical", "deg", _DEG),
+    "peak_force": Metric("peak force", "N"),
+    "peak_lean": Metric("peak lean (pitch)", "deg", _DEG),
+    "peak_tilt": Metric("peak tilt (any direction)", "deg", _DEG),
+    "margin_before": Metric("CoM margin before the push", "mm", 1e3),
+    "margin_min": Metric("minimum CoM margin", "mm", 1e3),
+    "margin_median": Metric("median CoM margin", "mm", 1e3),
+    "margin_final": Metric("final CoM margin", "mm", 1e3),
+    "below_zero": Metric("time with a negative margin", "s"),
+    "steps": Metric("steps taken"),
+    "displacement": Metric("base displaced", "mm", 1e3),
+    "sway": Metric("base sway, radial RMS", "mm", 1e3),
+    "goal_x": Metric("error at the goal along the line", "mm", 1e3),
+    "goal_y": Metric("error at the goal across the line", "mm", 1e3),
+    "goal_radial": Metric("error at the goal, radial", "mm", 1e3),
+    "odometry_error": Metric("odometry off the true pose", "mm", 1e3),
+    "goal_yaw": Metric("heading error at the goal", "deg", _DEG),
+    "base_range": Metric("largest distance between two places of the base", "mm", 1e3),
+    "share_not_negative": Metric("share of time with the CoM margin not negative", "%", 100.0),
+    "speed_before": Metric("forward speed before the push", "m/s"),
+    "error_vx": Metric("error of the mean forward speed", "m/s"),
+    "error_vy": Metric("error of the mean leftward speed", "m/s"),
+    "error_speed": Metric("error of the mean velocity", "m/s"),
+    "error_wz": Metric("error of the mean yaw rate", "rad/s"),
+    "seconds": Metric("time survived", "s"),
+    "pushes": Metric("pushes met"),
+    "distance": Metric("way gone", "m"),
+    "climbed": Metric("height gained", "m"),
+    "velocity_standing": Metric("velocity error standing, RMS", "m/s"),
+    "velocity_walking": Metric("velocity error walking, RMS", "m/s"),
+    "drift": Metric("position error at the end per way gone", "m/m"),
+    "yaw_drift": Metric("error of the heading's change", "deg", _DEG),
+    "gap": Metric("longest time without a believed foot", "ms", 1e3),
+    "tick": Metric("CPU time of a tick, median", "us", 1e6),
+    "tick_p99": Metric("CPU time of a tick, 99 % quantile", "us", 1e6),
+    "ate": Metric("trajectory off the true one, RMS after alignment", "cm", 1e2),
+    "end_error": Metric("place on the floor off at the end", "cm", 1e2),
+    "end_height": Metric("height off at the end", "cm", 1e2),
+    "end_heading": Metric("heading off at the end", "deg", _DEG),
+    "frames_lost": Metric("scans after which it was silent"),
+    "nees_place": Metric("squared error of the place over its covariance"),
+    "nees_heading": Metric("the same of the heading"),
+    "frame": Metric("CPU time of a scan with all between two, median", "ms", 1e3),
+    "frame_p99": Metric("CPU time of a scan with all between two, 99 % quantile", "ms", 1e3),
+    "plans_per_second": Metric("plans per second"),
+    "in_time": Metric("share of plans in time", "%", 100.0),
+    "cpu_per_plan": Metric("CPU time of a plan", "ms", 1e3),
 }
-"""Series name -> how it is shown; a series that is not here is shown as it is."""
+"""Name -> how it is shown."""
+
+
+def metric(name: str) -> Metric:
+    """Return how the scalar `name` is shown; one that is not declared, as it is."""
+    return METRICS.get(name, Metric(name.replace("_", " ")))

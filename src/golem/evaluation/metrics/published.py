@@ -1,4 +1,4 @@
-"""The published results that a rung's report sets beside its own."""
+"""The published results that a rung's report compares with its own."""
 
 from __future__ import annotations
 

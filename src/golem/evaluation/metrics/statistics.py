@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import binomtest
+from scipy.stats import binom, binomtest
+from scipy.stats import t as student
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,13 +20,31 @@ class Interval:
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
-    """Median and quartiles of `n` values, in the unit of the values."""
+class Distribution:
+    """What is quoted of `n` values, in their unit.
+
+    Attributes:
+        n: how many.
+        mean, mean_interval: with the 95 % interval of Student's t; None for one value.
+        median, median_interval: with the 95 % interval between two of the values, which assumes no distribution;
+            None for fewer than six.
+        q1, q3: quartiles (linear interpolation).
+        rms: root mean square.
+        p95_size: 95 % quantile of the absolute values.
+        minimum, maximum: extremes.
+    """
 
     n: int
+    mean: float
+    mean_interval: Interval | None
     median: float
+    median_interval: Interval | None
     q1: float
     q3: float
+    rms: float
+    p95_size: float
+    minimum: float
+    maximum: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,9 +134,39 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return adjusted
 
 
-def spread(values: Sequence[float]) -> Spread | None:
-    """Return median and quartiles (linear interpolation), or None for no values."""
-    if not values:
+def distribution(values: Sequence[float], scale: float = 1.0) -> Distribution | None:
+    """Return what is quoted of `values`, each multiplied by `scale`; None for no values."""
+    if not len(values):
         return None
-    q1, median, q3 = (float(q) for q in np.percentile(values, (25, 50, 75)))
-    return Spread(len(values), median, q1, q3)
+    x = scale * np.sort(np.array(values, dtype=np.float64))
+    q1, median, q3 = (float(q) for q in np.percentile(x, (25, 50, 75)))
+    return Distribution(
+        n=len(x),
+        mean=float(x.mean()),
+        mean_interval=mean_interval(x.tolist()),
+        median=median,
+        median_interval=_median_interval(x.tolist()),
+        q1=q1,
+        q3=q3,
+        rms=float(np.sqrt((x * x).mean())),
+        p95_size=float(np.quantile(np.abs(x), 0.95)),
+        minimum=float(x[0]),
+        maximum=float(x[-1]),
+    )
+
+
+def mean_interval(values: Sequence[float], confidence: float = 0.95) -> Interval | None:
+    """Return Student's t interval of the mean of `values`; None for fewer than two."""
+    n = len(values)
+    if n < 2:
+        return None
+    half = float(student.ppf(0.5 + confidence / 2, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
+    mean = float(np.mean(values))
+    return Interval(mean - half, mean + half)
+
+
+def _median_interval(ordered: Sequence[float], confidence: float = 0.95) -> Interval | None:
+    """Return the interval of the median between two order statistics (Conover, Practical Nonparametric Statistics)."""
+    n = len(ordered)
+    rank = int(binom.ppf((1 - confidence) / 2, n, 0.5))
+    return Interval(ordered[rank - 1], ordered[n - rank]) if rank >= 1 else None

@@ -1,22 +1,25 @@
-"""From trial records to the figures that are quoted: always recomputed, never stored beside the records."""
+"""From trial records to the figures that are quoted: always recomputed, never stored with the records."""
 
 from __future__ import annotations
 
 import itertools
 import json
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
 
+from golem.evaluation.base import Case, case_name
 from golem.evaluation.harness.records import TrialRecord
 from golem.evaluation.metrics.statistics import (
+    Distribution,
     Interval,
     PairedTable,
-    Spread,
+    distribution,
     holm,
     mcnemar,
+    mean_interval,
     paired_difference,
-    spread,
     wilson,
 )
 
@@ -26,22 +29,28 @@ NO_MODULE = "(no module to blame)"
 
 @dataclass(frozen=True, slots=True)
 class MethodSummary:
-    """One method on one rung.
+    """One method under one case of a rung.
 
     Attributes:
         method: its name.
+        case: the condition, empty on most rungs.
         n, successes: trials.
         interval: Wilson 95 % interval of the success rate.
-        times: name -> spread [s, robot time] over the trials that reached it.
+        times: name -> robot time [s] over the trials that reached it.
+        metrics: name -> scalar [SI units] over the trials that have it.
+        costs: the same of what depends on the machine.
         stages: failing stage -> failures, most frequent first.
         modules: module -> failures, most frequent first.
     """
 
     method: str
+    case: Case
     n: int
     successes: int
     interval: Interval
-    times: dict[str, Spread]
+    times: dict[str, Distribution]
+    metrics: dict[str, Distribution]
+    costs: dict[str, Distribution]
     stages: dict[str, int]
     modules: dict[str, int]
 
@@ -52,106 +61,150 @@ class MethodSummary:
 
 
 @dataclass(frozen=True, slots=True)
+class PairedMean:
+    """The mean difference of a metric, a minus b, over the `n` trials that have it with both methods."""
+
+    n: int
+    mean: float
+    interval: Interval
+
+
+@dataclass(frozen=True, slots=True)
 class Comparison:
     """Two methods on the same trials.
 
     Attributes:
         a, b: the methods.
+        case: the condition.
         table: paired counts.
         difference: 95 % interval of the success rate of `a` minus that of `b`.
         p: two-sided exact McNemar p-value.
         p_holm: the same, adjusted for the number of comparisons in the run.
+        metrics: name -> paired difference, a minus b, with Student's t interval.
     """
 
     a: str
     b: str
+    case: Case
     table: PairedTable
     difference: Interval
     p: float
     p_holm: float
+    metrics: dict[str, PairedMean]
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """All figures of one run."""
+    """All figures of one run, its rows case by case."""
 
-    methods: tuple[MethodSummary, ...]
+    rows: tuple[MethodSummary, ...]
     comparisons: tuple[Comparison, ...]
 
     def json(self) -> str:
-        """Return the summary as one line of JSON; rates and intervals are 0 to 1, times in robot seconds."""
-        return json.dumps({
-            "methods": {
-                m.method: {
-                    "n": m.n,
-                    "successes": m.successes,
-                    "rate": m.rate,
-                    "interval": [m.interval.low, m.interval.high],
-                    "median_times": {name: s.median for name, s in m.times.items()},
-                    "failures_by_stage": m.stages,
-                    "failures_by_module": m.modules,
-                }
-                for m in self.methods
-            },
-            "comparisons": [
-                {
-                    "a": c.a,
-                    "b": c.b,
-                    "only_a": c.table.only_a,
-                    "only_b": c.table.only_b,
-                    "difference": (c.table.only_a - c.table.only_b) / c.table.n,
-                    "interval": [c.difference.low, c.difference.high],
-                    "p": c.p,
-                    "p_holm": c.p_holm,
-                }
-                for c in self.comparisons
-            ],
-        })  # fmt: skip
+        """Return the summary as one line of JSON; rates and intervals are 0 to 1, figures in SI units."""
+        rows = [{**asdict(row), "rate": row.rate} for row in self.rows]
+        return json.dumps({"rows": rows, "comparisons": [asdict(c) for c in self.comparisons]})
 
-    def text(self) -> str:
-        """Return a few lines for a terminal."""
-        wide = max(len(m.method) for m in self.methods)
-        lines = []
-        for m in self.methods:
-            low, high = 100 * m.interval.low, 100 * m.interval.high
-            rate = f"{m.successes:4d}/{m.n:<4d} {100 * m.rate:5.1f} % [{low:.1f}, {high:.1f}]"
-            lost = ", ".join(f"{stage} {count}" for stage, count in m.stages.items())
-            times = ", ".join(f"{name} {s.median:.1f} s" for name, s in m.times.items())
-            lines.append(f"{m.method:{wide}} {rate}  median: {times or '-'}  lost: {lost or '-'}")
-        for c in self.comparisons:
-            lines.append(
-                f"{c.a} against {c.b}: {c.table.only_a} trials won only by the first, {c.table.only_b} only by the "
-                f"second, exact McNemar p = {c.p:.2g}, Holm-adjusted {c.p_holm:.2g}"
-            )
-        return "\n".join(lines)
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The methods, in the order they were asked for."""
+        return tuple(dict.fromkeys(row.method for row in self.rows))
+
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """The cases, in order."""
+        return tuple({case_name(row.case): row.case for row in self.rows}.values())
 
 
-def summarise(records: Sequence[TrialRecord], methods: Sequence[str]) -> Summary:
-    """Return the figures of `records`, which hold the same trial indices for each of `methods`."""
-    grouped = {m: sorted((r for r in records if r.method == m), key=lambda r: r.index) for m in methods}
-    pairs = list(itertools.combinations(methods, 2))
-    tables = [PairedTable.count(*([r.success for r in grouped[m]] for m in pair)) for pair in pairs]
+def summarise(
+    records: Sequence[TrialRecord],
+    methods: Sequence[str],
+    costs: Sequence[Mapping[str, Any]] = (),
+    *,
+    compared: bool = True,
+) -> Summary:
+    """Return the figures of `records`.
+
+    Args:
+        records: case by case the same indices for every method that has the case.
+        methods: their order.
+        costs: lines of the run's `timings.jsonl`.
+        compared: whether methods are compared pair by pair; not where an adaptive rung chose other cases for each.
+    """
+    cases = {case_name(r.case): r.case for r in records}
+    grouped: dict[tuple[str, str], list[TrialRecord]] = {}
+    for record in sorted(records, key=lambda r: r.index):
+        grouped.setdefault((case_name(record.case), record.method), []).append(record)
+    spent: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for line in costs:
+        spent.setdefault((case_name(line["case"]), line["method"]), []).append(line)
+    keys = [(name, method) for name in cases for method in methods if (name, method) in grouped]
+    pairs = [
+        (grouped[name, a], grouped[name, b])
+        for name in cases
+        for a, b in itertools.combinations(methods, 2)
+        if compared and (name, a) in grouped and (name, b) in grouped
+    ]
+    return Summary(tuple(row(grouped[key], spent.get(key, [])) for key in keys), comparisons_of(pairs))
+
+
+def comparisons_of(
+    pairs: Sequence[tuple[Sequence[TrialRecord], Sequence[TrialRecord]]],
+) -> tuple[Comparison, ...]:
+    """Return the paired tests of records, each pair of the same case and the same indices in the same order."""
+    tables = [PairedTable.count([r.success for r in a], [r.success for r in b]) for a, b in pairs]
     ps = [mcnemar(table) for table in tables]
-    return Summary(
-        tuple(_method(m, grouped[m]) for m in methods),
-        tuple(
-            Comparison(a, b, table, paired_difference(table), p, adjusted)
-            for (a, b), table, p, adjusted in zip(pairs, tables, ps, holm(ps), strict=True)
-        ),
+    return tuple(
+        Comparison(
+            a[0].method, b[0].method, a[0].case, table, paired_difference(table), p, adjusted, _paired(a, b)
+        )
+        for (a, b), table, p, adjusted in zip(pairs, tables, ps, holm(ps), strict=True)
     )
 
 
-def _method(method: str, records: Sequence[TrialRecord]) -> MethodSummary:
+def row(records: Sequence[TrialRecord], costs: Sequence[Mapping[str, Any]] = ()) -> MethodSummary:
+    """Return the figures of one method under one case; `costs` are its lines of `timings.jsonl`."""
     lost = [r for r in records if not r.success]
-    names = dict.fromkeys(name for r in records for name in r.timings)
-    times = {name: spread([r.timings[name] for r in records if name in r.timings]) for name in names}
     successes = len(records) - len(lost)
+    indices = {r.index for r in records}
+    timed = [
+        {
+            name: value
+            for name, value in line.items()
+            if name not in ("method", "case", "index", "wall", "cpu")
+        }
+        for line in costs
+        if line["index"] in indices
+    ]
     return MethodSummary(
-        method,
+        records[0].method,
+        records[0].case,
         len(records),
         successes,
         wilson(successes, len(records)),
-        {name: s for name, s in times.items() if s is not None},
+        _distributions([r.timings for r in records]),
+        _distributions([r.series for r in records]),
+        _distributions(timed),
         dict(Counter(r.stage for r in lost).most_common()),
         dict(Counter(r.module or NO_MODULE for r in lost).most_common()),
     )
+
+
+def _distributions(rows: Sequence[Mapping[str, float]]) -> dict[str, Distribution]:
+    names = sorted({name for row in rows for name in row})
+    found = {name: distribution([row[name] for row in rows if name in row]) for name in names}
+    return {name: d for name, d in found.items() if d is not None}
+
+
+def _paired(a: Sequence[TrialRecord], b: Sequence[TrialRecord]) -> dict[str, PairedMean]:
+    found: dict[str, PairedMean] = {}
+    sides = [
+        ({**one.series, **one.timings}, {**other.series, **other.timings})
+        for one, other in zip(a, b, strict=True)
+    ]
+    for name in sorted({name for one, _ in sides for name in one}):
+        differences = [one[name] - other[name] for one, other in sides if name in one and name in other]
+        interval = mean_interval(differences)
+        if interval is not None:
+            found[name] = PairedMean(len(differences), sum(differences) / len(differences), interval)
+    return found

@@ -5,21 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from golem import registry
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, legs_stack
+from golem.evaluation.episodes.episode import Episode, Loss
 from golem.evaluation.episodes.film_strip import FilmStrip
-from golem.evaluation.episodes.odometry import SimulatedOdometry
+from golem.evaluation.episodes.simulated_odometry import SimulatedOdometry
+from golem.evaluation.rungs.leg_rung import NO_WALKER, LegRung, PlantOptions
 from golem.interfaces import topics
-from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE
-from golem.robots.sensors.profiles import PROFILES
 from golem.skills.walk import WalkGoal
 from golem.types import PlanarPose
 
@@ -33,37 +31,35 @@ TIMEOUT = 60.0
 """Time it gets to arrive [s]."""
 PICTURES = 5
 """Moments of the strip of pictures."""
-NO_WALKER = "walk"
-"""Stage in which a lower body fails that cannot walk."""
 
 
-class NavigateLine:
-    """The robot walks to (6, 0, 0) in odom; the error is that of the true pose.
+@dataclass(frozen=True)
+class LineOptions(PlantOptions):
+    """The twin under the lower bodies."""
+
+    latency: float = 0.0
+    """Delay of motor commands on top of the profile's [s]."""
+
+
+class NavigateLine(LegRung[LineOptions]):
+    """Walk 6 m straight ahead over the open floor, by odometry; the error is that of the true pose.
 
     There is no LiDAR odometry yet: the robot goes by its base estimator, to whose pose a noise of 1 cm and 1 deg is
-    added (`golem.evaluation.episodes.odometry`, source `estimator`). The drift of legs and IMU over the line is in the
-    error.
+    added (`golem.evaluation.episodes.simulated_odometry`, source `estimator`). The drift of legs and IMU over the line
+    is in the error.
     """
 
     name = "navigate-line"
-    profiles = tuple(PROFILES)
-
-    def methods(self) -> tuple[str, ...]:
-        """Return the registered lower bodies; `policy:DESCRIPTION:NETWORK` names a policy's files."""
-        return registry.names("lower_body")
+    Options = LineOptions
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
-        return {
-            **stack_facts(legs_stack(method, profile, overrides)),
-            "distance": DISTANCE,
-            "tolerance": TOLERANCE,
-        }
+        facts = super().config(method, profile, overrides)
+        return {**facts, "distance": DISTANCE, "tolerance": TOLERANCE}
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
-        stack = legs_stack(spec.method, spec.profile, spec.overrides)
-        with closing(Episode(stack, episode_seed(spec.seed, spec.index))) as episode:
+        with closing(self.episode(spec)) as episode:
             if episode.running.envelope.vx[1] <= 0.0:
                 why = "It does not walk: the greatest forward speed in its envelope is zero."
                 return TrialOutcome(False, NO_WALKER, f"lower_body: {spec.method}", why)
@@ -109,12 +105,13 @@ def judge(episode: Episode, method: str) -> TrialOutcome:
     loss, result = episode.loss, episode.result
     module = f"lower_body: {method}"
     if loss is None and result is not None and not result.success:
-        loss = Loss(result.stage, result.reason)
-        module = f"navigator: {episode.running.stack.navigator.use}" if result.slot == "navigator" else module
+        loss = Loss(result.stage, result.reason, result.trace)
+        navigator = f"navigator: {episode.running.stack.choice('navigator').use}"
+        module = navigator if result.slot == "navigator" else module
     if loss is None and radial > TOLERANCE:
         loss = Loss("goal", f"It stands {radial:.2f} m beside the goal and believes to be there.")
         module = f"estimator: {episode.running.stack.choice('estimator').use}"
     if loss is not None:
-        return TrialOutcome(False, loss.stage, module, loss.detail, series=series)
+        return TrialOutcome(False, loss.stage, module, loss.detail, series=series, trace=loss.trace)
     detail = f"stands {1e3 * radial:.0f} mm from the goal"
     return TrialOutcome(True, DONE, None, detail, result.timings if result else {}, series)

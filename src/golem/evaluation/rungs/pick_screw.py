@@ -6,8 +6,8 @@ that `golem compare` of two runs says what balancing costs.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,20 +15,23 @@ import numpy as np
 
 from golem import registry
 from golem.errors import ConfigError
-from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
+from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
+from golem.evaluation.harness.sweep import read_sweep
 from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
-from golem.robots.sensors.profiles import PROFILES
+from golem.robots.worlds.conditions import LayoutKind
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import FAULT, SkillResult
 from golem.skills.pick import PickGoal
+from golem.slots import KEYS
 from golem.stack import Stack, load_stack
+from golem.types import Side
 
 SLOT = "grasp_method"
 """What the methods of these rungs are."""
@@ -46,15 +49,35 @@ STRAIGHT = 0.087
 """Tilt beyond which an extraction counts as off axis [rad]: 5 deg."""
 
 
-class PickRung:
+@dataclass(frozen=True)
+class PickOptions:
+    """The work place."""
+
+    layout: LayoutKind = "nominal"
+    """nominal: pack and tray always stand at the same place. varied: drawn from the trial's seed, as is what it looks
+    like and what lies about."""
+    sweep: str = ""
+    """A condition whose values are tried one by one: NAME=FROM..TO, NAME=FROM..TO:COUNT or NAME=VALUE,VALUE."""
+
+
+class PickRung(Rung[PickOptions]):
     """One screw per trial: seen, approached, grasped, pulled out, dropped in the tray.
 
     Attributes:
         name: of the rung, and of the shipped stack it runs.
     """
 
-    name: str
-    profiles = tuple(PROFILES)
+    Options = PickOptions
+    default_methods = ("centroid", "visual_servo")
+
+    def __init__(self, options: PickOptions | None = None) -> None:
+        """Read the sweep; see `Rung`."""
+        super().__init__(options)
+        self._sweep = read_sweep(self.options.sweep)
+
+    def cases(self, results: Results) -> Sequence[Case]:
+        """Return the values of the sweep; see `Rung`."""
+        return self._sweep
 
     def methods(self) -> tuple[str, ...]:
         """Return the registered grasp methods."""
@@ -63,32 +86,37 @@ class PickRung:
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
         stack = self._stack(method, profile, overrides)
-        classes = {slot: registry.load(slot, stack.choice(slot).use) for slot in registry.slots()}
+        classes = {key: registry.load(row.slot, stack.choice(key).use) for key, row in KEYS.items()}
         if not issubclass(classes["robot"], MujocoRobot):
             raise ConfigError(
-                f"Rung {self.name} judges on the simulator's truth; robot: {stack.robot.use} is not the twin, 'mujoco'."
+                f"Rung {self.name} judges on the simulator's truth; robot: {stack.choice('robot').use} is not the "
+                "twin, 'mujoco'."
             )
         shared_context()
         return {
             **stack_facts(stack),
-            "goal": asdict(PickGoal()),
+            "goal": asdict(self._goal),
         }
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
         stack = self._stack(spec.method, spec.profile, spec.overrides)
+        if self.options.layout != "nominal" or spec.case:
+            stack = stack.with_options("robot", layout=self.options.layout, conditions=dict(spec.case))
         running, robot = build(stack, episode_seed(spec.seed, spec.index))
+        if self.onlooker is not None:
+            self.onlooker(running, robot)
         oracle = Oracle(robot)
         try:
             if self.balances:
                 running.executor.run(READY, lambda: not robot.on_gantry)
                 if robot.on_gantry:
                     return TrialOutcome(
-                        False, HANGS.stage, f"lower_body: {stack.lower_body.use}", HANGS.detail
+                        False, HANGS.stage, f"lower_body: {stack.choice('lower_body').use}", HANGS.detail
                     )
                 running.executor.run(running.executor.t + RELEASED)
             watch = _Watch(running, oracle, BalanceRecorder(robot) if self.balances else None)
-            result = running.execute("pick", PickGoal(), watch=watch)
+            result = running.execute("pick", self._goal, watch=watch)
             running.executor.run(running.executor.t + SETTLE, watch.look)
             if artefacts is not None and watch.recorder is not None:
                 watch.recorder.trace().save(artefacts / TRACE)
@@ -96,6 +124,11 @@ class PickRung:
         finally:
             oracle.close()
             robot.close()
+
+    @property
+    def _goal(self) -> PickGoal:
+        """Either hand in a varied work place, whose tray is on either side."""
+        return PickGoal() if self.options.layout == "nominal" else PickGoal(side="either")
 
     @property
     def balances(self) -> bool:
@@ -117,13 +150,13 @@ class PickRung:
 
 
 class TetherRung(PickRung):
-    """The robot hangs in its hoist: perception and manipulation without balance."""
+    """Pick a screw while the robot hangs in its hoist: perception and manipulation without balance."""
 
     name = "tether"
 
 
 class StandRung(PickRung):
-    """The robot balances while its arms work; the lower body can be replaced with `--use lower_body=...`."""
+    """Pick a screw while the robot balances; the lower body can be replaced with `--use lower_body=...`."""
 
     name = STANDING
 
@@ -150,8 +183,8 @@ class _Watch:
         if feedback is None:
             return
         if feedback.stage == "grasp" and not feedback.data.get("failed"):
-            commanded = self._running.commanded(PickGoal().side)
-            self.grasp = self._oracle.grasp(PickGoal().side, commanded)
+            side: Side = feedback.data.get("side", "right")
+            self.grasp = self._oracle.grasp(side, self._running.commanded(side))
         if feedback.stage == DONE or feedback.data.get("failed"):
             self.picture = self._oracle.picture()
 
@@ -165,22 +198,22 @@ def _judge(
     if watch.recorder is not None:
         series |= balance(watch.recorder.trace())
     if loss is not None and result.stage not in ABORTED:
-        module = f"lower_body: {stack.lower_body.use}" if stack.on_ground else None
+        module = f"lower_body: {stack.choice('lower_body').use}" if stack.on_ground else None
         detail = f"{loss.detail} The errand itself: {result.reason}"
-        return TrialOutcome(False, loss.stage, module, detail, result.timings, series, oracle.picture())
+        return TrialOutcome(
+            False, loss.stage, module, detail, result.timings, series, oracle.picture(), loss.trace
+        )
     if oracle.screws_in_tray() and result.stage not in ABORTED:
         return TrialOutcome(True, DONE, None, result.reason, result.timings, series, watch.picture)
     # The skill may believe it succeeded: then the screw was lost between the pull and the tray.
     stage = result.stage if result.stage != DONE else "place"
     slot = blame(stage, result.slot, truth)
-    module = (
-        None if slot is None else f"{slot}: {stack.choice(slot).use}" if slot in registry.slots() else slot
-    )
+    module = None if slot is None else f"{slot}: {stack.choice(slot).use}" if slot in KEYS else slot
     detail = (
         result.reason if result.stage != DONE else "The skill reports success, but no screw is in the tray."
     )
     picture = watch.picture or oracle.picture()
-    return TrialOutcome(False, stage, module, detail, result.timings, series, picture)
+    return TrialOutcome(False, stage, module, detail, result.timings, series, picture, result.trace)
 
 
 def balance(stood: BalanceTrace) -> dict[str, float]:

@@ -10,24 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from golem import registry
 from golem.evaluation.base import DONE, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.episode import LATENCY, Episode, Loss, episode_seed, legs_stack
+from golem.evaluation.episodes.episode import Episode, Loss
 from golem.evaluation.episodes.film_strip import FilmStrip
 from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
-from golem.provenance import stack_facts
+from golem.evaluation.rungs.leg_rung import LegRung, PlantOptions
 from golem.robots.mujoco.balance import TRACE, BalanceTrace
 from golem.robots.mujoco.shoves import DIRECTIONS, Push, rod
-from golem.robots.sensors.profiles import PROFILES
+from golem.skills.runner import FAULT
 
 PEAK = (22.1, 6.9)
 """Mean and deviation of the rod's peak force [N], from the paper's ALMI trials."""
-LEAST_PEAK = 5.0
+MIN_PEAK = 5.0
 """Peak below which a draw is raised to it [N]."""
 SETTLE = (2.0, 3.0)
 """Range of the time between standing and the push [s]; the arms are then in motion."""
-PLANT = {"latency": LATENCY}
-"""The twin's options beside the profile's: what the leg benches test, too."""
 MOMENTS = (0.5, 0.5, 0.4, 0.6)
 """Times between the moments of the strip of pictures, from the begin of the push on [s]."""
 PATIENCE = 5.0
@@ -36,34 +33,24 @@ QUIET = 1.0
 """Time of quiet standing that ends a trial [s]."""
 
 
-class PushRung:
-    """One push per trial; success is standing again with the CoM inside the support polygon.
+class PushRung(LegRung[PlantOptions]):
+    """Stand again, the CoM inside the support polygon, after the rod has pushed the pelvis once.
 
     The rod's force is not cut when the margin becomes negative, as a person's hand would: a robot that steps would
     otherwise be pushed less than one that does not.
     """
 
     name = "push"
-    profiles = tuple(PROFILES)
-
-    def methods(self) -> tuple[str, ...]:
-        """Return the registered lower bodies; `policy:DESCRIPTION:NETWORK` names a policy's files."""
-        return registry.names("lower_body")
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
-        return {
-            **stack_facts(legs_stack(method, profile, overrides, PLANT)),
-            "peak": PEAK,
-            "settle": SETTLE,
-            "patience": PATIENCE,
-        }
+        facts = super().config(method, profile, overrides)
+        return {**facts, "peak": PEAK, "settle": SETTLE, "patience": PATIENCE}
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
-        stack = legs_stack(spec.method, spec.profile, spec.overrides, PLANT)
         push, settle = self.draw(spec.rng("push"))
-        with closing(Episode(stack, episode_seed(spec.seed, spec.index))) as episode:
+        with closing(self.episode(spec)) as episode:
             episode.start(ScriptedMotion(ArmMotion(spec.rng("arms"))))
             strip = FilmStrip(episode.robot, push.bearing)
             episode.stand(settle)
@@ -85,7 +72,7 @@ class PushRung:
     def draw(self, rng: np.random.Generator) -> tuple[Push, float]:
         """Return the push of one trial, and the time before it [s]."""
         direction = DIRECTIONS[rng.integers(len(DIRECTIONS))]
-        peak = max(float(rng.normal(*PEAK)), LEAST_PEAK)
+        peak = max(float(rng.normal(*PEAK)), MIN_PEAK)
         return rod(direction, peak), float(rng.uniform(*SETTLE))
 
     def pursue(self, episode: Episode, strip: FilmStrip) -> None:
@@ -97,7 +84,9 @@ class PushRung:
 
 def never_pushed(loss: Loss, method: str) -> TrialOutcome:
     """Return the outcome of a robot that was lost before its push."""
-    return TrialOutcome(False, "settle", f"lower_body: {method}", f"{loss.detail} It was not pushed yet.")
+    stage = FAULT if loss.stage == FAULT else "settle"
+    detail = f"{loss.detail.removesuffix('.')}. It was not pushed yet."
+    return TrialOutcome(False, stage, f"lower_body: {method}", detail, trace=loss.trace)
 
 
 def measures(trace: BalanceTrace, start: float) -> dict[str, float]:
@@ -128,7 +117,9 @@ def judge(
         loss = Loss("unrest", "It is on its feet, but does not come to rest.")
     if loss is not None:
         detail = f"{loss.detail} It was {pushed} at {start:.1f} s."
-        return TrialOutcome(False, loss.stage, f"lower_body: {method}", detail, series=series)
+        return TrialOutcome(
+            False, loss.stage, f"lower_body: {method}", detail, series=series, trace=loss.trace
+        )
     recovery = trace.recovery_time(start)
     # A robot that never lost its balance has none to recover.
     timings = {"recovery": recovery} if recovery > 0.0 else {}

@@ -14,12 +14,12 @@ from golem.robots.mujoco.shoves import DIRECTIONS, Push, ramp
 
 RATE = 40.0
 """Growth of the force [N/s] [own: a person's; the paper does not say]."""
-MOST = 300.0
-"""Force at which the rod is taken away from who has not lost his balance [N] [own: nearly half the robot's weight]."""
+MAX_FORCE = 300.0
+"""Force at which the push ends although the balance is not lost [N] [own: nearly half the robot's weight]."""
 
 
 class PushRampRung(PushRung):
-    """One push per trial, as long as the CoM is inside the support polygon; success is standing again afterwards.
+    """Stand again after the rod has pushed harder and harder until the CoM left the support polygon.
 
     The paper's robots were pushed so by hand: "until the robot loses balance", by a margin that becomes negative. Who
     steps is pushed on while the polygon follows, so `peak_force` says what a method takes, and the rest of the figures
@@ -30,17 +30,17 @@ class PushRampRung(PushRung):
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
-        return {**super().config(method, profile, overrides), "peak": (MOST, RATE)}
+        return {**super().config(method, profile, overrides), "peak": (MAX_FORCE, RATE)}
 
     def draw(self, rng: np.random.Generator) -> tuple[Push, float]:
         """Return the push of one trial, and the time before it [s]."""
         direction = DIRECTIONS[rng.integers(len(DIRECTIONS))]
-        return ramp(direction, MOST, MOST / RATE), float(rng.uniform(*SETTLE))
+        return ramp(direction, MAX_FORCE, MAX_FORCE / RATE), float(rng.uniform(*SETTLE))
 
     def pursue(self, episode: Episode, strip: FilmStrip) -> None:
         """Push until the balance is lost, and keep pictures of what comes then."""
         strip.keep(episode.t, episode.force)
-        episode.run(MOST / RATE, until=lambda: episode.recorder.margin < 0.0)
+        episode.run(MAX_FORCE / RATE, until=lambda: episode.recorder.margin < 0.0)
         strip.keep(episode.t, episode.force)
         episode.let_go()
         for seconds in MOMENTS[:-1]:

@@ -1,4 +1,4 @@
-"""`golem bench`: every performance figure beside its reference, in one run, in CPU time of this thread."""
+"""`golem bench`: every performance figure next to its reference, in one run, in CPU time of this thread."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from golem.types import NUM_JOINTS, TICK, UPPER, Array, Imu, LowCommand, LowStat
 
 @dataclass(frozen=True)
 class BenchConfig:
-    """Print every performance figure beside its reference, in CPU time."""
+    """Print every performance figure next to its reference, in CPU time."""
 
     quick: bool = False
     """Fewer repetitions."""
@@ -81,7 +81,7 @@ def run_bench(config: BenchConfig) -> list[Figure]:
     return figures
 
 
-def _timed(step: Callable[[int], object], n: int) -> Array:
+def timed(step: Callable[[int], object], n: int) -> Array:
     """Return the (n,) CPU times of `step(0) ... step(n - 1)` [s]."""
     times = np.empty(n)
     for i in range(n):
@@ -91,7 +91,8 @@ def _timed(step: Callable[[int], object], n: int) -> Array:
     return times
 
 
-def _figure(name: str, times: Array, scale: float, unit: str, reference: str) -> Figure:
+def figure(name: str, times: Array, scale: float, unit: str, reference: str) -> Figure:
+    """Return median and 99th percentile of times [s] in `unit`s of 1 / `scale` seconds."""
     return Figure(
         name, float(np.median(times)) * scale, float(np.quantile(times, 0.99)) * scale, unit, reference
     )
@@ -99,11 +100,13 @@ def _figure(name: str, times: Array, scale: float, unit: str, reference: str) ->
 
 def _control(config: BenchConfig) -> list[Figure]:
     n = 1000 if config.quick else 20000
-    figures = [_ik("IK tick, diff_ik", DiffIK(), min(n, 4000), "80 us wanted")]
+    figures = [ik_figure("IK tick, diff_ik", DiffIK(), min(n, 4000), "80 us wanted")]
     try:
         from golem.capabilities.arms.pink_ik import PinkIK
 
-        figures.append(_ik("IK tick, pink_ik", PinkIK(), min(n, 4000), "137 us: prototype of Pink + daqp"))
+        figures.append(
+            ik_figure("IK tick, pink_ik", PinkIK(), min(n, 4000), "137 us: prototype of Pink + daqp")
+        )
     except MissingExtra as error:
         Console().print(f"pink_ik left out: {error}")
     servo, limits, memory = Servo(), SafetyLimits.from_profile(), GateMemory()
@@ -122,11 +125,11 @@ def _control(config: BenchConfig) -> list[Figure]:
             GateInputs(t, state, command, EstopMessage(t, i % 256, False), request), limits, memory
         ).memory
 
-    figures.append(_figure("servo + safety tick", _timed(tick, n), 1e6, "us", "2000 us available at 500 Hz"))
+    figures.append(figure("servo + safety tick", timed(tick, n), 1e6, "us", "2000 us available at 500 Hz"))
     return figures
 
 
-def _ik(name: str, ik: UpperBody, n: int, reference: str) -> Figure:
+def ik_figure(name: str, ik: UpperBody, n: int, reference: str) -> Figure:
     """Time both hands on circles of 8 cm radius and 4 s period at 100 Hz."""
     q = start_posture()
     q[UPPER] = posture("ready")
@@ -141,8 +144,8 @@ def _ik(name: str, ik: UpperBody, n: int, reference: str) -> Figure:
         for T in pair:
             T[:3, 3] += offset
         targets.append(pair)
-    return _figure(
-        name, _timed(lambda i: ik.step(targets[i][0], targets[i][1], q, 0.01), n), 1e6, "us", reference
+    return figure(
+        name, timed(lambda i: ik.step(targets[i][0], targets[i][1], q, 0.01), n), 1e6, "us", reference
     )
 
 
@@ -157,9 +160,9 @@ def _physics(config: BenchConfig) -> list[Figure]:
         robot = MujocoRobot("ideal", config.seed, q, options)
         robot.release()
         tick = partial(robot.advance, stiff, {}, TICK)
-        times = _timed(lambda _, tick=tick: tick(), 500 if config.quick else 5000)
+        times = timed(lambda _, tick=tick: tick(), 500 if config.quick else 5000)
         name = f"twin's tick, {world}{', limbs stop each other' if limbs else ''}"
-        figures.append(_figure(name, times, 1e6, "us", "2000 us of robot time"))
+        figures.append(figure(name, times, 1e6, "us", "2000 us of robot time"))
         robot.close()
     return figures
 
@@ -176,13 +179,13 @@ def _perception(config: BenchConfig) -> list[Figure]:
             info = robot.cameras[camera]
             size = f"{info.width}x{info.height}"
             robot.capture(camera)
-            times = _timed(lambda i, camera=camera: robot.capture(camera), n)
-            figures.append(_figure(f"RGB-D frame {camera} {size}", times, 1e3, "ms", "with depth noise"))
+            times = timed(lambda i, camera=camera: robot.capture(camera), n)
+            figures.append(figure(f"RGB-D frame {camera} {size}", times, 1e3, "ms", "with depth noise"))
             rgb, depth = robot.capture(camera)
             frame = RgbdImage(0.0, info, rgb, depth, np.eye(4))
-            times = _timed(lambda i, frame=frame: detector.locate(frame, detector.classes), n)
+            times = timed(lambda i, frame=frame: detector.locate(frame, detector.classes), n)
             figures.append(
-                _figure(f"detector {camera} {size}", times, 1e3, "ms", "14.3 ms: 640x480, prototype")
+                figure(f"detector {camera} {size}", times, 1e3, "ms", "14.3 ms: 640x480, prototype")
             )
     finally:
         robot.close()

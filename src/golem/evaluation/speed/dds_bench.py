@@ -1,4 +1,4 @@
-"""`golem bench dds`: the 500 Hz loop of states and commands between two processes, ours beside the vendor's SDK."""
+"""`golem bench dds`: the 500 Hz loop of states and commands between two processes, ours next to the vendor's SDK."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ class BenchFailed(GolemError):
 
 @dataclass(frozen=True)
 class DdsBenchConfig:
-    """Measure the 500 Hz loop of lowstate and lowcmd between two processes, and what images cost beside it."""
+    """Measure the 500 Hz loop of lowstate and lowcmd between two processes, and what images cost at the same time."""
 
     seconds: float = 60.0
     """Duration of each loop [s]."""
     domain: int = 99
-    """DDS domain; nobody else should be on it."""
+    """DDS domain; no other process should be on it."""
     interface: str = "lo"
     """Network interface."""
     sdk: Path | None = None
@@ -132,13 +132,13 @@ def _loop(
     cameras: bool = False,
 ) -> Loop:
     """Run one loop: the controller (and the viewer) first, then the robot's side until it ends."""
-    listeners = {"controller": _Process(config, controller, "controller")}
+    listeners = {"controller": _Side(config, controller, "controller")}
     if cameras:
-        listeners["viewer"] = _Process(config, GOLEM, "viewer")
+        listeners["viewer"] = _Side(config, GOLEM, "viewer")
     try:
         for listener in listeners.values():
             listener.begin()
-        sender = _Process(config, robot, "robot", *(["--cameras"] if cameras else []))
+        sender = _Side(config, robot, "robot", *(["--cameras"] if cameras else []))
         sent = sender.result(config.seconds + 60.0)
         heard = {side: listener.result(30.0) for side, listener in listeners.items()}
     finally:
@@ -183,7 +183,7 @@ def _median_p99(values: Array) -> tuple[float, float]:
     return float(np.median(values)), float(np.quantile(values, 0.99))
 
 
-class _Process:
+class _Side:
     """One side, in a process of its own that ends with one line of JSON."""
 
     def __init__(self, config: DdsBenchConfig, command: tuple[str, ...], side: str, *options: str) -> None:

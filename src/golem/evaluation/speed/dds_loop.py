@@ -2,7 +2,7 @@
 
 The robot's side encodes a state with checksum, writes it and takes commands; the controller decodes each state as it
 comes and answers it. States have numbers from 1; those with number 0 come before and are not measured: who has found
-the other need not have been found by it, and what is written until then is for nobody. All measure on this machine's
+the other need not have been found by it, and what is written until then has no reader. All measure on this machine's
 monotonic clock and print one line of JSON at the end.
 """
 
@@ -124,7 +124,7 @@ def controller(participant: CycloneParticipant) -> dict[str, object]:
                 writer.write(convert.encode_low_command(command, convert.MODE_MACHINE, state.t))
 
     reader = participant.reader("rt/lowstate", hg.LOW_STATE.type_name, PATIENT, on_data=on_state)
-    cpu = until_told()
+    cpu = wait_for_stop()
     return {"came": came, "cpu": cpu}
 
 
@@ -144,11 +144,11 @@ def viewer(participant: CycloneParticipant) -> dict[str, object]:
         for kind in (COLOR, DEPTH):
             watch(f"/realsense/{camera}/{kind}", "sensor_msgs/msg/Image")
     watch("/" + CLOUD, "sensor_msgs/msg/PointCloud2")
-    cpu = until_told()
+    cpu = wait_for_stop()
     return {"came": {topic: len(sizes) for topic, sizes in came.items()}, "cpu": cpu}
 
 
-def until_told() -> float:
+def wait_for_stop() -> float:
     """Wait for the end of standard input; return the processor time that this process spent meanwhile [s]."""
     print("ready", flush=True)
     sys.stdin.readline()

@@ -1,0 +1,153 @@
+"""`golem check [SLOT [USE]]`: runs the conformance suites and prints what they found."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from golem import registry
+from golem.errors import ConfigError, GolemError, OutputError
+from golem.evaluation.conformance.base import FAILED, PASSED, Finding, Report
+from golem.evaluation.conformance.examine import SUITES, UNCHECKED, candidate, examine, suite_of
+
+BEGIN, END = "<!-- golem check: begin -->", "<!-- golem check: end -->"
+"""Between these lines of a page stands the table."""
+_MARKS = {PASSED: ("✓", "green"), FAILED: ("✗", "red")}
+
+
+@dataclass(frozen=True)
+class CheckConfig:
+    """Check modules against the contracts of their slots.
+
+    Exit code 0: all promises are kept. 1: one is broken. 2: the module cannot be found, or this machine lacks what it
+    needs.
+    """
+
+    slot: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[SLOT]", help_behavior_hint="")] = ""
+    """Which slot; default: all."""
+    use: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[USE]", help_behavior_hint="")] = ""
+    """Module: a name, file.py:Class, package.module:Class or "{use: NAME, option: value}"; default: all shipped."""
+    json: bool = False
+    """Print JSON instead of the report."""
+    page: Path | None = None
+    """Write the table of all modules into this page, between its two marks."""
+
+
+def run_check(config: CheckConfig) -> bool:
+    """Check what `config` names and print the report; return whether all promises are kept.
+
+    Raises:
+        ConfigError: there is no such slot or module, or the page has no marks.
+        GolemError: this machine lacks what the module needs.
+        OutputError: the page cannot be written.
+    """
+    if config.slot:
+        suite_of(config.slot)
+    console = Console(stderr=config.json)
+    reports: list[Report] = []
+    for slot, use in _wanted(config):
+        with console.status(f"{slot}: {use}"), _quiet():
+            report = examine(candidate(slot, use))
+        if report.lacks is not None and config.use:
+            raise GolemError(report.lacks)
+        reports.append(report)
+        if not config.json:
+            _print(console, report, whole=bool(config.use))
+    if config.json:
+        print(json.dumps([_plain(report) for report in reports], indent=2))
+    if config.page is not None:
+        _write(config.page, reports)
+    return all(report.passed or report.lacks is not None for report in reports)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep off the console what libraries log of inputs that are meant to be strange."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)
+
+
+def _wanted(config: CheckConfig) -> list[tuple[str, str]]:
+    """Return which modules are to be checked."""
+    if config.use:
+        return [(config.slot, config.use)]
+    slots = [config.slot] if config.slot else list(SUITES)
+    shipped = [(slot, use) for slot in slots for use in registry.names(slot)]
+    return [pair for pair in shipped if pair not in UNCHECKED]
+
+
+def _plain(report: Report) -> dict[str, Any]:
+    return asdict(report) | {"passed": report.passed}
+
+
+def _print(console: Console, report: Report, whole: bool) -> None:
+    """Print the findings; of several modules only what is wrong."""
+    heading = Text(f"{report.slot}: {report.use}", style="bold")
+    passed = sum(finding.status == PASSED for finding in report.findings)
+    if report.lacks is not None:
+        heading.append(f"  not checked: {report.lacks}", style="yellow")
+    elif report.failed:
+        heading.append(
+            f"  {len(report.failed)} of {passed + len(report.failed)} promises broken", style="red"
+        )
+    else:
+        heading.append(f"  keeps all {passed} promises", style="green")
+    console.print(heading, soft_wrap=True)
+    shown = [finding for finding in report.findings if whole or finding.status == FAILED]
+    if shown:
+        console.print(_table(shown))
+    for trace in dict.fromkeys(finding.trace for finding in report.failed if finding.trace):
+        console.print(Text(trace), soft_wrap=True)
+
+
+def _table(findings: list[Finding]) -> Table:
+    table = Table(show_header=False, box=None, padding=(0, 1))
+    for finding in findings:
+        mark, style = _MARKS.get(finding.status, ("-", "dim"))
+        said = finding.promise if finding.status == PASSED else finding.reason
+        table.add_row(Text(mark, style=style), Text(finding.check.replace("_", " ")), Text(said, style=style))
+    return table
+
+
+def page_table(reports: list[Report]) -> str:
+    """Return the table of a page: one row per module, with what it keeps, breaks, and is not asked."""
+    rows = ["| slot | module | kept | broken | not asked |", "|---|---|---|---|---|"]
+    for report in reports:
+        kept = sum(finding.status == PASSED for finding in report.findings)
+        broken = ", ".join(finding.check.replace("_", " ") for finding in report.failed) or "none"
+        rest = len(report.findings) - kept - len(report.failed)
+        row = (kept, broken, rest) if report.lacks is None else ("-", report.lacks, "-")
+        rows.append(f"| `{report.slot}` | `{report.use}` | {row[0]} | {row[1]} | {row[2]} |")
+    rows += [f"| `{slot}` | `{use}` | - | not checked: {why} | - |" for (slot, use), why in UNCHECKED.items()]
+    return "\n".join(rows)
+
+
+def _write(page: Path, reports: list[Report]) -> None:
+    try:
+        text = page.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"The page {page} cannot be read: {error.strerror}.") from error
+    if BEGIN not in text or END not in text.partition(BEGIN)[2]:
+        raise ConfigError(
+            f"The page {page} lacks the lines '{BEGIN}' and '{END}', between which the table goes."
+        )
+    before, _, rest = text.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    try:
+        page.write_text(f"{before}{BEGIN}\n{page_table(reports)}\n{END}{after}", encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"The page {page} cannot be written: {error.strerror}.") from error

@@ -1,0 +1,153 @@
+"""Runs a suite on a module."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any, cast
+
+from golem import registry
+from golem.errors import ConfigError, MissingExtra, MissingSystemLibrary, ModuleFault, unknown_name
+from golem.evaluation.conformance.base import (
+    FAILED,
+    PASSED,
+    SKIPPED,
+    Candidate,
+    Check,
+    Finding,
+    Inapplicable,
+    Report,
+    checks_of,
+)
+from golem.evaluation.conformance.suite import Suite
+from golem.options import check_values, read_yaml
+
+_HERE = "golem.evaluation.conformance"
+SUITES: dict[str, str] = {
+    "robot": f"{_HERE}.robot_suite:RobotSuite",
+    "estimator": f"{_HERE}.estimator_suite:EstimatorSuite",
+    "servo": f"{_HERE}.servo_suite:ServoSuite",
+    "hand": f"{_HERE}.hand_suite:HandSuite",
+    "lower_body": f"{_HERE}.leg_suite:LegSuite",
+    "upper_body": f"{_HERE}.arm_suite:ArmSuite",
+    "localizer": f"{_HERE}.localizer_suite:LocalizerSuite",
+    "grasp_method": f"{_HERE}.grasp_suite:GraspSuite",
+    "odometry": f"{_HERE}.odometry_suite:OdometrySuite",
+    "navigator": f"{_HERE}.navigator_suite:NavigatorSuite",
+    "skill": f"{_HERE}.skill_suite:SkillSuite",
+}
+"""Slot -> `module:Class` of its suite, imported when it is used."""
+OPTIONS: dict[tuple[str, str], Mapping[str, object]] = {
+    ("lower_body", "policy"): {"file": "almi_stand"},
+    ("lower_body", "handover"): {"walk": {"use": "almi"}, "stand": {"use": "hold"}},
+}
+"""What shipped modules without default options are checked with."""
+UNCHECKED: dict[tuple[str, str], str] = {
+    ("robot", "replay"): "it needs a recording: golem check robot '{use: replay, file: BAG}'",
+}
+"""Shipped modules that `golem check` leaves out where it is not asked for them, and why."""
+
+
+def suite_of(slot: str) -> Suite:
+    """Return the suite of `slot`.
+
+    Raises:
+        ConfigError: there is no such slot.
+    """
+    if slot not in SUITES:
+        raise unknown_name("slot", slot, SUITES)
+    module, _, name = SUITES[slot].partition(":")
+    return getattr(import_module(module), name)()
+
+
+def promises(slot: str) -> tuple[Check, ...]:
+    """Return the checks of a slot's suite.
+
+    Raises:
+        ConfigError: there is no such slot.
+    """
+    return checks_of(type(suite_of(slot)))
+
+
+def candidate(slot: str, use: str) -> Candidate:
+    """Return the module `use` of `slot`, ready to be made.
+
+    Args:
+        slot: its slot.
+        use: registered name, `file.py:Class`, `package.module:Class`, or `{use: NAME, option: value, ...}`.
+
+    Raises:
+        ConfigError: there is no such slot, name, file or class.
+        ModuleFault: importing the file raised.
+    """
+    suite = suite_of(slot)
+    name, options = _choice(use)
+    options = options or OPTIONS.get((slot, name), {})
+    registry.load(slot, name)
+    make = functools.partial(_make, suite, slot, name, options)
+    return Candidate(slot, name, make)
+
+
+def _make(suite: Suite, slot: str, name: str, options: Mapping[str, object]) -> Any:
+    return registry.create(slot, name, options, **suite.context())
+
+
+def _choice(use: str) -> tuple[str, Mapping[str, object]]:
+    if not use.startswith("{"):
+        return use, {}
+    value = read_yaml(use, f"'{use}'")
+    if not isinstance(value, Mapping) or not isinstance(value.get("use"), str):
+        raise ConfigError(f"'{use}' is not of the form '{{use: NAME, option: value, ...}}'.")
+    chosen = cast("Mapping[str, object]", value)
+    options = {key: v for key, v in chosen.items() if key != "use"}
+    check_values(use, options)
+    return str(chosen["use"]), options
+
+
+def examine(subject: Candidate, on_check: Callable[[Check], None] = lambda check: None) -> Report:
+    """Run every check of the suite on `subject`; nothing that the module does is raised.
+
+    Args:
+        subject: the module.
+        on_check: called before each check.
+    """
+    suite, findings, closed = suite_of(subject.slot), list[Finding](), ""
+    for check in checks_of(type(suite)):
+        on_check(check)
+        if closed:
+            finding = Finding(check.name, check.promise, SKIPPED, f"not asked: {closed} failed")
+        else:
+            try:
+                finding = _ask(suite, check, subject)
+            except (MissingExtra, MissingSystemLibrary) as lack:
+                return Report(subject.slot, subject.use, tuple(findings), str(lack))
+        findings.append(finding)
+        if check.gate and finding.status == FAILED:
+            closed = check.name
+    return Report(subject.slot, subject.use, tuple(findings))
+
+
+def _ask(suite: Suite, check: Check, subject: Candidate) -> Finding:
+    try:
+        with _own_faults(subject):
+            check.run(suite, subject)
+    except Inapplicable as why:
+        return Finding(check.name, check.promise, SKIPPED, str(why))
+    except ModuleFault as fault:
+        if isinstance(fault.__cause__, Inapplicable):
+            return Finding(check.name, check.promise, SKIPPED, str(fault.__cause__))
+        return Finding(check.name, check.promise, FAILED, fault.reason, fault.trace)
+    return Finding(check.name, check.promise, PASSED)
+
+
+@contextmanager
+def _own_faults(subject: Candidate) -> Iterator[None]:
+    """Turn what a module raises where it is made, or hands the suite to trip over, into its fault."""
+    try:
+        yield
+    except (ModuleFault, Inapplicable, MissingExtra, MissingSystemLibrary):
+        raise
+    except (Exception, SystemExit) as error:  # a user's module may raise anything, and return anything
+        raise ModuleFault.of(subject.slot, subject.use, error) from error

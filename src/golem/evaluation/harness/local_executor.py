@@ -1,0 +1,173 @@
+"""Worker processes here: one thread each, deaf to Ctrl-C, gone with their parent, replaced when they die."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections import deque
+from collections.abc import Generator
+from contextlib import suppress
+from multiprocessing.connection import Connection, wait
+
+from golem.evaluation.harness.copies import CAN_COPY
+from golem.evaluation.harness.trials import Batch, Died, Ending, Overdue
+from golem.evaluation.harness.worker import STARTED
+
+SINGLE_THREAD = {
+    name: "1"
+    for name in (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+    )
+}
+"""Environment of a worker: one thread each, so that `-j` alone sets the load and sums are in one order."""
+START = 300.0
+"""Time in which a process has to have begun its batch [s]."""
+GRACE = 5.0
+"""Time after a batch's limit that its process gets to say where it hangs [s]."""
+REPORT = 20_000
+"""Length of what is read of such a report [bytes]."""
+
+
+class LocalExecutor:
+    """Up to `processes` worker processes, started when there is work; see `TrialExecutor`."""
+
+    def __init__(self, processes: int) -> None:
+        """Start nothing yet."""
+        self._maximum = processes
+        self._waiting: deque[Batch] = deque()
+        self._workers: list[_Worker] = []
+
+    def submit(self, batch: Batch) -> None:
+        """Add a batch."""
+        self._waiting.append(batch)
+
+    def results(self) -> Generator[tuple[Batch, Ending], None, None]:
+        """Yield each batch and how it ended."""
+        while True:
+            self._give()
+            busy = [worker for worker in self._workers if worker.batch is not None]
+            if not busy:
+                return
+            soonest = min(worker.deadline for worker in busy) - time.monotonic()
+            ready = set(wait([x for worker in busy for x in worker.signs], timeout=max(0.0, soonest)))
+            for worker in busy:
+                ending = worker.look(not ready.isdisjoint(worker.signs))
+                if ending is not None:
+                    batch = worker.take()
+                    if worker.ended:
+                        self._workers.remove(worker)
+                    yield batch, ending
+
+    def _give(self) -> None:
+        """Give waiting batches to idle workers, and start a worker where none is idle."""
+        while self._waiting:
+            idle = next((worker for worker in self._workers if worker.batch is None), None)
+            if idle is None:
+                if len(self._workers) >= self._maximum:
+                    return
+                idle = _Worker()
+                self._workers.append(idle)
+            idle.give(self._waiting.popleft())
+
+    def close(self) -> None:
+        """End the processes."""
+        self._waiting.clear()
+        while self._workers:
+            self._workers.pop().kill()
+
+
+class _Worker:
+    """One worker process.
+
+    Attributes:
+        batch: what it runs; None while it is idle.
+        deadline: when it must have answered, on the clock `time.monotonic` [s].
+        signs: what becomes readable when it has answered or died.
+        ended: whether it is no more.
+    """
+
+    def __init__(self) -> None:
+        self.batch: Batch | None = None
+        self.deadline = 0.0
+        self.ended = False
+        self._report = tempfile.TemporaryFile()
+        ours, its = socket.socketpair()
+        with its:
+            command = [sys.executable, "-P", "-m", "golem.evaluation.harness.worker"]
+            self._process = subprocess.Popen(
+                [*command, str(its.fileno()), str(self._report.fileno())],
+                env={**os.environ, **SINGLE_THREAD},
+                stdin=subprocess.DEVNULL,
+                pass_fds=(its.fileno(), self._report.fileno()),
+                start_new_session=True,
+            )
+        self._connection = Connection(ours.detach())
+        self.signs: list[Connection | int] = [self._connection]
+        if CAN_COPY:  # a copy of it would hold the connection open
+            self.signs.append(os.pidfd_open(self._process.pid))
+        with suppress(OSError):  # it died already, which `finish` will find
+            self._connection.send(sys.path)
+
+    def give(self, batch: Batch) -> None:
+        """Let it run `batch`."""
+        self.batch = batch
+        self.deadline = time.monotonic() + START
+        with suppress(OSError):
+            self._connection.send(batch)
+
+    def take(self) -> Batch:
+        """Return its batch, which has ended."""
+        batch, self.batch = self.batch, None
+        assert batch is not None
+        return batch
+
+    def look(self, answered: bool) -> Ending | None:
+        """Return how its batch ended, None where it goes on; where it is overdue or died, the process is ended."""
+        overdue = not answered and time.monotonic() > self.deadline
+        ending: Ending | None = Overdue() if overdue else Died("") if answered else None
+        with suppress(EOFError, OSError):
+            if answered and self._connection.poll():
+                ending = self._connection.recv()
+        if ending == STARTED and self.batch is not None:
+            self.deadline = time.monotonic() + self.batch.limit + GRACE
+            return None
+        if isinstance(ending, Died | Overdue):
+            if not overdue:
+                with suppress(subprocess.TimeoutExpired):
+                    self._process.wait(GRACE)  # so that it is known how it died
+            self.kill()
+            trace = os.pread(self._report.fileno(), REPORT, 0).decode(errors="replace") or None
+            if isinstance(ending, Overdue) and ending.trace is None:
+                ending = Overdue(trace=trace)
+            elif isinstance(ending, Died) and not ending.how:
+                ending = Died(_how(self._process.returncode), trace)
+        return ending
+
+    def kill(self) -> None:
+        """End it and all that it started."""
+        self.ended = True
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        self._connection.close()
+        for sign in self.signs:
+            if isinstance(sign, int):
+                os.close(sign)
+
+
+def _how(code: int) -> str:
+    """Return how a process ended, by its return code."""
+    if code >= 0:
+        return f"it exited with code {code}"
+    if -code == signal.SIGKILL:
+        return "signal SIGKILL, as of a machine without memory"
+    return f"signal {signal.Signals(-code).name}"

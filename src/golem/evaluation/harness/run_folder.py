@@ -1,0 +1,221 @@
+"""The folder of one run, which survives being interrupted.
+
+`trials.jsonl` holds the records, `timings.jsonl` what depends on the machine: wall and CPU seconds, and what a rung
+timed. `run.json` says by which command, code and configuration they came to be. During a run records and timings grow
+in the order in which trials finish; `RunFolder.finish` puts the records into canonical order: by case, by index, then
+by the order of the methods.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from golem.errors import OutputError
+from golem.evaluation.base import TrialOutcome, TrialSpec, case_name
+from golem.evaluation.harness.records import Provenance, TrialRecord, artefacts, read_records, whole_lines
+from golem.provenance import changes
+
+FACTS = "run.json"
+SHOWN = 3
+"""So many differences are named, and the others counted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """A trial that came to an outcome.
+
+    Attributes:
+        outcome: what became of it.
+        wall, cpu: what it cost on its machine [s].
+        files: what it keeps in addition to its record, by file name.
+    """
+
+    outcome: TrialOutcome
+    wall: float
+    cpu: float
+    files: Mapping[str, bytes] = field(default_factory=dict[str, bytes])
+
+
+class RunFolder:
+    """The folder of one run, held against a second writer while it is open.
+
+    Opening makes the folder and writes nothing else; the files appear with the first trial. A folder that was made
+    here and is still empty when it is closed is taken away again.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Make the folder at `path` where needed and take its lock.
+
+        Raises:
+            golem.errors.OutputError: it cannot be written, or another run holds it.
+        """
+        self.path = path
+        self._made = not path.exists()
+        self._trials = path / "trials.jsonl"
+        self._costs = path / "timings.jsonl"
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            self._lock = os.open(path, os.O_RDONLY)
+        except OSError as error:
+            raise OutputError(f"Cannot write to --out {path}: {error.strerror}; choose another.") from error
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            os.close(self._lock)
+            raise OutputError(
+                f"Another run is writing to {path}; wait for it or choose another --out."
+            ) from error
+        if not os.access(path, os.W_OK | os.X_OK):
+            os.close(self._lock)
+            raise OutputError(f"Cannot write to --out {path}: Permission denied; choose another.")
+
+    def __enter__(self) -> RunFolder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Release the folder, and remove it if it is empty and was made here."""
+        os.close(self._lock)
+        if self._made and not any(self.path.iterdir()):
+            self.path.rmdir()
+
+    def resume(self, example: TrialSpec, provenance: Provenance) -> list[TrialRecord]:
+        """Return the trials the folder already holds and cut off torn last lines.
+
+        Args:
+            example: any trial of the run that shall continue.
+            provenance: of the present configuration and code.
+
+        Raises:
+            golem.errors.OutputError: they are of another experiment, configuration, code or package version, so
+                that continuing would mix what cannot be compared; says what differs.
+        """
+        records = read_records(self._trials)
+        for record in records:
+            for what, old, new in (
+                ("rung", record.rung, example.rung),
+                ("profile", record.profile, example.profile),
+                ("seed", record.seed, example.seed),
+                ("overrides", dict(record.overrides), dict(example.overrides)),
+                ("options", dict(record.options), dict(example.options)),
+                ("package versions", dict(record.versions), dict(provenance.versions)),
+            ):
+                if old != new:
+                    raise self._mixed(what, changes(what, old, new))
+            facts = read_facts(self.path)
+            if record.code != provenance.code:
+                raise self._mixed("code", changes("", facts.get("files", {}), provenance.files))
+            method = record.method
+            if provenance.configs.get(method, record.config) != record.config:
+                then = facts.get("configs", {}).get(method, {})
+                raise self._mixed("configuration", changes("", then, provenance.facts[method]))
+        for path in (self._trials, self._costs):
+            if path.exists():
+                os.truncate(path, whole_lines(path.read_bytes()))
+        return records
+
+    def _mixed(self, what: str, differences: Sequence[str]) -> OutputError:
+        named = "; ".join(differences[:SHOWN])
+        more = f"; and {len(differences) - SHOWN} more" if len(differences) > SHOWN else ""
+        return OutputError(
+            f"{self.path} holds trials that differ in {what} and cannot be mixed; choose another --out. "
+            f"What differs: {named or 'unknown, run.json is missing'}{more}."
+        )
+
+    def state(self, command: str, provenance: Provenance) -> None:
+        """Write by which command, code and configurations the trials came to be; methods of earlier runs stay."""
+        facts = {
+            "command": command,
+            "commit": provenance.commit,
+            "versions": dict(provenance.versions),
+            "configs": {**read_facts(self.path).get("configs", {}), **provenance.facts},
+            "files": dict(provenance.files),
+        }
+        self.write_text(FACTS, json.dumps(facts, indent=1) + "\n")
+
+    def append(self, record: TrialRecord, finished: Finished) -> None:
+        """Keep one finished trial: its files first, then its record, so that what a record names exists.
+
+        Raises:
+            golem.errors.OutputError: the disk refuses.
+        """
+        cost = {"method": record.method, "case": dict(record.case), "index": record.index}
+        cost |= {"wall": finished.wall, "cpu": finished.cpu, **finished.outcome.costs}
+        try:
+            for name, content in finished.files.items():
+                file = artefacts(self.path, record) / name
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_bytes(content)
+            if record.picture is not None and finished.outcome.picture is not None:
+                picture = self.path / record.picture
+                picture.parent.mkdir(exist_ok=True)
+                picture.write_bytes(finished.outcome.picture)
+            append_line(self._trials, record.line())
+            append_line(self._costs, json.dumps(cost) + "\n")
+        except OSError as error:
+            raise OutputError(f"Cannot write to {self.path}: {error.strerror}.") from error
+
+    def finish(
+        self, records: Sequence[TrialRecord], methods: Sequence[str], cases: Sequence[str] = ()
+    ) -> list[TrialRecord]:
+        """Rewrite `trials.jsonl` in canonical order, whole or not at all, and return the records so ordered.
+
+        Cases and methods that are not named (of an adaptive rung, or from an earlier run) follow by their values.
+        """
+        by_case, by_method = ({name: i for i, name in enumerate(names)} for names in (cases, methods))
+
+        def order(r: TrialRecord) -> tuple[Any, ...]:
+            case, method = case_name(r.case), by_method.get(r.method, len(methods))
+            return by_case.get(case, len(cases)), tuple(r.case.values()), r.index, method, r.method
+
+        ordered = sorted(records, key=order)
+        self.write_text(self._trials.name, "".join(record.line() for record in ordered))
+        return ordered
+
+    def write_text(self, name: str, text: str) -> Path:
+        """Write a file of the folder, whole or not at all, and return its path."""
+        path = self.path / name
+        part = path.with_name(name + ".part")
+        try:
+            part.write_text(text, encoding="utf-8")
+            os.replace(part, path)
+        except OSError as error:
+            raise OutputError(f"Cannot write {path}: {error.strerror}.") from error
+        return path
+
+
+def read_facts(folder: Path) -> dict[str, Any]:
+    """Return what `run.json` of a run folder says; nothing where there is none."""
+    try:
+        return json.loads((folder / FACTS).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+
+
+def read_costs(folder: Path) -> list[dict[str, Any]]:
+    """Return the lines of a run folder's `timings.jsonl`; a torn last one is left out."""
+    path = folder / "timings.jsonl"
+    if not path.is_file():
+        return []
+    text = path.read_bytes()
+    return [json.loads(line) for line in text[: whole_lines(text)].splitlines()]
+
+
+def append_line(path: Path, line: str) -> None:
+    """Append one line in one write, and wait until the disk has it."""
+    handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+    try:
+        if os.write(handle, line.encode()) < len(line.encode()):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,188 @@
+"""Runs every trial that a rung asks for, on whichever executor, and keeps each as it finishes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from golem.errors import GolemError
+from golem.evaluation.base import Case, Rung, TrialOutcome, TrialSpec, case_name
+from golem.evaluation.harness.progress import Progress
+from golem.evaluation.harness.records import Provenance, TrialRecord
+from golem.evaluation.harness.run_folder import Finished, RunFolder
+from golem.evaluation.harness.trial_executor import TrialExecutor
+from golem.evaluation.harness.trials import Batch, Died, Ending, Refused
+from golem.provenance import Unchanged
+
+ATTEMPTS = 3
+"""A trial is lost when its process has died so often."""
+CRASH = "crash"
+"""Stage of a trial whose process died."""
+TIMEOUT = "timeout"
+"""Stage of a trial that outlasted the limit of wall-clock time."""
+Key = tuple[str, str, int]
+"""Method, name of the case, and index of a trial."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What a run is of.
+
+    Attributes:
+        rung: made with its options.
+        target: its `module:Class`.
+        methods: what is compared.
+        n: trials per method and case.
+        example: a trial, of which method, index and case are to be replaced.
+        limit: wall-clock time that a batch may take [s].
+    """
+
+    rung: Rung[Any]
+    target: str
+    methods: tuple[str, ...]
+    n: int
+    example: TrialSpec
+    limit: float
+
+    def spec(self, method: str, index: int, case: Case) -> TrialSpec:
+        """Return one trial."""
+        e = self.example
+        return TrialSpec(e.rung, method, e.profile, e.seed, index, e.overrides, e.options, case)
+
+    def results(
+        self, method: str, case: Case, found: Mapping[Key, TrialOutcome]
+    ) -> list[TrialOutcome] | None:
+        """Return the outcomes of one case in the order of indices; None until all are among `found`."""
+        keys = [(method, case_name(case), index) for index in range(self.n)]
+        return [found[key] for key in keys] if all(key in found for key in keys) else None
+
+    def complete(self, specs: Sequence[TrialSpec], found: Mapping[Key, TrialOutcome]) -> bool:
+        """Return whether the case of any of `specs` is."""
+        return any(self.results(spec.method, spec.case, found) is not None for spec in specs)
+
+    def wanted(self, found: Mapping[Key, TrialOutcome]) -> list[TrialSpec]:
+        """Return every trial that the rung asks for, given what was `found` so far, in the order to run them."""
+        asked = {
+            method: self.rung.cases(lambda case, method=method: self.results(method, case, found))
+            for method in self.methods
+        }
+        return [
+            self.spec(method, index, cases[number])
+            for index in range(self.n)
+            for number in range(max(len(cases) for cases in asked.values()))
+            for method, cases in asked.items()
+            if number < len(cases)
+        ]
+
+
+class Runner:
+    """Runs one request into one folder.
+
+    Attributes:
+        records: what is kept so far.
+    """
+
+    def __init__(
+        self,
+        request: Request,
+        provenance: Provenance,
+        folder: RunFolder,
+        executor: TrialExecutor,
+        command: str,
+    ) -> None:
+        """Prepare; nothing is run and nothing written before `run`. `command` is the one that continues the run."""
+        self._request, self._provenance, self._folder = request, provenance, folder
+        self._executor, self._command = executor, command
+        self._code = Unchanged()
+        self.records: list[TrialRecord] = []
+        self._found: dict[Key, TrialOutcome] = {}
+        self._asked: set[Key] = set()
+        self._deaths: Counter[Key] = Counter()
+        self._explained: set[tuple[str | None, str]] = set()
+
+    def run(self, held: Sequence[TrialRecord]) -> list[TrialRecord]:
+        """Run what is wanted and not among `held`; return the records of all.
+
+        Raises:
+            golem.errors.GolemError: the rung refuses, or nothing can run any more; finished trials are kept.
+        """
+        records = self.records = list(held)
+        self._found = {record.key: record.outcome for record in held}
+        wanted = self._request.wanted(self._found)
+        with Progress(sum(spec.key in self._found for spec in wanted)) as progress:
+            progress.expect(len(wanted))
+            self._submit(wanted)
+            for batch, ending in self._executor.results():
+                for spec, finished in self._settled(batch, ending):
+                    self._code.check(self._folder.path)
+                    record = self._provenance.record(spec, finished.outcome)
+                    if not records:
+                        self._folder.state(self._command, self._provenance)
+                    self._folder.append(record, finished)
+                    records.append(record)
+                    self._found[record.key] = record.outcome
+                    progress.step(record.success)
+                    self._explain(record, progress)
+                if self._request.rung.adaptive and self._request.complete(batch.specs, self._found):
+                    wanted = self._request.wanted(self._found)
+                    progress.expect(len(wanted))
+                    self._submit(wanted)
+        return records
+
+    def _submit(self, wanted: Sequence[TrialSpec]) -> None:
+        """Submit what is neither found nor asked for yet, trials that belong together in one batch."""
+        groups: dict[Hashable, list[TrialSpec]] = {}
+        for spec in wanted:
+            if spec.key not in self._found and spec.key not in self._asked:
+                self._asked.add(spec.key)
+                groups.setdefault(self._request.rung.together(spec), []).append(spec)
+        p, request = self._provenance, self._request
+        for specs in groups.values():
+            self._executor.submit(
+                Batch(request.target, tuple(specs), request.limit, p.configs, p.code, p.versions)
+            )
+
+    def _settled(self, batch: Batch, ending: Ending) -> Iterable[tuple[TrialSpec, Finished]]:
+        """Return the trials of a batch that came to an outcome; what did not is run again, each by itself."""
+        if isinstance(ending, Refused):
+            raise _refusal(ending)
+        if isinstance(ending, tuple):
+            return zip(batch.specs, ending, strict=True)
+        spec, *others = batch.specs
+        if others:
+            for single in batch.split():
+                self._executor.submit(single)
+            return ()
+        if isinstance(ending, Died):
+            self._deaths[spec.key] += 1
+            if ending.again and self._deaths[spec.key] < ATTEMPTS:
+                self._executor.submit(batch)
+                return ()
+            detail = f"Its process died {ATTEMPTS if ending.again else 'several'} times: {ending.how}."
+            outcome = TrialOutcome(False, CRASH, None, detail, trace=ending.trace)
+        else:
+            place = f", in {ending.place}" if ending.place else ""
+            detail = f"It took longer than {batch.limit:g} s by the clock (--limit){place}."
+            outcome = TrialOutcome(False, TIMEOUT, ending.module, detail, trace=ending.trace)
+        return ((spec, Finished(outcome, batch.limit, 0.0)),)
+
+    def _explain(self, record: TrialRecord, progress: Progress) -> None:
+        """Print where a module failed, once per module and way of failing."""
+        what = record.module, record.stage
+        if record.trace is None or what in self._explained:
+            return
+        self._explained.add(what)
+        who = record.module or "no module to blame"
+        progress.say(
+            f"\nTrial {record.index} of {record.method}: {record.stage}, {who}: {record.detail}\n{record.trace}"
+        )
+
+
+def _refusal(ending: Refused) -> Exception:
+    if ending.trace is None:
+        return GolemError(ending.message)
+    return RuntimeError(
+        f"The rung itself failed, which is a fault of its code, not of a module.\n{ending.trace}"
+    )

@@ -1,0 +1,83 @@
+"""`golem results`: the tables of finished runs in Markdown, so that every published table comes from run folders."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tyro.conf import Positional
+
+from golem.errors import ConfigError, OutputError
+from golem.evaluation.base import RUNGS, make_rung
+from golem.evaluation.harness.records import TrialRecord, read_records
+from golem.evaluation.harness.run_folder import read_costs, read_facts
+from golem.evaluation.metrics.summary import summarise
+from golem.evaluation.metrics.tables import run_tables
+
+
+@dataclass(frozen=True)
+class ResultsConfig:
+    """Write what run folders hold as Markdown: per folder its command, commit, n, seed, profile and tables."""
+
+    runs: Positional[tuple[Path, ...]]
+    """Run folders of golem ladder."""
+    out: Path | None = None
+    """The file to write. Default: the terminal."""
+
+
+def run_results(config: ResultsConfig) -> str:
+    """Return the tables, and write them.
+
+    Raises:
+        ConfigError: no folder is given, one holds no trials, or its trials are of several commits.
+        OutputError: a file is no trial record, or the output cannot be written.
+    """
+    if not config.runs:
+        raise ConfigError("Name at least one run folder.")
+    text = "\n\n".join(section(folder) for folder in config.runs) + "\n"
+    if config.out is None:
+        print(text, end="")
+        return text
+    try:
+        config.out.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"Cannot write {config.out}: {error.strerror}.") from error
+    return text
+
+
+def section(folder: Path) -> str:
+    """Return the Markdown of one run folder.
+
+    Raises:
+        ConfigError, OutputError: see `run_results`.
+    """
+    records = read_records(folder / "trials.jsonl")
+    if not records:
+        raise ConfigError(f"{folder} holds no trials; give the --out folder of a finished golem ladder.")
+    commits = list(dict.fromkeys(record.commit for record in records))
+    if len(commits) > 1:
+        raise ConfigError(
+            f"{folder} holds trials of {len(commits)} commits, {', '.join(commits)}; measure again."
+        )
+    first = records[0]
+    rung = make_rung(RUNGS[first.rung], first.options)
+    methods = tuple(dict.fromkeys(record.method for record in records))
+    summary = summarise(records, methods, read_costs(folder), compared=not rung.adaptive and _paired(records))
+    own = rung.tables({m: [(r.spec, r.outcome) for r in records if r.method == m] for m in methods})
+    tables = [*own, *([] if rung.adaptive else run_tables(summary))]
+    fewest, most = min(row.n for row in summary.rows), max(row.n for row in summary.rows)
+    count = f"{fewest}" if fewest == most else f"{fewest} to {most}"
+    head = (
+        f"Rung `{first.rung}`, profile `{first.profile}`, n = {count} per method{' and case' if first.case else ''}, "
+        f"seed {first.seed}, commit `{commits[0]}`:"
+    )
+    command = read_facts(folder).get("command", "")
+    parts = [head, f"```sh\n{command}\n```" if command else "", *(table.markdown() for table in tables)]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _paired(records: Sequence[TrialRecord]) -> bool:
+    """Return whether every method has the same trials."""
+    keys = {m: {r.key[1:] for r in records if r.method == m} for m in {r.method for r in records}}
+    return len({frozenset(k) for k in keys.values()}) == 1

@@ -1,0 +1,190 @@
+"""The standard tables of a run, for terminal, report and documents alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from golem.evaluation.base import Case
+from golem.evaluation.metrics.metric_labels import METRICS, Metric, metric
+from golem.evaluation.metrics.statistics import Distribution, Interval
+from golem.evaluation.metrics.summary import MethodSummary, PairedMean, Summary
+from golem.evaluation.metrics.text_table import TextTable, short_names
+
+SECONDS = Metric("", "s")
+MINUS = "\N{MINUS SIGN}"
+
+
+def run_tables(summary: Summary) -> list[TextTable]:
+    """Return the tables that say all of a summary: rates, comparisons, metrics, and their paired differences."""
+    tables = [rates(summary), comparisons(summary), metrics(summary), metric_differences(summary)]
+    return [table for table in tables if table is not None]
+
+
+def rates(summary: Summary) -> TextTable:
+    """Return success rates with intervals, times, and where the rest was lost."""
+    times = list(dict.fromkeys(name for row in summary.rows for name in row.times))
+    columns = [
+        "success",
+        "rate",
+        "95 % interval",
+        *(f"{name.replace('_', ' ')} [s]" for name in times),
+        "lost in",
+    ]
+    short = short_names(summary.methods)
+    rows = [
+        (
+            *_head(row, short),
+            f"{row.successes}/{row.n}",
+            f"{percent(row.rate)} %",
+            _interval(row.interval, 100.0),
+            *(_median(row.times.get(name), SECONDS) for name in times),
+            ", ".join(f"{stage} {count}" for stage, count in row.stages.items()) or "-",
+        )
+        for row in summary.rows
+    ]
+    note = "Wilson intervals" + ("; times: median and quartiles, robot time." if times else ".")
+    return TextTable("", (*_names(summary), *columns), tuple(rows), note)
+
+
+def comparisons(summary: Summary) -> TextTable | None:
+    """Return the paired tests of success; None where nothing is compared."""
+    if not summary.comparisons:
+        return None
+    columns = (
+        "both",
+        "only first",
+        "only second",
+        "neither",
+        "difference [points]",
+        "McNemar p",
+        "Holm-adjusted p",
+    )
+    short = short_names(summary.methods)
+    rows = [
+        (
+            f"{short[c.a]} against {short[c.b]}",
+            *_values(c.case),
+            *(str(n) for n in (c.table.both, c.table.only_a, c.table.only_b, c.table.neither)),
+            f"{100 * (c.table.only_a - c.table.only_b) / c.table.n:+.1f} {_interval(c.difference, 100.0, '+')}",
+            p_value(c.p),
+            p_value(c.p_holm),
+        )
+        for c in summary.comparisons
+    ]
+    return TextTable("Paired comparison of success", ("pair", *_names(summary)[1:], *columns), tuple(rows))
+
+
+def metrics(summary: Summary) -> TextTable | None:
+    """Return what was measured: median and mean with intervals, extremes; None where nothing was."""
+    columns = (
+        "n",
+        "median",
+        "95 % interval",
+        "mean",
+        "95 % interval",
+        "rms",
+        "95th percentile of size",
+        "min",
+        "max",
+    )
+    short = short_names(summary.methods)
+    rows = [
+        (_label(name), *_head(row, short), *_figures(d, metric(name)))
+        for name in _measured([{**row.metrics, **row.costs} for row in summary.rows])
+        for row in summary.rows
+        if (d := {**row.metrics, **row.costs}.get(name)) is not None
+    ]
+    if not rows:
+        return None
+    return TextTable(
+        "What was measured",
+        ("metric", *_names(summary), *columns),
+        tuple(rows),
+        "Over the trials that got that far. Intervals: median, between two values; mean, Student's t.",
+    )
+
+
+def metric_differences(summary: Summary) -> TextTable | None:
+    """Return the paired differences of what was measured; None where nothing is compared."""
+    short = short_names(summary.methods)
+    # Where both met the same, as the draws of a scene, there is no difference to tell.
+    rows = [
+        (
+            _label(name),
+            f"{short[c.a]} {MINUS} {short[c.b]}",
+            *_values(c.case),
+            *_difference(c.metrics[name], metric(name)),
+        )
+        for name in _measured([c.metrics for c in summary.comparisons])
+        for c in summary.comparisons
+        if name in c.metrics and c.metrics[name].interval != Interval(0.0, 0.0)
+    ]
+    if not rows:
+        return None
+    columns = ("metric", "pair", *_names(summary)[1:], "n", "mean difference", "95 % interval")
+    return TextTable("Paired differences", columns, tuple(rows), "Student's t over the pairs.")
+
+
+def percent(value: float) -> str:
+    """Return a rate, 0 to 1, in percent."""
+    return f"{100 * value:.1f}"
+
+
+def p_value(value: float) -> str:
+    """Return a p-value as it is quoted."""
+    return "< 0.0001" if value < 1e-4 else f"{value:.2g}"
+
+
+def _names(summary: Summary) -> tuple[str, ...]:
+    return ("method", *(summary.rows[0].case if summary.rows else ()))
+
+
+def _head(row: MethodSummary, short: Mapping[str, str]) -> tuple[str, ...]:
+    return (short[row.method], *_values(row.case))
+
+
+def _values(case: Case) -> tuple[str, ...]:
+    return tuple(value if isinstance(value, str) else f"{value:g}" for value in case.values())
+
+
+def _measured(rows: Sequence[dict[str, Distribution]] | Sequence[dict[str, PairedMean]]) -> list[str]:
+    """Return the names of what was measured, declared metrics first and in their order."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    return [*(name for name in METRICS if name in names), *(name for name in names if name not in METRICS)]
+
+
+def _label(name: str) -> str:
+    m = metric(name)
+    return f"{m.label} [{m.unit}]" if m.unit else m.label
+
+
+def _figures(d: Distribution, m: Metric) -> tuple[str, ...]:
+    return (
+        str(d.n),
+        number(d.median, m),
+        _interval(d.median_interval, m.scale),
+        number(d.mean, m),
+        _interval(d.mean_interval, m.scale),
+        *(number(x, m) for x in (d.rms, d.p95_size, d.minimum, d.maximum)),
+    )
+
+
+def _difference(d: PairedMean, m: Metric) -> tuple[str, ...]:
+    return str(d.n), f"{m.scale * d.mean:+.3g}", _interval(d.interval, m.scale, "+")
+
+
+def number(value: float, m: Metric) -> str:
+    """Return a value in the unit it is shown in, with three digits."""
+    return f"{m.scale * value:.3g}"
+
+
+def _median(d: Distribution | None, m: Metric) -> str:
+    if d is None:
+        return "-"
+    return f"{number(d.median, m)} ({number(d.q1, m)} to {number(d.q3, m)}{f', n = {d.n}'})"
+
+
+def _interval(interval: Interval | None, scale: float, sign: str = "") -> str:
+    if interval is None:
+        return "-"
+    return f"[{scale * interval.low:{sign}.3g}, {scale * interval.high:{sign}.3g}]"

@@ -1,0 +1,93 @@
+"""Figures as inline SVG that takes its colours from the page's style sheet, so that they follow light and dark."""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import Any
+
+from golem.errors import MissingExtra
+from golem.figures import blank_figure
+
+WIDTH = 900.0
+"""Width of a figure over the whole page [px]; the page scales it."""
+_NAMES = (
+    "ink",
+    "muted",
+    "line",
+    "track",
+    "won",
+    "lost",
+    *(f"m{i}" for i in range(6)),
+    *(f"s{i}" for i in range(8)),
+)
+COLOUR = {name: f"#0000{i + 1:02x}" for i, name in enumerate(_NAMES)}
+"""Variable of the style sheet -> the colour that stands for it in a figure."""
+_VARIABLE = {code: f"var(--{name})" for name, code in COLOUR.items()}
+_STYLE: dict[Any, Any] = {
+    "svg.fonttype": "none",
+    "text.color": COLOUR["ink"],
+    "axes.labelcolor": COLOUR["muted"],
+    "axes.edgecolor": COLOUR["line"],
+    "axes.titlecolor": COLOUR["muted"],
+    "axes.titlelocation": "left",
+    "axes.titlesize": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "axes.unicode_minus": True,
+    "grid.color": COLOUR["line"],
+    "grid.linewidth": 0.8,
+    "xtick.color": COLOUR["muted"],
+    "ytick.color": COLOUR["muted"],
+    "xtick.labelcolor": COLOUR["muted"],
+    "ytick.labelcolor": COLOUR["ink"],
+    "ytick.major.size": 0,
+    "font.size": 9,
+    "legend.frameon": False,
+}
+
+
+def method_colour(i: int) -> str:
+    """Return the colour of method number `i`."""
+    return COLOUR[f"m{i % 6}"]
+
+
+def cause_colour(i: int) -> str:
+    """Return the colour of cause number `i` of failures."""
+    return COLOUR[f"s{i % 8}"]
+
+
+def styled() -> Any:
+    """Return the context in which figures of the page are drawn.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    try:
+        import matplotlib
+    except ImportError as error:
+        raise MissingExtra("matplotlib", "report") from error
+    return matplotlib.rc_context(_STYLE)
+
+
+def page_figure(height: float, width: float = WIDTH) -> Any:
+    """Return an empty figure of the page; call it, and `svg`, within `styled`."""
+    return blank_figure(width, height, facecolor="none")
+
+
+def svg(figure: Any, label: str) -> str:
+    """Return a figure as SVG, which says `label` to those who cannot see it."""
+    for axes in figure.axes:
+        axes.set_facecolor("none")
+    stream = io.StringIO()
+    figure.savefig(stream, format="svg", facecolor="none", metadata={"Date": None, "Creator": None})
+    text = stream.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
+    text = re.sub(r"#0000[0-1][0-9a-f]\b", lambda match: _VARIABLE.get(match[0], match[0]), text)
+    text = re.sub(r"font-family: [^;\"]*", "font-family: inherit", text)
+    size = re.search(r'viewBox="[^"]*"', text)
+    assert size is not None
+    return re.sub(r"<svg[^>]*>", f'<svg {size[0]} role="img" aria-label="{label}">', text, count=1)

@@ -1,0 +1,97 @@
+"""What the rungs of lower bodies have in common: a standing stack, one lower body in it, one plant under it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from golem import registry
+from golem.capabilities.legs.base import Envelope
+from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.episodes.episode import LATENCY, Episode, Loss, episode_seed, legs_stack
+from golem.evaluation.harness.arguments import robot_options
+from golem.provenance import stack_facts
+from golem.stack import Stack
+
+NO_WALKER = "walk"
+"""Stage in which a lower body fails that cannot walk."""
+
+
+@dataclass(frozen=True)
+class PlantOptions:
+    """The twin under the lower bodies."""
+
+    latency: float = LATENCY
+    """Delay of motor commands on top of the profile's [s]."""
+    robot: tuple[str, ...] = ()
+    """Further options of the twin, e.g. feet=box cone=elliptic, or mjcf=../h1_2.xml."""
+
+
+O = TypeVar("O", bound=PlantOptions)  # noqa: E741 - the options
+
+
+class LegRung(Rung[O]):
+    """A rung whose methods are lower bodies; `policy:DESCRIPTION:NETWORK` names a policy's files.
+
+    Attributes:
+        twin: further options of the twin that the rung asks for.
+        walks: whether a lower body has to walk.
+    """
+
+    Options = PlantOptions
+    default_methods = ("almi",)
+    twin: Mapping[str, object] = {}
+    walks: bool = False
+
+    def methods(self) -> tuple[str, ...]:
+        """Return the registered lower bodies."""
+        return registry.names("lower_body")
+
+    def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
+        """Return what determines a trial besides its seed; see `Rung`."""
+        return stack_facts(self.stack(method, profile, overrides))
+
+    def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
+        """Run one trial; see `Rung`."""
+        with closing(self.episode(spec)) as episode:
+            if self.walks and not can_walk(episode.running.envelope):
+                return no_walker(spec.method)
+            return self.trial(spec, episode)
+
+    def trial(self, spec: TrialSpec, episode: Episode) -> TrialOutcome:
+        """Run one trial with a robot that hangs in its band and can walk where it has to; `run` closes it."""
+        raise NotImplementedError
+
+    def stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
+        """Return the standing stack with a lower body on the plant."""
+        plant = {"latency": self.options.latency, **robot_options(self.options.robot), **self.twin}
+        return legs_stack(method, profile, overrides, plant)
+
+    def episode(self, spec: TrialSpec) -> Episode:
+        """Return the robot of a trial."""
+        stack = self.stack(spec.method, spec.profile, spec.overrides)
+        return Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker)
+
+
+def can_walk(envelope: Envelope) -> bool:
+    """Return whether a lower body follows any twist at all."""
+    return any(envelope.axes)
+
+
+def no_walker(method: str) -> TrialOutcome:
+    """Return the outcome of a lower body that only stands, where it is asked to walk."""
+    return TrialOutcome(False, NO_WALKER, f"lower_body: {method}", "It does not walk: its envelope is empty.")
+
+
+def judged(
+    method: str, loss: Loss | None, series: Mapping[str, float], timings: Mapping[str, float] | None = None
+) -> TrialOutcome:
+    """Return the outcome of a lower body: lost as `loss` says, or a success."""
+    if loss is None:
+        return TrialOutcome(True, DONE, timings=timings or {}, series=series)
+    return TrialOutcome(
+        False, loss.stage, f"lower_body: {method}", loss.detail, timings or {}, series, trace=loss.trace
+    )

@@ -1,0 +1,186 @@
+"""Rung `push-limit`: the largest push that a lower body survives, by direction and moment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from golem.errors import ConfigError
+from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
+from golem.evaluation.episodes.plain_episode import PlainEpisode, own_legs
+from golem.evaluation.harness.arguments import robot_options
+from golem.evaluation.metrics.text_table import TextTable, short_names
+from golem.evaluation.report.svg_figure import method_colour
+from golem.evaluation.rungs.leg_rung import NO_WALKER, can_walk
+from golem.evaluation.rungs.pushed_rung import PushedOptions, PushedRung
+from golem.robots.mujoco.shoves import DIRECTIONS
+
+Terms = Literal["stack", "own"]
+SURVIVED = 0.95
+"""Share of the trials of a level that has to be survived."""
+
+
+@dataclass(frozen=True)
+class PushLimitOptions(PushedOptions):
+    """The search. Levels ascend until one is lost; where the first level is lost they descend instead."""
+
+    terms: tuple[Terms, ...] = ("stack",)
+    """stack: with gate, estimator, latency and working arms. own: the robot alone in plain MuJoCo, the true state."""
+    first: float = 10.0
+    """First level."""
+    step: float = 10.0
+    """Distance between levels."""
+    last: float = 200.0
+    """Highest level."""
+
+
+class PushLimit(PushedRung[PushLimitOptions]):
+    """Survive ever larger pushes: the largest that 95 of 100 robots survive, by direction and moment."""
+
+    name = "push-limit"
+    Options = PushLimitOptions
+    adaptive = True
+
+    def __init__(self, options: PushLimitOptions | None = None) -> None:
+        """Check the search; see `Rung`."""
+        super().__init__(options)
+        o = self.options
+        for option, value in (("first", o.first), ("step", o.step)):
+            if value <= 0.0:
+                raise ConfigError(f"--{option} is {value:g}; it must be more than 0.")
+        if o.last < o.first:
+            raise ConfigError(f"--last is {o.last:g}; it must be at least --first, {o.first:g}.")
+        self._each("terms")
+
+    def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
+        """Return what determines a trial besides its seed; see `Rung`."""
+        if "own" in self.options.terms:
+            own_legs(method)
+        return super().config(method, profile, overrides)
+
+    def cases(self, results: Results) -> Sequence[Case]:
+        """Return the levels of every direction as far as the results lead."""
+        return [
+            case
+            for terms in self.options.terms
+            for phase in self.options.phase
+            for direction in self.options.direction
+            for case in self._levels(results, terms, phase, direction)
+        ]
+
+    def _levels(self, results: Results, terms: str, phase: str, direction: str) -> Iterator[Case]:
+        level: float | None = self.options.first
+        while level is not None:
+            case: Case = {"terms": terms, "phase": phase, "direction": direction, "level": level}
+            yield case
+            found = results(case)
+            if found is None:
+                return
+            level = self.next([None if o.success else o.stage for o in found], level)
+
+    def next(self, losses: Sequence[str | None], level: float) -> float | None:
+        """Return the level to try after `level` in one direction: up as long as they pass, down if the first fails.
+
+        Args:
+            losses: the stage in which each robot was lost at this level; None where it survived.
+            level: present one.
+        """
+        o, passed = self.options, survived(losses)
+        if level < o.first:
+            following = None if passed else level - o.step
+        elif passed:
+            following = level + o.step
+        else:
+            following = o.first - o.step if level == o.first and NO_WALKER not in losses else None
+        return following if following is not None and 1e-9 < following <= o.last + 1e-9 else None
+
+    def together(self, spec: TrialSpec) -> Hashable:
+        """Return what trials share that have one past: all but level and direction."""
+        return spec.method, spec.index, spec.case["terms"], spec.case["phase"]
+
+    def pushed(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
+        """Push one robot, on the terms of its case; see `PushedRung`."""
+        spec = specs[0]
+        if spec.case["terms"] != "own":
+            return super().pushed(specs)
+        path = robot_options(self.options.robot).get("mjcf")
+        plain = PlainEpisode(spec.method, None if path is None else Path(path), spec.rng("start"))
+        return self.from_moment(specs, plain, can_walk(plain.envelope), self.moment(spec).reach_plainly)
+
+    def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
+        """Return the largest push survived, a row per method, terms and phase."""
+        o, kind = self.options, self.options.kind
+        what = (
+            "shove of 0.2 s on the torso [N s]"
+            if kind == "shove"
+            else "half-sine push of 1 s at the pelvis [N]"
+        )
+        n = len({spec.index for trials in outcomes.values() for spec, _ in trials})
+        rows, short = list[tuple[str, ...]](), short_names(outcomes)
+        for method, trials in outcomes.items():
+            for terms in o.terms:
+                for phase in o.phase:
+                    mine = [t for t in trials if (t[0].case["terms"], t[0].case["phase"]) == (terms, phase)]
+                    cells = [limit([t for t in mine if t[0].case["direction"] == d]) for d in o.direction]
+                    lowest = min(cells, key=lambda cell: cell[0])[1]
+                    rows.append((short[method], terms, phase, *(text for _, text in cells), lowest))
+        directions = (d.replace("_", " ") for d in o.direction)
+        return (
+            TextTable(
+                f"Largest {what} survived in at least {100 * SURVIVED:.0f} % of {n} trials",
+                ("lower body", "terms", "phase", *directions, "min"),
+                tuple(rows),
+                f"A level is lost with {allowed(n) + 1} of {n} trials; >=: the highest one tried was not lost.",
+            ),
+        )
+
+    def plot(self, outcomes: Outcomes, figure: Any) -> str | None:
+        """Draw the largest push survived over its direction, ahead at the top; a plot per terms and phase."""
+        o = self.options
+        cells, short = [(terms, phase) for terms in o.terms for phase in o.phase], short_names(outcomes)
+        angles = np.radians([45.0 * DIRECTIONS.index(direction) for direction in o.direction])
+        plots = figure.subplots(1, len(cells), subplot_kw={"projection": "polar"}, squeeze=False)[0]
+        for axes, (terms, phase) in zip(plots, cells, strict=True):
+            for i, (method, trials) in enumerate(outcomes.items()):
+                mine = [t for t in trials if (t[0].case["terms"], t[0].case["phase"]) == (terms, phase)]
+                best = [limit([t for t in mine if t[0].case["direction"] == d])[0] for d in o.direction]
+                closed = np.append(angles, angles[:1]), [*best, best[0]]
+                axes.plot(
+                    *closed,
+                    "o-",
+                    color=method_colour(i),
+                    ms=4,
+                    label=short[method] if axes is plots[0] else None,
+                )
+                axes.fill(*closed, color=method_colour(i), alpha=0.12)
+            axes.set(theta_offset=np.pi / 2, title=f"{phase.replace('_', ' ')}, {terms}")
+            axes.set_xticks(np.radians(45.0 * np.arange(8)), [d.replace("_", " ") for d in DIRECTIONS])
+        figure.legend(loc="outside lower center", ncols=3)
+        return f"Largest push survived, by direction [{'N s' if o.kind == 'shove' else 'N'}]"
+
+
+def allowed(n: int) -> int:
+    """Return how many of `n` trials a level may lose."""
+    return math.floor((1.0 - SURVIVED) * n + 1e-9)
+
+
+def survived(losses: Sequence[str | None]) -> bool:
+    """Return whether a level passed, of whose trials `losses` were lost, None where one was not."""
+    return sum(loss is not None for loss in losses) <= allowed(len(losses))
+
+
+def limit(trials: Sequence[tuple[TrialSpec, TrialOutcome]]) -> tuple[float, str]:
+    """Return the largest level survived in one direction, and how it is written; 0 where none was."""
+    levels: dict[float, list[str | None]] = {}
+    for spec, outcome in trials:
+        levels.setdefault(float(spec.case["level"]), []).append(None if outcome.success else outcome.stage)
+    if any(NO_WALKER in losses for losses in levels.values()):
+        return 0.0, "does not walk"
+    best = max((level for level, losses in levels.items() if survived(losses)), default=0.0)
+    lost = any(not survived(losses) for losses in levels.values())
+    return best, f"{best:g}" if lost else f">= {best:g}"
