@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
 
 from golem import cli
+from golem.errors import SlowModule
 
 BROKEN = {
     "no command": ([], None),
     "command": (["ladr"], "Did you mean 'ladder'?"),
     "rung": (
         ["ladder", "--rung", "teter"],
-        "valid: navigate-line, push, push-ramp, stand, tether. Did you mean 'tether'?",
+        "valid: base-estimation, gate-limits, mpc-rate, navigate-line, odometry, push, push-limit, push-ramp, stand, ",
     ),
     "method": (["ladder", "--method", "centriod"], "Did you mean 'centroid'?"),
     "method file": (["ladder", "--method", "x.py:Mine"], "does not exist"),
+    "option of a rung": (["ladder", "--rung", "push-limit", "--first", "0"], "--first is 0; it must be more"),
+    "executor": (["ladder", "--executor", "slurm"], "'local' or 'dask:ADDRESS'"),
+    "trial": (["ladder", "--show", "nobody:3"], "Unknown trial 'nobody:3'"),
+    "results": (["results", "nowhere"], "nowhere holds no trials"),
     "profile": (["ladder", "--profile", "feild"], "valid: bench, field, ideal"),
     "n": (["ladder", "-n", "0"], "-n is 0; it must be 1 or more"),
     "slot": (["ladder", "--use", "upperbody=diff_ik"], "Did you mean 'upper_body'?"),
@@ -33,7 +39,14 @@ BROKEN = {
     "skill and by hand": (["run", "--skill", "pick", "--operate"], "give it or --skill, not both"),
     "skill of a domain": (["skill"], "Say which skill"),
     "format": (["model", "export", "--format", "step", "--out", "x"], "valid: mjcf, urdf"),
-    "model": (["model", "import"], "valid: export"),
+    "model": (["model", "import"], "valid: export, spheres"),
+    "spheres": (["model", "spheres", "none.urdf"], "Cannot read 'none.urdf'"),
+    "device": (["drivers", "estp"], "Did you mean 'estop'?"),
+    "board": (["drivers", "estop", "/dev/no_board"], "'/dev/no_board' cannot be opened"),
+    "hands": (["drivers", "hands"], "--left.port /dev/ttyUSB0"),
+    "bus": (["drivers", "hands", "--left.port", "/dev/no_bus"], "'/dev/no_bus' cannot be opened"),
+    "lidar": (["drivers", "lidar", "192.0.2.1"], "Nobody can listen to the LiDAR at 192.0.2.1"),
+    "board's port": (["safety", "--estop.use", "serial"], "estop: {use: serial, port: /dev/ttyACM0}"),
     "train": (["train", "arms"], "valid: detector, legs"),
 }
 
@@ -97,3 +110,42 @@ def test_the_model_is_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
             cli.main()
         assert end.value.code == 0
         assert "left_knee" in out.read_text()
+
+
+def test_a_modules_fault_ends_in_its_sentence_and_the_lines_that_led_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text("import golem\n1 / 0\n")
+    (tmp_path / "mine.yaml").write_text(f"upper_body: {tmp_path / 'mine.py'}:Arms\n")
+    monkeypatch.setattr(sys, "argv", ["golem", "run", str(tmp_path / "mine.yaml")])
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    sentence, *trace = capsys.readouterr().err.splitlines()
+    assert end.value.code == 2
+    assert sentence.endswith("importing it raised ZeroDivisionError: division by zero (mine.py:2)")
+    assert trace == [
+        "Traceback (most recent call last):",
+        f'  File "{tmp_path / "mine.py"}", line 2, in <module>',
+        "    1 / 0",
+        "ZeroDivisionError: division by zero",
+    ]
+
+
+def test_a_slow_module_is_told_in_one_line_and_other_warnings_as_ever(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def slow(words: list[str]) -> int:
+        warnings.warn("arms take 50 ms", SlowModule, stacklevel=1)
+        warnings.warn("something else", RuntimeWarning, stacklevel=1)
+        return 0
+
+    monkeypatch.setitem(cli.COMMANDS, "slow", slow)
+    monkeypatch.setattr(sys, "argv", ["golem", "slow"])
+    with warnings.catch_warnings(), pytest.raises(SystemExit):
+        warnings.simplefilter("always")
+        monkeypatch.setattr(cli, "_SHOW_WARNING", lambda message, *_: print(f"{message!r}", file=sys.stderr))
+        cli.main()
+    assert capsys.readouterr().err.splitlines() == [
+        "golem: arms take 50 ms",
+        "RuntimeWarning('something else')",
+    ]

@@ -2,14 +2,18 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from golem.dashboard.page import PickRecord, render_page
-from golem.demo import Demo, DemoConfig, run_demo
+from golem.demo import Demo, DemoConfig, DemoResult, run_demo
 from golem.errors import ConfigError, GolemError, OutputError
+from golem.evaluation.report.demo_page import PickRecord, balance_figures, balance_section, demo_page
+from golem.provenance import commit
+from golem.robots.mujoco.balance import BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.run import no_display
 from golem.runtime.lockstep import LockstepRunner, build
@@ -45,6 +49,11 @@ def test_a_world_without_screws_is_named(tmp_path: Path) -> None:
         run_demo(DemoConfig(stack=str(mine), headless=True, out=tmp_path / "demo"))
 
 
+def page_of(result: DemoResult) -> str:
+    assert result.report is not None
+    return result.report.read_text()
+
+
 @pytest.fixture(scope="module")
 def upright() -> Iterator[tuple[LockstepRunner, MujocoRobot]]:
     """A robot that has just been let go."""
@@ -67,8 +76,10 @@ def test_the_push_at_the_end_is_survived_and_reported(
     figures = json.loads((tmp_path / "demo.json").read_text())
     assert figures["success"] is figures["fallen"] is False
     assert figures["balance"]["push_margin_final"] > 0.05
-    report = result.report.read_text()
+    report = page_of(result)
     assert "A push at the end" in report and "It stood on its own feet" in report
+    assert commit() in report and "mujoco" in report
+    assert f"golem demo --stack stand --headless --profile bench --seed 0 --out {tmp_path}" in report
 
 
 def test_a_robot_that_fell_has_failed_and_the_report_says_so(
@@ -81,7 +92,21 @@ def test_a_robot_that_fell_has_failed_and_the_report_says_so(
     assert demo.lost() and demo.over()
     result = demo.write([])
     assert result.screws == ["screw_09"] and not result.success
-    assert "The robot fell." in result.report.read_text()
+    assert "The robot fell." in page_of(result)
+
+
+def test_without_the_extra_the_demonstration_ends_well_and_says_how_to_get_the_report(
+    upright: tuple[LockstepRunner, MujocoRobot],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    demo = Demo(DemoConfig(headless=True, out=tmp_path), *upright)
+    demo.tick()
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    result = demo.write([])
+    assert result.report is None and (tmp_path / "demo.json").exists()
+    assert "golem-humanoid[report]" in capsys.readouterr().out
 
 
 def test_a_folder_that_cannot_be_written_is_noticed_before_anything_runs(tmp_path: Path) -> None:
@@ -101,8 +126,29 @@ def test_the_page_names_every_pick_and_escapes_what_it_quotes() -> None:
         ),
         PickRecord(False, None, "extract", "It <slipped>.", 8.5, 5.0, [("detect", 0.1), ("extract", 1.0)]),
     ]
-    page = render_page("1 of 2", picks, None, ["demo.gif", "demo.mp4"], {"seed": "0"})
+    poster = np.zeros((9, 16, 3), np.uint8)
+    page = demo_page("1 of 2", picks, None, ["demo.gif", "demo.mp4"], poster, {"command": "golem demo"}, [])
     assert "screw_09 in the tray" in page and "lost in extract" in page
     assert "<slipped>" not in page and "&lt;slipped&gt;" in page
-    assert 'src="demo.mp4"' in page and 'src="demo.gif"' in page
+    assert 'src="demo.mp4"' in page and 'href="demo.gif"' in page
+    assert 'poster="data:image/jpeg;base64,' in page, "the film shows something before it is played"
     assert "http" not in page  # needs no network
+
+
+def test_work_and_push_are_told_apart() -> None:
+    margin = np.full(500, 0.1)
+    margin[200:220] = -0.15
+    three = np.zeros((500, 3))
+    t = np.linspace(0.0, 4.99, 500, dtype=np.float64)
+    whole = BalanceTrace(t, margin, three, three, np.zeros(500), three, np.ones((500, 2), bool), three)
+    assert balance_figures(whole, None)["margin_min"] == -0.15
+    figures = balance_figures(whole, 1.95)
+    assert (figures["margin_min"], figures["push_margin_min"], figures["push_margin_final"]) == (
+        0.1,
+        -0.15,
+        0.1,
+    )
+    work, push = balance_section(whole, 1.95, figures)
+    assert "100 mm or more" in work[1] and "Minimum margin -150 mm" in push[1]
+    assert work[2].startswith("<svg") and push[2].startswith("<svg")
+    assert len(balance_section(whole, None, balance_figures(whole, None))) == 1

@@ -10,7 +10,8 @@ import pytest
 import tyro
 import yaml
 
-from golem.runtime.live.process import SafetyConfig, TwinConfig, UpConfig
+from golem.runtime.live.process import TwinConfig, UpConfig
+from golem.runtime.live.safety_main import SafetyConfig
 
 ROOT = Path(__file__).parents[1]
 COMMANDS = {"twin": TwinConfig, "safety": SafetyConfig, "up": UpConfig}

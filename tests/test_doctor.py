@@ -40,7 +40,7 @@ def test_a_missing_gl_library_is_named_with_its_line(monkeypatch: pytest.MonkeyP
 
 
 def test_a_failing_row_makes_the_table_fail(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "check_graphics", lambda: doctor.Check("graphics", "none", "type [this]"))
+    monkeypatch.setattr(doctor, "check_graphics", lambda: doctor.Diagnosis("graphics", "none", "type [this]"))
     code, text = printed()
     assert code == 2
     assert "type [this]" in text

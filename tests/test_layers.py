@@ -11,7 +11,7 @@ SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
 
 # From the bottom up. A package may import from its own row and from every row below it.
 LAYERS = (
-    ("__init__", "types", "errors", "options", "registry"),
+    ("__init__", "types", "errors", "figures", "finite", "options", "traces", "registry", "slots"),
     ("middleware",),
     ("interfaces",),
     ("robots",),
@@ -19,7 +19,7 @@ LAYERS = (
     ("capabilities",),
     ("skills",),
     ("stack", "runtime", "provenance"),
-    ("evaluation", "training", "dashboard", "doctor"),
+    ("evaluation", "training", "dashboard", "doctor", "option_list"),
     ("run", "demo", "cli", "__main__"),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

@@ -12,9 +12,6 @@ MESSAGES = "msgs"
 MAY_REPEAT = {"__init__.py", "__main__.py", "base.py", "config.py"}
 """File names that say what a file is to its folder."""
 
-PENDING_FILES = {"curve.py", "shoves.py"}
-"""File names that still occur twice; none may come in."""
-
 
 def files() -> list[Path]:
     """Return every source file but the generated ones."""
@@ -40,4 +37,4 @@ def test_no_class_name_occurs_twice() -> None:
 def test_no_file_name_occurs_twice() -> None:
     names = [path.name for path in files() if path.name not in MAY_REPEAT]
     assert len(names) > 250
-    assert twice(names) <= PENDING_FILES
+    assert twice(names) == set()

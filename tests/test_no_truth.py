@@ -25,6 +25,7 @@ from golem.robots.mujoco.truth import Truth
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import Tick
 from golem.skills.pick import PickGoal
+from golem.slots import SLOTS
 from golem.stack import Choice, Stack
 
 SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
@@ -188,7 +189,6 @@ class Inspected:
             ("context", self.running._stack.context),
             ("coroutine", coroutine),
             ("bus", self.running.bus),
-            ("navigator", self.running._stack.context.navigator),
         ]
 
     def module(self, slot: str) -> Any:
@@ -205,7 +205,7 @@ def inspected(monkeypatch: pytest.MonkeyPatch) -> Iterator[Inspected]:
 
 def test_no_module_holds_a_way_to_the_truth(inspected: Inspected) -> None:
     made = {name for name, _ in inspected.roots}
-    assert made >= set(registry.slots()) - {"robot"}
+    assert made >= set(SLOTS) - {"robot"}
     assert inspected.running.bus.count(topics.rgbd_images("head")) > 0
     assert reachable(inspected.roots) == []
 
@@ -213,8 +213,7 @@ def test_no_module_holds_a_way_to_the_truth(inspected: Inspected) -> None:
 @pytest.mark.parametrize("legs", ["wbc", "mpc"])
 def test_no_module_of_a_standing_robot_does(legs: str, monkeypatch: pytest.MonkeyPatch) -> None:
     on_ground = Choice("mujoco", {"support": "ground"})
-    estimator = Choice("random_walk_kf")
-    stack = Stack(robot=on_ground, estimator=estimator, lower_body=Choice(legs), fallback=Choice("wbc"))
+    stack = Stack({"robot": on_ground, "lower_body": Choice(legs), "fallback": Choice("wbc")})
     inspected = Inspected(monkeypatch, stack)
     robot = inspected.robot
 

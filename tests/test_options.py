@@ -9,7 +9,7 @@ from typing import Any, Literal
 import pytest
 
 from golem.errors import ConfigError
-from golem.options import convert_all, fill
+from golem.options import convert_all, fill, read_yaml
 
 
 @dataclass(frozen=True)
@@ -126,3 +126,7 @@ def test_supplied_parameters_are_not_options() -> None:
 
 def test_a_constructor_that_takes_any_keyword_gets_any() -> None:
     assert convert_all("option", TakesAll, {"x": 1}) == {"x": 1}
+
+
+def test_a_number_with_an_exponent_needs_no_point() -> None:
+    assert read_yaml("[1e-6, -2E3, 1e6f]", "x") == [1e-6, -2000.0, "1e6f"]

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import subprocess
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -34,7 +35,7 @@ def commit() -> str:
 
 
 def code() -> str:
-    return provenance.code_digest.__wrapped__()
+    return provenance.digest(provenance.code_files.__wrapped__())
 
 
 def test_the_commit_is_gits_and_says_when_files_differ(package: Path) -> None:
@@ -65,7 +66,7 @@ def test_a_package_that_a_strangers_repository_ignores_is_not_of_its_commit(
     assert commit() == "1.2.3"
 
 
-def test_the_code_digest_follows_content_and_names_but_no_caches(package: Path) -> None:
+def test_the_code_files_follows_content_and_names_but_no_caches(package: Path) -> None:
     first = code()
     (package / "__pycache__").mkdir()
     (package / "__pycache__" / "x.pyc").write_bytes(b"cache")
@@ -86,9 +87,9 @@ def test_a_users_policy_is_its_description_and_its_network(tmp_path: Path) -> No
         Choice("policy", {"file": str(mine)}),
         Choice("handover", {"walk": policy, "stand": policy}),
     ):
-        before = provenance.user_files(Stack(lower_body=legs))
+        before = provenance.user_files(Stack({"lower_body": legs}))
         network.write_bytes(network.read_bytes() + b"more")
-        after = provenance.user_files(Stack(lower_body=legs))
+        after = provenance.user_files(Stack({"lower_body": legs}))
         assert before.keys() == after.keys() and before != after
 
 
@@ -96,9 +97,9 @@ def test_a_part_that_a_class_of_a_users_file_plays_is_that_file(tmp_path: Path) 
     mine = tmp_path / "mine.py"
     mine.write_text("one = 1\n")
     legs = Choice("handover", {"walk": {"use": f"{mine}:Mine"}, "stand": {"use": "almi"}})
-    before = provenance.user_files(Stack(lower_body=legs))
+    before = provenance.user_files(Stack({"lower_body": legs}))
     mine.write_text("one = 2\n")
-    after = provenance.user_files(Stack(lower_body=legs))
+    after = provenance.user_files(Stack({"lower_body": legs}))
     assert before.keys() == after.keys() == {"lower_body/walk/use"} and before != after
 
 
@@ -115,7 +116,43 @@ def test_a_module_named_by_its_package_is_a_users_file_too(
     file = tmp_path / "my_package" / "legs.py"
     file.write_text("one = 1\n")
     monkeypatch.syspath_prepend(str(tmp_path))
-    stack = Stack(lower_body=Choice("my_package.legs:Mine"))
+    stack = Stack({"lower_body": Choice("my_package.legs:Mine")})
     before = provenance.user_files(stack)
     file.write_text("one = 2\n")
     assert before.keys() == {"lower_body/use"} and provenance.user_files(stack) != before
+
+
+@dataclass(frozen=True)
+class Inner:
+    level: float = 1.0
+
+
+@dataclass(frozen=True)
+class Command:
+    out: str = "runs"
+    n: int = 3
+    method: tuple[str, ...] = ()
+    quick: bool = False
+    view: bool = True
+    seed: int = 0
+    inner: Inner = Inner()
+
+
+def test_a_command_line_says_what_is_not_the_default_and_what_shall_always_be_said() -> None:
+    assert provenance.command_line("golem x", Command(), always=("seed",)) == "golem x --seed 0"
+    given = Command("my runs", 4, ("a", "{use: b}"), True, False, 0, Inner(2.5))
+    assert provenance.command_line("golem x", given) == (
+        "golem x --out 'my runs' -n 4 --method a '{use: b}' --quick --no-view --level 2.5"
+    )
+
+
+def test_changes_are_named_by_where_they_are() -> None:
+    old = {"stack": {"latency": 0.02, "use": "a"}, "files": {"x.py": 16 * "a", "gone.py": 16 * "a"}}
+    new = {"stack": {"latency": 0.04, "use": "a"}, "files": {"x.py": 16 * "b"}, "seed": 1}
+    assert provenance.changes("", old, new) == [
+        "stack.latency was 0.02 and is 0.04",
+        "files.x.py has changed",
+        "files.gone.py has changed",
+        "seed was absent and is 1",
+    ]
+    assert provenance.changes("", old, old) == []

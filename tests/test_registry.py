@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from golem import registry
 from golem.capabilities.grasping.centroid import Centroid
 from golem.capabilities.grasping.visual_servo import VisualServo
 from golem.errors import ConfigError, ModuleFault
+from golem.slots import KEYS, SLOTS
 
 USER_FILE = """
 from __future__ import annotations
@@ -51,7 +53,15 @@ def user(tmp_path: Path) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("slot", registry.slots())
+def test_every_slot_has_a_contract_and_every_key_a_slot_with_its_default() -> None:
+    for slot in SLOTS:
+        assert registry.contract(slot).__name__ in SLOTS[slot].contract
+    assert {row.slot for row in KEYS.values()} == set(SLOTS) - {registry.SKILL}
+    for row in KEYS.values():
+        assert {row.default, row.standing or row.default} <= set(SLOTS[row.slot].shipped)
+
+
+@pytest.mark.parametrize("slot", SLOTS)
 def test_every_registered_name_is_a_class_with_the_promised_name(slot: str) -> None:
     for use in registry.names(slot):
         if use == "pink_ik":
@@ -127,6 +137,11 @@ def test_a_wrong_name_is_answered_with_what_would_work(slot: str, use: str, word
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
+def test_a_file_without_a_class_is_answered_with_the_form() -> None:
+    with pytest.raises(ConfigError, match=r"'my\.py' names a file and no class in it; write my\.py:CLASS\."):
+        registry.load("hand", "my.py")
+
+
 def test_a_wrong_class_of_a_file_is_answered_with_its_classes(user: str) -> None:
     with pytest.raises(ConfigError, match=r"'WithConfg'; valid: .*WithKeywords.* Did you mean 'WithConfig'"):
         registry.create("hand", f"{user}:WithConfg", {})
@@ -164,16 +179,41 @@ def test_a_constructor_that_raises_is_the_modules_fault(user: str) -> None:
         registry.create("hand", f"{user}:Raises", {})
 
 
-def test_a_new_name_may_be_registered_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    table = {slot: dict(names) for slot, names in registry._IMPLEMENTATIONS.items()}
-    monkeypatch.setattr(registry, "_IMPLEMENTATIONS", table)
-    registry.register("grasp_method", "mine", "golem.capabilities.grasping.centroid:Centroid")
-    registry.register("grasp_method", "mine", "golem.capabilities.grasping.centroid:Centroid")
-    assert registry.load("grasp_method", "mine") is Centroid
-    with pytest.raises(ConfigError, match="already stands for golem.capabilities.grasping.centroid:Centroid"):
-        registry.register("grasp_method", "mine", "golem.capabilities.grasping.visual_servo:VisualServo")
-    with pytest.raises(ConfigError, match=r"Unknown slot 'grasp'.*Did you mean 'grasp_method'"):
-        registry.register("grasp", "mine", "a:B")
+def install(folder: Path, package: str, *points: str) -> None:
+    """Install a package of one module `PACKAGE`, with entry points of the grasp methods' group, into `folder`."""
+    (folder / f"{package}.py").write_text("class Mine: ...\n")
+    info = folder / f"{package}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("\n".join(("[golem.grasp_method]", *points)))
+
+
+def test_an_installed_package_registers_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert "suction" not in registry.names("grasp_method")
+    install(tmp_path, "sucker", "suction = sucker:Mine")
+    monkeypatch.syspath_prepend(str(tmp_path / "another"))  # what is installed is looked up once per path
+    assert "sucker" not in sys.modules
+    assert type(registry.create("grasp_method", "suction", {})).__module__ == "sucker"
+    assert registry.names("grasp_method") == ("centroid", "visual_servo", "suction")
+    with pytest.raises(ConfigError, match="centroid, suction, visual_servo. Did you mean 'suction'"):
+        registry.load("grasp_method", "sucton")
+    assert "suction" not in registry.names("lower_body")
+
+
+def test_a_name_that_two_packages_register_is_refused_with_both(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path, "one_pack", "suction = one_pack:Mine", "centroid = one_pack:Mine")
+    install(tmp_path, "other_pack", "suction = other_pack:Mine")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(ConfigError, match="'suction' .* registered by (one|other)_pack and (one|other)_pack"):
+        registry.load("grasp_method", "suction")
+    with pytest.raises(ConfigError, match="'centroid' .* registered by golem-humanoid and one_pack"):
+        registry.load("grasp_method", "centroid")
+    assert registry.load("grasp_method", "one_pack:Mine").__name__ == "Mine"
+    assert registry.load("grasp_method", "visual_servo") is VisualServo
+    assert registry.names("grasp_method").count("centroid") == 1
 
 
 def test_a_class_that_does_not_say_what_it_takes_is_at_fault() -> None:

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from golem import registry
+from golem.capabilities.legs.foot_separation import FootSeparationConfig
+from golem.capabilities.legs.locomotion import LocomotionConfig
 from golem.errors import ConfigError
-from golem.middleware.unitree_api import LOCO_APIS
+from golem.interfaces.unitree_api import LOCO_APIS
+from golem.runtime.onboard_nodes import stack_loco_api
+from golem.slots import KEYS
 from golem.stack import Choice, Stack, load_stack, parse_stack, shipped
+
+GROUND = "robot: {use: mujoco, support: ground}"
 
 
 def test_an_empty_file_is_the_default_stack() -> None:
@@ -25,12 +30,8 @@ def test_the_shipped_stacks_name_implementations_that_exist() -> None:
     assert "tether" in shipped()
     for name in shipped():
         stack = load_stack(name)
-        for slot in registry.slots():
-            assert stack.choice(slot).use in registry.names(slot)
-
-
-def test_every_slot_of_the_registry_is_a_key() -> None:
-    assert set(registry.slots()) < {f.name for f in fields(Stack)}
+        for key, row in KEYS.items():
+            assert stack.choice(key).use in registry.names(row.slot)
 
 
 def test_names_options_and_words() -> None:
@@ -40,9 +41,9 @@ def test_names_options_and_words() -> None:
     profile: field
     """
     stack = parse_stack(text, "x.yaml")
-    assert stack.upper_body == Choice("pink_ik")
+    assert stack.choice("upper_body") == Choice("pink_ik")
     options = {"servo": {"tolerance": 0.002}, "list": [1, "a", None, True]}
-    assert stack.grasp_method == Choice("visual_servo", options)
+    assert stack.choice("grasp_method") == Choice("visual_servo", options)
     assert (stack.profile, stack.limits) == ("field", "urdf")
 
 
@@ -114,6 +115,12 @@ def test_a_file_that_is_not_there_is_answered_with_the_shipped_ones(tmp_path: Pa
         load_stack(tmp_path / "none.yaml")
 
 
+def test_a_name_without_its_ending_is_answered_with_the_file(tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text("profile: ideal")
+    with pytest.raises(ConfigError, match=r"No stack file .* Did you mean '.*mine\.yaml'\?"):
+        load_stack(tmp_path / "mine")
+
+
 def test_a_file_that_is_not_text_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.yaml"
     path.write_bytes(b"\xff\xfe\x00\x81")
@@ -127,31 +134,80 @@ def test_a_file_is_read(tmp_path: Path) -> None:
     assert load_stack(path) == Stack(profile="ideal")
 
 
-CHANGED: dict[str, Any] = (
-    {slot: Choice(Stack().choice(slot).use, {"option": 1}) for slot in registry.slots()}
-    | {"fallback": Choice("hold"), "onboard": Choice("hold"), "profile": "field", "limits": "paper"}
-    | {"skills": {"pick": Choice("pick", {"force": 8.0})}}
-)
+CHANGED = [Stack().with_options(key, option=1) for key in KEYS]
+CHANGED += [Stack(parts={"locomotion": {"blend": False}}), Stack(profile="field"), Stack(limits="paper")]
+CHANGED += [Stack(skills={"pick": Choice("pick", {"force": 8.0})})]
 
 
-@pytest.mark.parametrize("key", [f.name for f in fields(Stack)])
-def test_the_digest_changes_with_everything(key: str) -> None:
-    assert replace(Stack(), **{key: CHANGED[key]}).digest() != Stack().digest()
+def test_the_digest_changes_with_everything() -> None:
+    assert len({stack.digest() for stack in (Stack(), *CHANGED)}) == 1 + len(CHANGED)
+    assert len(CHANGED) == len(KEYS) + len(fields(Stack)) - 1
+
+
+def test_a_default_that_is_named_is_no_other_stack() -> None:
+    assert parse_stack("servo: pd_gravity\nonboard: almi", "x") == Stack()
 
 
 def test_a_robot_on_its_feet_falls_back_on_legs_that_balance() -> None:
-    assert Stack().legs_in_reserve == Choice("hold")
-    assert parse_stack("robot: {use: mujoco, support: ground}", "x").legs_in_reserve == Choice("almi")
+    assert Stack().choice("fallback") == Choice("hold")
+    assert parse_stack(GROUND, "x").choice("fallback") == Choice("almi")
     chosen = parse_stack("fallback: {use: hold, stance: crouch}", "x")
-    assert chosen.legs_in_reserve == Choice("hold", {"stance": "crouch"})
+    assert chosen.choice("fallback") == Choice("hold", {"stance": "crouch"})
 
 
 def test_a_robot_on_its_feet_is_not_taken_to_hang() -> None:
     assert Stack().choice("estimator") == Choice("tether")
-    ground = "robot: {use: mujoco, support: ground}"
-    assert parse_stack(ground, "x").choice("estimator") == Choice("random_walk_kf")
-    with pytest.raises(ConfigError, match="'tether' takes the base to stay.*random_walk_kf, invariant_ekf"):
-        parse_stack(f"{ground}\nestimator: tether", "x")
+    assert parse_stack(GROUND, "x").choice("estimator") == Choice("random_walk_kf")
+    with pytest.raises(ConfigError, match="estimator 'tether' .*'hoist', .* stands .*random_walk_kf, invar"):
+        parse_stack(f"{GROUND}\nestimator: tether", "x").check()
+    parse_stack(GROUND, "x").check()
+    Stack().check()
+
+
+def test_a_module_may_require_a_robot_on_its_feet(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text("class Legs:\n    requires = ('ground',)\n")
+    with pytest.raises(ConfigError, match="lower_body .*mine.py:Legs' .*'ground', and this one hangs"):
+        Stack({"lower_body": Choice(f"{mine}:Legs")}).check()
+
+
+def test_whether_a_robot_stands_is_what_its_class_says(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text(
+        "class Silent: ...\n"
+        "class Tall:\n"
+        "    @classmethod\n"
+        "    def on_feet(cls, options): return not options.get('seated', False)\n"
+    )
+    assert not Stack({"robot": Choice(f"{mine}:Silent", {"support": "ground"})}).on_ground
+    assert Stack({"robot": Choice(f"{mine}:Tall")}).on_ground
+    assert not Stack({"robot": Choice(f"{mine}:Tall", {"seated": True})}).on_ground
+
+
+def test_the_base_layer_of_the_legs_has_options() -> None:
+    text = "locomotion: {trim: off, foot_separation: {minimum: 0.1}, blend: off, timeout: 0.3}"
+    config = parse_stack(text, "x").part("locomotion")
+    separation = FootSeparationConfig(minimum=0.1)
+    assert config == LocomotionConfig(trim=None, foot_separation=separation, blend=None, timeout=0.3)
+    assert Stack().part("locomotion") == LocomotionConfig()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("locomotion: {trimm: off}", ["option of locomotion 'trimm'", "Did you mean 'trim'?"]),
+        ("locomotion: {trim: {gian: 1}}", ["locomotion 'trim'", "'gian'", "Did you mean 'gain'?"]),
+        ("locomotion: {timeout: 0}", ["timeout", "a positive time", "not 0"]),
+        ("locomotion: 3", ["x: 'locomotion' wants", "golem options locomotion"]),
+        ("locomoton: {}", ["'locomoton'", "Did you mean 'locomotion'?"]),
+    ],
+)
+def test_wrong_options_of_the_base_layer_are_refused_where_the_file_is_read(
+    text: str, words: list[str]
+) -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse_stack(text, "x")
+    assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
 def test_the_digest_does_not_depend_on_the_order_of_options() -> None:
@@ -161,10 +217,11 @@ def test_the_digest_does_not_depend_on_the_order_of_options() -> None:
 
 
 def test_another_choice_comes_without_the_options_of_the_old_one() -> None:
-    stack = Stack(hand=Choice("magpie", {"settle": 1.0}), profile="field")
+    stack = Stack({"hand": Choice("magpie", {"settle": 1.0})}, profile="field")
     changed = stack.with_choice("hand", "mine.py:Hand")
-    assert changed.hand == Choice("mine.py:Hand")
-    assert stack.with_choice("hand", "{use: magpie, settle: 2.0}").hand == Choice("magpie", {"settle": 2.0})
+    assert changed.choice("hand") == Choice("mine.py:Hand")
+    again = stack.with_choice("hand", "{use: magpie, settle: 2.0}")
+    assert again == stack.with_options("hand", settle=2.0)
     with pytest.raises(ConfigError, match="use: NAME"):
         stack.with_choice("hand", "{settle: 2.0}")
     assert changed.profile == "field"
@@ -184,12 +241,12 @@ def test_the_twin_runs_legs_on_board_where_something_speaks_to_them() -> None:
 
 
 def test_the_twin_answers_the_calls_that_the_stack_makes() -> None:
-    assert parse_stack("lower_body: almi", "x").loco_api == LOCO_APIS["h1"]
+    assert stack_loco_api(parse_stack("lower_body: almi", "x")) == LOCO_APIS["h1"]
     both = "lower_body: {use: handover, walk: {use: vendor, options: {robot: h2}}, stand: {use: almi}}"
-    assert parse_stack(both, "x").loco_api == LOCO_APIS["h2"]
-    for wrong in ("h3", "[1]"):
-        with pytest.raises(ConfigError, match="loco service .*h1"):
-            _ = parse_stack(f"lower_body: {{use: vendor, robot: {wrong}}}", "x").loco_api
+    assert stack_loco_api(parse_stack(both, "x")) == LOCO_APIS["h2"]
+    for wrong, said in (("h3", "loco service .*h1"), ("[1]", "'robot' is a word")):
+        with pytest.raises(ConfigError, match=said):
+            stack_loco_api(parse_stack(f"lower_body: {{use: vendor, robot: {wrong}}}", "x"))
 
 
 def test_a_stack_file_lists_skills_and_their_options() -> None:

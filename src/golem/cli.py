@@ -8,14 +8,15 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import tyro
 
-from golem.errors import GolemError, unknown_name
+from golem.errors import GolemError, ModuleFault, SlowModule, unknown_name
 
 T = TypeVar("T")
 
@@ -44,15 +45,28 @@ def _run(words: list[str]) -> int:
     return 0 if result.success else BAD_INPUT if result.stage == REFUSED else FAILED
 
 
+def _options(words: list[str]) -> int:
+    """List what a stack file may set: slots, their implementations, the options of one."""
+    _prepare_graphics()
+    from golem.option_list import OptionsConfig, options_text
+
+    print(options_text(_parse(OptionsConfig, "options", words)))
+    return 0
+
+
 def _ladder(words: list[str]) -> int:
     """Compare methods on one rung of the capability ladder, on the same seeds."""
     _prepare_graphics()
-    from golem.evaluation.harness.ladder import LadderConfig, run_ladder
+    from golem.evaluation.harness.ladder import read_ladder, run_ladder
 
-    config = _parse(LadderConfig, "ladder", words)
+    config = read_ladder(words)
+    if config.show is not None:
+        from golem.run import show_trial
+
+        return 0 if show_trial(config).success else FAILED
     result = run_ladder(config)
-    print(result.summary.text())
-    print(f"Report: {result.report}")
+    print(result.text())
+    print(f"Report: {result.report}" if result.report else result.note)
     if config.json:
         print(result.summary.json())
     return 0
@@ -63,6 +77,14 @@ def _compare(words: list[str]) -> int:
     from golem.evaluation.metrics.compare import CompareConfig, run_compare
 
     run_compare(_parse(CompareConfig, "compare", words))
+    return 0
+
+
+def _results(words: list[str]) -> int:
+    """Write the tables of run folders as Markdown, as they stand in the documentation."""
+    from golem.evaluation.metrics.results import ResultsConfig, run_results
+
+    run_results(_parse(ResultsConfig, "results", words))
     return 0
 
 
@@ -79,10 +101,18 @@ class ExportConfig:
 
 
 def _model(words: list[str]) -> int:
-    """Export the robot model as URDF or MJCF."""
-    if words and words[0] not in ("export", "-h", "--help"):
-        raise unknown_name("model command", words[0], ["export"])
-    config = _parse(ExportConfig, "model export", words[1:] if words[:1] == ["export"] else ["--help"])
+    """Export the robot model as URDF or MJCF, or cover a robot with spheres: `model export`, `model spheres`."""
+    if not words or words[0] in ("-h", "--help"):
+        print(f"usage: golem model {{{','.join(MODEL_COMMANDS)}}} [options]")
+        return 0 if words else BAD_INPUT
+    if words[0] not in MODEL_COMMANDS:
+        raise unknown_name("model command", words[0], MODEL_COMMANDS)
+    if words[0] == "spheres":
+        from golem.capabilities.collision.pack_robot import SpheresConfig, run_spheres
+
+        run_spheres(_parse(SpheresConfig, "model spheres", words[1:]))
+        return 0
+    config = _parse(ExportConfig, "model export", words[1:])
     from golem.robots.model.export import export
 
     export(config.format, config.hands, config.out)
@@ -90,21 +120,16 @@ def _model(words: list[str]) -> int:
     return 0
 
 
+MODEL_COMMANDS = ("export", "spheres")
+
+
 def _bench(words: list[str]) -> int:
-    """Print every performance figure beside its reference; `bench push|legs|estimation|dds` test one thing each."""
+    """Print performance figures next to their references; `bench dds`: two processes; `bench arms`: collision, IK."""
     _prepare_graphics()
-    if words[:1] == ["push"]:
-        from golem.evaluation.push_bench import PushBenchConfig, run_push_bench
+    if words[:1] == ["arms"]:
+        from golem.evaluation.speed.arms_bench import ArmsBenchConfig, run_arms_bench
 
-        run_push_bench(_parse(PushBenchConfig, "bench push", words[1:]))
-    elif words[:1] == ["legs"]:
-        from golem.evaluation.leg_bench import LegBenchConfig, run_leg_bench
-
-        run_leg_bench(_parse(LegBenchConfig, "bench legs", words[1:]))
-    elif words[:1] == ["estimation"]:
-        from golem.evaluation.estimation import EstimationConfig, run_estimation
-
-        run_estimation(_parse(EstimationConfig, "bench estimation", words[1:]))
+        run_arms_bench(_parse(ArmsBenchConfig, "bench arms", words[1:]))
     elif words[:1] == ["dds"]:
         from golem.evaluation.speed.dds_bench import DdsBenchConfig, run_dds_bench
 
@@ -149,7 +174,7 @@ def _twin(words: list[str]) -> int:
 
 
 def _safety(words: list[str]) -> int:
-    """Guard the robot on a domain; `safety activate|stop|reset|press|release|status|take` asks the one that does."""
+    """Run the safety gate of a robot on a domain; `safety activate|stop|reset|press|release|status|take` asks it."""
     from golem.runtime.live import operator
 
     if words[:1] == ["take"]:
@@ -157,14 +182,37 @@ def _safety(words: list[str]) -> int:
     if words and words[0] in operator.REQUESTS:
         config = _parse(operator.RequestConfig, f"safety {words[0]}", words[1:])
         return 0 if operator.run_request(words[0], config) else FAILED
-    from golem.runtime.live.process import SafetyConfig, run_safety
+    from golem.runtime.live.safety_main import SafetyConfig, run_safety
 
     run_safety(_parse(SafetyConfig, "safety", words))
     return 0
 
 
+def _drivers(words: list[str]) -> int:
+    """Put a device on a domain: `drivers camera`, `hands` and `lidar`; `drivers estop PORT` tries the e-stop board."""
+    what = words[0] if words else ""
+    if what in ("-h", "--help"):
+        print(f"usage: golem drivers {{{','.join(DEVICES)}}}")
+        return 0
+    if what not in DEVICES:
+        raise unknown_name("device", what, DEVICES)
+    module, config, run = DEVICES[what]
+    driver = importlib.import_module(module)
+    done = getattr(driver, run)(_parse(getattr(driver, config), f"drivers {what}", words[1:]))
+    return FAILED if done is False else 0
+
+
+DEVICES = {
+    "camera": ("golem.runtime.live.camera_process", "CameraConfig", "run_camera"),
+    "estop": ("golem.runtime.estop_check", "EstopCheckConfig", "run_estop_check"),
+    "hands": ("golem.runtime.live.hand_process", "HandsConfig", "run_hands"),
+    "lidar": ("golem.runtime.live.lidar_process", "LidarConfig", "run_lidar"),
+}
+"""What has a driver: its module, its options, and what runs it."""
+
+
 def _up(words: list[str]) -> int:
-    """Run everything of a stack file that decides what the robot on a domain does."""
+    """Run the modules of a stack file for the robot on a domain."""
     from golem.runtime.live.process import UpConfig, run_up
 
     run_up(_parse(UpConfig, "up", words))
@@ -172,7 +220,7 @@ def _up(words: list[str]) -> int:
 
 
 def _launch(words: list[str]) -> int:
-    """Start twin, safety and up for a stack file, and watch over them."""
+    """Start twin, safety and up for a stack file, and supervise them."""
     from golem.runtime.live.launch import LaunchConfig, run_launch
 
     return 0 if run_launch(_parse(LaunchConfig, "launch", words)) else FAILED
@@ -186,7 +234,7 @@ def _restart(words: list[str]) -> int:
 
 
 def _skill(words: list[str]) -> int:
-    """Let the robot on a domain do something; `skill --help` lists what its stack can."""
+    """Call a skill of the robot on a domain; `skill --help` lists those of its stack."""
     from golem.runtime.live.skill_client import run_skill
 
     return run_skill(words)
@@ -222,8 +270,24 @@ def _view(words: list[str]) -> int:
     return 0
 
 
+def _check(words: list[str]) -> int:
+    """Check modules against the contracts of their slots: `check`, `check SLOT`, `check SLOT USE`."""
+    _prepare_graphics()
+    from golem.evaluation.conformance.check_command import CheckConfig, run_check
+
+    return 0 if run_check(_parse(CheckConfig, "check", words)) else FAILED
+
+
+def _new(words: list[str]) -> int:
+    """Write a module for a slot, its test and a stack with it: `new SLOT NAME`."""
+    from golem.evaluation.conformance.new_module import NewConfig, run_new
+
+    run_new(_parse(NewConfig, "new", words), Path.cwd())
+    return 0
+
+
 def _doctor(words: list[str]) -> int:
-    """Say what this machine lacks to run GOLEM, and the line that brings it."""
+    """Report what this machine lacks to run GOLEM, and the line that installs it."""
     _parse(_NoOptions, "doctor", words)
     from golem.doctor import run
 
@@ -232,19 +296,22 @@ def _doctor(words: list[str]) -> int:
 
 @dataclass(frozen=True)
 class _NoOptions:
-    """Say what this machine lacks to run GOLEM, and the line that brings it."""
+    """Report what this machine lacks to run GOLEM, and the line that installs it."""
 
 
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "demo": _demo,
     "run": _run,
+    "options": _options,
     "ladder": _ladder,
     "compare": _compare,
+    "results": _results,
     "model": _model,
     "bench": _bench,
     "train": _train,
     "twin": _twin,
     "safety": _safety,
+    "drivers": _drivers,
     "up": _up,
     "launch": _launch,
     "restart": _restart,
@@ -253,16 +320,21 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "record": _record,
     "replay": _replay,
     "view": _view,
+    "check": _check,
+    "new": _new,
     "doctor": _doctor,
 }
 
 
 def main() -> None:
     """Run the command line; what a user can cause ends in one sentence and exit code 2."""
+    warnings.showwarning = _show_warning
     try:
         code = _dispatch(sys.argv[1:])
     except GolemError as error:
         print(f"golem: {error}", file=sys.stderr)
+        if isinstance(error, ModuleFault) and error.trace is not None:
+            print(error.trace, file=sys.stderr)
         code = BAD_INPUT
     except BrokenPipeError:  # whoever read what is printed has gone, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -273,9 +345,19 @@ def main() -> None:
     sys.exit(code)
 
 
+def _show_warning(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+    if issubclass(category, SlowModule):
+        print(f"golem: {message}", file=sys.stderr)
+    else:
+        _SHOW_WARNING(message, category, *rest)
+
+
+_SHOW_WARNING = warnings.showwarning
+
+
 def _dispatch(words: list[str]) -> int:
     if not words or words[0] in ("-h", "--help"):
-        print("usage: golem COMMAND [options]     (golem COMMAND --help tells the options)\n")
+        print("usage: golem COMMAND [options]     (golem COMMAND --help lists the options)\n")
         for name, command in COMMANDS.items():
             print(f"  {name:8s} {command.__doc__}")
         return 0 if words else BAD_INPUT

@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.dashboard.balance_chart import balance_figures, balance_section
 from golem.dashboard.film import Film, shots
 from golem.dashboard.live import LiveView
-from golem.dashboard.page import PickRecord, render_page
 from golem.dashboard.status import Timeline
-from golem.errors import ConfigError, OutputError
+from golem.errors import ConfigError, MissingExtra, OutputError
 from golem.evaluation.episodes.oracle import Oracle
+from golem.evaluation.report.demo_page import PickRecord, balance_figures, balance_section, demo_page
+from golem.provenance import command_line, commit, versions
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.shoves import Pusher, shove
@@ -55,7 +55,7 @@ class DemoConfig:
     headless: bool = field(default_factory=no_display)
     """Write a film instead of opening the live view; the default where there is no display."""
     screws: int = 2
-    """How many screws shall be in the tray at the end; tried up to twice as often."""
+    """Screws to put in the tray; up to twice as many picks are tried."""
     profile: str = "bench"
     """Realism profile: ideal, bench or field."""
     seed: int = 0
@@ -78,14 +78,14 @@ class DemoResult:
         picks: each attempt.
         screws: the screws in the tray.
         films: the films, the GIF first; empty with the live view.
-        report: the HTML page.
+        report: the HTML page; None where what draws it is not installed.
     """
 
     success: bool
     picks: list[PickRecord]
     screws: list[str]
     films: list[Path]
-    report: Path
+    report: Path | None
 
 
 class Demo:
@@ -189,8 +189,8 @@ class Demo:
                 self.picture = view.picture("close")
                 view.close()
 
-    def write(self, films: list[Path]) -> DemoResult:
-        """Write figures and report."""
+    def write(self, films: list[Path], poster: NDArray[np.uint8] | None = None) -> DemoResult:
+        """Write figures and report; `poster` stands for the film until it is played."""
         config, screws, folder = self._config, self.in_tray(), self._config.out
         robot_time, wall = self._running.executor.t, time.perf_counter() - self._started
         tries = f"{len(self.picks)} pick{'' if len(self.picks) == 1 else 's'}"
@@ -208,21 +208,15 @@ class Demo:
         elif standing:
             lead += " It stood on its own feet from the release of its band on."
         facts = {
+            "command": command_line("golem demo", config, always=("stack", "headless", "profile", "seed")),
             "stack": f"{config.stack}, digest {self._running.stack.digest()}",
             "profile": config.profile,
             "seed": str(config.seed),
+            "commit": commit(),
+            "versions": ", ".join(f"{name} {version}" for name, version in versions().items()),
         }
         balance = balance_figures(self.recorder.trace(), self._pushed_at) if standing else {}
-        page = render_page(
-            lead,
-            self.picks,
-            self.picture,
-            [film.name for film in films],
-            facts,
-            balance_section(self.recorder.trace(), self._pushed_at, balance) if standing else "",
-        )
-        report = folder / "report.html"
-        _write(report, page)
+        report = self._report(lead, films, poster, facts, balance)
         figures = {
             "success": success,
             "screws_in_tray": screws,
@@ -238,8 +232,28 @@ class Demo:
         print(f"{'Done' if success else 'Failed'}: {lead}")
         for film in films:
             print(f"Film:   {film}")
-        print(f"Report: {report}", flush=True)
+        if report is not None:
+            print(f"Report: {report}", flush=True)
         return DemoResult(success, self.picks, screws, films, report)
+
+    def _report(
+        self,
+        lead: str,
+        films: list[Path],
+        poster: NDArray[np.uint8] | None,
+        facts: dict[str, str],
+        balance: dict[str, float],
+    ) -> Path | None:
+        """Write the page; say what is missing where it cannot be drawn."""
+        report = self._config.out / "report.html"
+        try:
+            parts = balance_section(self.recorder.trace(), self._pushed_at, balance) if balance else []
+            names = [film.name for film in films]
+            _write(report, demo_page(lead, self.picks, self.picture, names, poster, facts, parts))
+        except MissingExtra as missing:
+            print(f"No report was written: {missing}", flush=True)
+            return None
+        return report
 
 
 def run_demo(config: DemoConfig) -> DemoResult:
@@ -301,7 +315,7 @@ def _filmed(config: DemoConfig, demo: Demo, running: LockstepRunner, robot: Mujo
             film.headline = f"A push of {SHOVE.impulse:.0f} N s"
             demo.push(watch)
         print(f"Writing the film ({len(film)} pictures).", flush=True)
-        return demo.write(film.save(config.out / "demo.gif"))
+        return demo.write(film.save(config.out / "demo.gif"), film.picture(len(film) // 3))
     finally:
         film.close()
 

@@ -1,4 +1,4 @@
-"""What this machine lacks to run GOLEM, and the line that brings it."""
+"""What this machine lacks to run GOLEM, and the line that installs it."""
 
 from __future__ import annotations
 
@@ -37,8 +37,11 @@ EXTRAS = {
     "record": ("mcap", "rosbags"),
     "foxglove": ("foxglove", "rosbags"),
     "report": ("matplotlib", "jinja2"),
+    "hardware": ("serial",),
+    "realsense": ("pyrealsense2",),
     "cluster": ("distributed",),
     "train": ("torch", "onnx"),
+    "lidar": ("kiss_icp", "rko_lio"),
     "docs": ("mkdocs",),
     "dev": ("pytest",),
 }
@@ -71,7 +74,7 @@ with mujoco.Renderer(model, 8, 8) as renderer:
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class Diagnosis:
     """One row of the table.
 
     Attributes:
@@ -92,24 +95,24 @@ class Check:
         return self.needed and bool(self.fix)
 
 
-def check_python() -> Check:
+def check_python() -> Diagnosis:
     """Look at the version of the interpreter."""
     found = sys.version.split()[0]
     if (3, 11) <= sys.version_info < (3, 14):
-        return Check("Python", found)
-    return Check(
+        return Diagnosis("Python", found)
+    return Diagnosis(
         "Python", found, "install Python 3.11, 3.12 or 3.13, then: make PYTHON=/path/to/python3.12 venv"
     )
 
 
-def check_packages() -> Check:
+def check_packages() -> Diagnosis:
     """Look whether every required package is installed in a version that is allowed."""
     from packaging.requirements import Requirement
 
     try:
         lines = importlib.metadata.requires("golem-humanoid") or []
     except importlib.metadata.PackageNotFoundError:
-        return Check("packages", "golem-humanoid itself is not installed", "make venv")
+        return Diagnosis("packages", "golem-humanoid itself is not installed", "make venv")
     wanted = [Requirement(line) for line in lines if "extra ==" not in line]
     wrong: list[str] = []
     for requirement in wanted:
@@ -121,24 +124,24 @@ def check_packages() -> Check:
         if version not in requirement.specifier:
             wrong.append(f"{requirement.name} is {version}, not {requirement.specifier}")
     if wrong:
-        return Check("packages", "; ".join(wrong), _reinstall_line())
-    return Check("packages", f"{len(wanted)} of {len(wanted)}")
+        return Diagnosis("packages", "; ".join(wrong), _reinstall_line())
+    return Diagnosis("packages", f"{len(wanted)} of {len(wanted)}")
 
 
-def check_extras() -> list[Check]:
+def check_extras() -> list[Diagnosis]:
     """Look which optional extras are there; none is needed."""
-    rows: list[Check] = []
+    rows: list[Diagnosis] = []
     for extra, modules in EXTRAS.items():
         absent = [module for module in modules if importlib.util.find_spec(module) is None]
         line = (
             f"make venv-{LOCKS.get(extra, extra)}" if _CHECKOUT else f"pip install 'golem-humanoid[{extra}]'"
         )
         found = f"without {', '.join(absent)}" if absent else "installed"
-        rows.append(Check(f"extra {extra}", found, line if absent else "", needed=False))
+        rows.append(Diagnosis(f"extra {extra}", found, line if absent else "", needed=False))
     return rows
 
 
-def check_dds() -> list[Check]:
+def check_dds() -> list[Diagnosis]:
     """Send a sample through Cyclone DDS, and look whether the system lets it receive images; nothing without it."""
     if importlib.util.find_spec("cyclonedds") is None:
         return []
@@ -147,51 +150,59 @@ def check_dds() -> list[Check]:
     try:
         checks.self_test()
     except GolemError as error:
-        return [Check("DDS", str(error), "do as that sentence says", needed=False)]
+        return [Diagnosis("DDS", str(error), "do as that sentence says", needed=False)]
     buffer = interfaces.receive_buffer()
     if buffer is not None and buffer < BUFFER_NEEDED:
         fix = f"sudo sysctl -w net.core.rmem_max={4 * BUFFER_NEEDED}"
         return [
-            Check("DDS", f"works, but images get lost in {buffer / 1e6:.1f} MB of buffer", fix, needed=False)
+            Diagnosis(
+                "DDS", f"works, but images get lost in {buffer / 1e6:.1f} MB of buffer", fix, needed=False
+            )
         ]
-    return [Check("DDS", "works", needed=False)]
+    return [Diagnosis("DDS", "works", needed=False)]
 
 
-def check_disk(folder: Path | None = None) -> Check:
+def check_disk(folder: Path | None = None) -> Diagnosis:
     """Look at the free space of `folder` (default: the working directory) and whether it can be written."""
     folder = folder or Path.cwd()
     free = shutil.disk_usage(folder).free
     found = f"{free / 1e9:.0f} GB free in {folder}"
     if not os.access(folder, os.W_OK):
-        return Check("disk", f"{folder} cannot be written", "work in a folder of yours, or pass --out FOLDER")
+        return Diagnosis(
+            "disk", f"{folder} cannot be written", "work in a folder of yours, or pass --out FOLDER"
+        )
     if free < DISK_NEEDED:
-        return Check("disk", found, f"free {DISK_NEEDED / 1e9:.0f} GB, or pass --out FOLDER on another disk")
-    return Check("disk", found)
+        return Diagnosis(
+            "disk", found, f"free {DISK_NEEDED / 1e9:.0f} GB, or pass --out FOLDER on another disk"
+        )
+    return Diagnosis("disk", found)
 
 
-def check_libraries() -> Check:
+def check_libraries() -> Diagnosis:
     """Load every package with native code in a process of its own."""
     environment = {key: value for key, value in os.environ.items() if key != "MUJOCO_GL"}
     problem = _problem(_LOAD, environment)
     if problem:
-        return Check("libraries", problem, install_line() if ".so" in problem else _reinstall_line())
-    return Check("libraries", "native code loads")
+        return Diagnosis("libraries", problem, install_line() if ".so" in problem else _reinstall_line())
+    return Diagnosis("libraries", "native code loads")
 
 
-def check_graphics() -> Check:
+def check_graphics() -> Diagnosis:
     """Render an 8x8 picture with MuJoCo in a process of its own, since a broken driver may abort it."""
     environment = dict(os.environ)
     if sys.platform == "linux":
         environment.setdefault("MUJOCO_GL", "egl")
     backend = environment.get("MUJOCO_GL", "the default")
     if backend == "egl" and not _loads(LIBRARIES["egl"][0]):
-        return Check("graphics", f"{LIBRARIES['egl'][0]} is missing", install_line())
+        return Diagnosis("graphics", f"{LIBRARIES['egl'][0]} is missing", install_line())
     problem = _problem(_RENDER, environment)
     if not problem:
-        return Check("graphics", f"MuJoCo renders with MUJOCO_GL={backend}")
+        return Diagnosis("graphics", f"MuJoCo renders with MUJOCO_GL={backend}")
     if backend not in ("egl", "the default"):
-        return Check("graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {problem}", "export MUJOCO_GL=egl")
-    return Check("graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {problem}", install_line())
+        return Diagnosis(
+            "graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {problem}", "export MUJOCO_GL=egl"
+        )
+    return Diagnosis("graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {problem}", install_line())
 
 
 def require_system() -> None:
@@ -216,7 +227,7 @@ def install_line() -> str:
     return f"install what your system calls these Debian packages: {' '.join(DEBIAN_PACKAGES)}"
 
 
-def diagnose() -> list[Check]:
+def diagnose() -> list[Diagnosis]:
     """Run every check."""
     checks = [check_python(), check_packages(), check_libraries(), check_graphics(), check_disk()]
     return [*checks, *check_dds(), *check_extras()]

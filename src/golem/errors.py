@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from golem.traces import Trace, describe, trace_of
+
 
 class GolemError(Exception):
     """Root of every error that a user, not a programmer, can cause; the CLI prints it and exits with 2."""
@@ -39,14 +41,35 @@ class ModuleFault(GolemError):
     Attributes:
         slot: the stack slot of the module, e.g. `"upper_body"`.
         use: the implementation as the stack file names it.
+        reason: how, in one line.
+        trace: where in its code it raised, as Python prints it, without the frames of others; None where it did not.
     """
 
-    def __init__(self, slot: str, use: str, reason: str) -> None:
+    def __init__(self, slot: str, use: str, reason: str, trace: str | None = None) -> None:
         """Describe which module (`slot`, `use`) broke its contract and how (`reason`)."""
         super().__init__(f"Module {slot}: {use} failed: {reason}")
         self.slot = slot
         self.use = use
         self.reason = reason
+        self.trace = trace
+
+    @classmethod
+    def of(cls, slot: str, use: str, error: BaseException, doing: str = "") -> ModuleFault:
+        """Return the fault of the module (`slot`, `use`) that raised `error`, which was just caught.
+
+        Args:
+            slot: its slot.
+            use: its name in the stack file.
+            error: what was raised. A `ConfigError` is about what the user wrote elsewhere, and gets no trace.
+            doing: what goes before it in the reason, e.g. `"importing it raised "`.
+        """
+        trace = Trace() if isinstance(error, ConfigError) else trace_of(error)
+        where = f" ({trace.where})" if trace.where else ""
+        return cls(slot, use, f"{doing}{describe(error)}{where}", trace.text)
+
+
+class SlowModule(UserWarning):
+    """A module takes far longer than it declares."""
 
 
 class RobotGone(GolemError):

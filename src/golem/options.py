@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import re
 import types
 import typing
 from collections.abc import Collection, Mapping
@@ -178,7 +179,9 @@ def convert(what: str, hint: Any, value: Any) -> Any:
         return hint(value)
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     if origin in (types.UnionType, typing.Union) and len(inner) == 2 and inner[1] is type(None):
-        return None if value is None else convert(what, inner[0], value)
+        # `off` is how YAML spells false: it switches off what may be absent.
+        absent = value is None or (value is False and inner[0] is not bool)
+        return None if absent else convert(what, inner[0], value)
     if origin is typing.Literal and value not in inner:
         raise unknown_name(f"value of {what}", str(value), map(str, inner))
     if origin in (tuple, list):
@@ -219,3 +222,9 @@ class _Loader(yaml.SafeLoader):
                 )
             seen.add(str(key.value))
         return super().construct_mapping(node, deep)
+
+
+# YAML 1.1 reads 1e-6, which has no point, as a word.
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+$"), list("-+0123456789")
+)

@@ -7,19 +7,21 @@ import hashlib
 import importlib.util
 import json
 import platform
+import re
+import shlex
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import MISSING, asdict, fields, is_dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any, cast
 
 import golem
-from golem import registry
 from golem.capabilities.legs.description import load_description
 from golem.errors import ConfigError, OutputError
 from golem.robots.sensors.profiles import load_profile
+from golem.slots import KEYS
 from golem.stack import Stack
 
 PACKAGES = ("golem-humanoid", "numpy", "scipy", "mujoco", "pin", "daqp", "onnxruntime", "torch")
@@ -32,8 +34,55 @@ def digest(data: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+def command_line(start: str, config: Any, always: Collection[str] = ()) -> str:
+    """Return the command that runs a configuration.
+
+    Args:
+        start: its first words.
+        config: dataclass of its options, as tyro reads it; a dataclass within it has no prefix. What is the default
+            is left out.
+        always: names of options that are said all the same.
+    """
+    words = [start]
+    for option in fields(config):
+        value, name = getattr(config, option.name), option.name.replace("_", "-")
+        default = option.default if option.default_factory is MISSING else option.default_factory()
+        if is_dataclass(value):
+            words.append(command_line("", value))
+        elif option.name in always or value != default:
+            values = value if isinstance(value, tuple) else () if isinstance(value, bool) else (value,)
+            dashes = "-" if len(name) == 1 else "--no-" if value is False else "--"
+            words += [dashes + name, *(shlex.quote(str(v)) for v in values)]
+    return " ".join(word for word in words if word)
+
+
+def changes(where: str, old: object, new: object) -> list[str]:
+    """Return in words in what JSON-like `new` differs from `old`, each found at `where`."""
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        before, after = cast("Mapping[str, object]", old), cast("Mapping[str, object]", new)
+        names = dict.fromkeys([*before, *after])
+        prefix = f"{where}." if where else ""
+        return [
+            line
+            for name in names
+            for line in changes(f"{prefix}{name}", before.get(name, "absent"), after.get(name, "absent"))
+        ]
+    if json.dumps(old) == json.dumps(new):
+        return []
+    hashes = all(isinstance(value, str) and _HASH.fullmatch(value) for value in (old, new))
+    return [f"{where} has changed" if hashes else f"{where} was {old} and is {new}"]
+
+
+_HASH = re.compile("[0-9a-f]{16,64}|absent")
+
+
 def stack_facts(stack: Stack) -> dict[str, Any]:
-    """Return what a stack contributes to a trial's configuration: itself, its profile's numbers, its files' content."""
+    """Return what a stack contributes to a trial's configuration: itself, its profile's numbers, its files' content.
+
+    Raises:
+        ConfigError, ModuleFault: see `Stack.check`.
+    """
+    stack.check()
     return {
         "stack": asdict(stack),
         "profile": asdict(load_profile(stack.profile)),
@@ -44,13 +93,11 @@ def stack_facts(stack: Stack) -> dict[str, Any]:
 def user_files(stack: Stack) -> dict[str, str]:
     """Return, for what a stack names that is a file, `slot/name` -> hash of its content."""
     found: dict[str, str] = {}
-    chosen = {slot: stack.choice(slot) for slot in registry.slots()} | {
-        name: choice for name, choice in (("fallback", stack.fallback), ("onboard", stack.onboard)) if choice
-    }
+    chosen = {key: stack.choice(key) for key in KEYS}
     chosen |= {f"skills/{name}": choice for name, choice in stack.skills.items()}
-    for slot, choice in chosen.items():
+    for key, choice in chosen.items():
         for name, path in _named({"use": choice.use, **choice.options}).items():
-            found[f"{slot}/{name}"] = hashlib.sha256(path.read_bytes()).hexdigest()
+            found[f"{key}/{name}"] = hashlib.sha256(path.read_bytes()).hexdigest()
     return found
 
 
@@ -93,14 +140,13 @@ def versions() -> dict[str, str]:
 
 
 @functools.cache
-def code_digest() -> str:
-    """Return 16 hex digits that identify the files of the package `golem`, committed or not."""
+def code_files() -> dict[str, str]:
+    """Return, for every file of the package `golem`, committed or not, 16 hex digits that identify its content."""
     root = _package()
-    total = hashlib.sha256()
-    for path in sorted(_package_files()):
-        total.update(path.relative_to(root).as_posix().encode() + b"\0")
-        total.update(hashlib.sha256(path.read_bytes()).digest())
-    return total.hexdigest()[:16]
+    return {
+        path.relative_to(root).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+        for path in sorted(_package_files())
+    }
 
 
 class Unchanged:

@@ -1,12 +1,14 @@
 """Which implementation a name stands for, per slot of the stack.
 
 An implementation is named by its registered name (`diff_ik`), by module and class (`my_package.legs:Squat`) or by
-file and class (`my_legs.py:Squat`). Nothing is imported before it is asked for.
+file and class (`my_legs.py:Squat`). An installed package registers a name by an entry point of the group
+`golem.<slot>`. Nothing is imported before it is asked for.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import importlib
 import importlib.util
@@ -14,88 +16,54 @@ import inspect
 import sys
 import typing
 from collections.abc import Mapping
+from importlib import metadata
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from golem.errors import ConfigError, GolemError, ModuleFault, unknown_name
 from golem.options import convert_all, dataclass_in, fill
+from golem.slots import PARTS, SLOTS
 
-_IMPLEMENTATIONS: dict[str, dict[str, str]] = {
-    "robot": {
-        "mujoco": "golem.robots.mujoco.engine:MujocoRobot",
-        "replay": "golem.robots.replay.robot:ReplayRobot",
-    },
-    "estimator": {
-        "tether": "golem.hardware.estimator.tether:TetherEstimator",
-        "random_walk_kf": "golem.hardware.estimator.random_walk_kf:RandomWalkKF",
-        "invariant_ekf": "golem.hardware.estimator.invariant_ekf:InvariantEKF",
-    },
-    "servo": {"pd_gravity": "golem.hardware.servo.servo:Servo"},
-    "hand": {"magpie": "golem.hardware.hands.magpie:MagpieHand"},
-    "lower_body": {
-        "almi": "golem.capabilities.legs.almi:Almi",
-        "handover": "golem.capabilities.legs.handover:Handover",
-        "hold": "golem.capabilities.legs.hold:JointHold",
-        "mpc": "golem.capabilities.legs.mpc.controller:MPC",
-        "policy": "golem.capabilities.legs.policy:Policy",
-        "vendor": "golem.capabilities.legs.vendor:Vendor",
-        "wbc": "golem.capabilities.legs.wbc:Wbc",
-    },
-    "upper_body": {
-        "diff_ik": "golem.capabilities.arms.diff_ik:DiffIK",
-        "pink_ik": "golem.capabilities.arms.pink_ik:PinkIK",
-    },
-    "localizer": {"onnx": "golem.capabilities.perception.onnx_detector:OnnxDetector"},
-    "grasp_method": {
-        "centroid": "golem.capabilities.grasping.centroid:Centroid",
-        "visual_servo": "golem.capabilities.grasping.visual_servo:VisualServo",
-    },
-    "navigator": {"goto": "golem.capabilities.navigation.goto:GoTo"},
-    "skill": {
-        "pick": "golem.skills.pick:Pick",
-        "stand": "golem.skills.walk:Stand",
-        "walk": "golem.skills.walk:Walk",
-    },
-}
+PACKAGE = "golem-humanoid"
+"""Distribution of the shipped implementations."""
+GROUP = "golem."
+"""What the group of an entry point begins with; the slot follows."""
 SKILL = "skill"
-"""The one kind of module of which a stack has any number, each under a name of its own."""
-
-
-def slots() -> tuple[str, ...]:
-    """Return the names of the slots in which a stack has one module each."""
-    return tuple(slot for slot in _IMPLEMENTATIONS if slot != SKILL)
+"""The one slot of which a stack has any number of modules, each under a name of its own."""
 
 
 def names(slot: str) -> tuple[str, ...]:
-    """Return the registered names of one slot."""
-    return tuple(_IMPLEMENTATIONS[slot])
+    """Return the registered names of one slot: the shipped ones, then those of other installed packages."""
+    return tuple(dict.fromkeys((*SLOTS[slot].shipped, *_others(slot, tuple(sys.path)))))
 
 
-def register(slot: str, name: str, target: str) -> None:
-    """Make `target` (`package.module:Class`) selectable as `name` in `slot`.
+def contract(slot: str) -> type[Any]:
+    """Return the protocol that the modules of `slot` satisfy."""
+    return _attribute(SLOTS[slot].contract)
+
+
+def requires(slot: str, use: str) -> tuple[str, ...]:
+    """Return what the implementation `use` of `slot` says it cannot do without; see `golem.stack.Stack.check`.
 
     Raises:
-        ConfigError: the slot does not exist, or the name is taken by something else.
+        ConfigError, ModuleFault: see `load`.
     """
-    if slot not in _IMPLEMENTATIONS:
-        raise unknown_name("slot", slot, _IMPLEMENTATIONS)
-    taken = _IMPLEMENTATIONS[slot].setdefault(name, target)
-    if taken != target:
-        raise ConfigError(f"The name '{name}' in slot '{slot}' already stands for {taken}.")
+    return tuple(getattr(load(slot, use), "requires", ()))
 
 
 def load(slot: str, use: str) -> type[Any]:
     """Return the class that `use` names in `slot`, importing it now.
 
     Raises:
-        ConfigError: there is no such name, file, module or class.
+        ConfigError: there is no such name, file, module or class, or two packages register the name.
         ModuleFault: importing the user's file raised.
     """
-    target = _IMPLEMENTATIONS[slot].get(use, use)
-    location, colon, class_name = target.rpartition(":")
+    location, colon, class_name = _target(slot, use).rpartition(":")
     if not colon:
-        raise unknown_name(f"{slot} implementation", use, _IMPLEMENTATIONS[slot])
+        if use.endswith(".py"):
+            raise ConfigError(f"'{use}' names a file and no class in it; write {use}:CLASS.")
+        raise unknown_name(f"{slot} implementation", use, names(slot))
     module = _import(slot, use, location)
     cls = getattr(module, class_name, None)
     if not inspect.isclass(cls):
@@ -116,26 +84,86 @@ def create(slot: str, use: str, options: Mapping[str, object], **context: object
         ModuleFault: the constructor raised.
     """
     cls = load(slot, use)
-    what = f"option of {slot}: {use}"
     try:
         parameters = inspect.signature(cls).parameters
         supplied = {key: value for key, value in context.items() if key in parameters}
-        config = _config_class(cls)
-        arguments = (
-            {"config": fill(what, config, options)} if config else convert_all(what, cls, options, supplied)
-        )
-        return cls(**arguments, **supplied)
+        config = config_class(cls)
+        if config is not None:
+            return cls(config=configure(slot, use, options), **supplied)
+        return cls(**convert_all(_option(slot, use), cls, options, supplied), **supplied)
     except GolemError:
         raise
-    except Exception as error:  # a user's constructor may raise anything
-        raise ModuleFault(slot, use, f"its constructor raised {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:  # a user's constructor may raise anything
+        raise ModuleFault.of(slot, use, error, "its constructor raised ") from error
 
 
-def _config_class(cls: type[Any]) -> type[Any] | None:
+def configure(slot: str, use: str, options: Mapping[str, object]) -> Any:
+    """Return the config dataclass of the implementation `use` of `slot`, with `options`; None if it has none.
+
+    Raises:
+        ConfigError, ModuleFault: see `create`.
+    """
+    config = config_class(load(slot, use))
+    return None if config is None else fill(_option(slot, use), config, options)
+
+
+def part(name: str, options: Mapping[str, object]) -> Any:
+    """Return the config dataclass of the part `name` (see `golem.slots.PARTS`) with `options`.
+
+    Raises:
+        ConfigError: an option does not exist or has the wrong type.
+    """
+    return fill(f"option of {name}", part_class(name), options)
+
+
+def part_class(name: str) -> type[Any]:
+    """Return the config dataclass of the part `name`."""
+    return _attribute(PARTS[name])
+
+
+def config_class(cls: type[Any]) -> type[Any] | None:
     """Return the dataclass that the constructor's parameter `config` takes, if there is one."""
     if dataclasses.is_dataclass(cls) or "config" not in inspect.signature(cls).parameters:
         return None
     return dataclass_in(typing.get_type_hints(cls.__init__).get("config"))
+
+
+def _option(slot: str, use: str) -> str:
+    """Return what an option of an implementation is to the user."""
+    return f"option of {slot}: {use}"
+
+
+def _attribute(target: str) -> type[Any]:
+    location, _, name = target.rpartition(":")
+    return getattr(importlib.import_module(location), name)
+
+
+def _target(slot: str, use: str) -> str:
+    """Return the `module:Class` that the name `use` stands for; what is no registered name, as it is.
+
+    Raises:
+        ConfigError: two packages register it.
+    """
+    shipped = SLOTS[slot].shipped
+    owners = [(PACKAGE, shipped[use])] if use in shipped else []
+    owners += _others(slot, tuple(sys.path)).get(use, [])
+    if len(owners) > 1:
+        packages = " and ".join(package for package, _ in owners)
+        raise ConfigError(
+            f"The name '{use}' in slot '{slot}' is registered by {packages}; name the class itself, e.g. "
+            f"{owners[-1][1]}, or remove one of the packages."
+        )
+    return owners[0][1] if owners else use
+
+
+@functools.cache
+def _others(slot: str, path: tuple[str, ...]) -> dict[str, list[tuple[str, str]]]:
+    """Return what the packages on the import `path` register in `slot`: name -> (package, `module:Class`) of each."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for point in metadata.entry_points(group=GROUP + slot):
+        package = "a package without a name" if point.dist is None else point.dist.name
+        found.setdefault(point.name, []).append((package, point.value))
+    return found
 
 
 def _import(slot: str, use: str, location: str) -> ModuleType:
@@ -164,10 +192,10 @@ def _import(slot: str, use: str, location: str) -> ModuleType:
         if error.name is not None and (location == error.name or location.startswith(error.name + ".")):
             raise ConfigError(
                 f"{slot}: '{use}' names the module {location}, which cannot be found; "
-                f"registered names: {', '.join(_IMPLEMENTATIONS[slot])}."
+                f"registered names: {', '.join(names(slot))}."
             ) from error
         raise ModuleFault(
             slot, use, f"it needs the package '{error.name}', which is not installed"
         ) from error
-    except Exception as error:  # a user's file may raise anything
-        raise ModuleFault(slot, use, f"importing it raised {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:  # a user's file may raise anything
+        raise ModuleFault.of(slot, use, error, "importing it raised ") from error

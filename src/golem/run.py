@@ -7,16 +7,20 @@ import sys
 import webbrowser
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import get_type_hints
+from typing import Annotated, get_type_hints
 
 import tyro
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from golem.dashboard.live import LiveView
 from golem.errors import ConfigError
+from golem.evaluation.base import TrialOutcome
+from golem.evaluation.harness.ladder import LadderConfig, find_trial, prepare
+from golem.evaluation.harness.records import trial_name
+from golem.evaluation.harness.trials import run_trial
 from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.robots.base import Robot
@@ -44,15 +48,15 @@ class RunConfig:
     The goal follows the options: golem run stand --skill walk --x 1. Its fields: golem run --skill walk --help.
     """
 
-    stack: Positional[str] = "tether"
+    stack: Annotated[str, Positional, arg(metavar="[STACK]")] = "tether"
     """Path of a stack file, or the name of a shipped one."""
-    skill: str | None = None
+    skill: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
     """Skill of the stack to run once. Default: pick where the robot hangs; where it stands you operate it."""
     operate: bool = False
     """Drive, push and start skills in the live view until Ctrl-C; the default where the robot stands on its feet."""
-    world: World | None = None
-    """World of the twin: pack, open, slope or rubble; default: the stack file's."""
-    profile: str | None = None
+    world: Annotated[World | None, arg(metavar="NAME", help_behavior_hint="")] = None
+    """World of the twin: pack, open, slope, rubble, furnished or corridor; default: the stack file's."""
+    profile: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="")] = None
     """Realism profile: ideal, bench or field; default: the stack file's."""
     seed: int = 0
     """Seed of the episode."""
@@ -60,7 +64,7 @@ class RunConfig:
     """Show a skill live in the browser, paced by the wall clock; operating always does."""
     port: int = 8080
     """Port of the live view."""
-    record: Path | None = None
+    record: Annotated[Path | None, arg(metavar="PATH", help_behavior_hint="")] = None
     """Write everything public of a skill into a bag, a new folder of this name."""
     foxglove: bool = False
     """Serve a skill to Foxglove on port 8765, paced by the wall clock."""
@@ -99,8 +103,7 @@ def run_stack(config: RunConfig, goal_words: Sequence[str] = ()) -> SkillResult:
     """
     stack = load_stack(config.stack, profile=config.profile)
     if config.world is not None:
-        robot = replace(stack.robot, options={**stack.robot.options, "world": config.world})
-        stack = replace(stack, robot=robot)
+        stack = stack.with_options("robot", world=config.world)
     if config.operate and config.skill is not None:
         raise ConfigError("--operate lets you start skills by hand; give it or --skill, not both.")
     if config.operate or (config.skill is None and stack.on_ground):
@@ -132,6 +135,7 @@ def run_stack(config: RunConfig, goal_words: Sequence[str] = ()) -> SkillResult:
     print(
         f"{'Done' if result.success else 'Failed'} after {running.executor.t:.1f} s of robot time: {result.reason}"
     )
+    _show_trace(result)
     return result
 
 
@@ -150,6 +154,7 @@ def _operate(config: RunConfig, stack: Stack) -> SkillResult:
                 if asked is not None:
                     result = view.run(*asked, watch=Narrator(running))
                     print(result.reason, flush=True)
+                    _show_trace(result)
                 else:
                     robot.close()
                     running, robot = build(stack, config.seed)
@@ -157,6 +162,46 @@ def _operate(config: RunConfig, stack: Stack) -> SkillResult:
         except KeyboardInterrupt:
             print()
     return SkillResult(True, "done", None, "Ended by the operator.")
+
+
+def show_trial(config: LadderConfig) -> TrialOutcome:
+    """Run one trial of a ladder in the live view, paced by the wall clock, and say how it ended.
+
+    Raises:
+        ConfigError: an option is wrong, or there is no such trial.
+    """
+    config = config.whole()
+    request, _ = prepare(config)
+    spec, record = find_trial(config, request)
+    views: list[LiveView] = []
+
+    def onlooker(running: LockstepRunner, robot: MujocoRobot) -> None:
+        views.append(LiveView(running, robot, passive=True))
+
+    print(f"Trial {trial_name(spec)} of rung {spec.rung}, paced by the wall clock.")
+    request.rung.onlooker = onlooker
+    try:
+        outcome = run_trial(request.rung, spec, leaving=(SystemExit,))
+    finally:
+        for view in views:
+            view.close()
+    print("A success." if outcome.success else f"Lost in {outcome.stage}, {outcome.module}: {outcome.detail}")
+    if outcome.trace:
+        print(outcome.trace)
+    if record is not None:
+        same = (record.success, record.stage, record.detail) == (
+            outcome.success,
+            outcome.stage,
+            outcome.detail,
+        )
+        print(f"It {'ended as' if same else 'did not end as'} its record in {config.out} says.")
+    return outcome
+
+
+def _show_trace(result: SkillResult) -> None:
+    """Print where a module failed, if one did."""
+    if result.trace is not None:
+        print(result.trace, file=sys.stderr)
 
 
 def on_air(
@@ -181,7 +226,9 @@ def shown(running: LockstepRunner, robot: object) -> MujocoRobot:
         ConfigError: it is none.
     """
     if not isinstance(robot, MujocoRobot):
-        raise ConfigError(f"The live view shows the twin; robot: {running.stack.robot.use} is not 'mujoco'.")
+        raise ConfigError(
+            f"The live view shows the twin; robot: {running.stack.choice('robot').use} is not 'mujoco'."
+        )
     return robot
 
 
@@ -198,4 +245,4 @@ class Narrator:
         feedback = self._news.read()
         if feedback is not None and (feedback.stage != self._stage or feedback.data.get("failed")):
             self._stage = feedback.stage
-            print(f"{feedback.t:7.2f} s  {feedback.stage:9s} {feedback.text}")
+            print(f"{feedback.t:7.2f} s  {feedback.stage:9s} {feedback.text}", flush=True)

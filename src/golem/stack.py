@@ -7,17 +7,22 @@ import json
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, cast
 
 from golem import registry
-from golem.capabilities.legs.vendor import Vendor
 from golem.errors import ConfigError, GolemError, unknown_name
-from golem.middleware.unitree_api import LOCO_API, LocoApi, loco_api
 from golem.options import check_values, read_yaml
+from golem.robots.base import Standing
+from golem.slots import KEYS, PARTS
 
+HOIST, GROUND, ONBOARD = "hoist", "ground", "onboard"
+"""What a module's class may say that it `requires`: a robot that hangs, one that stands on its feet, or the robot's own
+computer."""
+WORDS = ("profile", "limits")
+"""Keys of a stack file whose values are one word."""
 SKILLS = "skills"
 """Key of the skills in a stack file."""
 _SKILLS_EXAMPLE = "{pick: {force: 8}, mine: {use: my_skill.py:Mine}}"
@@ -45,7 +50,7 @@ def _chosen(options: Mapping[str, Any]) -> Iterator[Choice]:
     """Yield every choice among `options`, at any depth."""
     for value in options.values():
         if isinstance(value, Mapping):
-            if "use" in value:
+            if isinstance(value.get("use"), str):
                 # A part of `handover` has its options under a key of their own.
                 own = value.get("options") if value.keys() == {"use", "options"} else None
                 others = {name: v for name, v in value.items() if name != "use"}
@@ -53,58 +58,44 @@ def _chosen(options: Mapping[str, Any]) -> Iterator[Choice]:
             yield from _chosen(value)
 
 
-def _is_vendor(use: str) -> bool:
-    """Return whether the lower body `use` speaks to the on-board controller: `vendor`, or a class made of it."""
-    with suppress(GolemError):  # what cannot be loaded is refused where it is to run, which need not be here
-        return use == "vendor" or (":" in use and issubclass(registry.load("lower_body", use), Vendor))
-    return False
-
-
 @dataclass(frozen=True)
 class Stack:
-    """A whole stack: one choice per slot, the realism profile and the torque limits.
+    """A whole stack: its modules, the options of what has no alternatives, the realism profile and the torque limits.
 
     Attributes:
-        estimator: None: `random_walk_kf` where the robot's option `support` is `ground`, else `tether`.
-        fallback: the lower body that takes the legs when `lower_body` fails. None: `almi` on the ground, else `hold`.
-        onboard: the lower body that the twin's on-board controller runs for `vendor`. None: `almi`.
+        choices: by key of the stack file (see `golem.slots.KEYS`). What is left out gets its default at once, unless
+            the default depends on whether the robot stands on its feet.
+        parts: options by part (see `golem.slots.PARTS`).
         skills: by name; the shipped ones that it does not name are there, too, with their default options.
         profile: realism profile of a simulated robot: ideal, bench or field.
         limits: torque limit profile the safety gate enforces: urdf or paper.
     """
 
-    robot: Choice = Choice("mujoco")
-    estimator: Choice | None = None
-    servo: Choice = Choice("pd_gravity")
-    hand: Choice = Choice("magpie")
-    lower_body: Choice = Choice("hold")
-    upper_body: Choice = Choice("diff_ik")
-    localizer: Choice = Choice("onnx")
-    grasp_method: Choice = Choice("visual_servo")
-    navigator: Choice = Choice("goto")
-    fallback: Choice | None = None
-    onboard: Choice | None = None
+    choices: Mapping[str, Choice] = field(default_factory=dict[str, Choice])
+    parts: Mapping[str, Mapping[str, Any]] = field(default_factory=dict[str, Mapping[str, Any]])
     skills: dict[str, Choice] = field(default_factory=dict[str, Choice])
     profile: str = "bench"
     limits: str = "urdf"
 
     def __post_init__(self) -> None:
-        """Check what would otherwise fall over without a word.
+        """Fill in the defaults."""
+        defaults = {key: Choice(row.default) for key, row in KEYS.items() if row.standing is None}
+        object.__setattr__(self, "choices", {**defaults, **self.choices})
+
+    def choice(self, key: str) -> Choice:
+        """Return what is chosen under `key`, a key of `golem.slots.KEYS`."""
+        if key in self.choices:
+            return self.choices[key]
+        row = KEYS[key]
+        return Choice((row.standing if self.on_ground else None) or row.default)
+
+    def part(self, name: str) -> Any:
+        """Return the config of a part, a key of `golem.slots.PARTS`.
 
         Raises:
-            ConfigError: the robot is on its feet, and the estimator takes it to hang in the hoist.
+            ConfigError: an option is wrong.
         """
-        if self.on_ground and self.choice("estimator").use == "tether":
-            raise ConfigError(
-                "The estimator 'tether' takes the base to stay where it is; a robot with 'support: ground' needs "
-                "random_walk_kf, invariant_ekf or one of yours."
-            )
-
-    def choice(self, slot: str) -> Choice:
-        """Return what sits in `slot`."""
-        if slot == "estimator" and self.estimator is None:
-            return Choice("random_walk_kf" if self.on_ground else "tether")
-        return getattr(self, slot)
+        return registry.part(name, self.parts.get(name, {}))
 
     @property
     def all_skills(self) -> dict[str, Choice]:
@@ -112,52 +103,70 @@ class Stack:
         return {name: Choice(name) for name in registry.names(registry.SKILL)} | self.skills
 
     @property
-    def legs_in_reserve(self) -> Choice:
-        """The lower body that takes the legs when `lower_body` fails."""
-        return self.fallback or Choice("almi" if self.on_ground else "hold")
+    def on_ground(self) -> bool:
+        """Whether the robot stands on its feet, as its class says; see `robots.base.Standing`.
+
+        Raises:
+            ConfigError, ModuleFault: the class cannot be loaded.
+        """
+        robot = self.choice("robot")
+        cls = registry.load("robot", robot.use)
+        return issubclass(cls, Standing) and cls.on_feet(robot.options)
+
+    @property
+    def onboard_client(self) -> Choice | None:
+        """The lower body that speaks to the robot's own computer; None where none of the stack's does."""
+        for choice in (*self.choice("lower_body").all, *self.choice("fallback").all):
+            with suppress(GolemError):  # what cannot be loaded is refused where it is to run, not here
+                if ONBOARD in registry.requires("lower_body", choice.use):
+                    return choice
+        return None
 
     @property
     def legs_on_board(self) -> Choice | None:
         """The lower body of the twin's on-board controller; None where nothing speaks to that."""
-        return self.onboard or Choice("almi") if self._vendor else None
+        return self.choice("onboard") if self.onboard_client else None
 
-    @property
-    def loco_api(self) -> LocoApi:
-        """The calls by which `vendor` speaks to the on-board controller, and which the twin's answers.
+    def check(self) -> None:
+        """Check that every module gets from the robot what its class `requires`: `ground` or `hoist`.
 
         Raises:
-            ConfigError: there are none of that name.
+            ConfigError: one does not, or cannot be loaded.
+            ModuleFault: importing one raised.
         """
-        robot = self._vendor.options.get("robot", LOCO_API) if self._vendor else LOCO_API
-        return loco_api(robot)
+        missing, is_so = (HOIST, "stands on its feet") if self.on_ground else (GROUND, "hangs in the hoist")
+        for key, row in KEYS.items():
+            use = self.choice(key).use
+            if missing in registry.requires(row.slot, use):
+                others = ", ".join(name for name in registry.names(row.slot) if name != use)
+                raise ConfigError(
+                    f"The {key} '{use}' is for a robot with support '{missing}', and this one {is_so}: choose one of "
+                    f"{others}, or yours."
+                )
 
-    @property
-    def _vendor(self) -> Choice | None:
-        choices = (*self.lower_body.all, *self.legs_in_reserve.all)
-        return next((choice for choice in choices if _is_vendor(choice.use)), None)
-
-    @property
-    def on_ground(self) -> bool:
-        """Whether the robot stands on its feet."""
-        return self.robot.options.get("support") == "ground"
-
-    def with_choice(self, slot: str, use: str) -> Stack:
-        """Return a copy with another implementation in `slot`.
+    def with_choice(self, key: str, use: str | Choice) -> Stack:
+        """Return a copy with another implementation under `key`.
 
         Args:
-            slot: where; `skills` adds to those there are.
+            key: where; `skills` adds to those there are.
             use: its name, without options, or `{use: NAME, option: value, ...}` as a stack file has it; of skills
                 `{NAME: {option: value, ...}, ...}`.
 
         Raises:
-            ConfigError: there is no such slot, or `use` is neither.
+            ConfigError: there is no such key, or `use` is neither.
         """
-        value = read_yaml(use, f"'{use}'") if use.startswith("{") else use
-        if slot == SKILLS:
-            return replace(self, skills=self.skills | _skills(f"'{use}'", value))
-        if slot not in registry.slots():
-            raise unknown_name("slot", slot, (*registry.slots(), SKILLS))
-        return replace(self, **{slot: _choice(f"'{use}'", slot, slot, value)})
+        value = read_yaml(use, f"'{use}'") if isinstance(use, str) and use.startswith("{") else use
+        if key == SKILLS:
+            return replace(self, skills={**self.skills, **_skills(f"'{use}'", value)})
+        if key not in KEYS:
+            raise unknown_name("slot", key, (*KEYS, SKILLS))
+        choice = value if isinstance(value, Choice) else _choice(f"'{use}'", key, KEYS[key].slot, value)
+        return replace(self, choices={**self.choices, key: choice})
+
+    def with_options(self, key: str, **options: object) -> Stack:
+        """Return a copy in which some options of the implementation under `key` are others."""
+        old = self.choice(key)
+        return self.with_choice(key, Choice(old.use, {**old.options, **options}))
 
     def digest(self) -> str:
         """Return 12 hex digits that change whenever anything in the stack changes."""
@@ -187,8 +196,10 @@ def load_stack(source: str | Path, profile: str | None = None) -> Stack:
         elif path.is_file():
             text = path.read_text(encoding="utf-8")
         else:
+            meant = path.with_name(f"{path.name}.yaml")
+            hint = f" Did you mean '{meant}'?" if meant.is_file() else ""
             raise ConfigError(
-                f"No stack file '{source}'; give a path to a YAML file or one of: {', '.join(shipped())}."
+                f"No stack file '{source}'; give a path to a YAML file or one of: {', '.join(shipped())}.{hint}"
             )
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"The stack file '{source}' cannot be read as text: {error}.") from error
@@ -203,17 +214,31 @@ def parse_stack(text: str, name: str) -> Stack:
         return Stack()
     if not isinstance(data, Mapping):
         raise ConfigError(f"{name}: a stack file is a mapping such as 'upper_body: {{use: diff_ik}}'.")
-    values: dict[str, Any] = {}
-    valid = [f.name for f in fields(Stack)]
+    choices: dict[str, Choice] = {}
+    parts: dict[str, Mapping[str, Any]] = {}
+    skills: dict[str, Choice] = {}
+    words: dict[str, str] = {}
     for key, value in data.items():
-        if key not in valid:
-            raise unknown_name(f"key in {name}", str(key), valid)
-        if key == SKILLS:
-            values[key] = _skills(name, value)
-            continue
-        slot = "lower_body" if key in ("fallback", "onboard") else key
-        values[key] = _choice(name, key, slot, value) if slot in registry.slots() else _word(name, key, value)
-    return Stack(**values)
+        if key in KEYS:
+            choices[key] = _choice(name, key, KEYS[key].slot, value)
+        elif key in PARTS:
+            parts[key] = _options(name, key, value)
+        elif key == SKILLS:
+            skills = _skills(name, value)
+        elif key in WORDS:
+            words[key] = _word(name, key, value)
+        else:
+            raise unknown_name(f"key in {name}", str(key), (*KEYS, *PARTS, SKILLS, *WORDS))
+    return Stack(choices, parts, skills, **words)
+
+
+def _options(name: str, key: str, value: object) -> Mapping[str, Any]:
+    """Return the options of a part, which are checked here and not where they are used."""
+    if not isinstance(value, Mapping):
+        raise ConfigError(f"{name}: '{key}' wants '{{option: value, ...}}'; golem options {key} lists them.")
+    check_values(f"{name}: {key}", value)
+    registry.part(key, value)
+    return value
 
 
 def _word(name: str, key: str, value: object) -> str:

@@ -176,6 +176,20 @@ class Detection:
 
 
 @dataclass(frozen=True, slots=True)
+class Mask:
+    """Some pixels of an image.
+
+    Attributes:
+        pixels: (h, w) bool, a crop of the image: which pixels belong.
+        x, y: column and row of the crop's upper left pixel in the image [px].
+    """
+
+    pixels: NDArray[np.bool_]
+    x: int
+    y: int
+
+
+@dataclass(frozen=True, slots=True)
 class LocalizedObject:
     """A detection lifted into space.
 
@@ -184,12 +198,15 @@ class LocalizedObject:
         t: time of the frame [s].
         position: (3,) the object's position in odom [m]: the surface point seen at its centre.
         points: (n, 3) its point cloud in odom [m].
+        mask: the n pixels that `points` were lifted from, row by row; None where the localizer does not say. Of one
+            that knows boxes only, they are those of the box.
     """
 
     detection: Detection
     t: float
     position: Array
     points: Array
+    mask: Mask | None = None
 
     @property
     def label(self) -> str:

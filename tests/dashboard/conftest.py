@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from golem.runtime.lockstep import LockstepRunner, build
-from golem.stack import Choice, Stack, load_stack
+from golem.stack import Stack, load_stack
 from golem.types import LocalizedObject, RgbdImage
 
 
@@ -36,7 +35,7 @@ def twin() -> Iterator[tuple[LockstepRunner, Any]]:
 def standing() -> Stack:
     """A robot on its feet in the empty hall."""
     stack = load_stack("stand").with_choice("localizer", BLIND)
-    return replace(stack, robot=Choice("mujoco", {"support": "ground", "world": "open"}))
+    return stack.with_options("robot", world="open")
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from golem.dashboard import live
 from golem.dashboard.live import LiveView
 from golem.dashboard.panel import Button
 from golem.errors import ConfigError
@@ -262,3 +263,17 @@ def test_starting_over_shows_the_new_episode(
     assert len(walk._recorder.trace().t) == pytest.approx(11, abs=1)
     assert "robot time 0.1 s" in walk.panel._status.content
     robot.close()
+
+
+def test_a_passive_view_shows_a_robot_that_somebody_else_drives(
+    walker: tuple[LockstepRunner, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live, "ARRIVAL", 0.0)
+    running, robot = walker
+    with LiveView(*walker, port=0, passive=True) as view:
+        monkeypatch.setattr(view._server, "get_clients", lambda: {0: None})
+        robot.push(np.array([0.0, 50.0, 0.0]))
+        running.executor.run(0.2)
+        assert view._stage._arrow.visible, "the push of whoever pushes"
+        assert len(view._recorder.trace().t) >= 0.2 / PERIOD - 1
+        assert running.bus.latest(topics.TWIST) is None, "its sliders command nothing"

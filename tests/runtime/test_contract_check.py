@@ -79,6 +79,49 @@ def test_what_a_module_lacks_is_named() -> None:
     assert reason(caught) == "it lacks open, close, status of the contract HandController"
 
 
+class Asked(Protocol):
+    def step(self, state: float, dt: float, gains: float | None = None) -> None: ...
+
+
+def with_step(step: object) -> object:
+    return type("Mine", (), {"step": step})()
+
+
+@pytest.mark.parametrize(
+    "step",
+    [
+        lambda self, state, dt, gains: None,
+        lambda self, s, h, g=1, more=2: None,
+        lambda self, *everything: None,
+        staticmethod(lambda a, b, c: None),
+        print,
+    ],
+)
+def test_a_method_that_takes_the_arguments_satisfies_its_contract(step: object) -> None:
+    GUARD.satisfies(with_step(step), Asked)
+
+
+@pytest.mark.parametrize(
+    ("step", "words"),
+    [
+        (
+            lambda self, state, dt: None,
+            "its step takes (state, dt), the contract asks for step(state, dt, gains)",
+        ),
+        (
+            lambda self, state, dt, gains, more: None,
+            "its step takes (state, dt, gains, more), the contract asks for",
+        ),
+        (lambda self, *, state, dt, gains: None, "the contract asks for step(state, dt, gains)"),
+        (3.0, "its step is a float, the contract asks for a method"),
+    ],
+)
+def test_a_method_that_takes_other_arguments_is_named(step: object, words: str) -> None:
+    with pytest.raises(ModuleFault) as caught:
+        GUARD.satisfies(with_step(step), Asked)
+    assert words in reason(caught)
+
+
 @pytest.mark.parametrize(
     ("value", "words"),
     [

@@ -15,10 +15,13 @@ from golem.runtime.gantry_release import READY
 from golem.runtime.lockstep import LockstepRunner, build, start_posture
 from golem.stack import Choice, Stack
 
+CROUCH = Choice("hold", {"stance": "crouch", "standing": True})
 STANDING = Stack(
-    robot=Choice("mujoco", {"support": "ground", "world": "open"}),
-    lower_body=Choice("hold", {"stance": "crouch"}),
-    fallback=Choice("hold", {"stance": "crouch"}),
+    {
+        "robot": Choice("mujoco", {"support": "ground", "world": "open"}),
+        "lower_body": CROUCH,
+        "fallback": CROUCH,
+    },
     profile="ideal",
 )
 
@@ -56,14 +59,8 @@ def test_nothing_moves_until_then(stack: tuple[LockstepRunner, HasGantry]) -> No
 @pytest.mark.slow
 @pytest.mark.parametrize("profile", ["ideal", "field"])
 def test_a_robot_that_can_balance_stands_from_the_first_second(profile: str) -> None:
-    stack = Stack(
-        robot=STANDING.robot,
-        estimator=Choice("random_walk_kf"),
-        lower_body=Choice("wbc"),
-        fallback=Choice("wbc"),
-        profile=profile,
-    )
-    running, robot = build(stack, seed=1)
+    stack = STANDING.with_choice("lower_body", "wbc").with_choice("fallback", "wbc")
+    running, robot = build(replace(stack, profile=profile), seed=1)
     start = robot.truth.base().T_world_base[:3, 3]
     while running.executor.t < 6.0:
         running.executor.step()
@@ -107,7 +104,7 @@ class Blind(RandomWalkKF):
 
 def test_an_estimator_that_finds_no_floor_is_named(tmp_path: Path) -> None:
     (tmp_path / "blind.py").write_text(BLIND)
-    running, robot = build(replace(STANDING, estimator=Choice(f"{tmp_path / 'blind.py'}:Blind")), seed=0)
+    running, robot = build(STANDING.with_choice("estimator", f"{tmp_path / 'blind.py'}:Blind"), seed=0)
     assert released_at(running, robot, READY + 1.0) is not None
     with pytest.raises(ModuleFault, match="Module estimator: .*Blind failed: it found no foot"):
         running.executor.run(READY + 1.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -45,13 +44,10 @@ def on_open_ground(
     legs: Choice, fallback: str, estimator: Choice | None = None
 ) -> Iterator[tuple[LockstepRunner, Any]]:
     """A stack on open ground with certain legs, and a certain estimator."""
-    stack = replace(
-        load_stack("stand", profile="ideal"),
-        robot=Choice("mujoco", {"support": "ground", "world": "open"}),
-        lower_body=legs,
-        estimator=estimator,
-        fallback=Choice(fallback),
-    )
+    stack = load_stack("stand", profile="ideal").with_options("robot", world="open")
+    stack = stack.with_choice("lower_body", legs).with_choice("fallback", fallback)
+    if estimator is not None:
+        stack = stack.with_choice("estimator", estimator)
     running, robot = build(stack, seed=0)
     try:
         yield running, robot

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +19,7 @@ from golem.middleware.bus import Bus
 from golem.robots.sensors.cameras import HEAD
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.perception_nodes import LocalizerNode
-from golem.types import Detection, LocalizedObject, RgbdImage
+from golem.types import Detection, LocalizedObject, Mask, RgbdImage
 
 
 class Eyes:
@@ -73,9 +76,39 @@ def test_its_fault_arrives_while_a_skill_looks(still: bool) -> None:
             bus.publish(topics.detection_request("head"), DetectionRequest(()), 1.001)
         pool.submit(lambda: None).result()
         node.step(1.002)
-        fault = ModuleFaultMsg("localizer", "Module localizer: eyes failed: RuntimeError: gone")
-        assert bus.latest(topics.MODULE_FAULT) == (fault if still else None)
+        fault = bus.latest(topics.MODULE_FAULT)
+        assert (fault is not None) is still
+        if fault is not None:
+            assert re.fullmatch(
+                r"Module localizer: eyes failed: RuntimeError: gone \(test_localizer_beside.py:\d+\)",
+                fault.reason,
+            )
+            assert fault.slot == "localizer" and 'raise RuntimeError("gone")' in (fault.trace or "")
         assert bus.latest(topics.detections("head")) is None
+
+
+@pytest.mark.parametrize(
+    ("mask", "said"),
+    [
+        (Mask(np.ones((1, 1), np.bool_), 0, 0), None),
+        (Mask(np.ones((1, 2), np.bool_), 0, 0), "mask has 2 pixels, the contract asks for one per point: 1"),
+        (np.ones((1, 1), np.bool_), "mask is a ndarray, the contract asks for a Mask"),
+    ],
+    ids=["one pixel", "two pixels", "no mask"],
+)
+def test_a_mask_that_does_not_fit_its_points_is_a_fault(mask: Any, said: str | None) -> None:
+    class Masking(Eyes):
+        def locate(self, frame: RgbdImage, labels: Sequence[str]) -> list[LocalizedObject]:
+            return [replace(found, mask=mask) for found in super().locate(frame, labels)]
+
+    bus, eyes = Bus(), Masking()
+    eyes.let.set()
+    bus.publish(topics.detection_request("head"), DetectionRequest(("screw",)), 0.0)
+    node = LocalizerNode(bus, eyes, "head", ContractCheck("localizer", "eyes"))
+    bus.publish(topics.rgbd_images("head"), frame(1.0), 1.0)
+    node.step(1.0)
+    fault = bus.latest(topics.MODULE_FAULT)
+    assert (fault is None) if said is None else (fault is not None and said in fault.reason)
 
 
 def test_what_this_machine_lacks_ends_the_look_and_not_the_process() -> None:

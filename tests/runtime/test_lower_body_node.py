@@ -6,15 +6,18 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
+from golem.capabilities.legs.hold import JointHold
+from golem.capabilities.legs.locomotion import LocomotionConfig
 from golem.errors import ConfigError, ModuleFault
 from golem.interfaces import topics
-from golem.interfaces.payloads import GateState, LegStatus
+from golem.interfaces.payloads import GateState, LegCommand, LegStatus
+from golem.runtime.contract_check import ContractCheck
 from golem.runtime.lockstep import LockstepRunner, build
+from golem.runtime.lower_body_node import CheckedLowerBody
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.stack import Choice, Stack
@@ -97,8 +100,7 @@ class Drive:
 @contextmanager
 def hanging(**choices: Choice) -> Iterator[LockstepRunner]:
     """A tethered stack with other modules in some slots."""
-    changed: dict[str, Any] = dict(choices)
-    running, robot = build(Stack(profile="ideal", **changed), seed=0)
+    running, robot = build(Stack(choices, profile="ideal"), seed=0)
     try:
         yield running
     finally:
@@ -209,9 +211,41 @@ def test_what_failed_legs_sent_late_does_not_come_any_more(tmp_path: Path) -> No
         assert 240.0 < command.kp[0] < 300.0
 
 
+def test_legs_on_the_ground_say_what_torque_they_want() -> None:
+    zero = np.zeros(12)
+    untold, told = LegCommand(zero, zero, zero), LegCommand(zero, zero, zero, zero)
+    contract = ContractCheck("lower_body", "mine.py:Mine")
+    standing = CheckedLowerBody(JointHold(), contract, on_ground=True)
+    assert standing.check(told) is told
+    with pytest.raises(ModuleFault, match="lower_body: mine.py:Mine failed: tau is None, .* on the ground"):
+        standing.check(untold)
+    assert CheckedLowerBody(JointHold(), contract).check(untold) is untold
+
+
+def test_legs_on_the_ground_without_a_torque_go_to_the_fallback() -> None:
+    robot = {"support": "ground", "world": "open"}
+    choices = {"robot": Choice("mujoco", robot), "lower_body": Choice("hold"), "fallback": Choice("wbc")}
+    running, twin = build(Stack(choices, profile="ideal"), seed=0)
+    try:
+        running.executor.run(0.01)
+        fault = status(running).fault
+        assert fault is not None and "lower_body: hold failed: tau is None" in fault
+        assert status(running).controller == "wbc"
+    finally:
+        twin.close()
+
+
+def test_options_of_the_base_layer_reach_it() -> None:
+    parts = {"locomotion": {"trim": False, "timeout": 0.2}}
+    running, twin = build(Stack(parts=parts, profile="ideal"), seed=0)
+    twin.close()
+    config = running._stack.legs._locomotion.config
+    assert config == LocomotionConfig(trim=None, timeout=0.2)
+
+
 def test_a_fallback_that_does_not_exist_is_refused_when_the_stack_is_built() -> None:
     with pytest.raises(ConfigError, match="Unknown lower_body implementation 'hold_on'.*Did you mean 'hold'"):
-        build(Stack(fallback=Choice("hold_on")), seed=0)
+        build(Stack({"fallback": Choice("hold_on")}), seed=0)
 
 
 @pytest.mark.parametrize(

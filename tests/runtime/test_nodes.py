@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -92,8 +91,7 @@ class Look:
 
 def running(slot: str, use: str, options: dict[str, Any] | None = None) -> LockstepRunner:
     """Return a stack with another module in one slot."""
-    changes: dict[str, Any] = {slot: Choice(use, options or {})}
-    return build(replace(Stack(profile="ideal"), **changes), seed=0)[0]
+    return build(Stack({slot: Choice(use, options or {})}, profile="ideal"), seed=0)[0]
 
 
 @pytest.fixture
@@ -130,6 +128,58 @@ def test_what_a_module_returns_wrongly_is_its_fault(
     with pytest.raises(ModuleFault) as caught:
         stack.execute(Look(), None, timeout=0.5)
     assert (caught.value.slot, caught.value.use) == (slot, use)
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        (
+            "return ArmCommand(np.zeros(15, int), np.zeros(2), np.zeros(2), False)",
+            "its target of .* jumps by",
+        ),
+        (
+            "self.q = self.q + 0.4 * (np.arange(15) == 1); return ArmCommand(self.q, np.zeros(2), np.zeros(2), False)",
+            "jumps by 0.4 rad",
+        ),
+        ("return ArmCommand(self.q + 3.0, np.zeros(2), np.zeros(2), False)", "outside its limits"),
+        ("raise SystemExit(1)", r"SystemExit: 1 \(mine_upper_body_good.py:\d+\)"),
+    ],
+)
+def test_arms_that_leave_their_limits_or_end_the_process_are_named(
+    line: str, reason: str, module: Callable[[str, str, str], str]
+) -> None:
+    use = module("upper_body", "", f"def step(self, left, right, q, dt):\n    {line}\nArms.step = step\n")
+    with pytest.raises(ModuleFault, match=reason) as caught:
+        running("upper_body", use).execute(Look(), None, timeout=0.5)
+    assert (caught.value.slot, caught.value.use) == ("upper_body", use)
+
+
+def test_a_skill_is_told_where_the_module_that_ended_it_failed(
+    module: Callable[[str, str, str], str],
+) -> None:
+    use = module(
+        "localizer", "", "def locate(self, frame, labels):\n    return 1 / 0\nEyes.locate = locate\n"
+    )
+    result = running("localizer", use).execute(Look(), None, timeout=0.5)
+    assert "ZeroDivisionError: division by zero (mine_localizer_good.py:" in result.reason
+    assert (result.trace or "").splitlines()[2:] == [
+        "    return 1 / 0",
+        "ZeroDivisionError: division by zero",
+    ]
+
+
+def test_a_skill_that_fails_itself_is_told_where() -> None:
+    class Fails:
+        name = "fails"
+
+        async def run(self, context: Context, goal: None) -> SkillResult:
+            raise SystemExit("enough")
+
+    result = running("hand", "magpie").execute(Fails(), None, timeout=0.5)
+    assert (result.stage, result.slot) == ("fault", "skill")
+    assert "fails failed: SystemExit: enough (test_nodes.py:" in result.reason and "in run" in (
+        result.trace or ""
+    )
 
 
 @pytest.mark.parametrize("slot", SLOTS)

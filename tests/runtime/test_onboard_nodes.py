@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,15 +12,9 @@ import pytest
 from golem.capabilities.legs.hold import STANCES, JointHold
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, LegStatus
+from golem.interfaces.unitree_api import LOCO_APIS, encode
 from golem.middleware.bus import Bus
-from golem.middleware.unitree_api import (
-    LOCO_APIS,
-    ApiRequest,
-    Response,
-    encode,
-    request_topic,
-    response_topic,
-)
+from golem.middleware.wire.api import ApiRequest, Response, request_topic, response_topic
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.runtime.lower_body_node import CheckedLowerBody
@@ -45,8 +37,7 @@ class Failing(JointHold):
 @contextmanager
 def hanging(**choices: Choice) -> Iterator[LockstepRunner]:
     """A tethered stack whose legs the vendor's controller moves."""
-    changed: dict[str, Any] = {"lower_body": Choice("vendor"), **choices}
-    running, robot = build(Stack(profile="ideal", **changed), seed=0)
+    running, robot = build(Stack({"lower_body": Choice("vendor"), **choices}, profile="ideal"), seed=0)
     try:
         yield running
     finally:
@@ -112,9 +103,8 @@ def test_calls_are_answered_later_on_the_bus() -> None:
 
 @pytest.mark.slow
 def test_a_robot_on_the_ground_is_brought_up_and_walks_by_remote_calls() -> None:
-    stack = replace(load_stack("stand", profile="bench"), lower_body=Choice("vendor"))
-    options = {**stack.robot.options, "world": "open"}
-    running, robot = build(replace(stack, robot=replace(stack.robot, options=options)), seed=0)
+    stack = load_stack("stand", profile="bench").with_choice("lower_body", "vendor")
+    running, robot = build(stack.with_options("robot", world="open"), seed=0)
     try:
         running.executor.run(5.0)
         assert not robot.on_gantry

@@ -41,7 +41,7 @@ class Wait:
 
 def test_the_motors_damp_when_a_module_dies(tmp_path: Path) -> None:
     (tmp_path / "arms.py").write_text(DYING_ARMS)
-    stack = Stack(upper_body=Choice(f"{tmp_path / 'arms.py'}:Dying"), profile="ideal")
+    stack = Stack({"upper_body": Choice(f"{tmp_path / 'arms.py'}:Dying")}, profile="ideal")
     running, robot = build(stack, seed=0)
     with pytest.raises(ModuleFault, match="gone"):
         running.execute(Wait(), None, 5.0)

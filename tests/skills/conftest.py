@@ -10,7 +10,6 @@ import pytest
 
 from golem.capabilities.grasping.base import GraspMethod
 from golem.capabilities.grasping.visual_servo import VisualServo
-from golem.capabilities.navigation.goto import GoTo
 from golem.interfaces import topics
 from golem.interfaces.payloads import Detections, GripState, HandStatus
 from golem.middleware.bus import Bus
@@ -36,10 +35,8 @@ def seen(label: str, position: Array, t: float, score: float = 0.9) -> Localized
 
 def modules(**given: Any) -> Modules:
     """Return the modules of a stack, some of them given."""
-    navigator = GoTo()
     default: dict[str, Any] = {
         "grasp_method": VisualServo,
-        "navigator": lambda: navigator,
         "skill": SkillTable(Stack()).make,
     }
     return Modules(**default | given)

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from golem.capabilities.grasping.base import Grasp, GraspMethod, OpenLoop
-from golem.capabilities.grasping.centroid import Centroid
+from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, OpenLoop
+from golem.capabilities.grasping.centroid import Centroid, CentroidConfig
 from golem.capabilities.grasping.visual_servo import VisualServo
 from golem.interfaces import topics
 from golem.interfaces.payloads import DetectionRequest
+from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillResult
 from golem.skills.pick import Pick, PickConfig, PickGoal
-from golem.types import Array, LocalizedObject, Side
+from golem.skills.runner import SkillRun
+from golem.types import Array, CameraInfo, LocalizedObject, RgbdImage, Side
 
 SCREW = np.array([0.43, -0.14, -0.03])
 TRAY = np.array([0.48, -0.31, -0.03])
@@ -145,12 +150,71 @@ def test_of_several_screws_the_most_comfortable_is_taken(world: Any, thing: Any)
     proposals: list[Array] = []
 
     class Spy(Centroid):
-        def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+        def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
             proposals.append(target.position)
-            return super().propose(target, yaw)
+            return super().propose(target, scene, gripper)
 
     picked(world, Spy())
     np.testing.assert_array_equal(proposals[0], near)
+
+
+def test_a_method_gets_the_scene_and_the_hand_in_numbers(full: Any) -> None:
+    info = CameraInfo("head", 4, 3, 100.0, 100.0, 1.5, 1.0, near=0.2, far=6.0, rate=15.0)
+    depth = np.full((3, 4), 2.0, np.float32)
+    depth[0, 0] = np.nan
+    depth[1, 2] = 0.0
+    frame = RgbdImage(0.0, info, np.zeros((3, 4, 3), np.uint8), depth, np.eye(4))
+    full.bus.publish(topics.rgbd_images("head"), frame, 0.0)
+    given: list[tuple[Array, Gripper]] = []
+
+    class Spy(Centroid):
+        def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
+            given.append((scene, gripper))
+            return super().propose(target, scene, gripper)
+
+    assert picked(full, Spy()).success
+    ((scene, gripper),) = given
+    assert scene.shape == (10, 3)
+    np.testing.assert_allclose(scene[0], (-0.5 / 100.0 * 2.0, -1.0 / 100.0 * 2.0, 2.0))
+    assert (gripper.side, gripper.yaw, gripper.max_gap) == ("right", CONFIG.yaw, MAX_GAP)
+    np.testing.assert_array_equal(gripper.T_odom_gripper[:3, 3], (0.35, -0.2, 0.1))
+
+
+def test_a_slow_method_costs_the_time_that_it_declares(world: Any, thing: Any) -> None:
+    class Slow(Centroid):
+        latency = 0.5
+
+    took: list[float] = []
+    for method in (Centroid(), Slow()):
+        stocked(world, thing)
+        result = picked(world, method)
+        assert result.success
+        took.append(result.timings["detect_to_grasp"])
+    assert took[1] - took[0] == pytest.approx(0.5, abs=0.08)  # a frame of the head camera more or less
+
+
+def test_a_method_that_thinks_on_a_worker_stops_no_clock(full: Any) -> None:
+    thought = threading.Event()
+
+    class Waits(Centroid):
+        def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
+            assert thought.wait(30.0)
+            return super().propose(target, scene, gripper)
+
+    full.method = Waits(CentroidConfig())
+    with ThreadPoolExecutor(1) as pool:
+        full.context.modules = replace(full.context.modules, worker=pool)
+        run = SkillRun("pick", Pick(CONFIG).run(full.context, PickGoal()))
+        for _ in range(100):
+            full.step()
+            run.step()
+        assert run.result is None and full.sent == []
+        thought.set()
+        pool.submit(lambda: None).result()
+        for _ in range(6000):
+            full.step()
+            run.step()
+    assert run.result is not None and run.result.success
 
 
 def test_a_head_camera_that_says_nothing_is_the_localizers_failure(world: Any) -> None:
@@ -181,7 +245,9 @@ def test_what_is_out_of_reach_is_left_alone(place: tuple[float, ...], world: Any
 
 def test_a_method_without_a_grasp_fails_in_approach(full: Any) -> None:
     class Refuses(OpenLoop):
-        def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+        latency = 0.0
+
+        def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
             return []
 
     failed(picked(full, Refuses()), "approach", "grasp_method", "No grasp was proposed")
@@ -262,3 +328,56 @@ def test_a_pick_can_be_cancelled_at_any_time(share: float, world: Any, thing: An
             DetectionRequest(),
         )
     assert world.stages[-1] == "cancelled"
+
+
+def two_screws(world: Any, thing: Any) -> Any:
+    """Fill the world: a second screw to the right of the first; the palm camera sees what is below it."""
+    second = SCREW + (0.0, 0.09, 0.0)
+    stocked(world, thing)
+    world.objects["head"] = lambda: [
+        thing("screw", SCREW + HEAD_ERROR, world.t),
+        thing("screw", second + HEAD_ERROR, world.t),
+        thing("tray", TRAY, world.t),
+    ]
+
+    def below(side: Side) -> list[LocalizedObject]:
+        hand = world.context.arms[side].commanded[:3, 3]
+        nearest = min((SCREW, second), key=lambda p: float(np.linalg.norm(p - hand)))
+        return [thing("screw", nearest, world.t)]
+
+    world.objects |= {"left_hand": lambda: below("left"), "right_hand": lambda: below("right")}
+    return world
+
+
+def test_a_screw_that_does_not_come_is_left_for_the_next(world: Any, thing: Any) -> None:
+    two_screws(world, thing)
+    world.grips = [False, False, True]
+    result = picked(world)
+    world.step()
+    assert result.success, result
+    assert world.stages.count("approach") == 2
+    assert_safe(world)
+
+
+def test_an_open_loop_method_leaves_no_screw_for_the_next(world: Any, thing: Any) -> None:
+    two_screws(world, thing)
+    world.grips = [False] * 5
+    result = picked(world, Centroid())
+    world.step()
+    failed(result, "grasp", "grasp_method", "hold nothing")
+    assert world.stages.count("approach") == 1
+
+
+@pytest.mark.parametrize(("flip", "side"), [(1.0, "right"), (-1.0, "left")])
+def test_either_hand_is_the_one_on_the_side_of_the_tray(
+    flip: float, side: Side, world: Any, thing: Any
+) -> None:
+    mirror = np.array([1.0, flip, 1.0])
+    middle = np.array([0.43, 0.0, -0.03])
+    stocked(world, thing, screw=middle, tray=TRAY * mirror)
+    world.method = VisualServo()
+    run = world.run(Pick(CONFIG).run(world.context, PickGoal(side="either")))
+    assert run.result is not None and run.result.success, run.result
+    assert world.bus.latest(topics.hand_goal(side)) is not None
+    other: Side = "left" if side == "right" else "right"
+    assert world.bus.latest(topics.hand_goal(other)) is None

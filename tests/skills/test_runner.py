@@ -114,7 +114,7 @@ def test_what_a_skill_raises_becomes_a_result_that_names_it() -> None:
     result = ended(_raises(ZeroDivisionError("by zero")))
     assert (result.success, result.stage, result.slot) == (False, "fault", "skill")
     assert re.fullmatch(
-        r"Module skill: mine failed: ZeroDivisionError: by zero \(test_runner.py, line \d+\)", result.reason
+        r"Module skill: mine failed: ZeroDivisionError: by zero \(test_runner.py:\d+\)", result.reason
     )
 
 

@@ -11,11 +11,16 @@ import numpy as np
 import pytest
 from tests.skills.conftest import modules
 
+from golem.capabilities.navigation.base import Navigator, NavInputs
+from golem.capabilities.navigation.goto import GoTo
 from golem.errors import ConfigError
 from golem.interfaces import topics
+from golem.interfaces.nav_payloads import NavStep
 from golem.interfaces.payloads import LegStatus, Odometry
 from golem.middleware.bus import Bus
 from golem.robots.model.kinematics import Kinematics
+from golem.runtime.contract_check import ContractCheck
+from golem.runtime.navigator_node import NavigatorNode
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
@@ -43,10 +48,13 @@ class Ground:
     offset: float | None = None
     silent: float = math.inf
     speed: float = 0.85
+    navigator: Navigator = field(default_factory=GoTo)
 
     def __post_init__(self) -> None:
         self.bus = Bus()
         self.context = Context(self.bus, Kinematics(), PERIOD, modules())
+        contract = ContractCheck("navigator", "goto")
+        self.node = NavigatorNode(self.bus, self.navigator, contract, self.context.legs)
         self.pose = self.start
         self.stages: list[str] = []
         self._tick = 0
@@ -65,6 +73,7 @@ class Ground:
                 break
             self._advance()
             run.step()
+            self.node.step(self.context.t)
             feedback = self.bus.latest(topics.FEEDBACK)
             if feedback is not None and self.stages[-1:] != [feedback.stage]:
                 self.stages.append(feedback.stage)
@@ -136,6 +145,19 @@ def test_a_robot_that_does_not_get_there_gives_up_and_stands() -> None:
     assert (result.success, result.stage, result.slot) == (False, "walk", "navigator")
     assert "Not at the goal after 2 s: 1.00 m and 0 deg are left." in result.reason
     assert ground.twist == Twist()
+
+
+def test_a_navigator_that_finds_no_way_ends_the_walk_with_its_reason() -> None:
+    class Blocked(GoTo):
+        def step(self, inputs: NavInputs, dt: float) -> NavStep:
+            step = super().step(inputs, dt)
+            return step if inputs.pose.x < 0.5 else NavStep.failed("A wall is in the way.", step.left)
+
+    ground = Ground(navigator=Blocked())
+    result = outcome(ground.run(Walk().run(ground.context, WalkGoal(1.0, 0.0))))
+    assert (result.success, result.stage, result.slot) == (False, "walk", "navigator")
+    assert result.reason == "A wall is in the way."
+    assert ground.twist == Twist() and ground.pose.x < 0.55
 
 
 def test_legs_that_do_not_move_are_named_with_their_reason() -> None:

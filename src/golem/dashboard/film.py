@@ -145,7 +145,8 @@ class Film:
             chart = balance_chart(
                 self._recorder.trace(last=SPAN), (round(CHART[0] * unit), round(CHART[1] * unit))
             )
-            image.paste(Image.fromarray(chart), (edge, top - edge - chart.shape[0]))
+            if chart is not None:
+                image.paste(Image.fromarray(chart), (edge, top - edge - chart.shape[0]))
         middle = top + bar / 2
         draw.text((14 * unit, middle), status.stage, fill=ACCENT, font=self._fonts[19], anchor="lm")
         draw.text((120 * unit, middle), status.text, fill=INK, font=self._fonts[15], anchor="lm")

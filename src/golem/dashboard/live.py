@@ -30,12 +30,12 @@ from golem.interfaces.payloads import GateState
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.robots.mujoco.shoves import Push, Pusher
+from golem.robots.mujoco.shoves import Pusher
 from golem.robots.mujoco.spectator import SpectatorView
 from golem.runtime.executor import FOREVER
 from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import SkillResult
-from golem.types import Twist
+from golem.types import TICK, Twist
 
 PERIOD = 0.05
 """Time between two updates of the picture [s]."""
@@ -50,12 +50,20 @@ PATIENCE = 0.5
 """Time within which the safety gate must have armed after a reset [s]."""
 CHART = (CAMERA_WIDTH, 84)
 """Size of the chart of the CoM margin [px]."""
+ARRIVAL = 15.0
+"""Time that is waited for somebody to look [s]."""
 SHOWN = 0.6
 """Time for which the arrow of a push is shown at least [s]: the push itself is over in the blink of an eye."""
 
 
 class LiveView:
-    """Shows one running stack and drives it in real time, in the calling thread."""
+    """Shows one running stack and drives it in real time, in the calling thread.
+
+    Attributes:
+        period: as of a node that looks on, see `golem.runtime.executor.Node`.
+    """
+
+    period = TICK
 
     def __init__(
         self,
@@ -65,6 +73,7 @@ class LiveView:
         host: str = "127.0.0.1",
         *,
         restarts: bool = False,
+        passive: bool = False,
     ) -> None:
         """Start serving.
 
@@ -74,6 +83,7 @@ class LiveView:
             port: TCP port; 0 takes a free one.
             host: address to listen at; the default is reachable from this machine only.
             restarts: whether there is a button to start over, which makes `operate` return.
+            passive: whether somebody else drives the robot, and this shows every tick of it.
 
         Raises:
             ConfigError: the port cannot be had.
@@ -92,6 +102,15 @@ class LiveView:
         self._next_camera = 0.0
         self._factor = 1.0
         self._watch(running, robot)
+        if passive:
+            self._busy = True
+            self._panel.skill.hide()
+            self._await_by_the_clock()
+            running.executor.add(self)
+
+    def step(self, t: float) -> None:
+        """Show the tick at time `t` [s]."""
+        self.tick()
 
     def attach(self, running: LockstepRunner, robot: MujocoRobot) -> None:
         """Show another episode of the same stack and seed from now on."""
@@ -101,11 +120,11 @@ class LiveView:
         self._watch(running, robot)
 
     def _watch(self, running: LockstepRunner, robot: MujocoRobot) -> None:
-        self._running = running
+        self._running, self._robot = running, robot
         self._recorder = BalanceRecorder(robot, memory=SPAN)
         self._recorder(running.executor.t)
         self._pusher = Pusher(robot)
-        self._pushed: tuple[float, str] | None = None
+        self._pushed: float | None = None
         self._timeline = Timeline()
         self._revive_until: float | None = None
         self._asking = False
@@ -140,7 +159,14 @@ class LiveView:
             self._ended = self._running.executor.t
             self.update()
 
-    def await_spectator(self, patience: float = 15.0) -> None:
+    def _await_by_the_clock(self) -> None:
+        """Let the robot be until somebody looks, for `ARRIVAL` at most."""
+        print(f"Live view: {self.url}   (Ctrl-C ends it)", flush=True)
+        end = time.monotonic() + ARRIVAL
+        while not self._server.get_clients() and time.monotonic() < end:
+            time.sleep(PERIOD)
+
+    def await_spectator(self, patience: float = ARRIVAL) -> None:
         """Let time pass until somebody looks, at most `patience` [s] of robot time."""
         end = self._running.executor.t + patience
         self.idle(lambda: bool(self._server.get_clients()) or self._running.executor.t >= end)
@@ -164,7 +190,8 @@ class LiveView:
     def tick(self) -> None:
         """Keep pace with the wall clock, and every now and then the picture with the robot; call it every tick."""
         t = self._running.executor.t
-        self._recorder(t, self._pusher.force)
+        acting = self._robot.pushed
+        self._recorder(t, None if acting is None else acting[1])
         self._pusher.drive(t)
         if t >= self._next_update:
             self._next_update = t + PERIOD
@@ -216,7 +243,9 @@ class LiveView:
 
     def _show_pictures(self) -> None:
         if self._panel.legs is not None:
-            self._panel.show_picture("balance", balance_chart(self._recorder.trace(), CHART))
+            chart = balance_chart(self._recorder.trace(), CHART)
+            if chart is not None:
+                self._panel.show_picture("balance", chart)
         for camera, label in CAMERAS.items():
             picture = camera_picture(self._running, self._view, camera)
             height = round(CAMERA_WIDTH * picture.shape[0] / picture.shape[1])
@@ -224,10 +253,12 @@ class LiveView:
             self._panel.show_picture(label, np.asarray(picture, dtype=np.uint8))
 
     def _show_push(self, t: float) -> None:
-        force = self._pusher.force
-        if force.any() and self._pushed is not None:
-            self._stage.show_push(force, self._pushed[1])
-        elif self._pushed is not None and t > self._pushed[0] + SHOWN:
+        """Show the push of whoever pushes, its arrow for `SHOWN` at least."""
+        acting = self._robot.pushed
+        if acting is not None:
+            self._pushed = t if self._pushed is None else self._pushed
+            self._stage.show_push(acting[1], acting[0])
+        elif self._pushed is not None and t > self._pushed + SHOWN:
             self._pushed = None
             self._stage.show_push(np.zeros(3), BASE_LINK)
 
@@ -262,7 +293,7 @@ class LiveView:
             elif button is Button.STAND and self._panel.legs is not None:
                 self._panel.legs.twist = Twist()
             elif button is Button.PUSH and self._panel.legs is not None:
-                self._push(self._panel.legs.push)
+                self._pusher.begin(self._panel.legs.push, self._running.executor.t, self._recorder.yaw)
             else:
                 self._paused = not self._paused
         self._revive()
@@ -274,11 +305,6 @@ class LiveView:
             self._wanted = None if self._running.busy else (name, self._skills.goal(name, fields))
         except GolemError as error:
             self._note = str(error)
-
-    def _push(self, push: Push) -> None:
-        t = self._running.executor.t
-        self._pusher.begin(push, t, self._recorder.yaw)
-        self._pushed = (t, push.body)
 
     def _revive(self) -> None:
         """Reset the gate, and activate it as soon as that has armed it."""

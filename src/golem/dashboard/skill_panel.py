@@ -24,7 +24,8 @@ class SkillPanel:
         """Add the controls to `gui`, with the skill called `first` chosen if there is one."""
         self._gui, self._skills = gui, skills
         names = sorted(skills)
-        with gui.add_folder("Skill"):
+        self._folder = gui.add_folder("Skill")
+        with self._folder:
             self._name = gui.add_dropdown(
                 "skill", names, initial_value=first if first in skills else names[0]
             )
@@ -41,6 +42,10 @@ class SkillPanel:
         name, fields = self._shown  # at once: a thread of the server may be about to show another
         schema = self._skills[name].goal["properties"]
         return name, {key: _read(schema[key], field.value) for key, field in fields.items()}
+
+    def hide(self) -> None:
+        """Take the controls away, where somebody else starts the skills."""
+        self._folder.visible = False
 
     def fill(self, name: str, **values: Any) -> None:
         """Choose the skill called `name`, and fill in some fields, as clicks and keys do."""

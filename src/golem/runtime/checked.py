@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 from golem.capabilities.arms.base import check_pose
-from golem.capabilities.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus, ServoStep
-from golem.capabilities.navigation.base import Navigator, NavStep
+from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, ServoLaw, ServoStatus, ServoStep
+from golem.capabilities.navigation.base import Navigator, NavInputs
+from golem.interfaces.nav_payloads import NavStep
 from golem.runtime.contract_check import ContractCheck
+from golem.runtime.nodes import MIN_RATE
 from golem.types import Array, LocalizedObject, PlanarPose, Twist
 
 
 class CheckedGraspMethod:
-    """A `GraspMethod` whose faults name the module."""
+    """A `GraspMethod` whose faults name the module.
+
+    Attributes:
+        latency: see `GraspMethod`.
+    """
 
     def __init__(self, method: GraspMethod, contract: ContractCheck) -> None:
         """Watch `method`."""
         self._method, self._contract = method, contract
+        self.latency = contract.number("latency", method.latency, minimum=0.0)
 
-    def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+    def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
         """Return the method's grasps; see `GraspMethod`."""
-        grasps = self._contract.call(lambda: list(self._method.propose(target, yaw)))
+        grasps = self._contract.call(lambda: list(self._method.propose(target, scene, gripper)))
         for grasp in grasps:
             self._contract.kind("a proposal", grasp, Grasp)
             self._contract.array("T_odom_gripper", grasp.T_odom_gripper, 4, 4)
@@ -56,23 +63,33 @@ class CheckedServoLaw:
 
 
 class CheckedNavigator:
-    """A `Navigator` whose faults name the module."""
+    """A `Navigator` whose faults name the module.
+
+    Attributes:
+        rate, latency: see `Navigator`.
+    """
 
     def __init__(self, navigator: Navigator, contract: ContractCheck) -> None:
         """Watch `navigator`."""
         self._navigator, self._contract = navigator, contract
+        self.rate = contract.number("rate", navigator.rate, minimum=MIN_RATE)
+        self.latency = contract.number("latency", navigator.latency, minimum=0.0)
 
     def start(self, goal: PlanarPose) -> None:
         """Give the navigator its goal; see `Navigator`."""
         self._contract.call(self._navigator.start, goal)
 
-    def step(self, pose: PlanarPose, moving: bool, dt: float) -> NavStep:
-        """Return the navigator's course; see `Navigator`."""
-        course = self._contract.call(self._navigator.step, pose, moving, dt)
-        self._contract.kind("the course", course, NavStep)
-        self._contract.kind("twist", course.twist, Twist)
+    def step(self, inputs: NavInputs, dt: float) -> NavStep:
+        """Return the navigator's step; see `Navigator`."""
+        step = self._contract.call(self._navigator.step, inputs, dt)
+        self._contract.kind("the step", step, NavStep)
+        self._contract.kind("twist", step.twist, Twist)
+        self._contract.kind("arrived", step.arrived, bool)
+        self._contract.kind("left", step.left, PlanarPose)
         for name in ("vx", "vy", "wz"):
-            self._contract.number(name, getattr(course.twist, name))
-        self._contract.kind("arrived", course.arrived, bool)
-        self._contract.kind("left", course.left, PlanarPose)
-        return course
+            self._contract.number(name, getattr(step.twist, name))
+        for name in ("x", "y", "yaw"):
+            self._contract.number(f"left.{name}", getattr(step.left, name))
+        if step.failure is not None:
+            self._contract.kind("failure", step.failure, str)
+        return step

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import numbers
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
 
 from golem.errors import MissingExtra, MissingSystemLibrary, ModuleFault, RobotGone
+from golem.runtime.call_times import CallTimes
 from golem.types import Array
 
 T = TypeVar("T")
@@ -23,21 +25,28 @@ class ContractCheck:
     Attributes:
         slot: its slot.
         use: the implementation as the stack file names it.
+        times: what its calls take.
     """
 
     slot: str
     use: str
+    times: CallTimes = field(default_factory=CallTimes, compare=False, repr=False)
 
     def satisfies(self, module: object, contract: type[Any]) -> None:
-        """Check that `module` has every member of the protocol `contract`.
+        """Check that `module` has every member of the protocol `contract`, and methods that take its arguments.
 
         Raises:
-            ModuleFault: it lacks some; names them.
+            ModuleFault: it lacks some, or a method takes other arguments; names them.
         """
         members = {**contract.__annotations__, **vars(contract)}
         lacking = [name for name in members if not name.startswith("_") and not hasattr(module, name)]
         if lacking:
             raise self.fault(f"it lacks {', '.join(lacking)} of the contract {contract.__name__}")
+        for name, asked in vars(contract).items():
+            if inspect.isfunction(asked) and not name.startswith("_"):
+                wrong = arity_mismatch(name, getattr(module, name), asked)
+                if wrong:
+                    raise self.fault(wrong)
 
     def call(self, function: Callable[..., T], *arguments: Any) -> T:
         """Return `function(*arguments)`.
@@ -47,12 +56,16 @@ class ContractCheck:
             MissingExtra, MissingSystemLibrary: it needs what this machine lacks, which is not its fault.
             RobotGone: it is the robot, and is no longer there.
         """
+        started = self.times.start()
         try:
             return function(*arguments)
         except (ModuleFault, MissingExtra, MissingSystemLibrary, RobotGone):
             raise
-        except Exception as error:  # a user's module may raise anything
-            raise self.fault(f"{type(error).__name__}: {error}") from error
+        except (Exception, SystemExit) as error:  # a user's module may raise anything
+            raise ModuleFault.of(self.slot, self.use, error) from error
+        finally:
+            if started is not None:
+                self.times.stop(started, f"{self.slot}: {self.use}")
 
     def kind(self, name: str, value: object, kind: type[T]) -> T:
         """Return `value`, which is called `name` and must be a `kind`.
@@ -65,7 +78,7 @@ class ContractCheck:
         return value
 
     def number(self, name: str, value: object, minimum: float = -math.inf) -> float:
-        """Return `value`, which is called `name` and must be a finite number of at least `least`.
+        """Return `value`, which is called `name` and must be a finite number of at least `minimum`.
 
         Raises:
             ModuleFault: it is something else.
@@ -95,6 +108,26 @@ class ContractCheck:
     def fault(self, reason: str) -> ModuleFault:
         """Return the fault of this module for `reason`."""
         return ModuleFault(self.slot, self.use, reason)
+
+
+def arity_mismatch(name: str, method: object, asked: Callable[..., Any]) -> str:
+    """Return what keeps `method`, called `name`, from being called as the contract's function `asked` is.
+
+    Nodes pass every argument by position, so names are free. Empty where it can be called, or does not tell.
+    """
+    if not callable(method):
+        return f"its {name} is a {type(method).__name__}, the contract asks for a method"
+    wanted = list(inspect.signature(asked).parameters)[1:]
+    try:
+        own = inspect.signature(method)
+    except (TypeError, ValueError):  # of a function in C
+        return ""
+    try:
+        own.bind(*wanted)
+    except TypeError:
+        has, needs = ", ".join(own.parameters), ", ".join(wanted)
+        return f"its {name} takes ({has}), the contract asks for {name}({needs})"
+    return ""
 
 
 def _fits(shape: tuple[int, ...], asked: tuple[int | None, ...]) -> bool:

@@ -110,6 +110,12 @@ class Executor:
         # Whole microseconds, so that it is exactly zero for a clock that ticks as this one does.
         self._offset = round(start - TICK * round(start / TICK), 6)
 
+    def add(self, node: Node) -> None:
+        """Let `node` have the last turn of its ticks from now on: for who looks on."""
+        entry = _Entry(node)
+        entry.skip(self._tick)
+        self._schedule.append(entry)
+
     @property
     def t(self) -> float:
         """Present time [s]."""

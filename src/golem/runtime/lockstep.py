@@ -22,7 +22,7 @@ from golem.robots.base import HasGantry, Robot
 from golem.robots.sensors.profiles import load_profile
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import FOREVER, Executor, in_order
-from golem.runtime.node_groups import RobotNodes, SafetyNodes, StackNodes
+from golem.runtime.node_groups import RobotNodes, SafetyNodes, StackNodes, hears_lidar
 from golem.runtime.perception_nodes import LATENCY, detection_requested
 from golem.runtime.skill_table import SkillTable
 from golem.skills.base import Routine, SkillResult
@@ -42,19 +42,31 @@ class LockstepRunner:
         estop: the virtual emergency stop, to be pressed.
     """
 
-    def __init__(self, stack: Stack, robot: Robot) -> None:
+    def __init__(self, stack: Stack, robot: Robot, limits: SafetyLimits | None = None) -> None:
         """Wire the modules of `stack` to `robot`.
+
+        Args:
+            stack: what to run.
+            robot: its robot.
+            limits: what the safety gate enforces instead of the stack's profile: for studies of the gate.
 
         Raises:
             ConfigError: a name or an option of the stack is wrong.
             ModuleFault: a module's constructor raised, or the module lacks a part of its contract.
         """
+        if stack.part("estop").use != "virtual":
+            raise ConfigError(
+                "A board as emergency stop is for 'golem launch' and 'golem safety'; "
+                "in lock-step estop.use is 'virtual'."
+            )
         self.stack = stack
         self.bus = Bus()
         self.estop = VirtualEstop()
         gantry = robot if isinstance(robot, HasGantry) else None
-        self._robot = RobotNodes(self.bus, stack, robot, partial(detection_requested, self.bus))
-        self._safety = SafetyNodes(self.bus, SafetyLimits.from_profile(stack.limits), self.estop)
+        lidar = hears_lidar(stack)
+        seen = partial(detection_requested, self.bus)
+        self._robot = RobotNodes(self.bus, stack, robot, seen, lambda: lidar)
+        self._safety = SafetyNodes(self.bus, limits or SafetyLimits.from_profile(stack.limits), self.estop)
         self._stack = StackNodes(self.bus, stack, robot.calibration, gantry, LATENCY)
         placed = self._robot.nodes + self._safety.nodes + self._stack.nodes
         self.executor = Executor(self.bus, in_order(placed))
@@ -170,7 +182,7 @@ def build_robot(stack: Stack, seed: int) -> Any:
     load_profile(stack.profile)
     if seed < 0:
         raise ConfigError(f"The seed is {seed}; it must be 0 or more.")
-    choice, posture = stack.robot, start_posture(stack.on_ground)
+    choice, posture = stack.choice("robot"), start_posture(stack.on_ground)
     robot = registry.create(
         "robot", choice.use, choice.options, profile=stack.profile, seed=seed, posture=posture
     )
@@ -178,8 +190,8 @@ def build_robot(stack: Stack, seed: int) -> Any:
     return robot
 
 
-def build(stack: Stack, seed: int) -> tuple[LockstepRunner, Any]:
-    """Build the robot of `stack` for episode `seed`, and the stack around it.
+def build(stack: Stack, seed: int, limits: SafetyLimits | None = None) -> tuple[LockstepRunner, Any]:
+    """Build the robot of `stack` for episode `seed`, and the stack around it; `limits` as in `LockstepRunner`.
 
     Returns:
         The running stack, and the robot: for evaluation and viewers, never for modules.
@@ -188,4 +200,4 @@ def build(stack: Stack, seed: int) -> tuple[LockstepRunner, Any]:
         ConfigError, ModuleFault: see `build_robot`; so for every other module.
     """
     robot = build_robot(stack, seed)
-    return LockstepRunner(stack, robot), robot
+    return LockstepRunner(stack, robot, limits), robot

@@ -6,10 +6,10 @@ import time
 
 from golem.capabilities.legs.base import Envelope, LowerBody
 from golem.capabilities.legs.gait import GaitConfig
-from golem.capabilities.legs.locomotion import Locomotion
+from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
 from golem.errors import ModuleFault
 from golem.interfaces import topics
-from golem.interfaces.payloads import LegCommand, LegStatus
+from golem.interfaces.payloads import LegCommand, LegStatus, ModuleFaultMsg
 from golem.middleware.bus import Bus, News
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import MIN_RATE, moving
@@ -32,17 +32,17 @@ class CheckedLowerBody:
         rate: ticks per second [Hz].
     """
 
-    def __init__(self, controller: LowerBody, contract: ContractCheck) -> None:
-        """Take `controller`, watched by `guard`.
+    def __init__(self, controller: LowerBody, contract: ContractCheck, on_ground: bool = False) -> None:
+        """Take `controller`, watched by `contract`, of a robot that stands `on_ground` or hangs.
 
         Raises:
             ModuleFault: its rate, latency, envelope or gait is none.
         """
-        self.controller, self.contract = controller, contract
+        self.controller, self.contract, self._on_ground = controller, contract, on_ground
         contract.kind("envelope", controller.envelope, Envelope)
         contract.kind("gait", controller.gait, GaitConfig)
         self.rate = contract.number("rate", controller.rate, minimum=MIN_RATE)
-        self.check_latency()
+        contract.times.allowed = 1.0 / self.rate + self.check_latency()
 
     def check_latency(self) -> float:
         """Return the latency at this moment [s]; a controller may measure its own.
@@ -57,13 +57,18 @@ class CheckedLowerBody:
         """Return the `command` that the controller returned.
 
         Raises:
-            ModuleFault: it is none, or not finite.
+            ModuleFault: it is none, not finite, or leaves the torque of a robot on the ground to the servo.
         """
         checked = self.contract.kind("the leg command", command, LegCommand)
         for name in ("q", "kp", "kd"):
             self.contract.array(name, getattr(checked, name), JOINTS)
         if checked.tau is not None:
             self.contract.array("tau", checked.tau, JOINTS)
+        elif self._on_ground:
+            raise self.contract.fault(
+                "tau is None, with which the servo carries legs that hang; on the ground the contract asks for a "
+                "torque, zero where there is none to add"
+            )
         return checked
 
 
@@ -78,10 +83,12 @@ class LowerBodyNode:
         realtime: whether the wall clock counts; in lock-step a controller pays by its declared latency.
     """
 
-    def __init__(self, bus: Bus, legs: CheckedLowerBody, fallback: CheckedLowerBody) -> None:
-        """Run `legs`, with `fallback` in reserve."""
+    def __init__(
+        self, bus: Bus, legs: CheckedLowerBody, fallback: CheckedLowerBody, config: LocomotionConfig
+    ) -> None:
+        """Run `legs`, with `fallback` in reserve, under a base layer with `config`."""
         self._bus, self._legs, self._fallback = bus, legs, fallback
-        self._locomotion = Locomotion(legs.controller)
+        self._locomotion = Locomotion(legs.controller, config)
         self._twists = News(bus, topics.TWIST)
         self._fault: ModuleFault | None = None
         self._failed_at = -RECOVERY
@@ -111,7 +118,10 @@ class LowerBodyNode:
             if self._fault is not None:
                 raise self._both(fault) from fault
             # A copy: the one that was raised holds every frame it passed.
-            self._fault = ModuleFault(fault.slot, fault.use, fault.reason)
+            self._fault = ModuleFault(fault.slot, fault.use, fault.reason, fault.trace)
+            self._bus.publish(
+                topics.MODULE_FAULT, ModuleFaultMsg(fault.slot, str(fault), trace=fault.trace), t
+            )
             self._failed_at = t
             self._legs, self._overruns = self._fallback, 0
             self._bus.withdraw(topics.LEG_COMMAND)  # what the failed one sent late shall not come any more
@@ -149,7 +159,9 @@ class LowerBodyNode:
         first = self._fault
         assert first is not None
         reason = f"{first.reason}; the fallback {second.use} failed too: {second.reason}"
-        return ModuleFault(first.slot, first.use, reason)
+        return ModuleFault(
+            first.slot, first.use, reason, "\n".join(filter(None, (first.trace, second.trace)))
+        )
 
     def _report(self, t: float) -> None:
         locomotion = self._locomotion
@@ -166,5 +178,6 @@ class LowerBodyNode:
             self._legs.contract.use,
             None if self._fault is None else str(self._fault),
             self.envelope.speed,
+            None if self._fault is None else self._fault.trace,
         )
         self._bus.publish(topics.LEG_STATUS, status, t)

@@ -12,51 +12,40 @@ from dataclasses import dataclass
 from typing import Any
 
 from golem import registry
-from golem.capabilities.arms.base import UpperBody
-from golem.capabilities.grasping.base import GraspMethod
-from golem.capabilities.legs.base import Envelope, LowerBody
-from golem.capabilities.navigation.base import Navigator
-from golem.capabilities.perception.base import Localizer
+from golem.capabilities.legs.base import Envelope
 from golem.errors import GolemError
-from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.base import EmergencyStop
-from golem.hardware.hands.base import HandController
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
-from golem.hardware.servo.base import MotorServo
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
-from golem.robots.base import HasGantry, Robot
+from golem.robots.base import HasGantry, HasLidar, Robot
 from golem.robots.model.kinematics import Kinematics
-from golem.robots.onboard import motion_switcher
-from golem.robots.onboard.motion_switcher import MotionSwitcher
+from golem.robots.unitree import motion_switcher
+from golem.robots.unitree.motion_switcher import MotionSwitcher
 from golem.runtime import nodes, perception_nodes
 from golem.runtime.checked import CheckedGraspMethod, CheckedNavigator
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Phase, Placed
 from golem.runtime.gantry_release import GantryReleaseNode
 from golem.runtime.lower_body_node import CheckedLowerBody, LowerBodyNode
-from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode
+from golem.runtime.navigator_node import NavigatorNode
+from golem.runtime.odometry_node import LidarNode, OdometryNode
+from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode, stack_loco_api
 from golem.runtime.skill_table import SkillTable
 from golem.skills.base import Routine
 from golem.skills.context import Context, Modules
 from golem.skills.pursuit import pursue
 from golem.skills.runner import SkillRun
 from golem.skills.spec import as_goal
-from golem.stack import Choice, Stack
+from golem.slots import KEYS
+from golem.stack import Stack
 from golem.types import SIDES, Array, Side
 
-CONTRACTS: dict[str, type[Any]] = {
-    "estimator": BaseEstimator,
-    "servo": MotorServo,
-    "hand": HandController,
-    "lower_body": LowerBody,
-    "upper_body": UpperBody,
-    "localizer": Localizer,
-    "grasp_method": GraspMethod,
-    "navigator": Navigator,
-}
-"""What the module in a slot must have."""
+LEGS_ALONE = ("legs",)
+"""What an odometry goes by that knows no more than the base estimate, by which skills go without it."""
+POOLED = ("localizer", "grasp_method", "navigator")
+"""Slots whose modules may take longer than a tick: live, each thinks on a thread of its own, beside the clock."""
 
 
 @dataclass(frozen=True)
@@ -65,18 +54,28 @@ class ModuleFactory:
 
     stack: Stack
 
-    def make(self, slot: str, chosen: Choice | None = None, **context: object) -> tuple[Any, ContractCheck]:
-        """Return a new module for `slot`, by default the stack's choice, and its guard.
+    def make(self, key: str, **context: object) -> tuple[Any, ContractCheck]:
+        """Return a new module, what the stack chooses under `key`, and its guard.
 
         Raises:
             ConfigError: a name or an option is wrong.
             ModuleFault: the constructor raised, or the module lacks a part of its contract.
         """
-        choice = chosen or self.stack.choice(slot)
+        choice, slot = self.stack.choice(key), KEYS[key].slot
         contract = ContractCheck(slot, choice.use)
         module = registry.create(slot, choice.use, choice.options, **context)
-        contract.satisfies(module, CONTRACTS[slot])
+        contract.satisfies(module, registry.contract(slot))
         return module, contract
+
+
+def hears_lidar(stack: Stack) -> bool:
+    """Return whether the odometry of `stack` goes by the LiDAR or its IMU.
+
+    Raises:
+        ConfigError, ModuleFault: its class cannot be loaded.
+    """
+    sources = getattr(registry.load("odometry", stack.choice("odometry").use), "sources", ())
+    return bool({"imu", "scan"} & set(sources))
 
 
 class RobotNodes:
@@ -88,7 +87,12 @@ class RobotNodes:
     """
 
     def __init__(
-        self, bus: Bus, stack: Stack, robot: Robot, wanted: Callable[[str], Callable[[], bool]] | None
+        self,
+        bus: Bus,
+        stack: Stack,
+        robot: Robot,
+        wanted: Callable[[str], Callable[[], bool]] | None,
+        lidar_wanted: Callable[[], bool],
     ) -> None:
         """Connect `robot` to `bus`.
 
@@ -98,21 +102,24 @@ class RobotNodes:
             robot: the robot.
             wanted: called with the name of a camera, returns what says whether it is to be exposed; None where that
                 is another process's business.
+            lidar_wanted: says whether anybody listens to the LiDAR.
 
         Raises:
             ConfigError, ModuleFault: see `ModuleFactory.make`; about the on-board legs.
         """
-        contract = ContractCheck("robot", stack.robot.use)
+        contract = ContractCheck("robot", stack.choice("robot").use)
         self.act = nodes.ActNode(bus, robot, contract)
         self.nodes: list[Placed] = [(Phase.MEASURE, nodes.SenseNode(bus, robot, contract))]
         if wanted is not None:
             for name in robot.cameras:
                 camera = perception_nodes.CameraNode(bus, robot, name, wanted(name), contract)
                 self.nodes.append((Phase.EXPOSE, camera))
+        if isinstance(robot, HasLidar):
+            self.nodes.append((Phase.EXPOSE, LidarNode(bus, robot, lidar_wanted, contract)))
         loco: LocoServiceNode | None = None
         if stack.legs_on_board is not None:
-            legs = CheckedLowerBody(*ModuleFactory(stack).make("lower_body", stack.legs_on_board))
-            loco = LocoServiceNode(bus, stack.loco_api, legs)
+            legs = CheckedLowerBody(*ModuleFactory(stack).make("onboard"), stack.on_ground)
+            loco = LocoServiceNode(bus, stack_loco_api(stack), legs, stack.part("locomotion"))
             self.nodes.append((Phase.SERVE, loco))
         switcher = MotionSwitcher(None if loco is None else loco.service)
         self.nodes.append((Phase.SERVE, ServiceNode(bus, motion_switcher.SERVICE, switcher.answer)))
@@ -159,7 +166,7 @@ class StackNodes:
         calibration: Mapping[str, Array],
         gantry: HasGantry | None,
         latency: float,
-        pool: ThreadPoolExecutor | None = None,
+        pools: Mapping[str, ThreadPoolExecutor] | None = None,
         real: bool = False,
     ) -> None:
         """Build the modules of `stack` around `bus`.
@@ -170,26 +177,31 @@ class StackNodes:
             calibration: of each camera; see `Robot.calibration`.
             gantry: what is let go once the robot stands, or None.
             latency: what a camera's frame takes on top of its way over the bus [s].
-            pool: where the localizer runs; None is on the clock, see `LocalizerNode`.
+            pools: where the modules of the slots `POOLED` run; None is on the clock, see `LocalizerNode`.
             real: whether the robot is none of ours: no module can then call its on-board controller.
 
         Raises:
             ConfigError: a name or an option of the stack is wrong, or a module is to call a real robot's controller.
             ModuleFault: a module's constructor raised, or the module lacks a part of its contract.
         """
+        stack.check()
+        pools = pools or {}
         self.stack, self.bus = stack, bus
         make = ModuleFactory(stack).make
         self.skills = SkillTable(stack)
-        navigator: Navigator = CheckedNavigator(*make("navigator"))
+        navigator, navigator_contract = make("navigator")
         estimator, estimator_contract = make("estimator")
+        odometry, odometry_contract = make("odometry")
         localizer, contract = make("localizer")
-        lower_body = make("lower_body", onboard=None if real else BusOnboard(bus))
-        reserve = make("lower_body", stack.legs_in_reserve, onboard=None if real else BusOnboard(bus))
-        self.legs = LowerBodyNode(bus, CheckedLowerBody(*lower_body), CheckedLowerBody(*reserve))
+        legs, reserve = (
+            CheckedLowerBody(*make(key, onboard=None if real else BusOnboard(bus)), stack.on_ground)
+            for key in ("lower_body", "fallback")
+        )
+        self.legs = LowerBodyNode(bus, legs, reserve, stack.part("locomotion"))
         modules = Modules(
             grasp_method=lambda: CheckedGraspMethod(*make("grasp_method")),
-            navigator=lambda: navigator,
             skill=self.skills.make,
+            worker=pools.get("grasp_method"),
         )
         self.context = Context(bus, Kinematics(), nodes.SkillNode.period, modules)
         self.running = nodes.SkillNode(self.context)
@@ -197,19 +209,34 @@ class StackNodes:
             (Phase.ESTIMATE, nodes.EstimatorNode(bus, estimator, estimator_contract)),
             (Phase.PERCEIVE, perception_nodes.ImagePoseNode(bus, calibration, latency)),
             *(
-                (Phase.PERCEIVE, perception_nodes.LocalizerNode(bus, localizer, name, contract, pool))
+                (
+                    Phase.PERCEIVE,
+                    perception_nodes.LocalizerNode(bus, localizer, name, contract, pools.get("localizer")),
+                )
                 for name in calibration
             ),
             (Phase.DECIDE, self.running),
+            (
+                Phase.DECIDE,
+                NavigatorNode(
+                    bus,
+                    CheckedNavigator(navigator, navigator_contract),
+                    navigator_contract,
+                    self.context.legs,
+                    pools.get("navigator"),
+                ),
+            ),
             (Phase.CONTROL, self.legs),
             (Phase.CONTROL, nodes.UpperBodyNode(bus, *make("upper_body"))),
         ]
+        if tuple(odometry.sources) != LEGS_ALONE:
+            self.nodes.append((Phase.PERCEIVE, OdometryNode(bus, odometry, odometry_contract)))
         for side in SIDES:
             hand, hand_contract = make("hand", side=side)
             self.nodes.append((Phase.CONTROL, nodes.HandNode(bus, hand, side, hand_contract)))
         self.nodes.append((Phase.CONTROL, nodes.ServoNode(bus, *make("servo"))))
         if gantry is not None:
-            robot_contract = ContractCheck("robot", stack.robot.use)
+            robot_contract = ContractCheck("robot", stack.choice("robot").use)
             self.nodes.append(
                 (Phase.OPERATE, GantryReleaseNode(bus, gantry, robot_contract, estimator_contract))
             )

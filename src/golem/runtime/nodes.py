@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from golem.capabilities.arms.base import UpperBody
+from golem.capabilities.arms.trajectory import TrajectoryFollower
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.hands.base import HandController
@@ -17,9 +18,11 @@ from golem.interfaces.payloads import (
     GateState,
     GateStatus,
     HandStatus,
+    JointTrajectory,
 )
 from golem.middleware.bus import Bus, News
 from golem.robots.base import Robot
+from golem.runtime.arm_limits import ArmLimits
 from golem.runtime.contract_check import ContractCheck
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
@@ -30,6 +33,7 @@ from golem.types import (
     SIDES,
     TICK,
     UPPER,
+    Array,
     BaseEstimate,
     HandCommand,
     HandState,
@@ -96,6 +100,7 @@ class EstimatorNode:
     def __init__(self, bus: Bus, estimator: BaseEstimator, contract: ContractCheck) -> None:
         """Run `estimator`."""
         self._bus, self._estimator, self._contract = bus, estimator, contract
+        contract.times.allowed = self.period
         self._started = False
 
     def step(self, t: float) -> None:
@@ -120,14 +125,23 @@ class EstimatorNode:
 
 
 class UpperBodyNode:
-    """Runs the upper-body controller at its rate, its targets brought from odom into base_link."""
+    """Runs the upper-body controller at its rate, its targets brought from odom into base_link.
+
+    A joint trajectory that is newer than the palm targets is followed instead. The arms stay where it ends, and the
+    controller goes on from there when palm targets come.
+    """
 
     def __init__(self, bus: Bus, arms: UpperBody, contract: ContractCheck) -> None:
         """Run `arms`."""
         self._bus, self._arms, self._contract = bus, arms, contract
         self._latency = contract.number("latency", arms.latency, minimum=0.0)
         self.period = 1.0 / contract.number("rate", arms.rate, minimum=MIN_RATE)
+        self._limits = ArmLimits(contract, self.period)
+        contract.times.allowed = self.period + self._latency
         self._stopped_at = 0.0
+        self._follower = TrajectoryFollower()
+        self._followed: JointTrajectory | None = None
+        self._command: Array | None = None
 
     def step(self, t: float) -> None:
         """Publish upper-body targets."""
@@ -138,7 +152,35 @@ class UpperBodyNode:
         if not moving(self._bus):
             self._stopped_at = t
             self._contract.call(self._arms.reset, state.q)
+            self._limits.reset(state.q)
+            self._followed = self._command = None
         targets = self._bus.latest(topics.PALM_TARGETS)
+        trajectory = self._bus.latest(topics.ARM_TRAJECTORY)
+        if trajectory is not None and self._counts(trajectory, targets):
+            if trajectory is not self._followed:
+                start = state.q[UPPER] if self._command is None else self._command
+                self._follower.start(trajectory, start)
+                self._followed = trajectory
+            command = self._follower.step(t, self.period)
+        else:
+            command = self._to_palms(targets, state, base, t)
+        self._command = command.q
+        self._bus.publish(topics.ARM_COMMAND, command, t, self._latency)
+
+    def _counts(self, trajectory: JointTrajectory, targets: PalmTargets | None) -> bool:
+        """Return whether `trajectory` has points, is from after the last stop, and no older than `targets`."""
+        newest = targets is None or trajectory.t >= targets.t
+        return newest and trajectory.t > self._stopped_at and len(trajectory.times) > 0
+
+    def _to_palms(
+        self, targets: PalmTargets | None, state: LowState, base: BaseEstimate, t: float
+    ) -> ArmCommand:
+        """Return what the controller wants."""
+        if self._followed is not None:
+            self._followed = None
+            start = np.concatenate((state.q[: UPPER.start], self._follower.q))
+            self._contract.call(self._arms.reset, start)
+            self._limits.reset(start)
         if targets is None or targets.t <= self._stopped_at:
             # A target from before a stop must not set the arms in motion when the robot is released.
             targets = PalmTargets(t)
@@ -146,8 +188,8 @@ class UpperBodyNode:
         left, right = (None if T is None else T_base_odom @ T for T in (targets.left, targets.right))
         command = self._contract.call(self._arms.step, left, right, state.q, self.period)
         self._contract.kind("the arm command", command, ArmCommand)
-        self._contract.array("q", command.q, UPPER.stop - UPPER.start)
-        self._bus.publish(topics.ARM_COMMAND, command, t, self._latency)
+        self._limits.check(self._contract.array("q", command.q, UPPER.stop - UPPER.start))
+        return command
 
 
 class HandNode:
@@ -158,6 +200,7 @@ class HandNode:
     def __init__(self, bus: Bus, hand: HandController, side: Side, contract: ContractCheck) -> None:
         """Run `hand` on `side`."""
         self._bus, self._hand, self._contract = bus, hand, contract
+        contract.times.allowed = self.period
         self._side: Side = side
         self._goals = 0
         self._frozen = False
@@ -209,6 +252,7 @@ class ServoNode:
     def __init__(self, bus: Bus, servo: MotorServo, contract: ContractCheck) -> None:
         """Run `servo`."""
         self._bus, self._servo, self._contract = bus, servo, contract
+        contract.times.allowed = self.period
 
     def step(self, t: float) -> None:
         """Publish the command that the safety gate shall judge."""
@@ -315,10 +359,10 @@ class SkillNode:
         if self.run is None or self.run.result is not None:
             return
         if fault is not None:
-            self.run.end(SkillResult(False, fault.stage, fault.slot, fault.reason))
+            self.run.end(SkillResult(False, fault.stage, fault.slot, fault.reason, trace=fault.trace))
         legs = self._context.bus.latest(topics.LEG_STATUS)
         if legs is not None and legs.fault is not None:
-            self.run.fail("lower_body", legs.fault)
+            self.run.fail("lower_body", legs.fault, legs.trace)
         self.run.step()
         if isinstance(self.run.error, LACKS) and not self.live:
             raise self.run.error

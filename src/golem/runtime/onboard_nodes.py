@@ -3,27 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
+from golem import registry
 from golem.capabilities.legs.base import STANDING
 from golem.capabilities.legs.hold import STANCES, HoldConfig, JointHold
-from golem.capabilities.legs.locomotion import Locomotion
+from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
 from golem.capabilities.legs.vendor import damp
 from golem.errors import ModuleFault
 from golem.interfaces import topics
 from golem.interfaces.payloads import LegCommand
+from golem.interfaces.unitree_api import LOCO_API, LOCO_APIS, LocoApi
 from golem.middleware.bus import Bus, News
-from golem.middleware.unitree_api import ApiRequest, LocoApi, Response
-from golem.robots.onboard.loco_service import LocoService
+from golem.middleware.wire.api import ApiRequest, Response
+from golem.robots.unitree.loco_service import LocoService
 from golem.runtime.lower_body_node import CheckedLowerBody
+from golem.stack import Stack
 from golem.types import LEGS, TICK, BaseEstimate, LowState
 
 ANSWER = 0.004
 """Time a call takes to be answered [s] [own: two servo periods, so that no client can count on an answer at once]."""
 STANCE = "crouch"
 """Where the stand-up state ends."""
+
+
+def stack_loco_api(stack: Stack) -> LocoApi:
+    """Return the loco service that the lower body of `stack` speaks to; the assumed one where it speaks to none.
+
+    Raises:
+        ConfigError: its options are wrong.
+    """
+    client = stack.onboard_client
+    config = None if client is None else registry.configure("lower_body", client.use, client.options)
+    return getattr(config, "loco_api", LOCO_APIS[LOCO_API])
 
 
 class BusOnboard:
@@ -82,13 +95,15 @@ class LocoServiceNode:
 
     period = TICK
 
-    def __init__(self, bus: Bus, api: LocoApi, legs: CheckedLowerBody) -> None:
-        """Serve `api` on `bus`, with `legs` for the start state."""
+    def __init__(
+        self, bus: Bus, api: LocoApi, legs: CheckedLowerBody, config: LocomotionConfig | None = None
+    ) -> None:
+        """Serve `api` on `bus`, with `legs` for the start state, under a base layer with `config`."""
         self._bus, self._legs = bus, legs
         self.service = LocoService(api)
         self._state = self.service.state
-        self._hold = JointHold(HoldConfig(stance=STANCE, speed=1.0))
-        self._locomotion = Locomotion(legs.controller)
+        self._hold = JointHold(HoldConfig(stance=STANCE, speed=1.0, standing=True))
+        self._locomotion = Locomotion(legs.controller, config)
         self._calls = ServiceNode(bus, api.service, self.service.answer)
 
     def step(self, t: float) -> None:
@@ -119,8 +134,7 @@ class LocoServiceNode:
                 self._hold.reset(state)
             command = self._hold.step(state, base, STANDING, TICK)
             service.standing = bool(np.allclose(command.q, np.tile(STANCES[STANCE], 2)))
-            # The legs carry the robot: their own weight is not what the motors have to bear.
-            return replace(command, tau=np.zeros(LEGS.stop))
+            return command
         if service.state == service.api.damp:
             return damp(state)
         zero = np.zeros(LEGS.stop)

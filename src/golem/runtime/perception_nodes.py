@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+
+import numpy as np
 
 from golem.capabilities.perception.base import Localizer
 from golem.errors import ConfigError, MissingExtra, MissingSystemLibrary, ModuleFault
@@ -15,7 +18,7 @@ from golem.robots.base import STAMP_TOLERANCE, Robot
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.runtime.contract_check import ContractCheck
-from golem.types import TICK, Array, BaseEstimate, LocalizedObject, LowState, RgbdImage
+from golem.types import TICK, Array, BaseEstimate, LocalizedObject, LowState, Mask, RgbdImage
 
 LATENCY = 0.033
 """Time from exposure to the frame being available [s]: one frame period of a D400 at 30 Hz."""
@@ -106,6 +109,7 @@ class LocalizerNode:
         """
         self._bus, self._localizer, self._camera, self._contract = bus, localizer, camera, contract
         self._latency = contract.number("latency", localizer.latency, minimum=0.0) if pool is None else 0.0
+        contract.times.allowed = math.inf if pool is not None else max(self._latency, self.period)
         self._frames = News(bus, topics.rgbd_images(camera))
         self._pool = pool
         self._job: tuple[Future[Detections], tuple[str, ...]] | None = None
@@ -149,14 +153,23 @@ class LocalizerNode:
             self._contract.kind("a located object", o, LocalizedObject)
             self._contract.array("position", o.position, 3)
             self._contract.array("points", o.points, None, 3)
+            if o.mask is not None:
+                self._check_mask(self._contract.kind("mask", o.mask, Mask), len(o.points))
         return Detections(frame.t, self._camera, objects)
+
+    def _check_mask(self, mask: Mask, points: int) -> None:
+        count = self._contract.call(np.count_nonzero, mask.pixels)
+        if count != points:
+            raise self._contract.fault(
+                f"mask has {count} pixels, the contract asks for one per point: {points}"
+            )
 
 
 def _message(fault: ModuleFault) -> ModuleFaultMsg:
     """Return what a localizer did; a label that it does not know is the user's error, by the contract."""
     if isinstance(fault.__cause__, ConfigError):
         return ModuleFaultMsg(None, str(fault.__cause__), "refused")
-    return ModuleFaultMsg(fault.slot, str(fault))
+    return ModuleFaultMsg(fault.slot, str(fault), trace=fault.trace)
 
 
 def detection_requested(bus: Bus, camera: str) -> Callable[[], bool]:

@@ -37,6 +37,7 @@ class SkillResult:
         reason: one sentence.
         timings: seconds of robot time by name, e.g. `detect_to_grasp`.
         value: what the skill found out, an instance of its `Result`; None for a skill without one.
+        trace: where a module failed, see `ModuleFault`; None where none did.
     """
 
     success: bool
@@ -45,6 +46,7 @@ class SkillResult:
     reason: str
     timings: dict[str, float] = field(default_factory=dict[str, float])
     value: Any = None
+    trace: str | None = None
 
     def __post_init__(self) -> None:
         """Check what is sent to others as it is.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -10,12 +11,10 @@ import numpy as np
 
 from golem.capabilities.arms.base import check_pose
 from golem.capabilities.arms.line import Line
-from golem.capabilities.grasping.base import GraspMethod
-from golem.capabilities.navigation.base import Navigator
+from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper
+from golem.capabilities.perception.lift import scene_of
 from golem.interfaces import topics
 from golem.interfaces.payloads import (
-    DetectionRequest,
-    Detections,
     Feedback,
     HandGoal,
     HandStatus,
@@ -24,8 +23,11 @@ from golem.interfaces.payloads import (
 from golem.middleware.bus import Bus, Topic
 from golem.robots.model.kinematics import Kinematics
 from golem.skills.base import Skill, SkillResult, StageFailed, Tick, expect
+from golem.skills.detection_stream import DetectionStream
+from golem.skills.joint_motion import follow
+from golem.skills.navigation import Navigation
 from golem.skills.pursuit import call
-from golem.types import Array, PalmTargets, Side, Twist
+from golem.types import UPPER, Array, LocalizedObject, PalmTargets, PlanarPose, Side, Twist
 
 T = TypeVar("T")
 
@@ -39,13 +41,13 @@ class Modules:
 
     Attributes:
         grasp_method: makes a new one.
-        navigator: returns the stack's; one for all goals, since it may learn how these legs stop.
         skill: makes a new skill, by its name in the stack.
+        worker: where slow modules think; None is on the clock, at the price of the latency that they declare.
     """
 
     grasp_method: Callable[[], GraspMethod]
-    navigator: Callable[[], Navigator]
     skill: Callable[[str], Skill[Context, Any]]
+    worker: Executor | None = None
 
 
 class Hand:
@@ -205,7 +207,7 @@ class LegsInterface:
         return self._context.T_odom_base if odometry is None else odometry.T_odom_base
 
     def drive(self, twist: Twist) -> None:
-        """Move the base with `twist`; to be said again at least every 0.5 s, or the robot stands."""
+        """Move the base with `twist`; it has to be repeated every 0.5 s, or the robot stands."""
         self._context.publish(topics.TWIST, twist)
 
 
@@ -248,6 +250,18 @@ class Context:
         base = self.bus.latest(topics.BASE)
         return np.eye(4) if base is None else base.T_odom_base
 
+    @property
+    def joints(self) -> Array:
+        """(15,) measured joints of torso, left arm, right arm [rad].
+
+        Raises:
+            StageFailed: the motors do not report.
+        """
+        state = self.bus.latest(topics.LOW_STATE)
+        if state is None:
+            raise StageFailed("move", "robot", "The motors do not report.")
+        return state.q[UPPER]
+
     def publish(self, topic: Topic[T], value: T) -> None:
         """Send `value` on `topic` now."""
         self.bus.publish(topic, value, self.t)
@@ -256,6 +270,27 @@ class Context:
         """Publish where both arms are being sent; an arm that was never moved keeps its posture."""
         left, right = (self.arms[side]._commanded for side in ("left", "right"))
         self.publish(topics.PALM_TARGETS, PalmTargets(self.t, left, right))
+
+    async def follow(self, times: Array, q: Array, dq: Array | None = None) -> float:
+        """Move torso and arms along a timed joint trajectory; they stay where it ends.
+
+        It begins as soon as the safety gate lets commands through: at the next tick, and a little later when the
+        episode has only just begun. Cancelled on the way, the arms stay where they are.
+
+        Args:
+            times: (n,) times of its points after its beginning [s], increasing. A first time of 0 asks for a first
+                point where the arms are; a later one lets them get there in a straight line.
+            q: (n, 15) torso, left arm, right arm [rad]; `joints` has where they are.
+            dq: (n, 15) velocities there [rad/s]; None goes straight from point to point.
+
+        Returns:
+            The largest distance of a measured joint from the last point at its time [rad].
+
+        Raises:
+            TargetError: the arms cannot follow it; nothing has moved.
+            StageFailed: the motors do not report, or the safety gate stays shut.
+        """
+        return await follow(self, times, q, dq)
 
     def release_arms(self) -> None:
         """Forget where the arms were sent: they keep their posture, and the next motion starts from where they are."""
@@ -268,10 +303,39 @@ class Context:
         """Return a new grasp method, the one that the stack chose."""
         return self.modules.grasp_method()
 
-    @property
-    def navigator(self) -> Navigator:
-        """The navigator that the stack chose."""
-        return self.modules.navigator()
+    async def propose(
+        self, method: GraspMethod, target: LocalizedObject, side: Side, yaw: float
+    ) -> list[Grasp]:
+        """Return the grasps that `method` proposes for `target`, best first, once it has thought.
+
+        Args:
+            method: from `grasp_method`.
+            target: as the head camera saw it.
+            side: of the hand that is to grasp.
+            yaw: heading of the gripper's x axis about the vertical that suits the arm best [rad].
+        """
+        scene, gripper = self.scene("head"), Gripper(side, self.arms[side].pose, yaw)
+        return await self._think(lambda: method.propose(target, scene, gripper), method.latency)
+
+    def scene(self, camera: str) -> Array:
+        """Return the (n, 3) points in odom that the newest frame of `camera` shows [m]; n is 0 before the first."""
+        frame = self.bus.latest(topics.rgbd_images(camera))
+        return np.zeros((0, 3)) if frame is None else scene_of(frame)
+
+    async def _think(self, function: Callable[[], T], latency: float) -> T:
+        """Return what `function()` does: after `latency` [s] of robot time, or, live, when the worker is done."""
+        if self.modules.worker is None:
+            result = function()
+            await self.sleep(latency)
+            return result
+        job = self.modules.worker.submit(function)
+        while not job.done():
+            await self.tick()
+        return job.result()
+
+    def navigate(self, goal: PlanarPose) -> Navigation:
+        """Let the stack's navigator bring base_link to `goal`, in odom, for as long as what is returned is open."""
+        return Navigation(self, goal)
 
     async def run(self, name: str, goal: object, timeout: float | None = None) -> SkillResult:
         """Pursue `goal` with another skill of the stack, and return how that ended; its feedback is heard as its own.
@@ -317,45 +381,3 @@ class Context:
     def watch(self, camera: str, *labels: str) -> DetectionStream:
         """Let a camera stream what it sees of `labels`, for as long as the returned `DetectionStream` is open."""
         return DetectionStream(self, camera, labels)
-
-
-class DetectionStream:
-    """A camera that streams sightings while it is open (a context manager)."""
-
-    def __init__(self, context: Context, camera: str, labels: tuple[str, ...]) -> None:
-        """Watch `camera` for `labels`."""
-        self._context = context
-        self._camera = camera
-        self._labels = labels
-        self._seen = 0
-        self._since = 0.0
-
-    def __enter__(self) -> DetectionStream:
-        """Start the stream."""
-        self._seen = self._context.bus.count(topics.detections(self._camera))
-        self._since = self._context.t
-        self._context.publish(topics.detection_request(self._camera), DetectionRequest(self._labels))
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Stop the stream, so that nothing is rendered or inferred unasked."""
-        self._context.publish(topics.detection_request(self._camera), DetectionRequest())
-
-    def fresh(self) -> Detections | None:
-        """Return the sightings of a frame exposed since the eye opened that was not returned before, or None."""
-        topic = topics.detections(self._camera)
-        count = self._context.bus.count(topic)
-        if count == self._seen:
-            return None
-        self._seen = count
-        newest = self._context.bus.latest(topic)
-        return newest if newest is not None and newest.t >= self._since else None
-
-    async def look(self, timeout: float) -> Detections | None:
-        """Wait for the next fresh sightings, at most `timeout` [s]; None when no frame came."""
-        end = self._context.t + timeout
-        while True:
-            sightings = self.fresh()
-            if sightings is not None or self._context.t >= end:
-                return sightings
-            await self._context.tick()

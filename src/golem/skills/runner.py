@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import traceback
 from collections.abc import Callable, Coroutine
-from pathlib import Path
 
 from golem.errors import ConfigError, MissingExtra, MissingSystemLibrary, ModuleFault
 from golem.skills.base import CANCELLED, FAULT, REFUSED, SkillCancelled, SkillResult, StageFailed
@@ -52,9 +50,9 @@ class SkillRun:
             self.close()
             self.result = result
 
-    def fail(self, slot: str, reason: str) -> None:
-        """End the skill because the module in `slot` broke its contract."""
-        self.end(SkillResult(False, FAULT, slot, reason))
+    def fail(self, slot: str, reason: str, trace: str | None = None) -> None:
+        """End the skill because the module in `slot` broke its contract; see `ModuleFault`."""
+        self.end(SkillResult(False, FAULT, slot, reason, trace=trace))
 
     def close(self) -> None:
         """Let the skill, if it has not ended, clean up without a further tick."""
@@ -77,7 +75,7 @@ class SkillRun:
         except ConfigError as refusal:
             self.result = SkillResult(False, REFUSED, None, str(refusal))
         except ModuleFault as fault:
-            self.result = SkillResult(False, FAULT, fault.slot, str(fault))
+            self.result = _failed(fault)
         except LACKS as lack:
             self.error = lack
             self.result = SkillResult(False, FAULT, SLOT, str(lack))
@@ -85,9 +83,11 @@ class SkillRun:
             raise
         except BaseException as error:  # a user's skill may raise anything, even SystemExit
             self.error = error
-            place = traceback.extract_tb(error.__traceback__)[-1]
-            where = f"{Path(place.filename).name}, line {place.lineno}"
-            self.result = self._fault(f"{type(error).__name__}: {error} ({where})")
+            self.result = _failed(ModuleFault.of(SLOT, self._name, error))
 
     def _fault(self, reason: str) -> SkillResult:
-        return SkillResult(False, FAULT, SLOT, str(ModuleFault(SLOT, self._name, reason)))
+        return _failed(ModuleFault(SLOT, self._name, reason))
+
+
+def _failed(fault: ModuleFault) -> SkillResult:
+    return SkillResult(False, FAULT, fault.slot, str(fault), trace=fault.trace)

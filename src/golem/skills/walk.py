@@ -70,9 +70,6 @@ class Walk:
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
             return SkillResult(False, failure.stage, failure.slot, str(failure))
-        finally:
-            # However it ends, also by cancellation: the robot stands.
-            context.legs.drive(ZERO)
 
     async def _pursue(self, context: Context, goal: WalkGoal) -> SkillResult:
         start = context.t
@@ -82,31 +79,28 @@ class Walk:
         if goal.frame == "base_link":
             target = PlanarPose.of(context.legs.pose) @ target
         check_reach(context, target, goal.timeout)
-        navigator = context.navigator
-        navigator.start(target)
         said = -math.inf
-        while True:
-            status = context.legs.status
-            pose = PlanarPose.of(context.legs.pose) @ status.rest
-            course = navigator.step(pose, status.moving, context.period)
-            left = course.left
-            distance, turn = math.hypot(left.x, left.y), math.degrees(left.yaw)
-            if course.arrived:
-                text = f"Standing {distance * 1e3:.0f} mm and {turn:.1f} deg from the goal."
-                context.say("done", text, left=[left.x, left.y, left.yaw])
-                return SkillResult(True, "done", None, text, {"walk": context.t - start})
-            if context.t - start >= goal.timeout:
-                text = (
-                    f"Not at the goal after {goal.timeout:g} s: {distance:.2f} m and {turn:.0f} deg are left."
-                )
-                if status.applied == ZERO and status.reason:
-                    raise StageFailed("walk", "lower_body", f"{text} The legs do not move: {status.reason}.")
-                raise StageFailed("walk", "navigator", text)
-            if context.t - said >= 1.0:
-                said = context.t
-                context.say("walk", f"{distance:.2f} m to go.", left=[left.x, left.y, left.yaw])
-            context.legs.drive(course.twist)
-            await context.tick()
+        with context.navigate(target) as way:
+            while True:
+                await context.tick()
+                status, step, left = context.legs.status, way.newest, way.remaining
+                distance, turn = math.hypot(left.x, left.y), math.degrees(left.yaw)
+                if step is not None and step.arrived:
+                    text = f"Standing {distance * 1e3:.0f} mm and {turn:.1f} deg from the goal."
+                    context.say("done", text, left=[left.x, left.y, left.yaw])
+                    return SkillResult(True, "done", None, text, {"walk": context.t - start})
+                if step is not None and step.failure is not None:
+                    raise StageFailed("walk", "navigator", step.failure)
+                if context.t - start >= goal.timeout:
+                    text = f"Not at the goal after {goal.timeout:g} s: {distance:.2f} m and {turn:.0f} deg are left."
+                    if status.applied == ZERO and status.reason:
+                        raise StageFailed(
+                            "walk", "lower_body", f"{text} The legs do not move: {status.reason}."
+                        )
+                    raise StageFailed("walk", "navigator", text)
+                if context.t - said >= 1.0:
+                    said = context.t
+                    context.say("walk", f"{distance:.2f} m to go.", left=[left.x, left.y, left.yaw])
 
 
 def check_reach(context: Context, target: PlanarPose, timeout: float) -> None:
@@ -114,7 +108,7 @@ def check_reach(context: Context, target: PlanarPose, timeout: float) -> None:
 
     Raises:
         ConfigError: they cannot.
-        StageFailed: they do not report, or nobody knows where the robot is.
+        StageFailed: they do not report, or the place of the robot is unknown.
     """
     legs = context.legs.status
     if legs.speed == 0.0:

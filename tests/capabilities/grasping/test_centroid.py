@@ -7,10 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from golem.capabilities.grasping.base import Gripper
 from golem.capabilities.grasping.centroid import Centroid, CentroidConfig, grasp_depth, grasp_pose
 from golem.types import Array, Detection, LocalizedObject
 
 TOP = np.array([0.43, -0.14, -0.03])
+
+NO_SCENE = np.zeros((0, 3))
+
+
+def gripper(yaw: float) -> Gripper:
+    return Gripper("right", np.eye(4), yaw)
 
 
 def thing(points: Array) -> LocalizedObject:
@@ -61,7 +68,7 @@ def test_the_depth_is_always_between_a_third_and_all_of_it(
 
 def test_one_grasp_below_the_top_with_the_score_of_the_detection() -> None:
     config = CentroidConfig(depth=0.01, gap=0.04)
-    (grasp,) = Centroid(config).propose(thing(np.zeros((0, 3))), yaw=0.3)
+    (grasp,) = Centroid(config).propose(thing(np.zeros((0, 3))), NO_SCENE, gripper(0.3))
     np.testing.assert_allclose(grasp.T_odom_gripper, grasp_pose(TOP - (0.0, 0.0, 0.01), 0.3))
     assert (grasp.gap, grasp.score) == (0.04, 0.7)
 
@@ -69,4 +76,4 @@ def test_one_grasp_below_the_top_with_the_score_of_the_detection() -> None:
 def test_it_is_executed_open_loop() -> None:
     method = Centroid()
     target = thing(np.zeros((0, 3)))
-    assert method.servo(target, method.propose(target, 0.0)[0], 0.0) is None
+    assert method.servo(target, method.propose(target, NO_SCENE, gripper(0.0))[0], 0.0) is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.capabilities.grasping.ground import LEAST_POINTS, ground_normal
+from golem.capabilities.grasping.ground import MIN_POINTS, ground_normal
 from golem.types import Array, Detection, LocalizedObject
 
 TOP = np.array([0.43, -0.14, -0.03])
@@ -53,7 +53,7 @@ def test_a_step_in_the_ground_is_left_out() -> None:
 
 def test_too_few_points_give_no_normal() -> None:
     assert ground_normal(sighting((0.0, 0.0), n=7)) is None
-    assert 7 * 7 < LEAST_POINTS
+    assert 7 * 7 < MIN_POINTS
 
 
 def test_a_wall_is_no_ground() -> None:

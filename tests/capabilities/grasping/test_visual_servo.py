@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from golem.capabilities.grasping.base import GraspMethod, ServoLaw, ServoStatus, ServoStep
+from golem.capabilities.grasping.base import GraspMethod, Gripper, ServoLaw, ServoStatus, ServoStep
 from golem.capabilities.grasping.centroid import Centroid, grasp_pose
 from golem.capabilities.grasping.visual_servo import ServoLawConfig, VisualServo, VisualServoConfig
 from golem.types import Array, Detection, LocalizedObject
@@ -18,6 +18,7 @@ from golem.types import Array, Detection, LocalizedObject
 DT = 0.01
 FRAME = 7
 SPEED = 0.15
+NO_SCENE = np.zeros((0, 3))
 SCREW = np.array([0.43, -0.14, -0.03])
 HEAD_ERROR = np.array([0.04, -0.03, 0.02])
 """What the head camera is off by."""
@@ -49,7 +50,7 @@ class Chase:
     def __post_init__(self) -> None:
         method = VisualServo(self.config)
         target = thing(SCREW + HEAD_ERROR)
-        grasp = method.propose(target, -np.pi / 2)[0]
+        grasp = method.propose(target, NO_SCENE, Gripper("right", np.eye(4), -np.pi / 2))[0]
         self.law: ServoLaw = method.servo(target, grasp, 0.0)
         self.gripper = grasp.T_odom_gripper[:3, 3] + (0.0, 0.0, 0.15)
         self.t = 0.0
@@ -88,7 +89,10 @@ def steady(t: float) -> list[LocalizedObject]:
 
 def test_it_is_a_grasp_method() -> None:
     method: GraspMethod = VisualServo()
-    assert method.propose(thing(SCREW), 0.0)[0].gap == Centroid().propose(thing(SCREW), 0.0)[0].gap
+    (fine,), (coarse,) = (
+        m.propose(thing(SCREW), NO_SCENE, Gripper("right", np.eye(4), 0.0)) for m in (method, Centroid())
+    )
+    assert (fine.gap, method.latency) == (coarse.gap, 0.0)
 
 
 def test_it_converges_on_what_the_palm_camera_sees() -> None:

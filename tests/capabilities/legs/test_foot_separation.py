@@ -9,7 +9,7 @@ import pytest
 from tests.capabilities.legs.recorder import Recorder, crouching, still
 
 from golem.capabilities.legs.foot_separation import FootSeparation, FootSeparationConfig
-from golem.capabilities.legs.locomotion import Locomotion
+from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
 from golem.interfaces.payloads import LegCommand
 from golem.robots.model.leg_dynamics import LegDynamics
 from golem.types import LEGS, SIDES, Array, LowState, Twist
@@ -71,6 +71,14 @@ def test_nothing_else_is_touched() -> None:
     led = FootSeparation().step(said, leaning(0.2), SWINGS["left"])
     assert not said.q.any()
     assert led.kp is said.kp and led.kd is said.kd and led.tau is said.tau
+
+
+def test_a_base_layer_without_it_leads_no_foot() -> None:
+    layer = Locomotion(Recorder(), LocomotionConfig(foot_separation=None))
+    state = leaning(0.2)
+    layer.reset(state)
+    said = [layer.step(state, still(), Twist(0.3), 0.02).q[list(ROLLS.values())] for _ in range(100)]
+    assert not np.any(said)
 
 
 @pytest.mark.parametrize("on_ground", [False, True])

@@ -17,6 +17,7 @@ from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
 from golem.capabilities.legs.velocity_integrator import VelocityIntegratorConfig
 from golem.errors import ConfigError
+from golem.interfaces.payloads import LegCommand
 from golem.types import Array, Twist
 
 DT = 0.02
@@ -28,7 +29,9 @@ class Driver:
 
     def __init__(self, controller: Recorder, trim: float = 0.0) -> None:
         self.controller, self.state, self.base = controller, crouching(), still()
-        self.layer = Locomotion(controller, LocomotionConfig(trim=VelocityIntegratorConfig(gain=trim)))
+        self.layer = Locomotion(
+            controller, LocomotionConfig(trim=VelocityIntegratorConfig(gain=trim) if trim else None)
+        )
         self.layer.reset(self.state)
 
     def run(self, seconds: float, twist: Twist | None = None, dt: float = DT) -> None:
@@ -203,6 +206,14 @@ def test_a_controller_that_changes_its_gait_gets_it(driver: Driver) -> None:
     assert (phases[1] - phases[0]) % 1.0 == pytest.approx(DT / 1.4)
 
 
+def test_no_blend_lets_the_next_controller_speak_at_once(driver: Driver) -> None:
+    layer = Locomotion(driver.controller, LocomotionConfig(blend=None, foot_separation=None))
+    layer.reset(driver.state)
+    layer.step(driver.state, driver.base, None, DT)
+    layer.hand_over(Recorder(), driver.state, LegCommand(np.ones(12), np.ones(12), np.ones(12)))
+    assert layer.step(driver.state, driver.base, None, DT).q[0] != pytest.approx(1.0, abs=0.5)
+
+
 @given(rate=st.sampled_from([50.0, 100.0, 200.0, 500.0]), loop=st.sampled_from([100.0, 200.0, 500.0]))
 def test_a_controller_runs_at_its_own_rate_in_a_faster_loop(rate: float, loop: float) -> None:
     rate = min(rate, loop)
@@ -248,7 +259,7 @@ def test_after_a_hand_over_the_targets_do_not_jump(driver: Driver) -> None:
     driver.layer.hand_over(Recorder(target=1.0, stiffness=200.0), driver.state, last)
     commands = [driver.layer.step(driver.state, driver.base, None, DT) for _ in range(10)]
     q, kp = np.array([(c.q[0], c.kp[0]) for c in commands]).T
-    np.testing.assert_allclose(q[:7], np.arange(1, 8) * DT / LocomotionConfig().blend)
+    np.testing.assert_allclose(q[:7], np.arange(1, 8) * DT / (LocomotionConfig().blend or 0.0))
     np.testing.assert_allclose(kp, 100.0 + 100.0 * q)
     np.testing.assert_array_equal(q[7:], 1.0)
 

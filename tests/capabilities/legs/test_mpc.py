@@ -13,7 +13,8 @@ from golem.capabilities.legs.base import STANDING, Envelope, LowerBody
 from golem.capabilities.legs.mpc.controller import FAILURES, MPC, MPCConfig, PlanningError
 from golem.capabilities.legs.mpc.planner import Method, PlannerConfig
 from golem.errors import ConfigError
-from golem.evaluation.harness.pool import CAN_COPY, in_a_copy
+from golem.evaluation.harness.copies import CAN_COPY, in_a_copy
+from golem.finite import NotFinite
 from golem.types import Array
 
 QUICK = MPCConfig(threads=0, plan_rate=25.0)
@@ -48,13 +49,21 @@ def test_a_robot_of_which_no_rollout_is_finite_is_given_up(
     legs, plant = MPC(QUICK), FloorPlant()
     state, base = plant.sense()
     legs.reset(state)
-    lost = replace(base, velocity=np.full(3, np.nan))
+    lost = replace(base, velocity=np.full(3, 1e200))  # finite, and its rollouts are not
     for _ in range(FAILURES - 1):
         legs.step(state, lost, STANDING, 0.04)
     with pytest.raises(PlanningError, match="finite for 5 plans in a row"):
         legs.step(state, lost, STANDING, 0.04)
     legs.reset(state)
     legs.step(state, base, STANDING, 0.04)
+
+
+def test_an_estimate_that_is_not_finite_is_refused_at_once() -> None:
+    legs, plant = MPC(QUICK), FloorPlant()
+    state, base = plant.sense()
+    legs.reset(state)
+    with pytest.raises(NotFinite, match="the velocity of the base"):
+        legs.step(state, replace(base, velocity=np.full(3, np.nan)), STANDING, 0.04)
 
 
 def commands(legs: MPC, ticks: int = 6) -> Array:

@@ -12,8 +12,9 @@ from golem.capabilities.legs.base import STANDING, LocomotionCommand, LowerBody
 from golem.capabilities.legs.vendor import SETTLE, Vendor, VendorConfig, VendorFault
 from golem.errors import ConfigError
 from golem.interfaces.payloads import LegCommand
-from golem.middleware.unitree_api import LOCO_APIS, ApiRequest, Response
-from golem.robots.onboard.loco_service import LocoService
+from golem.interfaces.unitree_api import LOCO_APIS
+from golem.middleware.wire.api import ApiRequest, Response
+from golem.robots.unitree.loco_service import LocoService
 from golem.types import LEGS, NUM_JOINTS, BaseEstimate, Imu, LowState, Twist
 
 API = LOCO_APIS["h1"]

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.capabilities.navigation.base import Navigator, NavStep
+from golem.capabilities.navigation.base import Navigator, NavInputs
 from golem.capabilities.navigation.goto import GoTo, GoToConfig
 from golem.errors import ConfigError
+from golem.interfaces.nav_payloads import NavStep
 from golem.types import PlanarPose, Twist
 
 DT = 0.01
@@ -58,7 +59,7 @@ def go(navigator: Navigator, walker: Walker, goal: PlanarPose, seconds: float = 
     """Walk until the navigator is content, at most for `seconds`."""
     navigator.start(goal)
     for _ in range(round(seconds / DT)):
-        course = navigator.step(walker.measured(), walker.stepping, DT)
+        course = navigator.step(NavInputs(walker.measured(), walker.stepping), DT)
         if course.arrived:
             return course
         walker.step(course.twist)
@@ -124,7 +125,7 @@ def test_a_goal_near_by_is_reached_on_a_straight_line_without_turning_away() -> 
     goal = PlanarPose(0.6, 0.6, 0.0)
     navigator.start(goal)
     for _ in range(1500):
-        course = navigator.step(walker.pose, walker.stepping, DT)
+        course = navigator.step(NavInputs(walker.pose, walker.stepping), DT)
         walker.step(course.twist)
         assert abs(walker.pose.x - walker.pose.y) < 0.05
         assert abs(walker.pose.yaw) < 0.05
@@ -179,7 +180,7 @@ def test_far_away_it_faces_the_goal() -> None:
     navigator = GoTo()
     navigator.start(PlanarPose(0.0, 5.0, 0.0))
     for _ in range(600):
-        walker.step(navigator.step(walker.pose, walker.stepping, DT).twist)
+        walker.step(navigator.step(NavInputs(walker.pose, walker.stepping), DT).twist)
     assert walker.pose.yaw == pytest.approx(math.pi / 2, abs=0.1)
 
 
@@ -188,10 +189,10 @@ def test_it_is_not_there_before_the_robot_stands() -> None:
     here = PlanarPose(1.0, 2.0, 0.3)
     navigator.start(here)
     for _ in range(300):
-        course = navigator.step(here, True, DT)
+        course = navigator.step(NavInputs(here, True), DT)
         assert not course.arrived
         assert course.twist == Twist()
-    rest = [navigator.step(here, False, DT).arrived for _ in range(300)]
+    rest = [navigator.step(NavInputs(here, False), DT).arrived for _ in range(300)]
     config = GoToConfig()
     assert rest.index(True) == pytest.approx((config.settle + config.rest) / DT, abs=1)
 
@@ -202,7 +203,7 @@ def test_a_robot_that_is_moved_while_it_stops_starts_over() -> None:
     goal = PlanarPose(1.0, 0.0, 0.0)
     go(navigator, walker, goal)
     walker.pose = PlanarPose(walker.pose.x - 0.1, walker.pose.y, walker.pose.yaw)
-    courses = [navigator.step(walker.pose, False, DT) for _ in range(100)]
+    courses = [navigator.step(NavInputs(walker.pose, False), DT) for _ in range(100)]
     assert courses[-1].twist.vx >= GoToConfig().pulse - 1e-9
     assert not courses[-1].arrived
 
@@ -236,7 +237,7 @@ def test_a_push_during_a_stop_is_not_learned() -> None:
     navigator.start(PlanarPose(1.0, 0.0, 0.0))
     pushed = False
     for _ in range(4000):
-        course = navigator.step(walker.measured(), walker.stepping, DT)
+        course = navigator.step(NavInputs(walker.measured(), walker.stepping), DT)
         if course.twist == Twist() and not pushed:
             walker.pose, pushed = PlanarPose(3.0, 0.0, 0.0), True
         walker.step(course.twist)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from golem.capabilities.perception.lift import LiftConfig, lift, surface_depth
-from golem.robots.sensors.cameras import CAMERAS
+from golem.robots.sensors.cameras import CAMERAS, project
 from golem.types import Array, Detection, RgbdImage
 
 PALM = CAMERAS["right_hand"]
@@ -55,6 +55,19 @@ def test_position_and_points_go_through_the_pose_of_the_frame() -> None:
     np.testing.assert_allclose(found.position, pose[:3, 3] + pose[:3, 2] * HEAD, atol=1e-6)
     depths = (found.points - pose[:3, 3]) @ pose[:3, 2]
     assert set(np.round(depths, 4)) == {HEAD, PLATE}
+
+
+def test_the_mask_says_which_pixel_each_point_was_lifted_from() -> None:
+    c, depth = (60.0, 40.0), scene((60.0, 40.0), 8, HEAD)
+    depth[38:43, 50:58] = 0.0  # a hole in the depth
+    found = lift(frame(depth), detection("screw", c, 8), LiftConfig())
+    assert found is not None and found.mask is not None
+    mask = found.mask
+    rows, columns = np.nonzero(mask.pixels)
+    assert mask.pixels.dtype == np.bool_ and len(rows) == len(found.points) > 100
+    pixels = project(PALM, found.points)
+    np.testing.assert_allclose(pixels, np.column_stack([columns + mask.x, rows + mask.y]), atol=1e-3)
+    assert not mask.pixels[40 - mask.y, 52 - mask.x]
 
 
 def test_a_screw_is_the_near_mode_even_where_its_head_is_a_minority() -> None:

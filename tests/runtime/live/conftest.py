@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import GateState
@@ -55,10 +56,12 @@ class Live:
         # In this one process nobody could answer while the twin waits.
         self.twin = Twin(self.stack, self.robot, *self.member("twin"), patience=0.0)
 
-    def start_gate(self, patient: bool = False, real: bool = False) -> None:
-        """Put a new gate on the domain."""
+    def start_gate(
+        self, patient: bool = False, real: bool = False, estop: EmergencyStop | None = None
+    ) -> None:
+        """Put a new gate on the domain, with a virtual e-stop if none is given."""
         limits = SafetyLimits.from_profile(self.stack.limits)
-        estop = VirtualEstop()
+        estop = estop or VirtualEstop()
         self.gate = SafetyProcess(
             *self.member("safety"), limits, estop, clock=lambda: self.clock, patient=patient, real=real
         )
@@ -151,7 +154,8 @@ def live(tmp_path: Any) -> Iterator[Live]:
     """A hanging robot that sees nothing: twin, gate and stack."""
     (tmp_path / "blind.py").write_text(BLIND)
     robot = Choice("mujoco", {"world": "open"})
-    stack = Stack(robot, localizer=Choice(f"{tmp_path / 'blind.py'}:Blind"), profile="ideal")
+    choices = {"robot": robot, "localizer": Choice(f"{tmp_path / 'blind.py'}:Blind")}
+    stack = Stack(choices, profile="ideal")
     live = Live(stack)
     live.start_twin()
     live.start_gate()

@@ -9,17 +9,19 @@ import time
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from queue import Empty, SimpleQueue
 
 import pytest
 import tyro
 
 from golem.errors import ConfigError
+from golem.interfaces import public
 from golem.middleware.dds import discovery
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.exclusive_writers import owner, refuse_second
 from golem.middleware.wire import hg
+from golem.runtime.live.exclusive_writers import LAUNCH, owner, refuse_second
 from golem.runtime.live.launch import LaunchConfig, commands, run_launch
 from golem.runtime.live.node_setup import company, member
 from golem.runtime.live.process import TwinConfig, run_twin
@@ -45,6 +47,40 @@ def test_a_twin_never_joins_the_robots_domain() -> None:
         run_twin(TwinConfig(dds=ROBOT))
     with pytest.raises(ConfigError, match="golem launch starts a simulation"):
         run_launch(LaunchConfig(dds=ROBOT))
+
+
+def test_a_second_launch_ends_with_a_sentence(here: DdsConfig) -> None:
+    with member(LAUNCH, here), pytest.raises(ConfigError, match="a launched robot on domain .* golem launch"):
+        run_launch(LaunchConfig(dds=here))
+
+
+def test_nothing_is_launched_beside_a_part_of_a_robot(here: DdsConfig) -> None:
+    with member("safety", here) as (participant, _):
+        row = public.topic("/lowcmd")
+        writer = participant.writer("rt/lowcmd", hg.LOW_CMD.type_name, row.qos)
+        with pytest.raises(ConfigError, match="a safety gate on domain .* golem safety"):
+            run_launch(LaunchConfig(dds=here))
+        writer.close()
+
+
+@pytest.mark.slow
+def test_a_stack_asks_for_a_robot_only_where_nobody_starts_one(here: DdsConfig) -> None:
+    program = (
+        "import golem.runtime.live.process as p; from golem.middleware.dds.domain import DdsConfig; p.ALONE = 0.3;"
+        f"p.run_up(p.UpConfig(dds=DdsConfig(domain={here.domain})))"
+    )
+    lines: SimpleQueue[str] = SimpleQueue()
+    with member(LAUNCH, here):
+        command = [sys.executable, "-u", "-c", program]
+        up = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        assert up.stdout is not None
+        threading.Thread(target=lambda out=up.stdout: [lines.put(line) for line in out], daemon=True).start()
+        assert "is on domain" in lines.get(timeout=60)
+        with pytest.raises(Empty):
+            lines.get(timeout=1.5)
+    assert "No robot on domain" in lines.get(timeout=60)
+    up.kill()
+    up.wait()
 
 
 def test_the_robot_is_demanded_by_name_and_by_number() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,7 @@ from tests.runtime.live.conftest import BLIND, Live
 
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState
-from golem.stack import Choice, load_stack
+from golem.stack import load_stack
 
 
 @pytest.mark.slow
@@ -18,7 +17,7 @@ from golem.stack import Choice, load_stack
 def test_it_stands_without_its_band(legs: str, tmp_path: Path) -> None:
     (tmp_path / "blind.py").write_text(BLIND)
     stack = load_stack("stand", profile="ideal")
-    stack = replace(stack, lower_body=Choice(legs), localizer=Choice(f"{tmp_path / 'blind.py'}:Blind"))
+    stack = stack.with_choice("lower_body", legs).with_choice("localizer", f"{tmp_path / 'blind.py'}:Blind")
     live = Live(stack)
     live.start_twin()
     live.start_gate()

@@ -37,8 +37,10 @@ def test_a_fallback_that_takes_the_legs_is_said_once(
     (tmp_path / "blind.py").write_text(BLIND)
     live = Live(
         Stack(
-            lower_body=Choice(f"{tmp_path / 'mine.py'}:Failing"),
-            localizer=Choice(f"{tmp_path / 'blind.py'}:Blind"),
+            {
+                "lower_body": Choice(f"{tmp_path / 'mine.py'}:Failing"),
+                "localizer": Choice(f"{tmp_path / 'blind.py'}:Blind"),
+            }
         )
     )
     live.start_twin()

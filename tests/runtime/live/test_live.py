@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from tests.runtime.live.conftest import Live
 
-from golem.interfaces import topics
 from golem.interfaces.payloads import GateState
 from golem.middleware.dds.base import Qos
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
@@ -22,7 +21,7 @@ VENDOR = Qos(depth=1)
 def stiff(live: Live) -> bool:
     """Return whether the motors of the robot hold a position."""
     assert live.gate is not None
-    command = live.gate.bus.latest(topics.LOW_CMD)
+    command = live.gate.command
     return command is not None and bool(command.kp.any())
 
 
@@ -47,7 +46,7 @@ def test_a_stack_that_dies_is_noticed_and_the_robot_damped_then_it_comes_back(li
     live.run(0.2)
     assert (live.state, live.reason) == (GateState.STOP1, "command_stale") and not stiff(live)
     assert live.gate is not None
-    command = live.gate.bus.latest(topics.LOW_CMD)
+    command = live.gate.command
     assert command is not None and (command.kd > 0.0).all()
     live.start_up()
     live.run(0.1)

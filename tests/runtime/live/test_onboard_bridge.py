@@ -5,28 +5,28 @@ import pytest
 from tests.middleware.wire.rpc import reach, serve
 
 from golem.capabilities.legs.hold import JointHold
-from golem.interfaces import topics
+from golem.interfaces import public, topics
+from golem.interfaces.onboard_legs import decode_legs, encode_legs
 from golem.interfaces.payloads import LegCommand
+from golem.interfaces.unitree_api import LOCO_APIS, OK, decode_int, encode
 from golem.middleware.bus import Bus
-from golem.middleware.dds.base import CALLS, DEFAULT
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.unitree_api import LOCO_APIS, OK, ApiRequest, Response, decode_int, encode
+from golem.middleware.ros.node import DdsNode
 from golem.middleware.wire import hg
-from golem.robots.onboard import motion_switcher
-from golem.robots.onboard.motion_switcher import CHECK_MODE, MotionSwitcher
+from golem.middleware.wire.api import ApiRequest, Response
+from golem.robots.unitree import motion_switcher
+from golem.robots.unitree.motion_switcher import CHECK_MODE, MotionSwitcher
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Executor
+from golem.runtime.live.bridge import StreamIn, StreamOut
 from golem.runtime.live.onboard_bridge import (
     AnswersIn,
     AnswersOut,
     CallsIn,
     CallsOut,
     Identities,
-    LegsIn,
-    OnboardLegsOut,
-    decode_legs,
-    encode_legs,
 )
+from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.lower_body_node import CheckedLowerBody
 from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode
 from golem.types import Array
@@ -117,13 +117,15 @@ def legs(tau: Array | None) -> LegCommand:
 @pytest.mark.parametrize("tau", [None, np.arange(12) / 8.0])
 def test_targets_of_the_legs_cross_over(tau: Array | None) -> None:
     domain, bus, there = LocalDomain(), Bus(), Bus()
-    writer = domain.participant().writer("rt/onboard/lowcmd", hg.LOW_CMD.type_name, DEFAULT)
-    reader = domain.participant().reader("rt/onboard/lowcmd", hg.LOW_CMD.type_name, CALLS)
-    out, incoming = OnboardLegsOut(bus, writer), LegsIn(there, reader, print)
+    ours, theirs = domain.participant(), domain.participant()
+    robot = RoleEndpoints("robot", ours, DdsNode(ours, "robot"))
+    stack = RoleEndpoints("stack", theirs, DdsNode(theirs, "stack"))
+    row = public.topic("/onboard/lowcmd")
+    out, incoming = StreamOut(bus, robot, row), StreamIn(there, stack, row, lambda: 0.0, print)
     bus.publish(topics.ONBOARD_LEGS, legs(tau), 0.0)
     out.step(0.0)
-    writer.write(hg.LOW_CMD.blank())
-    incoming.step(0.0)
+    robot.publish(row.name, hg.LOW_CMD.blank())
+    stack.step(0.0)
     got = BusOnboard(there).legs()
     assert got is not None
     for name in ("q", "kp", "kd", "tau"):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,11 +24,12 @@ from golem.middleware.wire import hg
 from golem.middleware.wire.convert import answered, encode_low_state
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.robots.sensors.cameras import CAMERAS
-from golem.runtime.executor import Executor
-from golem.runtime.live.motor_bridge import RequestOut
-from golem.runtime.live.process import SafetyConfig, run_safety
+from golem.runtime.executor import Executor, in_order
+from golem.runtime.live.bridge import outgoing
 from golem.runtime.live.role_endpoints import RoleEndpoints
+from golem.runtime.live.safety_main import SafetyConfig, run_safety
 from golem.runtime.live.safety_process import SafetyProcess
+from golem.runtime.live.stack_out import encoders
 from golem.stack import Choice
 from golem.types import NUM_JOINTS, Imu, LowCommand, LowState
 
@@ -99,7 +99,8 @@ def test_a_stack_ticks_once_for_each_state_and_answers_that_one(live: Live, firs
     participant, node = live.member("answering")
     reader = live.member("gate")[0].reader("rt/safety/lowcmd_in", hg.LOW_CMD.type_name, Qos(depth=100))
     bus = Bus()
-    executor = Executor(bus, [RequestOut(bus, RoleEndpoints("stack", participant, node), lambda: 0)], first)
+    sent = outgoing(bus, RoleEndpoints("stack", participant, node), encoders(bus, lambda: 0))
+    executor = Executor(bus, in_order(sent), first)
     got = []
     for k in range(50):
         t = first + 0.002 * k
@@ -159,7 +160,7 @@ def test_the_real_robots_own_leg_controller_is_not_commanded_against(live: Live,
         Choice(f"{mine}:Mine"),
         Choice("handover", {"walk": {"use": f"{mine}:Mine"}, "stand": {"use": "almi"}}),
     ):
-        live.stack = replace(live.stack, lower_body=legs)
+        live.stack = live.stack.with_choice("lower_body", legs)
         with pytest.raises(ConfigError, match="moves its legs itself"):
             live.start_up(real=True)
 
@@ -171,7 +172,7 @@ def test_no_module_of_a_real_robots_stack_can_call_its_own_controller(live: Live
         "from golem.capabilities.legs.vendor import Vendor\n\n"
         "class Mine:\n    def __new__(cls, onboard): return Vendor(onboard=onboard)\n"
     )
-    live.stack = replace(live.stack, lower_body=Choice(f"{mine}:Mine"))
+    live.stack = live.stack.with_choice("lower_body", f"{mine}:Mine")
     live.start_twin()
     live.start_gate()
     live.start_up(real=True)

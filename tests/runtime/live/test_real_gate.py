@@ -10,18 +10,20 @@ from tests.runtime.live.conftest import Live
 
 from golem.errors import ConfigError
 from golem.interfaces.payloads import GateState
+from golem.interfaces.unitree_api import encode
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.local import LocalReader
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
-from golem.middleware.unitree_api import ApiRequest, encode
 from golem.middleware.wire import convert as wire
 from golem.middleware.wire import hg
+from golem.middleware.wire.api import ApiRequest
 from golem.middleware.wire.rpc import RpcServer
-from golem.robots.onboard import motion_switcher
+from golem.robots.unitree import motion_switcher
 from golem.runtime.live import motion_switcher_client
-from golem.runtime.live.process import SafetyConfig, run_safety
-from golem.runtime.live.safety_process import LOOK, WARY, Arrivals, SafetyProcess
+from golem.runtime.live.safety_arrivals import Arrivals
+from golem.runtime.live.safety_main import SafetyConfig, run_safety
+from golem.runtime.live.safety_process import LOOK, WARY, SafetyProcess
 from golem.types import TICK
 
 

@@ -17,8 +17,8 @@ from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.node import DdsNode
 from golem.robots.base import Restorable
 from golem.runtime.live import render_worker as live_darkroom
+from golem.runtime.live.bridge import outgoing
 from golem.runtime.live.render_worker import RenderWorker, expose, image_topics
-from golem.runtime.live.robot_out import CameraOut
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.lockstep import build, build_robot
 from golem.stack import Stack
@@ -45,14 +45,14 @@ def test_nothing_is_rendered_unless_somebody_listens() -> None:
     endpoints = RoleEndpoints("robot", participant, DdsNode(participant, "cameras"), image_topics())
     robot = build_robot(Stack(profile="ideal"), 0)
     bus = Bus()
-    cameras = {"left_hand": CameraOut(bus, endpoints, "left_hand")}
+    streams = outgoing(bus, endpoints)
     topic, save_state = topics.exposures("left_hand"), robot.save_state()
-    expose(robot, cameras, bus, "left_hand", 0.5, save_state)
+    expose(robot, endpoints, bus, streams, "left_hand", 0.5, save_state)
     assert bus.count(topic) == 0
     listener = DdsNode(domain.participant(), "listener")
     row = public.topic(public.image("left_hand", public.COLOR_JPEG))
     subscription = listener.subscription(row.name, row.type, None, row.qos)
-    expose(robot, cameras, bus, "left_hand", 1.5, save_state)
+    expose(robot, endpoints, bus, streams, "left_hand", 1.5, save_state)
     assert bus.latest(topic) is not None
     message = subscription.latest()
     assert message is not None and (message.header.stamp.sec, message.header.stamp.nanosec) == (1, 500000000)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from tests.middleware.wire.rpc import reach
@@ -12,8 +10,8 @@ from tests.runtime.live.conftest import Live
 from golem.capabilities.legs.hold import STANCES
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, LegStatus
-from golem.middleware.unitree_api import ApiRequest
-from golem.robots.onboard.motion_switcher import RELEASE_MODE, SERVICE
+from golem.middleware.wire.api import ApiRequest
+from golem.robots.unitree.motion_switcher import RELEASE_MODE, SERVICE
 from golem.stack import Choice
 from golem.types import LEGS
 
@@ -31,7 +29,8 @@ def test_the_onboard_controller_moves_the_legs_until_its_mode_is_released(live: 
     for node in ("up", "safety", "twin"):
         live.leave(node)
     onboard = Choice("hold", {"stance": "straight", "speed": 2.0})
-    live.stack = replace(live.stack, lower_body=Choice("vendor", {"robot": robot}), onboard=onboard)
+    vendor = Choice("vendor", {"robot": robot})
+    live.stack = live.stack.with_choice("lower_body", vendor).with_choice("onboard", onboard)
     live.start_twin()
     live.start_gate()
     live.start_up()

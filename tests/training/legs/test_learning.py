@@ -19,7 +19,6 @@ from golem.errors import ConfigError
 from golem.provenance import commit
 from golem.robots.model.leg_kinematics import leg_poses
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, read_checkpoint, read_curve
-from golem.training.legs.curve import draw_curves
 from golem.training.legs.disturbances import (
     GENTLE,
     QUARTERS,
@@ -30,6 +29,7 @@ from golem.training.legs.disturbances import (
 )
 from golem.training.legs.env import LAYOUT, TASKS, LegsEnv, Task
 from golem.training.legs.export_policy import TRAINED, command_of, export, load_actor
+from golem.training.legs.learning_curve import draw_curves
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
 from golem.training.legs.train_legs import Adversary, TrainLegsConfig, _Run, train

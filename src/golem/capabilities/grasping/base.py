@@ -1,4 +1,4 @@
-"""The contract of a grasp method: an object in, ranked grasps or a servo law out."""
+"""The contract of a grasp method: an object, the scene around it and a gripper in, ranked grasps or a servo law out."""
 
 from __future__ import annotations
 
@@ -6,7 +6,31 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from golem.types import Array, LocalizedObject
+from golem.robots.model.magpie_model import MAX_FORCE, MAX_GAP, PAD_HALF_SIZE
+from golem.types import Array, LocalizedObject, Side
+
+
+@dataclass(frozen=True, slots=True)
+class Gripper:
+    """The hand that is to grasp, in numbers.
+
+    Attributes:
+        side: which hand.
+        T_odom_gripper: (4, 4) where its grasp frame is, by the measured joints and the base estimate.
+        yaw: heading of its x axis about the vertical that suits the arm best [rad].
+        max_gap: widest opening between the pads [m].
+        max_force: greatest force of one finger [N].
+        pad_length: of a pad, along the approach axis [m].
+        pad_width: of a pad, along x [m].
+    """
+
+    side: Side
+    T_odom_gripper: Array
+    yaw: float
+    max_gap: float = MAX_GAP
+    max_force: float = MAX_FORCE
+    pad_length: float = 2.0 * float(PAD_HALF_SIZE[2])
+    pad_width: float = 2.0 * float(PAD_HALF_SIZE[0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +49,14 @@ class Grasp:
 
 
 class ServoStatus(StrEnum):
-    """Where a servo law stands."""
+    """Where a servo law stands.
+
+    Attributes:
+        TRACKING: on its way; the skill goes on to send the hand where the step says.
+        CONVERGED: the fingers shall close now.
+        LOST: the palm camera no longer sees the object; the attempt ends, and the localizer is named.
+        STALLED: the hand comes no nearer; the attempt ends, and the upper body is named.
+    """
 
     TRACKING = "tracking"
     CONVERGED = "converged"
@@ -54,6 +85,9 @@ class ServoStep:
 class ServoLaw(Protocol):
     """A closed loop from sightings of the palm camera to gripper poses, in odom.
 
+    The law decides how high the hand stays and when it goes down; the skill only sends the hand where each step says,
+    at bounded speed.
+
     Attributes:
         label: what it follows.
     """
@@ -72,14 +106,23 @@ class ServoLaw(Protocol):
 
 
 class GraspMethod(Protocol):
-    """Proposes grasps for an object, and may close the loop on it."""
+    """Proposes grasps for an object, and may close the loop on it.
 
-    def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+    Attributes:
+        latency: time that a proposal takes [s]: the hand waits for so long in lock-step. Live, `propose` runs on a
+            thread of its own and takes what it takes. A servo law's step costs nothing: its images were paid for.
+    """
+
+    latency: float
+
+    def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
         """Return grasps for `target`, best first; empty when there is none.
 
         Args:
             target: the object as the head camera saw it, in odom.
-            yaw: heading of the gripper's x axis about the vertical that suits the arm best [rad].
+            scene: (n, 3) everything that the head camera's newest frame shows, in odom, row by row [m]: the object,
+                what lies around it, the robot's own arms. Pixels without a depth are left out: n varies, and may be 0.
+            gripper: the hand that is to grasp.
         """
         ...
 

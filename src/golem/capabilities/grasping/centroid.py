@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.grasping.base import Grasp, OpenLoop
+from golem.capabilities.grasping.base import Grasp, Gripper, OpenLoop
+from golem.finite import check_finite
 from golem.types import Array, LocalizedObject
 
 
@@ -64,14 +65,22 @@ def grasp_depth(target: LocalizedObject, depth: float, clearance: float) -> floa
 
 
 class Centroid(OpenLoop):
-    """One grasp, straight down on the object's centre."""
+    """One grasp, straight down on the object's centre.
+
+    Attributes:
+        config: its options.
+        latency: none: a proposal takes a few microseconds.
+    """
+
+    latency = 0.0
 
     def __init__(self, config: CentroidConfig | None = None) -> None:
         """Take the distances from `config`."""
         self.config = config or CentroidConfig()
 
-    def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+    def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
         """Return the one top-down grasp; see `GraspMethod`."""
+        check_finite("the object's position", target.position)
         depth = grasp_depth(target, self.config.depth, self.config.clearance)
         position = target.position - (0.0, 0.0, depth)
-        return [Grasp(grasp_pose(position, yaw), self.config.gap, target.detection.score)]
+        return [Grasp(grasp_pose(position, gripper.yaw), self.config.gap, target.detection.score)]

@@ -10,7 +10,7 @@ STANDS_PROUD = 0.004
 """What is less than this below the object's top is the object [m]."""
 THICKNESS = 0.004
 """Points further than this from the first plane are not ground [m]."""
-LEAST_POINTS = 60
+MIN_POINTS = 60
 """Fewer points give no plane."""
 STEEPEST = 0.35
 """A plane steeper than this against the vertical is not the ground the object stands on [rad]."""
@@ -25,7 +25,7 @@ def ground_normal(sighting: LocalizedObject) -> Array | None:
     points = sighting.points[sighting.points[:, 2] < sighting.position[2] - STANDS_PROUD]
     normal = None
     for _ in range(2):
-        if len(points) < LEAST_POINTS:
+        if len(points) < MIN_POINTS:
             return None
         d = points - points.mean(axis=0)
         xx, xy, yy = d[:, 0] @ d[:, 0], d[:, 0] @ d[:, 1], d[:, 1] @ d[:, 1]

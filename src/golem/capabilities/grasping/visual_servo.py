@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from golem.capabilities.grasping.base import Grasp, ServoLaw, ServoStatus, ServoStep
+from golem.capabilities.grasping.base import Grasp, Gripper, ServoLaw, ServoStatus, ServoStep
 from golem.capabilities.grasping.centroid import UP, Centroid, CentroidConfig, grasp_depth, grasp_pose
 from golem.capabilities.grasping.ground import ground_normal
 from golem.types import Array, LocalizedObject
@@ -190,16 +190,23 @@ class VisualServoConfig:
 
 
 class VisualServo:
-    """Centroid grasp, refined by the palm camera at image rate."""
+    """Centroid grasp, refined by the palm camera at image rate.
+
+    Attributes:
+        config: its options.
+        latency: that of `Centroid`.
+    """
+
+    latency = Centroid.latency
 
     def __init__(self, config: VisualServoConfig | None = None) -> None:
         """Take the numbers from `config`."""
         self.config = config or VisualServoConfig()
         self._coarse = Centroid(self.config.centroid)
 
-    def propose(self, target: LocalizedObject, yaw: float) -> list[Grasp]:
+    def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
         """Return the centroid grasp, to start from; see `GraspMethod`."""
-        return self._coarse.propose(target, yaw)
+        return self._coarse.propose(target, scene, gripper)
 
     def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw:
         """Return the loop that refines `grasp`; see `GraspMethod`."""

@@ -16,7 +16,11 @@ from golem.types import Array, BaseEstimate, LowState, Twist
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """The twists a controller can follow: lowest and highest vx, vy [m/s] and wz [rad/s]; zero is always inside."""
+    """The twists a controller can follow; zero is always inside.
+
+    Attributes:
+        vx, vy, wz: lowest and highest of this component [m/s], [rad/s].
+    """
 
     vx: tuple[float, float] = (0.0, 0.0)
     vy: tuple[float, float] = (0.0, 0.0)
@@ -58,7 +62,7 @@ class LocomotionCommand:
 
     Attributes:
         twist: velocity to aim at: a twist inside the controller's envelope, and the base layer's small correction (see
-            `trim.TrimConfig.most`) of the components that the envelope has; exactly zero means stand.
+            `VelocityIntegratorConfig.maximum`) of the components that the envelope has; exactly zero means stand.
         phase: (2,) gait phase of the left and the right leg, 0 to 1, a leg's stance first (see `gait.Gait`).
         stepping: whether the gait clock runs; while it does not, both feet belong on the ground.
         commanded: whether the robot shall move, at once or as soon as the controller follows twists; if not, `twist`
@@ -80,13 +84,22 @@ class LowerBody(Protocol):
     """Moves the base with the legs; standing is the zero twist.
 
     The base layer (`locomotion.Locomotion`) clamps twists, runs the gait clock and decides when to step: no
-    controller does that itself.
+    controller does that itself. It also corrects the twist by the estimated velocity and keeps a swinging foot beside
+    the other; a controller that does either itself switches that off with `locomotion: {trim: off}` or
+    `{foot_separation: off}` in its stack file.
+
+    What a controller may have besides, and is asked for only where it is there:
+        `started` (see `Starting`): it cannot carry the robot at once.
+        `follows` (see `Following`): it follows twists only at times.
+        `requires`: a tuple of what its class cannot do without. `ground` or `hoist`: a robot that stands or hangs, else
+            the stack is refused. `onboard`: the robot's own computer; the twin then runs leg control of its own.
+        `onboard`, a parameter of its constructor: gets that computer (`vendor.Onboard`), or None beside a real robot.
 
     Attributes:
-        rate: ticks per second it wants to be run at [Hz].
-        latency: time from reading the state to the command being available [s].
-        envelope: the twists it can follow.
-        gait: the gait clock it wants.
+        rate: ticks per second it wants to be run at [Hz], from 1 to 500.
+        latency: time from reading the state to the command being available [s], at most 0.1.
+        envelope: the twists it can follow; empty where it only stands.
+        gait: the gait clock it wants; `GaitConfig(start="never")` where it steps by itself or not at all.
     """
 
     rate: float
@@ -106,6 +119,10 @@ class LowerBody(Protocol):
             base: estimated pose, height and velocity of base_link.
             motion: twist and gait phase to follow.
             dt: time since the previous tick [s], positive.
+
+        Returns:
+            Joint targets, gains and torque, finite. On the ground `tau` is not None: the servo cannot know what the
+            legs carry.
         """
         ...
 

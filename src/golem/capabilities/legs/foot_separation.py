@@ -26,7 +26,7 @@ class FootSeparationConfig:
 
     Attributes:
         minimum: distance of the soles' centres across base_link below which the swinging leg is led outward [m]: soles
-            are 0.08 m wide; 0 switches it off. Twice as much worsened the turning of a robot that walks fast and askew.
+            are 0.08 m wide. Twice as much worsened the turning of a robot that walks fast and askew.
         lead: how far ahead it is extrapolated from how the feet move now [s]: what a leg needs to answer.
         gain: change of the hip roll's target per angle that is missing: the leg lags behind it by most of it.
         maximum: largest change [rad].

@@ -1,4 +1,4 @@
-"""Holds the legs in one posture: the lower body of a robot that hangs in a hoist."""
+"""Holds the legs in one posture: the lower body of a robot that hangs in a hoist, or is kept upright by its band."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ class HoldConfig:
         kp: stiffness of hip yaw, hip pitch, hip roll, knee, ankle pitch, ankle roll [N m/rad].
             These values and those of kd are from correlllab/HAMS walk.yaml.
         kd: damping of the same six joints [N m s/rad].
+        standing: whether the legs carry the robot; else they hang, and the servo carries their weight.
         rate: ticks per second [Hz].
     """
 
@@ -40,6 +41,7 @@ class HoldConfig:
     speed: float = 0.5
     kp: tuple[float, ...] = (200.0, 200.0, 200.0, 300.0, 40.0, 40.0)
     kd: tuple[float, ...] = (2.5, 2.5, 2.5, 4.0, 2.0, 2.0)
+    standing: bool = False
     rate: float = 50.0
 
 
@@ -72,6 +74,7 @@ class JointHold:
         self._goal: Array = np.tile(np.asarray(STANCES[self.config.stance]), 2)
         self._kp: Array = np.tile(np.asarray(self.config.kp), 2)
         self._kd: Array = np.tile(np.asarray(self.config.kd), 2)
+        self._tau = np.zeros(LEGS.stop) if self.config.standing else None
         self._q: Array = self._goal.copy()
 
     def reset(self, state: LowState) -> None:
@@ -82,4 +85,4 @@ class JointHold:
         """Move the targets towards the stance by at most `speed * dt`; see `LowerBody.step`."""
         reach = self.config.speed * dt
         self._q = self._q + np.clip(self._goal - self._q, -reach, reach)
-        return LegCommand(q=self._q.copy(), kp=self._kp.copy(), kd=self._kd.copy())
+        return LegCommand(self._q.copy(), self._kp.copy(), self._kd.copy(), self._tau)

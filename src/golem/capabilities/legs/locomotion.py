@@ -21,6 +21,7 @@ from golem.capabilities.legs.rate_divider import RateDivider
 from golem.capabilities.legs.stop_predictor import StopPredictor
 from golem.capabilities.legs.velocity_integrator import VelocityIntegrator, VelocityIntegratorConfig
 from golem.interfaces.payloads import LegCommand
+from golem.options import require
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.leg_kinematics import SOLE_CENTER
@@ -41,20 +42,35 @@ class LocomotionConfig:
         acceleration: bounds on the change of vx, vy [m/s^2] and wz [rad/s^2] [own: full speed in less than a second].
         timeout: age of the newest twist from which it counts as zero [s]: whoever sent it may have died.
         blend: time over which the targets go from one controller's to the next one's after a hand-over [s] [own: a
-            jump of the targets in the middle of a step drives a light foot beyond its speed limit].
+            jump of the targets in the middle of a step drives a light foot beyond its speed limit]; `off` blends
+            nothing.
         gate_rate: how often gait clock and trim run at most [Hz]; controllers may be faster.
-        trim: how the twist is corrected by the estimated velocity.
-        apart: how the feet are kept from crossing.
+        trim: how the twist is corrected by the estimated velocity; `off` corrects nothing.
+        foot_separation: how the feet are kept from crossing; `off` leaves that to the controller.
     """
 
     dead_band: float = 0.1
     minimum: float = 0.02
     acceleration: tuple[float, float, float] = (1.0, 1.0, 2.0)
     timeout: float = 0.5
-    blend: float = 0.15
+    blend: float | None = 0.15
     gate_rate: float = 100.0
-    trim: VelocityIntegratorConfig = field(default_factory=VelocityIntegratorConfig)
-    apart: FootSeparationConfig = field(default_factory=FootSeparationConfig)
+    trim: VelocityIntegratorConfig | None = field(default_factory=VelocityIntegratorConfig)
+    foot_separation: FootSeparationConfig | None = field(default_factory=FootSeparationConfig)
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ConfigError: one of them cannot be meant.
+        """
+        require(
+            "locomotion option ",
+            ("acceleration", min(self.acceleration), min(self.acceleration) > 0.0, "three positive numbers"),
+            ("timeout", self.timeout, self.timeout > 0.0, "a positive time in seconds"),
+            ("gate_rate", self.gate_rate, self.gate_rate > 0.0, "a positive rate in Hz"),
+            ("minimum", self.minimum, 0.0 <= self.minimum <= self.dead_band, "from 0 to the dead band"),
+        )
 
 
 class Locomotion:
@@ -74,9 +90,10 @@ class Locomotion:
         self.config = config or LocomotionConfig()
         self.gait = Gait(controller.gait)
         self._paced = RateDivider(controller)
-        self._blend = CommandBlender(self.config.blend)
-        self._trim = VelocityIntegrator(self.config.trim)
-        self._apart = FootSeparation(self.config.apart)
+        self._blend = CommandBlender(self.config.blend or 0.0)
+        trim, separation = self.config.trim, self.config.foot_separation
+        self._trim = None if trim is None else VelocityIntegrator(trim)
+        self._separation = None if separation is None else FootSeparation(separation)
         self._rest = StopPredictor()
         self._kinematics = Kinematics()
         left, right = self._feet(np.zeros(NUM_JOINTS))[:, :3, 3]
@@ -157,17 +174,23 @@ class Locomotion:
         commanded = waits or self.applied != ZERO
         motion = LocomotionCommand(self._trimmed, self.gait.phases, bool(self.gait.stepping), commanded)
         command = self._blend.step(self._paced.step(state, base, motion, dt), dt)
+        if self._separation is None:
+            return command
         swings = self.gait.stepping & (motion.phase >= self.gait.config.stance)
-        return self._apart.step(command, state, swings & (base.contact < 0.5))
+        return self._separation.step(command, state, swings & (base.contact < 0.5))
 
     def _forget(self) -> None:
         self.commanded = self.applied = self._trimmed = ZERO
-        self._trim.reset()
+        self._forget_trim()
         self.clamped = False
         self.reason = ""
         self._held, self._finite = False, True
         self._age = math.inf
         self._until_gate = self._since_gate = 0.0
+
+    def _forget_trim(self) -> None:
+        if self._trim is not None:
+            self._trim.reset()
 
     def _listen(self, twist: Twist | None, dt: float) -> None:
         self._age += dt
@@ -233,13 +256,15 @@ class Locomotion:
         capture, misplaced = balance_errors(R, com, velocity, soles @ R.T, self._stance)
         if self.gait.config != self.controller.gait:
             # Another controller has the legs, as in a hand-over: what was learned about the last one is void.
-            self._trim.reset()
+            self._forget_trim()
             self.gait.config = self.controller.gait
         self.gait.step(np.asarray(self.applied != ZERO), capture, misplaced, dt)
         self._rest.step(base.T_odom_base, feet, base.contact, self.moving, dt)
         if self.applied == ZERO and not self.gait.stepping:
-            self._trim.reset()
+            self._forget_trim()
             self._trimmed = ZERO
+        elif self._trim is None:
+            self._trimmed = self.applied
         else:
             # Also through the last steps of a stop, and those after a push: they shall not carry it away.
             wanted = np.array(_values(self.applied))

@@ -19,7 +19,7 @@ class VelocityIntegratorConfig:
     """Options of `VelocityIntegrator`.
 
     Attributes:
-        gain: correction per velocity error and time [1/s]; 0 corrects nothing.
+        gain: correction per velocity error and time [1/s].
         maximum: bound of the correction of vx, vy [m/s] and wz [rad/s]; by so much the twist may leave the envelope.
             Turning falls short most, where it is asked for beside full speed ahead and to a side.
         heed: bound of each error that is integrated: a push is not the controller's doing.
@@ -39,7 +39,7 @@ class VelocityIntegrator:
     def __init__(self, config: VelocityIntegratorConfig | None = None) -> None:
         """Begin without a correction."""
         self.config = config or VelocityIntegratorConfig()
-        self._most, self._heed = np.array(self.config.maximum), np.array(self.config.heed)
+        self._maximum, self._heed = np.array(self.config.maximum), np.array(self.config.heed)
         self.reset()
 
     def reset(self) -> None:
@@ -62,5 +62,5 @@ class VelocityIntegrator:
         # Command and measurement pass the same filter, so that its lag is no error.
         self._surplus += (twist - measured - self._surplus) * (dt / (config.smoothing + dt))
         change = config.gain * dt * np.clip(self._surplus, -self._heed, self._heed)
-        self._correction = np.clip(self._correction + change, -self._most, self._most)
+        self._correction = np.clip(self._correction + change, -self._maximum, self._maximum)
         return twist + self._correction

@@ -19,7 +19,8 @@ from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.errors import ConfigError, GolemError
 from golem.interfaces.payloads import LegCommand
-from golem.middleware.unitree_api import LOCO_API, OK, ApiRequest, Response, decode_int, encode, loco_api
+from golem.interfaces.unitree_api import LOCO_API, OK, LocoApi, decode_int, encode, loco_api
+from golem.middleware.wire.api import ApiRequest, Response
 from golem.options import require
 from golem.types import LEGS, Array, BaseEstimate, LowState, Twist
 
@@ -71,6 +72,15 @@ class VendorConfig:
     refresh: float = 0.1
     duration: float = 0.5
 
+    @property
+    def loco_api(self) -> LocoApi:
+        """The loco service that is spoken to.
+
+        Raises:
+            ConfigError: `robot` has none.
+        """
+        return loco_api(self.robot)
+
 
 class Vendor:
     """Brings the on-board controller from whatever state it is in to its start state, then passes twists on.
@@ -81,6 +91,8 @@ class Vendor:
         rate, latency, envelope, gait: see `LowerBody`; the gait clock is the on-board controller's own.
         started: whether the on-board controller has confirmed its start state.
     """
+
+    requires = ("onboard",)
 
     def __init__(self, config: VendorConfig | None = None, onboard: Onboard | None = None) -> None:
         """Speak to `onboard`, which the stack supplies.
@@ -106,7 +118,7 @@ class Vendor:
         self.envelope = c.envelope
         self.gait = GaitConfig(start="never")
         self.started = False
-        self._api = loco_api(c.robot)
+        self._api = c.loco_api
         self._onboard = onboard
         self._t = 0.0
         self._id = 0

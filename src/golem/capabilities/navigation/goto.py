@@ -12,13 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.navigation.base import NavStep
+from golem.capabilities.navigation.base import NavInputs
+from golem.finite import check_finite
+from golem.interfaces.nav_payloads import NavStep
 from golem.options import require
 from golem.types import Array, PlanarPose, Twist, wrap
 
 ZERO = Twist()
 
-MOST_COAST = (0.3, 0.3, 0.5)
+MAX_COAST = (0.3, 0.3, 0.5)
 """Furthest that a stop may be expected to move the robot ahead, to its left [m] and round [rad] [own]."""
 
 
@@ -30,9 +32,9 @@ class GoToConfig:
         speed: bounds of vx, vy [m/s] and wz [rad/s], backward as forward.
         gain: twist per error [1/s].
         face: distance beyond which the robot turns towards the goal instead of into its final heading [m].
-        pulse: least size of a twist that sets a standing robot in motion, as the norm of vx, vy and wz; above the dead
+        pulse: smallest twist that sets a standing robot in motion, as the norm of vx, vy and wz; above the dead
             band of the legs, 0.1.
-        creep: least size of a twist on the way; above what counts as zero for walking legs, 0.02.
+        creep: smallest size of a twist on the way; above what counts as zero for walking legs, 0.02.
         smoothing: time constant of the filter on the measured pose [s]: half a step, so that the sway of walking
             and the noise of odometry do not reach the twist.
         close, aligned: errors within which the robot has to stay to be told to stand [m], [rad].
@@ -87,7 +89,16 @@ class GoToConfig:
 
 
 class GoTo:
-    """Follows the straight line to the goal; see `Navigator`."""
+    """Follows the straight line to the goal; see `Navigator`.
+
+    Attributes:
+        config: its options.
+        rate: steps per second [Hz].
+        latency: none: a step takes some 50 microseconds.
+    """
+
+    rate = 100.0
+    latency = 0.0
 
     def __init__(self, config: GoToConfig | None = None) -> None:
         """Begin without a goal: the place of the first pose."""
@@ -101,8 +112,9 @@ class GoTo:
         self._goal = goal
         self._forget()
 
-    def step(self, pose: PlanarPose, moving: bool, dt: float) -> NavStep:
-        """Return the twist of this tick; see `Navigator`."""
+    def step(self, inputs: NavInputs, dt: float) -> NavStep:
+        """Return the twist of this step; see `Navigator`. It looks at neither map nor scan."""
+        pose, moving = inputs.pose, inputs.moving
         if self._goal is None:
             self._goal = pose
         config = self.config
@@ -117,11 +129,11 @@ class GoTo:
             near = steady and distance < self._slack * config.close and turn < self._slack * config.aligned
             self._near = self._near + dt if near else 0.0
             self._walking = self._near < config.dwell
-            self._told = here if moving else None
+            self._sent_from = here if moving else None
         elif self._rested >= config.settle + config.rest:
-            if self._told is not None:
+            if self._sent_from is not None:
                 # A robot that was pushed meanwhile shall not teach the next stop.
-                measured, self._told = _within(self._told.to(here), MOST_COAST), None
+                measured, self._sent_from = _within(self._sent_from.to(here), MAX_COAST), None
                 self._coast = self._coast.toward(measured, config.learn)
             off = distance > self._slack * config.accept or turn > self._slack * config.straight
             if off:
@@ -136,7 +148,7 @@ class GoTo:
         self._velocity: Array = np.zeros(3)
         self._rested = self._moved = 0.0
         self._sum: Array = np.zeros(3)
-        self._told: PlanarPose | None = None
+        self._sent_from: PlanarPose | None = None
         self._slack = 1.0
         self._near = 0.0
         self._walking = True
@@ -144,6 +156,7 @@ class GoTo:
     def _filter(self, pose: PlanarPose, dt: float) -> None:
         """Track pose and velocity by the critically damped g-h filter with fading memory (Brookner, 1998)."""
         measured = np.array([pose.x, pose.y, pose.yaw])
+        check_finite("the pose", measured)
         if self._pose is None:
             self._pose = measured
             return

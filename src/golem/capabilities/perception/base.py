@@ -24,7 +24,7 @@ class Localizer(Protocol):
         """Return what is seen of `labels`, best score first; an empty list when nothing is.
 
         Positions are in odom by the frame's own camera pose, so they carry its errors. An object without valid depth
-        is left out.
+        is left out. A mask is there where the localizer has one; on the public topics objects go without it.
 
         Args:
             frame: the exposure; `frame.info` says which camera it is.

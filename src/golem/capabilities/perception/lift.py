@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.robots.sensors.cameras import rays
-from golem.types import Array, Detection, LocalizedObject, RgbdImage
+from golem.types import Array, Detection, LocalizedObject, Mask, RgbdImage
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,26 +22,26 @@ class LiftConfig:
 
     Attributes:
         window: share of the box, around the centre, where the object's depth is looked for.
-        least_window: least half side of that window [px].
-        most_window: greatest half side [px].
+        min_window: smallest half side of that window [px].
+        max_window: greatest half side [px].
         grow: how far the box of the point cloud exceeds the detection, as a share of its size, so that the ground
             around the object is in the cloud.
-        near_share: least share of the window's valid depths that counts as a mode of its own.
+        near_share: smallest share of the window's valid depths that counts as a mode of its own.
         bin: width of a mode at the camera [m].
         bin_growth: growth of that width with the squared distance [1/m]; stereo noise grows so.
-        least_valid: least number of valid depths in the window.
+        min_valid: smallest number of valid depths in the window.
         flush: labels whose depth is the greatest mode.
         around: labels whose depth is looked for in the grown box, as their inside is deeper.
     """
 
     window: float = 0.6
-    least_window: int = 2
-    most_window: int = 8
+    min_window: int = 2
+    max_window: int = 8
     grow: float = 0.3
     near_share: float = 0.2
     bin: float = 0.002
     bin_growth: float = 0.008
-    least_valid: int = 5
+    min_valid: int = 5
     flush: tuple[str, ...] = ("screw_hole", "tray")
     around: tuple[str, ...] = ("screw_hole",)
 
@@ -55,7 +55,7 @@ def surface_depth(depths: NDArray[np.float32], config: LiftConfig, *, flush: boo
         flush: take the greatest mode, else the nearest that is a mode at all.
     """
     valid = np.sort(depths[np.isfinite(depths) & (depths > 0)].astype(np.float64))
-    if len(valid) < config.least_valid:
+    if len(valid) < config.min_valid:
         return None
     width = config.bin + config.bin_growth * float(np.median(valid)) ** 2
     # For every depth, how many lie within one width behind it.
@@ -64,7 +64,7 @@ def surface_depth(depths: NDArray[np.float32], config: LiftConfig, *, flush: boo
     if flush:
         start = int(np.argmax(counts))
     else:
-        enough = counts >= max(config.near_share * len(valid), config.least_valid / 2)
+        enough = counts >= max(config.near_share * len(valid), config.min_valid / 2)
         first = int(np.argmax(enough))
         # Slide to the densest place of this nearest mode: the first qualifying window may hold only its front edge.
         reach = int(np.searchsorted(valid, valid[first] + width, side="right"))
@@ -81,15 +81,15 @@ def lift(frame: RgbdImage, detection: Detection, config: LiftConfig) -> Localize
         config: how depth is read.
 
     Returns:
-        position: the surface point seen at the detection's centre; for a hole the centre of its mouth. points: all
-        valid depths in the grown box: the object and the ground around it.
+        position: the surface point seen at the detection's centre; for a hole the centre of its mouth. points and mask:
+        all valid depths in the grown box: the object and the ground around it.
     """
     low, high = detection.box[:2], detection.box[2:]
     cloud = _window(frame, low - config.grow * (high - low) - 0.5, high + config.grow * (high - low) + 0.5)
     if detection.label in config.around:
         window = cloud
     else:
-        half = np.clip(config.window * (high - low) / 2, config.least_window, config.most_window)
+        half = np.clip(config.window * (high - low) / 2, config.min_window, config.max_window)
         window = _window(frame, detection.center - half, detection.center + half)
     depth = surface_depth(frame.depth[window], config, flush=detection.label in config.flush)
     if depth is None:
@@ -98,7 +98,24 @@ def lift(frame: RgbdImage, detection: Detection, config: LiftConfig) -> Localize
     x, y = detection.center
     ray = np.array([(x - info.cx) / info.fx, (y - info.cy) / info.fy, 1.0])
     position = _transform(frame.T_odom_optical, ray * depth)
-    return LocalizedObject(detection, frame.t, position, _points(frame, cloud))
+    rows, columns = cloud
+    inside = frame.depth[cloud]
+    mask = Mask(np.isfinite(inside) & (inside > 0), columns.start, rows.start)
+    return LocalizedObject(detection, frame.t, position, unproject(frame, mask), mask)
+
+
+def scene_of(frame: RgbdImage) -> Array:
+    """Return the (n, 3) points in odom of all pixels of `frame` whose depths are valid, row by row [m]."""
+    return unproject(frame, Mask(np.isfinite(frame.depth) & (frame.depth > 0), 0, 0))
+
+
+def unproject(frame: RgbdImage, mask: Mask) -> Array:
+    """Return the (n, 3) points in odom of the n pixels of `mask`, whose depths are valid, row by row [m]."""
+    height, width = mask.pixels.shape
+    window = slice(mask.y, mask.y + height), slice(mask.x, mask.x + width)
+    depth = frame.depth[window][mask.pixels]
+    optical = rays(frame.info)[window][mask.pixels].astype(np.float64) * depth[:, None]
+    return _transform(frame.T_odom_optical, optical)
 
 
 def _window(frame: RgbdImage, low: Array, high: Array) -> tuple[slice, slice]:
@@ -107,13 +124,6 @@ def _window(frame: RgbdImage, low: Array, high: Array) -> tuple[slice, slice]:
     x0, y0 = np.ceil(np.maximum(low, 0.0)).astype(int)
     x1, y1 = np.floor(np.minimum(high, (width - 1, height - 1))).astype(int)
     return slice(int(y0), int(y1) + 1), slice(int(x0), int(x1) + 1)
-
-
-def _points(frame: RgbdImage, window: tuple[slice, slice]) -> Array:
-    depth = frame.depth[window]
-    valid = np.isfinite(depth) & (depth > 0)
-    optical = rays(frame.info)[window][valid].astype(np.float64) * depth[valid, None]
-    return _transform(frame.T_odom_optical, optical)
 
 
 def _transform(T: Array, points: Array) -> Array:

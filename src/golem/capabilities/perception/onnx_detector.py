@@ -26,7 +26,7 @@ class OnnxDetectorConfig:
 
     Attributes:
         weights: an ONNX file written by `golem.training.detector`; the shipped one if absent.
-        threshold: least score of a detection.
+        threshold: smallest score of a detection.
         latency: declared time per frame [s]; docs/explanation/detector.md has the measured one.
         lift: how depth is read.
     """

@@ -10,7 +10,7 @@ from golem.types import Array, Detection
 
 STRIDE = 4
 """Pixels per cell of the maps; the middle of cell j is pixel 4 j + 1.5, as pixel centres are integers."""
-MOST = 200
+MAX_PEAKS = 200
 """Candidates per class that are looked at; a pack has 68 fasteners."""
 SAME_SHARE = 0.35
 """Two centres of one class closer than this share of the better one's shorter side are one part."""
@@ -54,7 +54,7 @@ def find_peaks(
         maps: (classes + 6, h, w): logits, then the centre's offset [cells] and the log distances to the box's sides.
         labels: names of the classes.
         wanted: the classes to return.
-        threshold: least score.
+        threshold: smallest score.
         size: width and height of the image [px]; boxes are clipped to it and centres outside dropped.
     """
     width, height = size
@@ -66,7 +66,7 @@ def find_peaks(
         heat = maps[index]
         peak = (heat >= logit) & (heat >= cv2.dilate(heat, np.ones((3, 3), np.uint8)))
         rows, columns = np.nonzero(peak)
-        best = np.argsort(-heat[rows, columns], kind="stable")[:MOST]
+        best = np.argsort(-heat[rows, columns], kind="stable")[:MAX_PEAKS]
         rows, columns = rows[best], columns[best]
         dx, dy, left, top, right, bottom = maps[len(labels) :, rows, columns].astype(np.float64)
         centers = np.column_stack([STRIDE * (columns + dx), STRIDE * (rows + dy)]) + (STRIDE - 1) / 2

@@ -7,42 +7,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
+from functools import partial
 from pathlib import Path
 
 from golem.interfaces import topics
-from golem.interfaces.public import Role
 from golem.interfaces.recorded import public_topics
+from golem.interfaces.rows import Role
+from golem.middleware.bags.base import Sink
+from golem.middleware.bags.recorder import PERIOD, Recorder
 from golem.middleware.bus import Bus, News
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.record.base import Sink
-from golem.middleware.record.recorder import PERIOD, Recorder
 from golem.middleware.ros.node import DdsNode
 from golem.middleware.wire.convert import MODE_MACHINE, encode_low_command
 from golem.robots.base import Robot
-from golem.runtime.executor import Executor, Node
+from golem.runtime.executor import Executor, Node, Phase
 from golem.runtime.live import robot_out, stack_out
-from golem.runtime.live.motor_bridge import RequestOut, StateOut
+from golem.runtime.live.bridge import outgoing
 from golem.runtime.live.role_endpoints import RoleEndpoints
-from golem.runtime.live.safety_process import REPORT
-from golem.runtime.live.safety_status import status_message
+from golem.runtime.live.safety_status import StatusReports
 from golem.runtime.lockstep import LockstepRunner
-from golem.types import SIDES, TICK
-
-
-class CommandOut:
-    """Sends what the gate tells the motors."""
-
-    period = TICK
-
-    def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
-        """Send what is on `bus`."""
-        self._commands, self._writer = News(bus, topics.LOW_CMD), endpoints.writer("/lowcmd")
-
-    def step(self, t: float) -> None:
-        """Send a new command."""
-        command = self._commands.read()
-        if command is not None:
-            self._writer.write(encode_low_command(command, MODE_MACHINE))
+from golem.types import TICK
 
 
 class StatusOut:
@@ -51,20 +35,14 @@ class StatusOut:
     period = TICK
 
     def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
-        """Publish on `surface` what is on `bus`."""
-        self._bus, self._endpoints = bus, endpoints
-        self._said: tuple[object, ...] = ()
-        self._due = 0.0
+        """Send what is on `bus`."""
+        self._news, self._reports = News(bus, topics.SAFETY), StatusReports(endpoints)
 
     def step(self, t: float) -> None:
-        """Send the verdict if it changed, or was not sent for long."""
-        status = self._bus.latest(topics.SAFETY)
-        if status is None:
-            return
-        says = (status.state, status.reason, status.detail)
-        if says != self._said or t >= self._due:
-            self._said, self._due = says, t + REPORT
-            self._endpoints.publish("/safety/status", status_message(status))
+        """Take a new verdict."""
+        status = self._news.read()
+        if status is not None:
+            self._reports.add(status)
 
 
 class Broadcast:
@@ -112,23 +90,14 @@ def _nodes(bus: Bus, robot: Robot, domain: LocalDomain) -> list[Node]:
 
     body, safety, stack = endpoints("robot"), endpoints("safety"), endpoints("stack")
     robot_out.describe(body, robot.calibration)
-    return [
-        robot_out.ClockOut(body),
-        StateOut(bus, body),
-        robot_out.JointsOut(bus, body),
-        robot_out.FramesOut(bus, body),
-        *(robot_out.CameraOut(bus, body, name) for name in robot.cameras),
-        *(robot_out.HandOut(bus, body, side) for side in SIDES),
-        stack_out.BaseOut(bus, stack),
-        stack_out.OdometryOut(bus, stack),
-        stack_out.LegsOut(bus, stack),
-        *(stack_out.SightingsOut(bus, stack, name) for name in robot.cameras),
-        *(stack_out.HandCommandOut(bus, stack, side) for side in SIDES),
-        *(stack_out.HandStatusOut(bus, stack, side) for side in SIDES),
-        RequestOut(bus, stack, lambda: MODE_MACHINE),
-        CommandOut(bus, safety),
-        StatusOut(bus, safety),
+    command = partial(encode_low_command, mode_machine=MODE_MACHINE)
+    placed = [
+        *outgoing(bus, body, robot_out.encoders(bus)),
+        *outgoing(bus, safety, {"/lowcmd": command}, without=("/safety/status",)),
+        *outgoing(bus, stack, stack_out.encoders(bus, lambda: MODE_MACHINE)),
+        (Phase.SEND, StatusOut(bus, safety)),
     ]
+    return [node for _, node in placed]
 
 
 @contextmanager
@@ -156,12 +125,13 @@ def broadcast(
             stack.callback(casts[-1].close)
 
         if bag is not None:
-            from golem.middleware.record.writer import BagWriter
+            from golem.middleware.bags.writer import BagWriter
 
-            every = public_topics()
-            add(stack.enter_context(closing(BagWriter(bag))), lambda recorder: recorder.add(every))
+            every, writer = public_topics(), BagWriter(bag)
+            stack.callback(lambda: print(f"{writer}.", flush=True))
+            add(stack.enter_context(closing(writer)), lambda recorder: recorder.add(every))
         if foxglove is not None:
-            from golem.middleware.record.foxglove_server import FoxgloveServer, ServerConfig
+            from golem.middleware.bags.foxglove_server import FoxgloveServer, ServerConfig
 
             offered = public_topics()
             server = stack.enter_context(closing(FoxgloveServer(ServerConfig(port=foxglove))))

@@ -58,11 +58,11 @@ class RobotClock:
     """Judges the stamps of the robot's states.
 
     States of another writer do not count while the one that is known writes: of two robots, whose clocks differ, each
-    would else be the other one started anew, at every state.
+    would else be the other one restarted, at every state.
 
     Attributes:
         t: newest time [s]; -inf before the first.
-        anew: whether the state that was judged last is the first of a robot that was started anew.
+        restarted: whether the state that was judged last is the first of a robot that was restarted.
     """
 
     def __init__(self, now: Callable[[], float], writers: Callable[[], Container[int]]) -> None:
@@ -72,7 +72,7 @@ class RobotClock:
             now: this process's own clock [s].
             writers: tells who writes states; one that was killed is among them for ten seconds more.
         """
-        self.t, self.anew = -math.inf, False
+        self.t, self.restarted = -math.inf, False
         self._now, self._writers = now, writers
         self._writer: int | None = None
         self._heard = -math.inf
@@ -81,15 +81,15 @@ class RobotClock:
         """Return whether a state with stamp `t` [s] from `writer` is new, and remember it if so.
 
         One that repeats or was overtaken is not, nor is a second robot's. A writer that is merely another does not mean
-        that the robot was started anew: one that was lost for long comes back as another.
+        that the robot was restarted: one that was lost for long comes back as another.
         """
         known, now = self._writer, self._now()
         foreign = (
             known is not None and known != writer and now - self._heard < GONE and known in self._writers()
         )
         overtaken = writer == known and t >= self.t - BACK
-        self.anew = t < self.t and not overtaken and not foreign
-        if foreign or not (self.anew or t > self.t):
+        self.restarted = t < self.t and not overtaken and not foreign
+        if foreign or not (self.restarted or t > self.t):
             return False
         self.t, self._writer, self._heard = t, writer, now
         return True

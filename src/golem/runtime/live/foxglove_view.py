@@ -12,14 +12,14 @@ from tyro.conf import OmitArgPrefixes
 from golem.errors import ConfigError, unknown_name
 from golem.interfaces import public
 from golem.interfaces.recorded import public_topics
+from golem.middleware.bags.base import BagTopic
+from golem.middleware.bags.foxglove_server import FoxgloveServer, ServerConfig
+from golem.middleware.bags.recorder import Recorder
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.exclusive_writers import identity
 from golem.middleware.interrupt import interrupted
-from golem.middleware.record.base import BagTopic
-from golem.middleware.record.foxglove_server import FoxgloveServer, ServerConfig
-from golem.middleware.record.recorder import Recorder
+from golem.runtime.live.exclusive_writers import identity
 
 PERIOD = 0.02
 """Time between two looks at what has come [s] [own]: half a frame of a camera at 25 Hz."""

@@ -19,13 +19,15 @@ from typing import Any, Literal
 from golem.errors import ConfigError
 from golem.interfaces import public
 from golem.interfaces.payloads import GateState, GateStatus
+from golem.interfaces.ros_safety import to_gate_status
 from golem.middleware.interrupt import LIFELINE, interrupted
 from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
+from golem.runtime.live.exclusive_writers import LAUNCH, refuse_second_launch
 from golem.runtime.live.node_setup import log_line, member, until
 from golem.runtime.live.process import TwinConfig
-from golem.runtime.live.safety_status import describe_status, to_status
+from golem.runtime.live.safety_status import describe_status
 from golem.runtime.live.sim_sync import SILENCE
 from golem.stack import load_stack
 
@@ -40,12 +42,12 @@ PERIOD = 0.1
 
 @dataclass(frozen=True)
 class LaunchConfig(TwinConfig):
-    """Start twin, safety and up for a stack file, let its commands through, and watch over them until Ctrl-C."""
+    """Start twin, safety and up for a stack file, open the gate, and supervise them until Ctrl-C."""
 
     strict: bool = False
-    """Stop the robot as early as the real one for what is late: a busy machine then stops it."""
+    """Use the time limits of the real robot; a busy machine may exceed them, which stops the robot."""
     activate: bool = True
-    """Let commands through as soon as the gate is armed. After a stop, that is for you to do: golem safety reset,
+    """Open the gate as soon as it is armed. After a stop, open it yourself: golem safety reset,
     golem safety activate."""
 
 
@@ -64,9 +66,17 @@ def commands(config: LaunchConfig) -> dict[Part, list[str]]:
     dds = config.dds.words()
     profile = ["--profile", config.profile] if config.profile else []
     world = ["--world", config.world] if config.world else []
+    estop = stack.part("estop").words()
     return {
         "twin": ["twin", config.stack, "--seed", str(config.seed), *profile, *world, *dds],
-        "safety": ["safety", "--limits", stack.limits, *(["--strict"] if config.strict else []), *dds],
+        "safety": [
+            "safety",
+            "--limits",
+            stack.limits,
+            *(["--strict"] if config.strict else []),
+            *estop,
+            *dds,
+        ],
         "up": ["up", config.stack, *profile, *dds],
     }
 
@@ -195,7 +205,7 @@ class Launcher:
         return answer
 
     def _heard(self, message: Any) -> None:
-        self.gate = to_status(message, 0.0)
+        self.gate = to_gate_status(message)
 
     def _activated(self, answer: Future[Any]) -> None:
         self._activation = None
@@ -209,11 +219,12 @@ def run_launch(config: LaunchConfig) -> bool:
     """Start everything and watch over it until Ctrl-C; return whether nothing had died by then.
 
     Raises:
-        ConfigError: an option or the stack file is wrong.
+        ConfigError: an option or the stack file is wrong, or a robot, a gate or a stack is on the domain already.
         DdsError: the domain cannot be joined.
     """
     words = commands(config)
-    with interrupted() as stop, member("launch", config.dds) as (_, node):
+    with interrupted() as stop, member(LAUNCH, config.dds) as (participant, node):
+        refuse_second_launch(participant, config.dds)
         launcher = Launcher(words, node, config.activate)
         try:
             while not stop.is_set():

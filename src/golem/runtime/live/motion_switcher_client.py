@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from golem.middleware.unitree_api import OK, ApiRequest, decode, request_topic, response_topic
+from golem.interfaces.unitree_api import OK, decode
+from golem.middleware.wire.api import ApiRequest, request_topic, response_topic
 from golem.middleware.wire.rpc import RpcClient
-from golem.robots.onboard.motion_switcher import CHECK_MODE, RELEASE_MODE, SERVICE
+from golem.robots.unitree.motion_switcher import CHECK_MODE, RELEASE_MODE, SERVICE
 from golem.runtime.live.clock import Every
 from golem.runtime.live.onboard_bridge import Identities
 from golem.runtime.live.role_endpoints import RoleEndpoints

@@ -1,4 +1,4 @@
-"""Motor states and commands between the bus of a process and the robot's own wire."""
+"""What the motors are told, from the robot's own wire to the bus of a twin."""
 
 from __future__ import annotations
 
@@ -6,31 +6,15 @@ import time
 from collections.abc import Callable
 
 from golem.interfaces import topics
-from golem.middleware.bus import Bus, News
+from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Sample
 from golem.middleware.ros.waitset import WaitSet
-from golem.middleware.wire.convert import answered, decode_low_command, encode_low_command, encode_low_state
+from golem.middleware.wire.convert import answered, decode_low_command
 from golem.middleware.wire.struct_layout import WireError
 from golem.runtime.live.rejected import RejectedMessages
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.sim_sync import LAG, PATIENCE
 from golem.types import TICK
-
-
-class StateOut:
-    """Sends every state of the robot."""
-
-    period = TICK
-
-    def __init__(self, bus: Bus, endpoints: RoleEndpoints) -> None:
-        """Send what is on `bus`."""
-        self._bus, self._writer = bus, endpoints.writer("/lowstate")
-
-    def step(self, t: float) -> None:
-        """Send the present state."""
-        state = self._bus.latest(topics.LOW_STATE)
-        if state is not None:
-            self._writer.write(encode_low_state(state))
 
 
 class CommandIn:
@@ -81,21 +65,3 @@ class CommandIn:
             self.refused.add(error)
             return
         self._bus.publish(topics.LOW_CMD, command, self._t)
-
-
-class RequestOut:
-    """Sends what the stack wants of the motors to the safety gate."""
-
-    period = TICK
-
-    def __init__(self, bus: Bus, endpoints: RoleEndpoints, mode_machine: Callable[[], int]) -> None:
-        """Send what is on `bus`; `mode_machine()` is the machine type that the robot reports."""
-        self._bus, self._mode_machine = bus, mode_machine
-        self._writer = endpoints.writer("/safety/lowcmd_in")
-        self._commands = News(bus, topics.LOW_CMD_REQUEST)
-
-    def step(self, t: float) -> None:
-        """Send a new command, with the time of the state it answers."""
-        command, state = self._commands.read(), self._bus.latest(topics.LOW_STATE)
-        if command is not None and state is not None:
-            self._writer.write(encode_low_command(command, self._mode_machine(), answers=state.t))

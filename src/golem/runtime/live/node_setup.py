@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -12,11 +13,11 @@ from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
-from golem.middleware.exclusive_writers import identity
 from golem.middleware.ros.base import ActionClient, Client, RosNode
 from golem.middleware.ros.callback_guard import log_error
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.node import DdsNode
+from golem.runtime.live.exclusive_writers import identity
 
 SEARCH = 5.0
 """How long is looked for whoever offers something [s]."""
@@ -70,6 +71,12 @@ def find(node: RosNode, name: str, client: Client | ActionClient, remedy: str) -
     """
     if not until(node, client.ready, SEARCH):
         raise RosError(f"Nobody offers '{name}'; {remedy}.")
+
+
+def settle() -> None:
+    """Take what lives by now from the garbage collector: going through it, rarely as that is, takes 50 ms and more."""
+    gc.collect()
+    gc.freeze()
 
 
 def log_line(text: str) -> None:

@@ -1,4 +1,4 @@
-"""The robot's own computer across processes: calls, answers and the legs it controls, between a bus and the domain.
+"""The robot's own computer across processes: calls and answers, between a bus and the domain.
 
 A bus holds the newest value of a stream only: calls that arrive together are therefore let onto it one per tick.
 """
@@ -7,29 +7,18 @@ from __future__ import annotations
 
 import random
 from collections import deque
-from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
 from golem.interfaces import topics
-from golem.interfaces.payloads import LegCommand
 from golem.middleware.bus import Bus, News
-from golem.middleware.dds.base import Payload, Reader, Writer
-from golem.middleware.unitree_api import ApiRequest, Response
-from golem.middleware.wire import hg
-from golem.middleware.wire.convert import decode_low_command, encode_low_command
+from golem.middleware.wire.api import ApiRequest, Response
 from golem.middleware.wire.rpc import RpcClient, RpcServer
-from golem.middleware.wire.struct_layout import WireError
-from golem.runtime.live.rejected import RejectedMessages
-from golem.types import LEGS, NUM_JOINTS, TICK, LowCommand
+from golem.types import TICK
 
 WAITING = 64
 """Calls that may wait for their tick; of more the oldest are dropped [own]."""
 _CALLS = 2**16
 """Calls of one client before its identities repeat."""
-_TO_SERVO = 1
-"""Index in `reserve` of the word that says whether the feed-forward torque is left to the servo."""
 
 
 class CallsIn:
@@ -120,71 +109,3 @@ class AnswersIn:
                 self._waiting.append(own)
         if self._waiting:
             self._bus.publish(self._topic, self._waiting.popleft(), t)
-
-
-class OnboardLegsOut:
-    """Sends what the on-board controller tells the legs."""
-
-    period = TICK
-
-    def __init__(self, bus: Bus, writer: Writer) -> None:
-        """Send through `writer`, of `LowCmd_`."""
-        self._news, self._writer = News(bus, topics.ONBOARD_LEGS), writer
-
-    def step(self, t: float) -> None:
-        """Send new targets."""
-        command = self._news.read()
-        if command is not None:
-            self._writer.write(encode_legs(command))
-
-
-class LegsIn:
-    """Brings the on-board controller's targets to the bus.
-
-    Attributes:
-        refused: messages that were not well-formed.
-    """
-
-    period = TICK
-
-    def __init__(self, bus: Bus, reader: Reader, tell: Callable[[str], None]) -> None:
-        """Take them from `reader`, of `LowCmd_`; `tell` a person what is refused."""
-        self._bus, self._reader = bus, reader
-        self.refused = RejectedMessages("targets of the on-board legs", tell)
-
-    def step(self, t: float) -> None:
-        """Take the newest targets."""
-        for sample in self._reader.take():
-            if sample.alive:
-                try:
-                    self._bus.publish(topics.ONBOARD_LEGS, decode_legs(sample.payload), t)
-                except WireError as error:
-                    self.refused.add(error)
-
-
-def encode_legs(command: LegCommand) -> bytes:
-    """Return leg targets as a `LowCmd_` whose other motors get zero gains and zero torque.
-
-    Raises:
-        WireError: a value is not finite in single precision.
-    """
-    whole = {name: np.zeros(NUM_JOINTS) for name in ("q", "dq", "tau", "kp", "kd")}
-    for name in ("q", "kp", "kd"):
-        whole[name][LEGS] = getattr(command, name)
-    if command.tau is not None:
-        whole["tau"][LEGS] = command.tau
-    payload = bytearray(encode_low_command(LowCommand(0.0, **whole), 0))
-    hg.LOW_CMD.read(payload)["reserve"][_TO_SERVO] = command.tau is None
-    hg.COMMAND_CHECKSUM.seal(payload)
-    return bytes(payload)
-
-
-def decode_legs(payload: Payload) -> LegCommand:
-    """Return the leg targets in a `LowCmd_`.
-
-    Raises:
-        WireError: see `decode_low_command`.
-    """
-    whole = decode_low_command(payload, 0.0)
-    to_servo = bool(hg.LOW_CMD.read(payload)["reserve"][_TO_SERVO])
-    return LegCommand(whole.q[LEGS], whole.kp[LEGS], whole.kd[LEGS], None if to_servo else whole.tau[LEGS])

@@ -11,6 +11,7 @@ from tyro.conf import OmitArgPrefixes, Positional
 from golem.errors import ConfigError
 from golem.interfaces import public
 from golem.interfaces.payloads import GateState
+from golem.interfaces.ros_safety import to_gate_status
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros.base import RosNode
@@ -19,7 +20,7 @@ from golem.middleware.ros.msgs.std_srvs import SetBool_Request, Trigger_Request
 from golem.runtime.live.motion_switcher_client import CALLS, MotionSwitcherClient
 from golem.runtime.live.node_setup import ANSWER, SEARCH, find, log_line, member, until
 from golem.runtime.live.role_endpoints import RoleEndpoints
-from golem.runtime.live.safety_status import describe_status, to_status
+from golem.runtime.live.safety_status import describe_status
 
 REQUESTS: dict[str, tuple[str, Any]] = {
     "activate": ("/safety/activate", Trigger_Request()),
@@ -112,7 +113,7 @@ def _status(node: RosNode, dds: DdsConfig) -> bool:
         raise RosError(f"No safety gate on {dds}; start one with: {dds.command('safety')}")
     message = subscription.latest()
     assert message is not None
-    status = to_status(message, 0.0)
+    status = to_gate_status(message)
     log_line(describe_status(status))
     return status.state is GateState.ACTIVE
 

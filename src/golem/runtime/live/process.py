@@ -1,38 +1,31 @@
-"""`golem twin`, `golem safety` and `golem up`: the processes of a live robot."""
+"""`golem twin` and `golem up`: the processes of a live robot beside `golem safety`."""
 
 from __future__ import annotations
 
-import gc
-import signal
+import math
 import time
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, field
 
 from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.errors import ConfigError
-from golem.hardware.estop.virtual import VirtualEstop
-from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import GateState, GateStatus
 from golem.middleware.dds.domain import ROBOT_DOMAIN, DdsConfig
-from golem.middleware.exclusive_writers import owner, refuse_second
+from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.interrupt import interrupted
 from golem.robots.base import Restorable
-from golem.runtime.live.node_setup import AsyncLogger, company, member
+from golem.runtime.live.exclusive_writers import launcher, refuse_second
+from golem.runtime.live.node_setup import AsyncLogger, company, member, settle
 from golem.runtime.live.render_worker import RenderWorker
-from golem.runtime.live.safety_process import SafetyProcess
-from golem.runtime.live.safety_status import describe_status
+from golem.runtime.live.safety_status import report
 from golem.runtime.live.stack_process import StackProcess
 from golem.runtime.live.twin import Twin
 from golem.runtime.lockstep import build_robot
+from golem.runtime.node_groups import POOLED
 from golem.stack import Stack, load_stack
-from golem.types import TICK
 
-ROBOT_LIMITS = "urdf"
-"""Limit profile of the real robot: the smaller torques."""
 ALONE = 5.0
 """Time without a robot after which the stack says what it waits for [s]."""
 
@@ -44,7 +37,7 @@ class TwinConfig:
     stack: Positional[str] = "tether"
     """Path of a stack file, or the name of a shipped one."""
     world: str | None = None
-    """World of the twin: pack, open, slope or rubble; default: the stack file's."""
+    """World of the twin: pack, open, slope, rubble, furnished or corridor; default: the stack file's."""
     profile: str | None = None
     """Realism profile: ideal, bench or field; default: the stack file's."""
     seed: int = 0
@@ -53,23 +46,8 @@ class TwinConfig:
 
 
 @dataclass(frozen=True)
-class SafetyConfig:
-    """Guard the robot on a domain: emergency stop and safety gate, and nothing else in this process.
-
-    To ask something of the one that runs: golem safety activate, stop, reset, press, release or status. To have a
-    robot's own controller let go of the motors: golem safety take.
-    """
-
-    limits: str = "urdf"
-    """Limit profile to enforce: urdf or paper. The stack file's is not read here: the gate trusts no stack."""
-    strict: bool = False
-    """Stop a simulated robot as early as the real one for what is late: a busy machine then stops it."""
-    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
-
-
-@dataclass(frozen=True)
 class UpConfig:
-    """Run everything of a stack file that decides what the robot on a domain does."""
+    """Run the modules of a stack file for the robot on a domain."""
 
     stack: Positional[str] = "tether"
     """Path of a stack file, or the name of a shipped one."""
@@ -86,15 +64,8 @@ def twin_stack(config: TwinConfig) -> Stack:
     """
     stack = load_stack(config.stack, profile=config.profile)
     if config.world is not None:
-        options = {**stack.robot.options, "world": config.world}
-        stack = replace(stack, robot=replace(stack.robot, options=options))
+        stack = stack.with_options("robot", world=config.world)
     return stack
-
-
-def settle() -> None:
-    """Take what lives by now from the garbage collector: going through it, rarely as that is, takes 50 ms and more."""
-    gc.collect()
-    gc.freeze()
 
 
 def run_twin(config: TwinConfig) -> None:
@@ -129,51 +100,6 @@ def run_twin(config: TwinConfig) -> None:
             twin.run(stop.is_set)
 
 
-def run_safety(config: SafetyConfig) -> None:
-    """Guard until Ctrl-C; a robot in motion is damped first.
-
-    Raises:
-        ConfigError: an option is wrong, or a gate is on the domain already.
-        DdsError: the domain cannot be joined.
-    """
-    limits = SafetyLimits.from_profile(config.limits)
-    if config.dds.robot and config.limits != ROBOT_LIMITS:
-        raise ConfigError(f"The real robot is guarded with --limits {ROBOT_LIMITS}, not '{config.limits}'.")
-    patient = not (config.strict or config.dds.robot)
-    estop = None if config.dds.robot else VirtualEstop()
-    with (
-        # Ctrl-Z or Ctrl-\ in the wrong terminal would freeze or kill the gate, and leave the motors a stiff command.
-        interrupted(also=(signal.SIGTSTP, signal.SIGQUIT)) as stop,
-        closing(AsyncLogger()) as tell,
-        member("safety", config.dds, tell) as (participant, node),
-    ):
-        refuse_second(participant, config.dds, "/lowcmd")
-        who = partial(owner, participant)
-        gate = SafetyProcess(
-            participant, node, limits, estop, who=who, patient=patient, real=config.dds.robot
-        )
-        tell(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
-        if estop is None:
-            tell("No driver of an emergency stop is here: the gate stays shut.")
-        said = gate.status
-        settle()
-        try:
-            while not stop.is_set():
-                gate.commands.wait(TICK)
-                gate.step()
-                said = report(said, gate.status, tell)
-            while not gate.stop():
-                gate.commands.wait(TICK)
-        except BaseException:
-            # Without the gate, which has just failed: the last command must not be a stiff one.
-            end = time.monotonic() + limits.damping_time
-            while time.monotonic() < end:
-                gate.damp()
-                time.sleep(TICK)
-            raise
-        report(said, gate.status, tell)
-
-
 def run_up(config: UpConfig) -> None:
     """Run the stack until Ctrl-C.
 
@@ -186,36 +112,33 @@ def run_up(config: UpConfig) -> None:
     with (
         interrupted() as stop,
         closing(AsyncLogger()) as tell,
-        ThreadPoolExecutor(1, "localizer") as pool,
+        ExitStack() as threads,
         member("up", config.dds, tell) as (participant, node),
     ):
         refuse_second(participant, config.dds, "/safety/lowcmd_in")
-        live = StackProcess(stack, participant, node, real=config.dds.robot, pool=pool, tell=tell)
+        pools = {slot: threads.enter_context(ThreadPoolExecutor(1, slot)) for slot in POOLED}
+        live = StackProcess(stack, participant, node, real=config.dds.robot, pools=pools, tell=tell)
         tell(f"The stack '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
-        waiting_since: float | None = time.monotonic()
+        waiting_since = time.monotonic()
         said, restarts = GateStatus(0.0, GateState.INIT), 0
         settle()
         while not stop.is_set():
             live.states.wait(0.02)
             live.step()
             if live.side is None:
-                if waiting_since is not None and time.monotonic() - waiting_since > ALONE:
-                    waiting_since = None
-                    start = (
-                        ""
-                        if config.dds.robot
-                        else f" Start one with: {config.dds.command('twin ' + config.stack)}"
-                    )
-                    tell(f"No robot on {config.dds} yet; {company(participant, config.dds)}.{start}")
+                if time.monotonic() - waiting_since > ALONE:
+                    # Whoever launches a robot says what becomes of it.
+                    launched = launcher(participant)
+                    waiting_since = time.monotonic() if launched else math.inf
+                    if not launched:
+                        tell(_no_robot(config, participant))
                 continue
             if live.restarts != restarts:
                 restarts = live.restarts
-                tell("The robot was started anew, and so was the stack.")
+                tell("The robot was restarted, and so was the stack.")
             said = report(said, live.side.safety or said, tell)
 
 
-def report(before: GateStatus, now: GateStatus, tell: Callable[[str], None]) -> GateStatus:
-    """Tell what the gate is now if it changed; return it."""
-    if (now.state, now.reason) != (before.state, before.reason):
-        tell(f"Safety gate: {describe_status(now)}")
-    return now
+def _no_robot(config: UpConfig, participant: CycloneParticipant) -> str:
+    start = "" if config.dds.robot else f" Start one with: {config.dds.command('twin ' + config.stack)}"
+    return f"No robot on {config.dds} yet; {company(participant, config.dds)}.{start}"

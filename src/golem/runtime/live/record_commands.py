@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import shutil
 import time
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,16 +14,20 @@ from tyro.conf import OmitArgPrefixes, Positional
 
 from golem.errors import ConfigError
 from golem.interfaces.recorded import public_topics
+from golem.middleware.bags.catalog import offered
+from golem.middleware.bags.player import PlayConfig, Player
+from golem.middleware.bags.reader import Bag, repair
+from golem.middleware.bags.recorder import Recorder
+from golem.middleware.bags.writer import BagConfig, BagWriter, Compression
 from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.exclusive_writers import SOLE, identity, refuse_second
 from golem.middleware.interrupt import interrupted
-from golem.middleware.record.catalog import offered
-from golem.middleware.record.player import PlayConfig, Player
-from golem.middleware.record.reader import Bag, repair
-from golem.middleware.record.recorder import Recorder
-from golem.middleware.record.writer import BagConfig, BagWriter, Compression
+from golem.runtime.live.exclusive_writers import SOLE, identity, refuse_second
+from golem.runtime.live.node_setup import log_line
+
+LOOK = 3.0
+"""Time over which is watched how fast a bag grows [s]."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +39,7 @@ class RecordConfig:
     topics: tuple[str, ...] = ()
     """Topics to record, by their ROS names; default: all public ones, images as they are."""
     all: bool = False
-    """Record whatever anybody publishes, compressed images too, as far as its type is known."""
+    """Record every topic of a known type, compressed images included."""
     compression: Compression = "none"
     """Of the messages: none, lz4 or zstd. zstd makes an image smaller for about 1 ms of CPU."""
     split: int = 2048
@@ -64,6 +70,34 @@ class ReplayBagConfig:
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
 
 
+class Growth:
+    """Says once how fast a bag grows, and how long the disk has room for it."""
+
+    def __init__(self, bag: BagWriter, say: Callable[[str], None] = log_line) -> None:
+        """Watch `bag`; `say` a line to a person."""
+        self._bag, self._say = bag, say
+        self._since: tuple[float, int] | None = None
+        self._said = False
+
+    def look(self) -> None:
+        """Look at the bag, which was flushed."""
+        if self._said or self._bag.messages == 0:
+            return
+        now, size = time.monotonic(), self._bag.size
+        if self._since is None:
+            self._since = now, size
+            return
+        took, grown = now - self._since[0], size - self._since[1]
+        if took < LOOK or grown <= 0:
+            return
+        self._said = True
+        rate, room = grown / took, shutil.disk_usage(self._bag.folder).free
+        self._say(
+            f"The bag grows by {rate * 60e-6:.0f} MB a minute; the disk has room for {room / rate / 60.0:.0f} minutes. "
+            "--topics and --compression make it smaller."
+        )
+
+
 def run_record(config: RecordConfig) -> int:
     """Record, and say what; return how many messages.
 
@@ -80,8 +114,11 @@ def run_record(config: RecordConfig) -> int:
         with closing(bag), closing(Recorder(participant, bag)) as recorder:
             recorder.add(public_topics(config.topics))
 
+            growth = Growth(bag)
+
             def every_second() -> None:
                 bag.flush()
+                growth.look()
                 if config.topics or config.all:
                     found = offered(discovery.writers(participant))
                     recorder.add(t for t in found if config.all or t.name in config.topics)
@@ -91,9 +128,8 @@ def run_record(config: RecordConfig) -> int:
     for name in sorted({*recorder.received, *config.topics}):
         lost = "  more than could be kept; some were lost" if name in recorder.overruns else ""
         print(f"{recorder.received.get(name, 0):9d}  {name}{lost}")
-    size = sum(file.stat().st_size for file in folder.iterdir())
     nothing = f" Nobody published anything on {config.dds}." if bag.messages == 0 else ""
-    print(f"{bag.messages} messages, {size / 1e6:.1f} MB, in {folder}.{nothing}", flush=True)
+    print(f"{bag}.{nothing}", flush=True)
     return bag.messages
 
 

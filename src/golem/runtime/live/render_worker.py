@@ -10,7 +10,7 @@ import math
 import multiprocessing
 import signal
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from multiprocessing.connection import Connection
 
@@ -20,8 +20,10 @@ from golem.interfaces.payloads import Exposure
 from golem.middleware.bus import Bus
 from golem.middleware.dds.domain import DdsConfig
 from golem.robots.base import Restorable
+from golem.runtime.executor import Placed
+from golem.runtime.live.bridge import outgoing
 from golem.runtime.live.node_setup import member
-from golem.runtime.live.robot_out import CameraOut
+from golem.runtime.live.robot_out import images_wanted
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.sim_sync import PATIENCE
 from golem.runtime.lockstep import build_robot
@@ -114,32 +116,40 @@ def _work(stack: Stack, seed: int, dds: DdsConfig, link: Connection) -> None:
     with member("cameras", dds) as (participant, node), closing(build_robot(stack, seed)) as robot:
         bus = Bus()
         endpoints = RoleEndpoints("robot", participant, node, image_topics())
-        cameras = {name: CameraOut(bus, endpoints, name) for name in robot.cameras}
-        for name in cameras:
+        streams = outgoing(bus, endpoints)
+        for name in robot.cameras:
             robot.capture(name)  # the first image takes a second
         try:
             while True:
                 link.send_bytes(b"free")
-                expose(robot, cameras, bus, *link.recv())
+                expose(robot, endpoints, bus, streams, *link.recv())
         except (EOFError, OSError):
             return
 
 
 def expose(
-    robot: Restorable, cameras: dict[str, CameraOut], bus: Bus, name: str, t: float, save_state: bytes
+    robot: Restorable,
+    endpoints: RoleEndpoints,
+    bus: Bus,
+    streams: Iterable[Placed],
+    name: str,
+    t: float,
+    save_state: bytes,
 ) -> None:
     """Send the images of one moment, if anybody wants them.
 
     Args:
         robot: a robot that recalls.
-        cameras: what sends them, by camera.
-        bus: what those read.
+        endpoints: where the images go.
+        bus: between the two.
+        streams: what sends the images on `bus`.
         name: which camera.
         t: time of the moment [s].
         save_state: the moment.
     """
-    if cameras[name].wanted():
+    if images_wanted(endpoints, name):
         robot.restore_state(save_state)
         rgb, depth = robot.capture(name)
         bus.publish(topics.exposures(name), Exposure(t, robot.cameras[name], rgb, depth), t)
-        cameras[name].step(t)
+        for _, stream in streams:
+            stream.step(t)

@@ -8,22 +8,27 @@ from dataclasses import replace
 from typing import Any
 
 from golem.interfaces import public
-from golem.interfaces.public import Role
+from golem.interfaces.rows import Role, TopicRow
 from golem.middleware.dds.base import Participant, Qos, Reader, Sample, Writer
 from golem.middleware.ros import names
 from golem.middleware.ros.base import ActionHandler, ActionServer, Publisher, RosNode, Subscription
 from golem.middleware.ros.codec import dds_name
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.waitset import Inbox, WaitSet
+from golem.middleware.wire.struct_layout import WireError
 from golem.types import TICK
 
 
 class RoleEndpoints:
-    """The endpoints of one role.
+    """The endpoints of one role; as a node of an executor it handles what has arrived, once per tick.
 
     Attributes:
+        role: whose they are.
         node: its ROS node.
+        rows: what it publishes.
     """
+
+    period = TICK
 
     def __init__(
         self, role: Role, participant: Participant, node: RosNode, only: Collection[str] | None = None
@@ -31,28 +36,50 @@ class RoleEndpoints:
         """Publish every topic of `role`, or `only` some of them.
 
         Args:
-            role: whose surface it is.
+            role: whose they are.
             participant: what the vendor's own topics are created by.
             node: what all others are created by.
             only: names of topics; None is all.
         """
-        self.node = node
-        self._role, self._participant = role, participant
+        self.role, self.node = role, node
+        self._participant = participant
+        self._arrived = WaitSet()
+        offered = (row for row in public.TOPICS if row.by == role and (only is None or row.name in only))
+        self.rows: dict[str, TopicRow] = {row.name: row for row in offered}
         self._publishers: dict[str, Publisher] = {}
         self._writers: dict[str, Writer] = {}
-        for row in public.TOPICS:
-            if only is not None and row.name not in only:
-                continue
-            if row.by == role and row.vendor:
-                self._writers[row.name] = participant.writer(
-                    names.topic(row.name), dds_name(row.type), row.qos
-                )
-            elif row.by == role:
-                self._publishers[row.name] = node.publisher(row.name, row.type, row.qos)
+        for name, row in self.rows.items():
+            if row.vendor:
+                self._writers[name] = participant.writer(names.topic(name), dds_name(row.type), row.qos)
+            else:
+                self._publishers[name] = node.publisher(name, row.type, row.qos)
+
+    def step(self, t: float) -> None:
+        """Handle what has arrived."""
+        self.node.poll()
+        self._arrived.poll()
 
     def publish(self, topic: str, message: Any) -> None:
-        """Send a message."""
-        self._publishers[topic].publish(message)
+        """Send a message, or the payload of one of the vendor's."""
+        if topic in self._writers:
+            self._writers[topic].write(message)
+        else:
+            self._publishers[topic].publish(message)
+
+    def send(self, topic: str, value: Any, encode: Callable[[Any], Any] | None = None) -> None:
+        """Send a value as the table says, or as `encode` says, unless that is made on demand and nobody listens.
+
+        Raises:
+            ValueError: neither says how.
+        """
+        row = self.rows[topic]
+        encode = encode or row.encode
+        if encode is None:
+            raise ValueError(f"the table does not say how to send {topic}, nor does the process")
+        if not row.on_demand or self.heard(topic):
+            message = encode(value)
+            if message is not None:
+                self.publish(topic, message)
 
     def writer(self, topic: str) -> Writer:
         """Return the writer of one of the vendor's topics."""
@@ -61,6 +88,40 @@ class RoleEndpoints:
     def heard(self, *topics: str) -> bool:
         """Return whether anybody listens to one of the topics."""
         return any((self._writers.get(topic) or self._publishers[topic]).matched() > 0 for topic in topics)
+
+    def listen(
+        self,
+        topic: str,
+        take: Callable[[Any], None],
+        refuse: Callable[[Exception], None] = lambda error: None,
+    ) -> None:
+        """Give the values of a topic to `take`, as the table reads them, when what has arrived is handled.
+
+        Args:
+            topic: its name.
+            take: takes a value.
+            refuse: told why a message is none.
+
+        Raises:
+            ValueError: the table does not let this role read it, or does not say how.
+        """
+        row = self._read(topic)
+        decode = row.decode
+        if decode is None:
+            raise ValueError(f"the table does not say how to read {topic}")
+
+        def handle(message: Any) -> None:
+            try:
+                value = decode(message)
+            except (CodecError, WireError) as error:
+                refuse(error)
+                return
+            take(value)
+
+        if row.vendor:
+            self.receive(topic, self._arrived, lambda sample: handle(sample.payload))
+        else:
+            self.subscribe(topic, handle)
 
     def subscribe(self, topic: str, callback: Callable[[Any], None]) -> Subscription:
         """Give the messages of a topic to `callback`, when the node is polled; one that it cannot read is dropped.
@@ -90,39 +151,25 @@ class RoleEndpoints:
 
     def serve(self, services: Mapping[str, Callable[[Any], Any]]) -> None:
         """Offer every service of the role; `services` says what answers each."""
-        rows = {row.name: row for row in public.SERVICES if row.by == self._role}
+        rows = {row.name: row for row in public.SERVICES if row.by == self.role}
         _same(rows, services)
         for name, callback in services.items():
             self.node.service(name, rows[name].type, callback)
 
     def act(self, handlers: Mapping[str, ActionHandler]) -> dict[str, ActionServer]:
         """Offer every action of the role; `handlers` says who decides about the goals of each."""
-        rows = {row.name: row for row in public.ACTIONS if row.by == self._role}
+        rows = {row.name: row for row in public.ACTIONS if row.by == self.role}
         _same(rows, handlers)
         return {
             name: self.node.action_server(name, rows[name].type, handler)
             for name, handler in handlers.items()
         }
 
-    def _read(self, topic: str) -> public.TopicRow:
+    def _read(self, topic: str) -> TopicRow:
         row = public.topic(topic)
-        if self._role not in row.to:
-            raise ValueError(f"the table does not let '{self._role}' read {topic}")
+        if self.role not in row.to:
+            raise ValueError(f"the table does not let '{self.role}' read {topic}")
         return row
-
-
-class Poll:
-    """Lets a ROS node handle what has arrived, once per tick."""
-
-    period = TICK
-
-    def __init__(self, node: RosNode) -> None:
-        """Poll `node`."""
-        self._node = node
-
-    def step(self, t: float) -> None:
-        """Handle what has arrived."""
-        self._node.poll()
 
 
 def _same(rows: Mapping[str, object], given: Mapping[str, object]) -> None:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from golem.interfaces.payloads import GateState, GateStatus, Reason
-from golem.interfaces.ros_convert import header
-from golem.middleware.ros.msgs import golem_interfaces
+from collections.abc import Callable
+
+from golem.interfaces.payloads import GateStatus
+from golem.runtime.live.clock import Every
+from golem.runtime.live.role_endpoints import RoleEndpoints
+
+REPORT = 0.05
+"""Time between two reports while nothing changes [s]."""
 
 
 def describe_status(status: GateStatus) -> str:
@@ -13,16 +18,25 @@ def describe_status(status: GateStatus) -> str:
     return f"{status.state} ({why})" if why else str(status.state)
 
 
-def status_message(status: GateStatus) -> golem_interfaces.SafetyStatus:
-    """Return what the gate lets everybody know."""
-    return golem_interfaces.SafetyStatus(header(status.t), status.state, status.reason or "", status.detail)
+class StatusReports:
+    """Sends the verdicts of the gate: at every change, and regularly."""
+
+    def __init__(self, endpoints: RoleEndpoints) -> None:
+        """Send through `endpoints`."""
+        self._endpoints = endpoints
+        self._said: tuple[object, ...] = ()
+        self._due = Every(REPORT)
+
+    def add(self, status: GateStatus) -> None:
+        """Send a verdict if it says something else, or was not sent for long."""
+        says = (status.state, status.reason)
+        if says != self._said or self._due.due(status.t):
+            self._said = says
+            self._endpoints.send("/safety/status", status)
 
 
-def to_status(message: golem_interfaces.SafetyStatus, t: float) -> GateStatus:
-    """Return what the gate said, as of time `t` [s]; a state or a reason nobody knows is a shut gate."""
-    try:
-        return GateStatus(
-            t, GateState(message.state), Reason(message.reason) if message.reason else None, message.detail
-        )
-    except ValueError:
-        return GateStatus(t, GateState.INIT, None, f"the gate says '{message.state}', '{message.reason}'")
+def report(before: GateStatus, now: GateStatus, tell: Callable[[str], None]) -> GateStatus:
+    """Tell what the gate is now if it changed; return it."""
+    if (now.state, now.reason) != (before.state, before.reason):
+        tell(f"Safety gate: {describe_status(now)}")
+    return now

@@ -44,7 +44,7 @@ class SkillActionServer:
     def attach(self, stack: StackNodes) -> None:
         """Work with `stack` from now on; what was pursued with another has failed."""
         if self._pursuit is not None:
-            self._end(SkillResult(False, "robot", "robot", "The robot was started anew."))
+            self._end(SkillResult(False, "robot", "robot", "The robot was restarted."))
         self._stack = stack
 
     def hear(self, silent: bool) -> None:

@@ -1,30 +1,30 @@
-"""What the stack reads from the domain beside the robot's state: images, hands, the gate, velocities, calibration."""
+"""What the stack reads from the domain where it takes more than a row of the public table: images, gate, gantry."""
 
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Generic, TypeVar
 
 from golem.interfaces import images, public, topics
 from golem.interfaces import ros_convert as convert
 from golem.interfaces.payloads import Exposure, GateState, GateStatus
-from golem.middleware.bus import Bus
+from golem.middleware.bus import Bus, Topic
 from golem.middleware.ros.base import Client, RosNode, Subscription
 from golem.middleware.ros.future import Future
-from golem.middleware.ros.msgs import golem_interfaces, sensor_msgs
-from golem.middleware.ros.msgs.geometry_msgs import Twist
+from golem.middleware.ros.msgs import sensor_msgs
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
-from golem.robots.sensors.calibration import calibrations
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.pairing import Pairing
 from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.role_endpoints import RoleEndpoints
-from golem.runtime.live.safety_status import to_status
 from golem.runtime.live.sim_sync import SILENCE
-from golem.runtime.live.velocity import Velocities
-from golem.runtime.nodes import moving
 from golem.runtime.perception_nodes import detection_requested
-from golem.types import SIDES, TICK, Array, CameraInfo, Side
+from golem.types import TICK, CameraInfo
+
+T = TypeVar("T")
 
 AHEAD = 0.05
 """How far ahead of the robot's time an image may be stamped [s] [own]: more, and its clock is another."""
@@ -89,19 +89,36 @@ class CameraIn:
             )
 
 
+class OnePerTick(Generic[T]):
+    """Brings values to the bus one per tick: of those that arrive together the bus would keep the newest alone."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, topic: Topic[T], most: int) -> None:
+        """Bring them to `topic` of `bus`; of more than `most` that wait the oldest are dropped."""
+        self._bus, self._topic = bus, topic
+        self._waiting: deque[T] = deque(maxlen=most)
+
+    def take(self, value: T) -> None:
+        """Take a value."""
+        self._waiting.append(value)
+
+    def step(self, t: float) -> None:
+        """Publish the oldest."""
+        if self._waiting:
+            self._bus.publish(self._topic, self._waiting.popleft(), t)
+
+
 class GateIn:
     """Brings the verdicts of the safety gate to the bus; a gate that is silent counts as shut."""
 
     period = TICK
 
-    def __init__(
-        self, bus: Bus, endpoints: RoleEndpoints, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, bus: Bus, clock: Callable[[], float] = time.monotonic) -> None:
         """Bring them to `bus`; `clock` is this process's own [s]."""
         self._bus, self._clock = bus, clock
         self._heard_at, self._t = -SILENCE, 0.0
         self._status: GateStatus | None = None
-        endpoints.subscribe("/safety/status", self._take)
 
     def step(self, t: float) -> None:
         """Publish the newest verdict."""
@@ -114,8 +131,9 @@ class GateIn:
         else:
             self._bus.publish(topics.SAFETY, self._status, t)
 
-    def _take(self, message: golem_interfaces.SafetyStatus) -> None:
-        self._heard_at, self._status = self._clock(), to_status(message, self._t)
+    def take(self, status: GateStatus) -> None:
+        """Take a verdict; the gate's clock is none of ours."""
+        self._heard_at, self._status = self._clock(), replace(status, t=self._t)
 
 
 class RemoteGantry:
@@ -151,34 +169,3 @@ class RemoteGantry:
             return
         # Let go, or there was none.
         self.on_gantry = False
-
-
-def listen(
-    bus: Bus,
-    endpoints: RoleEndpoints,
-    calibration: dict[str, Array],
-    now: Callable[[], float],
-    busy: Callable[[], bool],
-) -> None:
-    """Bring hands and velocities to the bus, and keep the calibration of the cameras up to date.
-
-    Args:
-        bus: where they go.
-        endpoints: where they come from.
-        calibration: by camera; see `Robot.calibration`.
-        now: robot time [s].
-        busy: whether a skill has the robot: velocities from elsewhere are then ignored.
-    """
-    velocities = Velocities(bus, now, lambda: busy() or not moving(bus))
-
-    def take_twist(message: Twist) -> None:
-        velocities.take(convert.to_twist(message))
-
-    def take_hand(side: Side) -> Callable[[golem_interfaces.HandState], None]:
-        topic = topics.hand_state(side)
-        return lambda message: bus.publish(topic, convert.to_hand_state(message), now())
-
-    endpoints.subscribe("/tf_static", lambda message: calibration.update(calibrations(message)))
-    endpoints.subscribe("/cmd_vel", take_twist)
-    for side in SIDES:
-        endpoints.subscribe(public.gripper(side, "state"), take_hand(side))

@@ -1,13 +1,13 @@
 """The stack as a process: everything that decides what the robot does, on the robot's own clock.
 
 Each state that arrives makes the clock tick. A slow robot thus slows the stack and not the physics; a robot that was
-started anew finds a stack that was built anew.
+restarted finds a stack that was built anew.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -18,29 +18,35 @@ from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant, Sample
 from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.waitset import WaitSet
-from golem.middleware.unitree_api import request_topic, response_topic
 from golem.middleware.wire import convert
+from golem.middleware.wire.api import request_topic, response_topic
 from golem.middleware.wire.rpc import RpcClient
 from golem.middleware.wire.struct_layout import WireError
+from golem.robots.sensors.calibration import calibrations
 from golem.runtime.executor import Executor, Phase, Placed, in_order
 from golem.runtime.live import stack_out as out
+from golem.runtime.live.bridge import incoming, outgoing
 from golem.runtime.live.clock import RobotClock
 from golem.runtime.live.legs_monitor import LegsMonitor
-from golem.runtime.live.motor_bridge import RequestOut
 from golem.runtime.live.node_setup import log_line
-from golem.runtime.live.onboard_bridge import AnswersIn, CallsOut, Identities, LegsIn
+from golem.runtime.live.onboard_bridge import AnswersIn, CallsOut, Identities
 from golem.runtime.live.rejected import RejectedMessages
-from golem.runtime.live.robot_out import ClockOut, FramesOut, JointsOut, describe
-from golem.runtime.live.role_endpoints import Poll, RoleEndpoints
+from golem.runtime.live.robot_out import describe, encoders
+from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.sim_sync import CATCH_UP, SILENCE
 from golem.runtime.live.skill_action_server import SkillActionServer
 from golem.runtime.live.skill_messages import list_message
-from golem.runtime.live.stack_in import CameraIn, GateIn, RemoteGantry, listen
-from golem.runtime.node_groups import StackNodes
+from golem.runtime.live.stack_in import CameraIn, GateIn, OnePerTick, RemoteGantry
+from golem.runtime.live.velocity import Velocities
+from golem.runtime.node_groups import StackNodes, hears_lidar
+from golem.runtime.nodes import moving
+from golem.runtime.onboard_nodes import stack_loco_api
 from golem.runtime.skill_table import SkillTable
 from golem.stack import Stack
 from golem.types import SIDES, Array
 
+IMU_BACKLOG = 40
+"""Samples of the LiDAR's IMU that may wait for their ticks: 0.2 s."""
 SHOWN = ("/clock", "/joint_states", "/tf", "/tf_static", "/robot_description")
 """What of the robot's surface follows from its state, and is not the vendor's to publish."""
 
@@ -51,7 +57,7 @@ class StackProcess:
     Attributes:
         states: what to wait on between two steps.
         side: the stack, once a robot has reported.
-        restarts: how often the robot was started anew since.
+        restarts: how often the robot was restarted since.
         refused: states that were damaged.
     """
 
@@ -62,7 +68,7 @@ class StackProcess:
         node: RosNode,
         *,
         real: bool = False,
-        pool: ThreadPoolExecutor | None = None,
+        pools: Mapping[str, ThreadPoolExecutor] | None = None,
         clock: Callable[[], float] = time.monotonic,
         tell: Callable[[str], None] = log_line,
     ) -> None:
@@ -75,7 +81,7 @@ class StackProcess:
             real: whether the robot is none of ours. Nobody then calls to let a band go, the wall clock holds leg
                 controllers to their period, and joints and frames are shown by this process, since none of the
                 robot's does.
-            pool: where the localizer runs; see `LocalizerNode`.
+            pools: where modules run beside the clock; see `StackNodes`.
             clock: this process's own [s].
             tell: says a line to a person; beside a real robot one that is never held up.
 
@@ -97,18 +103,26 @@ class StackProcess:
         self.restarts, self.refused = 0, RejectedMessages("states of the robot", tell)
         self._executor: Executor | None = None
         self._mode_machine = 0
-        self._pool = pool
+        self._pools = pools
         self._gantry = RemoteGantry(node) if stack.on_ground and not real else None
-        self._gate = GateIn(self._bus, endpoints, clock)
+        self._gate = GateIn(self._bus, clock)
         self._cameras = [CameraIn(self._bus, endpoints, name) for name in public.CAMERAS]
-        service = stack.loco_api.service
-        requests, responses = request_topic(service), response_topic(service)
+        self._service = stack_loco_api(stack).service
+        requests, responses = request_topic(self._service), response_topic(self._service)
         self._calls = RpcClient(endpoints.writer(f"/{requests}"), endpoints.reader(f"/{responses}"))
-        self._onboard = endpoints.reader("/onboard/lowcmd")
         self._skills = SkillActionServer(endpoints, tell)
         endpoints.publish("/skill/list", list_message(SkillTable(stack).specs.values()))
         endpoints.serve({k: v for s in SIDES for k, v in out.hand_services(self._bus, s, self._now).items()})
-        listen(self._bus, endpoints, self._calibration, self._now, self._skills.busy)
+        unheard = () if hears_lidar(stack) else public.LIDAR
+        velocities = Velocities(self._bus, self._now, lambda: self._skills.busy() or not moving(self._bus))
+        self._lidar_imu = OnePerTick(self._bus, topics.LIDAR_IMU, IMU_BACKLOG)
+        takers = {
+            "/safety/status": self._gate.take,
+            "/cmd_vel": velocities.take,
+            "/livox/imu": self._lidar_imu.take,
+        }
+        incoming(self._bus, endpoints, self._now, tell, takers, without=("/lowstate", *unheard))
+        endpoints.subscribe("/tf_static", lambda message: self._calibration.update(calibrations(message)))
         self._drivers = RoleEndpoints("robot", participant, node, only=SHOWN) if real else None
         if self._drivers is not None:
             describe(self._drivers, {})
@@ -135,8 +149,8 @@ class StackProcess:
         if not self._robot.advances(state.t, sample.writer):
             return
         self._mode_machine = convert.mode_machine(sample.payload)
-        if self._robot.anew or self._executor is None:
-            self.restarts += self._robot.anew
+        if self._robot.restarted or self._executor is None:
+            self.restarts += self._robot.restarted
             self._executor = self._build(state.t)
         self._bus.publish(topics.LOW_STATE, state, state.t)
         self._executor.advance(state.t, CATCH_UP)
@@ -151,32 +165,23 @@ class StackProcess:
         if self._gantry is not None:
             self._gantry.renew()
         side = self.side = StackNodes(
-            bus, self._stack, self._calibration, self._gantry, 0.0, self._pool, self._real
+            bus, self._stack, self._calibration, self._gantry, 0.0, self._pools, self._real
         )
         side.legs.realtime, side.running.live = self._real, True
         self._skills.attach(side)
-        service, identities = self._stack.loco_api.service, Identities()
+        service, identities = self._service, Identities()
         placed: list[Placed] = [
-            (Phase.RECEIVE, Poll(self._node)),
+            (Phase.RECEIVE, endpoints),
             (Phase.RECEIVE, self._gate),
+            (Phase.RECEIVE, self._lidar_imu),
             (Phase.RECEIVE, AnswersIn(bus, service, self._calls, identities)),
-            (Phase.RECEIVE, LegsIn(bus, self._onboard, self._tell)),
             *side.nodes,
-            # Before anything else is sent: it is what the robot waits for.
-            (Phase.PROTECT, RequestOut(bus, endpoints, lambda: self._mode_machine)),
-            (Phase.SEND, out.BaseOut(bus, endpoints)),
-            (Phase.SEND, out.OdometryOut(bus, endpoints)),
-            (Phase.SEND, out.LegsOut(bus, endpoints)),
+            *outgoing(bus, endpoints, out.encoders(bus, lambda: self._mode_machine)),
             (Phase.SEND, CallsOut(bus, service, self._calls, identities)),
             (Phase.SEND, self._skills),
             (Phase.SEND, LegsMonitor(bus, self._tell)),
             *((Phase.SEND, camera) for camera in self._cameras),
-            *((Phase.SEND, out.SightingsOut(bus, endpoints, name)) for name in public.CAMERAS),
-            *((Phase.SEND, out.HandCommandOut(bus, endpoints, hand)) for hand in SIDES),
-            *((Phase.SEND, out.HandStatusOut(bus, endpoints, hand)) for hand in SIDES),
         ]
         if self._drivers is not None:
-            placed.append((Phase.SEND, ClockOut(self._drivers)))
-            placed.append((Phase.SEND, JointsOut(bus, self._drivers)))
-            placed.append((Phase.SEND, FramesOut(bus, self._drivers)))
+            placed += outgoing(bus, self._drivers, encoders(bus))
         return Executor(bus, in_order(placed), t)

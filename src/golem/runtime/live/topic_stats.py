@@ -13,8 +13,8 @@ from golem.middleware.dds.base import Qos, Reader
 from golem.middleware.dds.discovery import Endpoint
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
-from golem.middleware.exclusive_writers import DISCOVERY, owner
 from golem.middleware.ros import names
+from golem.runtime.live.exclusive_writers import DISCOVERY, owner
 from golem.runtime.live.node_setup import log_line, member
 
 EAR = Qos(reliable=False, depth=None)
@@ -28,7 +28,7 @@ class TopicStatsConfig:
     seconds: float = 2.0
     """How long to listen."""
     all: bool = False
-    """Also the requests and replies of services and actions, and what ROS tells itself."""
+    """Also the requests and replies of services and actions, and the topics that ROS 2 uses internally."""
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
 
 

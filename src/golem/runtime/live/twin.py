@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from golem.interfaces import public
@@ -10,30 +11,24 @@ from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant
 from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.msgs.std_srvs import Trigger_Response
-from golem.middleware.unitree_api import request_topic, response_topic
+from golem.middleware.wire.api import request_topic, response_topic
 from golem.middleware.wire.rpc import RpcServer
 from golem.robots.base import HasGantry, Robot
-from golem.robots.onboard import motion_switcher
+from golem.robots.unitree import motion_switcher
 from golem.runtime import nodes
 from golem.runtime.executor import Executor, Phase, Placed, in_order
-from golem.runtime.live.motor_bridge import CommandIn, StateOut
+from golem.runtime.live.bridge import incoming, outgoing
+from golem.runtime.live.motor_bridge import CommandIn
 from golem.runtime.live.node_setup import log_line
-from golem.runtime.live.onboard_bridge import AnswersOut, CallsIn, OnboardLegsOut
+from golem.runtime.live.onboard_bridge import AnswersOut, CallsIn
 from golem.runtime.live.render_worker import RenderWorker, image_topics
-from golem.runtime.live.robot_out import (
-    CameraOut,
-    ClockOut,
-    FramesOut,
-    HandOut,
-    JointsOut,
-    describe,
-    take_hand_commands,
-)
-from golem.runtime.live.role_endpoints import Poll, RoleEndpoints
+from golem.runtime.live.robot_out import describe, encoders, images_wanted, lidar_wanted
+from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.sim_sync import PATIENCE
+from golem.runtime.live.unanswered_calls import UnansweredCalls
 from golem.runtime.node_groups import ModuleFactory, RobotNodes
+from golem.runtime.onboard_nodes import stack_loco_api
 from golem.stack import Stack
-from golem.types import SIDES
 
 FOREVER = 1e9
 """A time nobody sees [s]."""
@@ -76,36 +71,30 @@ class Twin:
         only = None if render_worker is None else {row.name for row in public.TOPICS} - images
         endpoints = RoleEndpoints("robot", participant, node, only)
         self._robot = robot
-        cameras = (
-            {name: CameraOut(bus, endpoints, name) for name in robot.cameras} if render_worker is None else {}
-        )
         self.commands = CommandIn(bus, endpoints, tell, patience)
-        side = RobotNodes(bus, stack, robot, (lambda c: cameras[c].wanted) if render_worker is None else None)
+        exposed = (
+            None if render_worker is not None else lambda camera: partial(images_wanted, endpoints, camera)
+        )
+        side = RobotNodes(bus, stack, robot, exposed, partial(lidar_wanted, endpoints))
         placed: list[Placed] = [
-            (Phase.RECEIVE, Poll(node)),
+            (Phase.RECEIVE, endpoints),
             (Phase.RECEIVE, self.commands),
             *side.nodes,
-            # As soon as it is measured: whoever answers has the whole tick for it.
-            (Phase.ESTIMATE, StateOut(bus, endpoints)),
-            (Phase.ESTIMATE, ClockOut(endpoints)),
-            (Phase.SEND, JointsOut(bus, endpoints)),
-            (Phase.SEND, FramesOut(bus, endpoints)),
-            (Phase.SEND, OnboardLegsOut(bus, endpoints.writer("/onboard/lowcmd"))),
-            *((Phase.SEND, camera) for camera in cameras.values()),
-            *((Phase.SEND, HandOut(bus, endpoints, hand)) for hand in SIDES),
+            *outgoing(bus, endpoints, encoders(bus)),
         ]
-        for service in (motion_switcher.SERVICE, stack.loco_api.service):
+        for service in (motion_switcher.SERVICE, stack_loco_api(stack).service):
             requests, responses = request_topic(service), response_topic(service)
             server = RpcServer(endpoints.reader(f"/{requests}"), endpoints.writer(f"/{responses}"))
             placed.append((Phase.RECEIVE, CallsIn(bus, service, server)))
             placed.append((Phase.SEND, AnswersOut(bus, service, server)))
         if render_worker is not None:
             placed.append((Phase.EXPOSE, render_worker))
-        if stack.legs_on_board is not None:
+        if stack.legs_on_board is None:
+            placed.append((Phase.SERVE, UnansweredCalls(bus, stack_loco_api(stack), tell)))
+        else:
             estimator = nodes.EstimatorNode(bus, *ModuleFactory(stack).make("estimator"))
             placed.append((Phase.ESTIMATE, estimator))
-        for hand in SIDES:
-            take_hand_commands(bus, endpoints, hand)
+        incoming(bus, endpoints, lambda: self.executor.t, tell)
         endpoints.serve({"/elastic_band/release": self._release})
         describe(endpoints, robot.calibration)
         self.executor = Executor(bus, in_order(placed))

@@ -34,7 +34,7 @@ class Velocities:
     def take(self, twist: Twist) -> None:
         """Pass `twist` on, or not."""
         t, still = self._now(), math.hypot(twist.vx, twist.vy, twist.wz) < STILL  # false for nan
-        # A robot that was started anew begins its time anew.
+        # A robot that was restarted begins its time anew.
         if still or not 0.0 <= t - self._heard <= LET_GO:
             self._held = False
         self._heard = t

@@ -66,7 +66,7 @@ def curve(run: Path = RUNS / "run", out: Path = RUNS / "curve.png") -> None:
         run: folder of `train`.
         out: PNG file.
     """
-    from golem.training.detector.curve import draw_curve
+    from golem.training.detector.precision_curve import draw_curve
 
     draw_curve(run / "curve.csv", out)
 

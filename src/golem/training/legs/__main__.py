@@ -11,8 +11,8 @@ from rich.table import Table
 from tyro.conf import arg
 
 from golem.training.legs.checkpoint import CHECKPOINT
-from golem.training.legs.curve import draw_curves
 from golem.training.legs.env import Task
+from golem.training.legs.learning_curve import draw_curves
 from golem.training.legs.train_legs import Adversary, TrainLegsConfig
 from golem.training.legs.train_legs import train as run_training
 
@@ -103,7 +103,7 @@ def shove(
         seed: of the robots.
         threads: of the physics.
     """
-    from golem.training.legs.shoves import shove_all
+    from golem.training.legs.shove_networks import shove_all
 
     rows = shove_all(network, impulse, n, seed, threads)
     table = Table(

@@ -45,7 +45,7 @@ def read_curve(run: Path) -> dict[str, Array]:
 
 
 def read_table(table: Path, name: str) -> dict[str, Array]:
-    """Return the columns of the run `name` in a table that `curve.draw_curves` wrote.
+    """Return the columns of the run `name` in a table that `learning_curve.draw_curves` wrote.
 
     Raises:
         ConfigError: there is no such table, or no such run in it.

@@ -13,6 +13,7 @@ from golem.capabilities.legs.mpc.cost import CostConfig, cost
 from golem.capabilities.legs.mpc.planner import Planner, PlannerConfig
 from golem.capabilities.legs.mpc.planning_model import PlanningModel
 from golem.errors import ConfigError, GolemError, unknown_name
+from golem.finite import check_finite, check_measured
 from golem.interfaces.payloads import LegCommand
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
@@ -126,6 +127,9 @@ class MPC:
         if np.isfinite(self._age):
             self.planner.shift(self._age)
         self._age = 0.0
+        check_measured(state)
+        check_finite("the pose of the base", base.T_odom_base)
+        check_finite("the velocity of the base", base.velocity)
         self._model.measure(state, base)
         knots = self.planner.sample()
         targets = self.planner.targets(self._times, knots)

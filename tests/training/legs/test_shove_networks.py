@@ -12,7 +12,7 @@ from golem.errors import ConfigError
 from golem.robots.mujoco.shoves import DIRECTIONS
 from golem.training.legs.checkpoint import CHECKPOINT
 from golem.training.legs.disturbances import RandomPushes
-from golem.training.legs.shoves import shove_all
+from golem.training.legs.shove_networks import shove_all
 from golem.training.legs.train_legs import TrainLegsConfig, train
 
 

@@ -19,7 +19,7 @@ from golem.training.legs.export_policy import load_actor
 
 SETTLE, PATIENCE = 2.0, 3.0
 """Time of standing before the shove, and time after its begin [s]; both have to be survived."""
-NOBODY = np.arange(0)
+NO_ROBOT = np.arange(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ def shove_all(network: Path, impulse: float, n: int, seed: int, threads: int) ->
     for _ in range(round((SETTLE + PATIENCE) / PERIOD)):
         seen = torch.from_numpy(env.observe()[0]).float()
         with torch.no_grad():
-            step = env.step(actor(seen).double().numpy(), NOBODY, np.zeros((0, 15)))
+            step = env.step(actor(seen).double().numpy(), NO_ROBOT, np.zeros((0, 15)))
         lost = step.ended & ~stopped & ~fell
         stopped |= lost & env.world.stopped
         fell |= lost & ~env.world.stopped

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
 
 from golem.errors import ConfigError
+from golem.figures import blank_figure
 from golem.training.legs.checkpoint import CURVE, read_curve, read_table
 from golem.types import Array
 
@@ -22,8 +22,7 @@ PANELS = (
 )
 """Column, title and top of the axis of each panel."""
 SIZE = (360, 300)
-MARGIN = (50, 30, 22, 40)
-"""Left, top, right, bottom of a panel [px]."""
+"""Width and height of a panel [px]."""
 KEPT = (
     *("steps", "cpu_s", "falls", "error_moving", "error_standing", "survival"),
     *("push", "amplitude", "payload", "std"),
@@ -71,6 +70,7 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         out: the PNG file; the table is the CSV file beside it.
 
     Raises:
+        MissingExtra: matplotlib is not installed.
         ConfigError: more runs than colours, two of one name, no such curve, `out` is no PNG file, or the table would
             replace a run's own.
     """
@@ -86,36 +86,25 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
     curves = [Curve.of(run) for run in runs]
     if len({curve.name for curve in curves}) < len(curves):
         raise ConfigError("The picture names the runs by their folders; give them different names.")
-    last = max(float(curve.columns["steps"][-1]) for curve in curves)
-    image = Image.new("RGB", (SIZE[0] * len(PANELS), SIZE[1] + 20 * len(curves)), "white")
-    pen, font = ImageDraw.Draw(image), ImageFont.load_default(12)
-    left, top, right, bottom = MARGIN
-    width, height = SIZE[0] - left - right, SIZE[1] - top - bottom
-    for panel, (column, title, maximum) in enumerate(PANELS):
-        x0 = panel * SIZE[0] + left
-        pen.text((x0, 8), title, fill="black", font=font)
-        for k in range(6):
-            y = top + height * (1 - k / 5)
-            pen.line([(x0, y), (x0 + width, y)], fill="#dddddd")
-            pen.text((x0 - 6, y), f"{maximum * k / 5:.2g}", fill="black", font=font, anchor="rm")
-        for k in range(5):
-            x = x0 + width * k / 4
-            pen.text((x, top + height + 8), f"{last * k / 4e6:.1f}M", fill="black", font=font, anchor="ma")
+    figure = blank_figure(SIZE[0] * len(PANELS), SIZE[1] + 24 * ((len(curves) + 3) // 4))
+    plots = figure.subplots(1, len(PANELS))
+    for axes, (column, title, maximum) in zip(plots, PANELS, strict=True):
+        axes.set(ylim=(0.0, maximum), xlabel="steps [millions]")
+        axes.set_title(title, fontsize=10)
+        axes.grid(color="#dddddd")
         for curve, colour in zip(curves, COLOURS, strict=False):
             rows = SMOOTH // curve.thin
             values = np.convolve(curve.columns[column], np.full(rows, 1.0 / rows), mode="valid")
-            steps = curve.columns["steps"][-len(values) :]
-            points = [
-                (x0 + width * s / last, top + height * (1 - min(v / maximum, 1.0)))
-                for s, v in zip(steps, values, strict=True)
-            ]
-            pen.line(points, fill=colour, width=2)
-    for k, (curve, colour) in enumerate(zip(curves, COLOURS, strict=False)):
-        y = SIZE[1] + 20 * k
-        pen.line([(left, y + 6), (left + 24, y + 6)], fill=colour, width=3)
-        pen.text((left + 32, y), curve.name, fill="black", font=font)
+            axes.plot(1e-6 * curve.columns["steps"][-len(values) :], values, color=colour)
+    figure.legend(
+        plots[0].get_lines(),
+        [curve.name for curve in curves],
+        loc="outside lower left",
+        ncols=4,
+        frameon=False,
+    )
     out.parent.mkdir(parents=True, exist_ok=True)
-    image.save(out)
+    figure.savefig(out)
     with table.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("run", *KEPT))

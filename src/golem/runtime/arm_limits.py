@@ -1,0 +1,62 @@
+"""Watches that the targets of the upper body keep the limits of its joints, as their contract asks for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from golem.robots.model.limits import load_limits
+from golem.robots.model.table import JOINT_NAMES
+from golem.runtime.contract_check import ContractCheck
+from golem.types import UPPER, Array
+
+ROUNDING = 1e-3
+"""How far targets may exceed a limit [rad]: sums of steps and single precision."""
+BEGINNING = 0.1
+"""How much further the first targets after a reset may be from the measured joints [rad]: a controller with narrower
+limits of its own, or with an encoder's offset at a limit, starts inside them."""
+
+
+class ArmLimits:
+    """Remembers the targets of the previous tick, and compares."""
+
+    def __init__(self, contract: ContractCheck, period: float) -> None:
+        """Watch the module of `contract`, which runs every `period` [s]."""
+        limits = load_limits()
+        self._contract, self._period = contract, period
+        self._lower: Array = limits.lower[UPPER]
+        self._upper: Array = limits.upper[UPPER]
+        self._step: Array = limits.velocity[UPPER] * period + ROUNDING
+        self._last: Array | None = None
+        self._slack = 0.0
+
+    def reset(self, q: Array) -> None:
+        """Start from the measured joints `q` (27,) [rad]."""
+        self._last = np.clip(q[UPPER], self._lower, self._upper)
+        self._slack = BEGINNING
+
+    def check(self, q: Array) -> None:
+        """Check the targets `q` (15,) of this tick [rad].
+
+        Raises:
+            ModuleFault: one is outside its position limits, or further from the previous one than its joint can move.
+        """
+        outside = np.maximum(self._lower - q, q - self._upper)
+        if outside.max() > ROUNDING:
+            i = int(outside.argmax())
+            raise self._contract.fault(
+                f"it sends {_joint(i)} to {q[i]:.3g} rad, outside its limits, "
+                f"{self._lower[i]:.3g} to {self._upper[i]:.3g} rad"
+            )
+        if self._last is not None:
+            excess = np.abs(q - self._last) - self._step - self._slack
+            if excess.max() > 0.0:
+                i = int(excess.argmax())
+                raise self._contract.fault(
+                    f"its target of {_joint(i)} jumps by {abs(q[i] - self._last[i]):.3g} rad in a tick of "
+                    f"{self._period:g} s; the joint moves {self._step[i] - ROUNDING:.3g} rad at most"
+                )
+        self._last, self._slack = q.copy(), 0.0
+
+
+def _joint(i: int) -> str:
+    return JOINT_NAMES[UPPER][i]

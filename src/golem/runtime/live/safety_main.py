@@ -1,0 +1,92 @@
+"""`golem safety`. It imports no simulator and no module of a stack: a gate that is started again is there at once."""
+
+from __future__ import annotations
+
+import signal
+import time
+from contextlib import closing
+from dataclasses import dataclass, field
+from functools import partial
+
+from tyro.conf import OmitArgPrefixes
+
+from golem.errors import ConfigError
+from golem.hardware.estop.estop_config import EstopConfig
+from golem.hardware.safety.base import SafetyLimits
+from golem.middleware.dds.domain import DdsConfig
+from golem.middleware.interrupt import interrupted
+from golem.runtime.live.exclusive_writers import owner, refuse_second
+from golem.runtime.live.node_setup import AsyncLogger, member, settle
+from golem.runtime.live.safety_process import SafetyProcess
+from golem.runtime.live.safety_status import report
+from golem.types import TICK
+
+ROBOT_LIMITS = "urdf"
+"""Limit profile of the real robot: the smaller torques."""
+
+
+@dataclass(frozen=True)
+class SafetyConfig:
+    """Guard the robot on a domain: emergency stop and safety gate, and nothing else in this process.
+
+    To ask something of the one that runs: golem safety activate, stop, reset, press, release or status. To have a
+    robot's own controller let go of the motors: golem safety take.
+    """
+
+    limits: str = "urdf"
+    """Limit profile to enforce: urdf or paper. The stack file's is not read here: the gate trusts no stack."""
+    strict: bool = False
+    """Stop a simulated robot as early as the real one for what is late: a busy machine then stops it."""
+    estop: EstopConfig = field(default_factory=EstopConfig)
+    """The emergency stop. A real robot has none until its board is named."""
+    dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
+
+
+def run_safety(config: SafetyConfig) -> None:
+    """Guard until Ctrl-C; a robot in motion is damped first.
+
+    Raises:
+        ConfigError: an option is wrong, or a gate is on the domain already.
+        DdsError: the domain cannot be joined.
+        MissingExtra, PortError: the board of the emergency stop cannot be opened.
+    """
+    limits = SafetyLimits.from_profile(config.limits)
+    if config.dds.robot and config.limits != ROBOT_LIMITS:
+        raise ConfigError(f"The real robot is guarded with --limits {ROBOT_LIMITS}, not '{config.limits}'.")
+    patient = not (config.strict or config.dds.robot)
+    virtual = config.estop.use == "virtual"
+    estop = None if virtual and config.dds.robot else config.estop.create()
+    with (
+        # Ctrl-Z or Ctrl-\ in the wrong terminal would freeze or kill the gate, and leave the motors a stiff command.
+        interrupted(also=(signal.SIGTSTP, signal.SIGQUIT)) as stop,
+        closing(AsyncLogger()) as tell,
+        member("safety", config.dds, tell) as (participant, node),
+    ):
+        refuse_second(participant, config.dds, "/lowcmd")
+        who = partial(owner, participant)
+        gate = SafetyProcess(
+            participant, node, limits, estop, who=who, patient=patient, real=config.dds.robot
+        )
+        tell(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
+        if estop is None:
+            tell(
+                "No emergency stop is here, so the gate stays shut; "
+                "name its board: --estop.use serial --estop.port /dev/ttyACM0."
+            )
+        said = gate.status
+        settle()
+        try:
+            while not stop.is_set():
+                gate.commands.wait(TICK)
+                gate.step()
+                said = report(said, gate.status, tell)
+            while not gate.stop():
+                gate.commands.wait(TICK)
+        except BaseException:
+            # Without the gate, which has just failed: the last command must not be a stiff one.
+            end = time.monotonic() + limits.damping_time
+            while time.monotonic() < end:
+                gate.damp()
+                time.sleep(TICK)
+            raise
+        report(said, gate.status, tell)

@@ -1,0 +1,133 @@
+"""The node of the navigator: it computes steps towards the goal that a skill set, and drives the legs by them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+
+from golem.capabilities.navigation.base import Navigator, NavInputs
+from golem.errors import ModuleFault
+from golem.interfaces import topics
+from golem.interfaces.nav_payloads import NavGoal, NavStep
+from golem.interfaces.payloads import ModuleFaultMsg
+from golem.middleware.bus import Bus, News
+from golem.runtime.contract_check import ContractCheck
+from golem.runtime.nodes import SkillNode
+from golem.skills.base import StageFailed
+from golem.skills.context import LegsInterface
+from golem.skills.runner import LACKS
+from golem.types import PlanarPose, Twist
+
+ZERO = Twist()
+
+
+class NavigatorNode:
+    """Runs the navigator while a skill has a goal for it. It has its turn after the skill, in the same tick.
+
+    A fault of it ends the skill, and nothing else. One navigator serves all goals: it may learn how these legs stop.
+    """
+
+    period = SkillNode.period
+
+    def __init__(
+        self,
+        bus: Bus,
+        navigator: Navigator,
+        contract: ContractCheck,
+        legs: LegsInterface,
+        pool: ThreadPoolExecutor | None = None,
+    ) -> None:
+        """Run a navigator.
+
+        Args:
+            bus: where goals, map and scan are.
+            navigator: what is run, already checked.
+            contract: names it.
+            legs: the lower body, as the running skill reads it.
+            pool: where a navigator with a latency runs; None is here, at the price of the latency that it declares.
+        """
+        self._bus, self._navigator, self._slot, self._legs, self._pool = (
+            bus,
+            navigator,
+            contract.slot,
+            legs,
+            pool,
+        )
+        self._worker = pool if navigator.latency > 0.0 else None
+        self._latency = 0.0 if self._worker is not None else navigator.latency
+        self._every = max(1, round(1.0 / (navigator.rate * self.period)))
+        self._goals = News(bus, topics.NAV_GOAL)
+        self._pursue(NavGoal(None))
+
+    def step(self, t: float) -> None:
+        """Take a new goal, compute the step that is due, and drive the legs by the newest that is there."""
+        goal = self._goals.read()
+        if goal is not None:
+            self._pursue(goal)
+        if self._goal is None:
+            return
+        try:
+            self._advance(t)
+        except ModuleFault as fault:
+            self._give_up(ModuleFaultMsg(fault.slot, str(fault)), t)
+            return
+        except StageFailed as lost:
+            self._give_up(ModuleFaultMsg(lost.slot, str(lost), lost.stage), t)
+            return
+        except LACKS as lack:
+            if self._pool is None:
+                raise
+            self._give_up(ModuleFaultMsg(self._slot, str(lack)), t)
+            return
+        newest = self._bus.latest(topics.NAV_STEP)
+        if newest is not None and self._bus.count(topics.NAV_STEP) > self._seen:
+            self._legs.drive(ZERO if newest.ended else newest.twist)
+
+    def _pursue(self, goal: NavGoal) -> None:
+        """Forget the previous goal, with every step that was on its way."""
+        self._bus.withdraw(topics.NAV_STEP)
+        self._goal = self._unstarted = goal.pose
+        self._seen = self._bus.count(topics.NAV_STEP)
+        self._ticks, self._stepped_at = 0, -1
+        self._job: Future[NavStep] | None = None
+
+    def _advance(self, t: float) -> None:
+        """Publish the step that is due, or that the thread has found."""
+        self._ticks += 1
+        if self._job is not None:
+            if not self._job.done():
+                return
+            job, self._job = self._job, None
+            self._bus.publish(topics.NAV_STEP, job.result(), t)
+        if self._stepped_at >= 0 and self._ticks - self._stepped_at < self._every:
+            return
+        since = self._every if self._stepped_at < 0 else self._ticks - self._stepped_at
+        self._stepped_at = self._ticks
+        think = self._thought(since * self.period)
+        if self._worker is not None:
+            self._job = self._worker.submit(think)
+        else:
+            self._bus.publish(topics.NAV_STEP, think(), t, self._latency)
+
+    def _thought(self, dt: float) -> Callable[[], NavStep]:
+        """Return what computes one step from what is known now."""
+        status = self._legs.status
+        inputs = NavInputs(
+            PlanarPose.of(self._legs.pose) @ status.rest,
+            status.moving,
+            self._bus.latest(topics.MAP),
+            self._bus.latest(topics.SCAN),
+        )
+        goal, self._unstarted = self._unstarted, None
+
+        def think() -> NavStep:
+            if goal is not None:
+                self._navigator.start(goal)
+            return self._navigator.step(inputs, dt)
+
+        return think
+
+    def _give_up(self, message: ModuleFaultMsg, t: float) -> None:
+        self._bus.publish(topics.MODULE_FAULT, message, t)
+        self._pursue(NavGoal(None))
+        self._legs.drive(ZERO)

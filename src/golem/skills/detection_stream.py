@@ -1,0 +1,53 @@
+"""What a camera sees, as a skill follows it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from golem.interfaces import topics
+from golem.interfaces.payloads import DetectionRequest, Detections
+
+if TYPE_CHECKING:
+    from golem.skills.context import Context
+
+
+class DetectionStream:
+    """A camera that streams sightings while it is open (a context manager)."""
+
+    def __init__(self, context: Context, camera: str, labels: tuple[str, ...]) -> None:
+        """Watch `camera` for `labels`."""
+        self._context = context
+        self._camera = camera
+        self._labels = labels
+        self._seen = 0
+        self._since = 0.0
+
+    def __enter__(self) -> DetectionStream:
+        """Start the stream."""
+        self._seen = self._context.bus.count(topics.detections(self._camera))
+        self._since = self._context.t
+        self._context.publish(topics.detection_request(self._camera), DetectionRequest(self._labels))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop the stream, so that nothing is rendered or inferred unasked."""
+        self._context.publish(topics.detection_request(self._camera), DetectionRequest())
+
+    def fresh(self) -> Detections | None:
+        """Return the sightings of a frame exposed since the eye opened that was not returned before, or None."""
+        topic = topics.detections(self._camera)
+        count = self._context.bus.count(topic)
+        if count == self._seen:
+            return None
+        self._seen = count
+        newest = self._context.bus.latest(topic)
+        return newest if newest is not None and newest.t >= self._since else None
+
+    async def look(self, timeout: float) -> Detections | None:
+        """Wait for the next fresh sightings, at most `timeout` [s]; None when no frame came."""
+        end = self._context.t + timeout
+        while True:
+            sightings = self.fresh()
+            if sightings is not None or self._context.t >= end:
+                return sightings
+            await self._context.tick()

@@ -1,0 +1,24 @@
+"""Poses of a hand that are found from another one."""
+
+from __future__ import annotations
+
+from golem.types import Array
+
+
+def lifted(T: Array, height: float) -> Array:
+    """Return pose `T` (4, 4) raised by `height` [m] along odom z."""
+    return at_height(T, T[2, 3] + height)
+
+
+def retracted(T: Array, distance: float) -> Array:
+    """Return pose `T` (4, 4) moved back by `distance` [m] against its approach axis, z."""
+    back = T.copy()
+    back[:3, 3] -= distance * T[:3, 2]
+    return back
+
+
+def at_height(T: Array, z: float) -> Array:
+    """Return pose `T` (4, 4) with its odom z set to `z` [m]."""
+    raised = T.copy()
+    raised[2, 3] = z
+    return raised

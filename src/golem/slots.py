@@ -1,0 +1,150 @@
+"""What a stack is made of: slots with the implementations that come with this package, and the keys of a stack file.
+
+A new implementation is one line here. A new slot is a row in `SLOTS`, a row in `KEYS`, and its node in
+`golem.runtime.node_groups`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """One kind of module.
+
+    Attributes:
+        contract: the protocol that its modules satisfy, `package.module:Class`.
+        shipped: implementations of this package by name, each `package.module:Class`.
+        supplied: parameters of a constructor that the stack fills in; they are no options.
+    """
+
+    contract: str
+    shipped: Mapping[str, str]
+    supplied: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class StackKey:
+    """A key of the stack file under which one implementation is chosen.
+
+    Attributes:
+        slot: of which slot.
+        default: the implementation where the file does not have the key.
+        standing: the same for a robot that stands on its feet; None: no other.
+    """
+
+    slot: str
+    default: str
+    standing: str | None = None
+
+
+SLOTS: dict[str, Slot] = {
+    "robot": Slot(
+        "golem.robots.base:Robot",
+        {
+            "mujoco": "golem.robots.mujoco.engine:MujocoRobot",
+            "replay": "golem.robots.replay.robot:ReplayRobot",
+        },
+        ("profile", "seed", "posture"),
+    ),
+    "estimator": Slot(
+        "golem.hardware.estimator.base:BaseEstimator",
+        {
+            "tether": "golem.hardware.estimator.tether:TetherEstimator",
+            "random_walk_kf": "golem.hardware.estimator.random_walk_kf:RandomWalkKF",
+            "invariant_ekf": "golem.hardware.estimator.invariant_ekf:InvariantEKF",
+        },
+    ),
+    "servo": Slot(
+        "golem.hardware.servo.base:MotorServo",
+        {"pd_gravity": "golem.hardware.servo.servo:Servo"},
+    ),
+    "hand": Slot(
+        "golem.hardware.hands.base:HandController",
+        {
+            "deligrasp": "golem.hardware.hands.deligrasp:DeliGrasp",
+            "magpie": "golem.hardware.hands.magpie:MagpieHand",
+        },
+        ("side",),
+    ),
+    "lower_body": Slot(
+        "golem.capabilities.legs.base:LowerBody",
+        {
+            "almi": "golem.capabilities.legs.almi:Almi",
+            "handover": "golem.capabilities.legs.handover:Handover",
+            "hold": "golem.capabilities.legs.hold:JointHold",
+            "mpc": "golem.capabilities.legs.mpc.controller:MPC",
+            "policy": "golem.capabilities.legs.policy:Policy",
+            "vendor": "golem.capabilities.legs.vendor:Vendor",
+            "wbc": "golem.capabilities.legs.wbc:Wbc",
+        },
+        ("onboard",),
+    ),
+    "upper_body": Slot(
+        "golem.capabilities.arms.base:UpperBody",
+        {
+            "diff_ik": "golem.capabilities.arms.diff_ik:DiffIK",
+            "pink_ik": "golem.capabilities.arms.pink_ik:PinkIK",
+        },
+    ),
+    "localizer": Slot(
+        "golem.capabilities.perception.base:Localizer",
+        {"onnx": "golem.capabilities.perception.onnx_detector:OnnxDetector"},
+    ),
+    "grasp_method": Slot(
+        "golem.capabilities.grasping.base:GraspMethod",
+        {
+            "centroid": "golem.capabilities.grasping.centroid:Centroid",
+            "visual_servo": "golem.capabilities.grasping.visual_servo:VisualServo",
+        },
+    ),
+    "odometry": Slot(
+        "golem.capabilities.odometry.base:LidarOdometry",
+        {
+            "kiss_icp": "golem.capabilities.odometry.kiss_icp:KissIcp",
+            "legs": "golem.capabilities.odometry.legs:Legs",
+            "lio": "golem.capabilities.odometry.lio:Lio",
+            "rko_lio": "golem.capabilities.odometry.rko_lio:RkoLio",
+            "topic": "golem.capabilities.odometry.external_topic:ExternalTopic",
+        },
+    ),
+    "navigator": Slot(
+        "golem.capabilities.navigation.base:Navigator",
+        {"goto": "golem.capabilities.navigation.goto:GoTo"},
+    ),
+    "skill": Slot(
+        "golem.skills.base:Skill",
+        {
+            "pick": "golem.skills.pick:Pick",
+            "stand": "golem.skills.walk:Stand",
+            "walk": "golem.skills.walk:Walk",
+        },
+    ),
+}
+"""Every slot by name."""
+
+KEYS: dict[str, StackKey] = {
+    "robot": StackKey("robot", "mujoco"),
+    "estimator": StackKey("estimator", "tether", standing="random_walk_kf"),
+    "servo": StackKey("servo", "pd_gravity"),
+    "hand": StackKey("hand", "magpie"),
+    "lower_body": StackKey("lower_body", "hold"),
+    "upper_body": StackKey("upper_body", "diff_ik"),
+    "localizer": StackKey("localizer", "onnx"),
+    "grasp_method": StackKey("grasp_method", "visual_servo"),
+    "odometry": StackKey("odometry", "legs"),
+    "navigator": StackKey("navigator", "goto"),
+    # Takes the legs when `lower_body` fails.
+    "fallback": StackKey("lower_body", "hold", standing="almi"),
+    # Run by the twin's on-board computer for a lower body that speaks to it.
+    "onboard": StackKey("lower_body", "almi"),
+}
+"""Where a stack has one module each, by key of the stack file. Skills, of which it has any number, are no key."""
+
+PARTS: dict[str, str] = {
+    "estop": "golem.hardware.estop.estop_config:EstopConfig",
+    "locomotion": "golem.capabilities.legs.locomotion:LocomotionConfig",
+}
+"""What has options in a stack file and no alternatives: key -> its dataclass, `package.module:Class`."""
