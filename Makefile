@@ -39,4 +39,4 @@ venv-%:
 	@PYTHON="$(PYTHON)" scripts/bootstrap.sh $*
 
 clean:  ## remove everything the targets above created
-	rm -rf .venv .uv .cache site dist .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-* .uv .cache site dist .pytest_cache .ruff_cache .hypothesis

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Usage: scripts/bootstrap.sh GROUP...     GROUP is the name of a lock in requirements/: cluster, core, dds, dev, docs, pink, record, report, train
+# Usage: scripts/bootstrap.sh GROUP...     GROUP is the name of a lock in requirements/: cluster, core, dds, dev, docs, hardware, lidar, pink, realsense, record, report, train
 #
 # Creates .venv, or $VENV, with the locked packages of every GROUP and this package itself, and sees to it that they find
 # their system libraries. Needs Python 3.11-3.13 and a network to the package index; brings everything else: uv goes to
@@ -75,7 +75,7 @@ python=$(find_python)
 export UV_PYTHON_DOWNLOADS=never UV_NO_PROGRESS=1
 locks=()
 for group in "$@"; do
-    [ -f "requirements/$group.txt" ] || die "no lock requirements/$group.txt; groups: cluster, core, dds, dev, docs, pink, record, report, train"
+    [ -f "requirements/$group.txt" ] || die "no lock requirements/$group.txt; groups: cluster, core, dds, dev, docs, hardware, lidar, pink, realsense, record, report, train"
     stamp="$venv/.golem-$group"
     sum=$(cat "requirements/$group.txt" pyproject.toml | cksum)
     if [ ! -x "$venv/bin/golem" ] || [ "$sum" != "$(cat "$stamp" 2> /dev/null)" ]; then

@@ -13,40 +13,41 @@ GOLEM=${GOLEM:-.venv/bin/golem}
 shift 2
 export OMP_NUM_THREADS=1
 
-push() { "$GOLEM" bench push -j "$JOBS" --out "$OUT/$name" "$@"; }
-legs() { "$GOLEM" bench legs --out "$OUT/$name" -j "$JOBS" "$@"; }
-ladder() { "$GOLEM" ladder -j "$JOBS" --out "$OUT/$name" --seed 0 "$@"; }
+rung() { "$GOLEM" ladder --rung "$1" -j "$JOBS" --out "$OUT/$name" --seed 0 "${@:2}"; }
 
 peers=(wbc mpc vendor)
-[ -z "$ALMI" ] || peers+=("policy:almi_open:$ALMI")
-[ -z "$RL_GYM" ] || peers+=("policy:unitree_rl_gym:$RL_GYM")
+public=()
+[ -z "$ALMI" ] || public+=("policy:almi_open:$ALMI")
+[ -z "$RL_GYM" ] || public+=("policy:unitree_rl_gym:$RL_GYM")
 
 # Standing, and walking: side by side with others.
-shoves() { push --phase standing --first 40 --method almi "${peers[@]}"; }
-rods() { push --kind rod --phase standing --first 150 --last 150; }
-quiet() { legs --test quiet; }
-arms() { legs --test arms -n 100; }
-push_rung() { ladder --rung push --method almi -n 300; }
-ramp() { ladder --rung push-ramp --method almi wbc -n 40; }
+shoves() { rung push-limit --phase standing --first 40 --method almi "${peers[@]}" "${public[@]}"; }
+own_terms() { rung push-limit --terms own --phase standing walking --first 40 --method almi wbc "${public[@]}"; }
+rods() { rung push-limit --kind rod --phase standing --first 150 --last 150; }
+quiet() { rung stand-quiet; }
+arms() { rung stand-arms -n 100; }
+push_rung() { rung push -n 300; }
+ramp() { rung push-ramp --method almi wbc -n 40; }
 # Walking.
-swings() { push --phase left_swing right_swing --first 30 --method almi vendor "${peers[@]:3}"; }
-tracking() { legs --test tracking -n 30; }
-stopping() { legs --test stopping -n 200 --profile field; }
-line() { ladder --rung navigate-line --method almi -n 30; }
-endurance() { legs --test endurance -n 120; }
-rough() { legs --test slope rubble -n 20; }
-plans() { legs --test plans -n 5 --method mpc -j 1; }
+swings() { rung push-limit --phase left_swing right_swing --first 30 --method almi vendor "${public[@]}"; }
+tracking() { rung walk-twist; }
+stopping() { rung walk-stop -n 200; }
+line() { rung navigate-line; }
+endurance() { rung walk-endurance -n 120; }
+slope() { rung walk-slope; }
+rubble() { rung walk-rubble; }
+plans() { JOBS=1 rung mpc-rate; }
 # On another plant.
-box_feet() { push --phase standing --first 60 --robot feet=box cone=elliptic; }
-vendor_model() { [ -z "$MJCF" ] || push --phase standing --first 60 --robot "mjcf=$MJCF"; }
-estimators() { "$GOLEM" bench estimation; }
+box_feet() { rung push-limit --phase standing --first 60 --robot feet=box cone=elliptic; }
+vendor_model() { [ -z "$MJCF" ] || rung push-limit --phase standing --first 60 --robot "mjcf=$MJCF"; }
+estimators() { rung base-estimation; }
 # The work.
-tether() { ladder --rung tether -n 100; }
-stand() { ladder --rung stand -n 100; }
+tether() { rung tether -n 100; }
+stand() { rung stand -n 100; }
 mcnemar() { "$GOLEM" compare "$OUT/tether" "$OUT/stand"; }
 
-ALL=(shoves rods quiet tracking stopping push_rung ramp rough swings line arms endurance stand tether mcnemar
-    box_feet vendor_model plans estimators)
+ALL=(shoves own_terms rods quiet tracking stopping push_rung ramp slope rubble swings line arms endurance stand tether
+    mcnemar box_feet vendor_model plans estimators)
 [ $# -gt 0 ] || set -- "${ALL[@]}"
 mkdir -p "$OUT"
 for name; do
@@ -56,3 +57,7 @@ for name; do
     echo "== $name =="
     "$name" | tee "$OUT/$name.txt"
 done
+# What docs/results.md shows, from the run folders.
+folders=()
+for name; do [ ! -f "$OUT/$name/trials.jsonl" ] || folders+=("$OUT/$name"); done
+[ "${#folders[@]}" -eq 0 ] || "$GOLEM" results "${folders[@]}" --out "$OUT/tables.md"

@@ -1,11 +1,14 @@
 #!/usr/bin/env bash
-# Runs the fast tests with every supported Python but the one of .venv, each in an environment of its own, .venv-3.13
-# for one; says which are not on this machine.
+# Usage: scripts/test_other_pythons.sh [VERSION...]     default: 3.13 3.12 3.11
+#
+# Runs the fast tests with every VERSION of Python but that of .venv, each in an environment of its own, .venv-3.13 for
+# one; says which are not on this machine.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 own=$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')
-for version in 3.13 3.12 3.11; do
+[ $# -gt 0 ] || set -- 3.13 3.12 3.11
+for version in "$@"; do
     [ "$version" != "$own" ] || continue
     # Where pyenv keeps the interpreters, one answers only to who asks for its version.
     if ! python=$(PYENV_VERSION=$version "python$version" -c 'import sys; print(sys.executable)' 2> /dev/null); then
