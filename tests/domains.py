@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-DOMAINS = range(20, 201)
-"""Above those that people choose by hand, with ports below 58000."""
+DOMAINS = range(20, 101)
+"""Above those that people choose by hand; their ports end below 32768, where Linux begins to give
+ports to whoever asks for any."""
 _turn = itertools.count(os.getpid() * 7)
 
 

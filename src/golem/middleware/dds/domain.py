@@ -24,6 +24,11 @@ LAST_DOMAIN = 232
 """The last domain whose UDP ports exist: 7400 + 250 * 232 < 65536 (DDSI-RTPS 2.5, 9.6.2.3)."""
 
 
+def first_port(domain: int) -> int:
+    """Return the first of a domain's 250 UDP ports, that of multicast discovery (DDSI-RTPS 2.5, 9.6.2.3)."""
+    return 7400 + 250 * domain
+
+
 @dataclass(frozen=True, slots=True)
 class DdsConfig:
     """How to join a DDS domain."""
@@ -149,7 +154,9 @@ def open_domain(library: Cyclone, config: DdsConfig) -> None:
                     "open it with golem.middleware.dds first."
                 )
             what = (
-                f"DDS domain {config.domain} cannot be opened on '{interface.name}'; has it an IPv4 address?"
+                f"DDS domain {config.domain} cannot be opened on '{interface.name}'; it needs an IPv4 address, and "
+                f"UDP ports from {first_port(config.domain)} that nobody else has (domains above 100 use ports that "
+                "Linux gives to whoever asks for any)."
             )
             known = _open[config.domain] = _Open(xml, library.check(entity, what))
         elif known.xml != xml:

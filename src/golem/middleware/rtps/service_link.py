@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable, Iterable
 
 from golem.middleware.dds.base import Payload, Qos, Sample
+from golem.middleware.dds.domain import first_port
 from golem.middleware.ros.request_header import Header, pack, unpack
 from golem.middleware.rtps import announcements, submessages
 from golem.middleware.rtps.announcements import (
@@ -57,7 +58,7 @@ class ServiceLink:
         """
         self.malformed = 0
         self._prefix = submessages.NO_VENDOR + os.urandom(10)
-        self._group = _group_socket(7400 + 250 * domain, address)
+        self._group = _group_socket(first_port(domain), address)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind((address, 0))
         port = self._socket.getsockname()[1]
