@@ -17,6 +17,7 @@ from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.interrupt import interrupted
 from golem.robots.base import Restorable
 from golem.runtime.live.exclusive_writers import launcher, refuse_second
+from golem.runtime.live.heap import map_large_blocks
 from golem.runtime.live.node_setup import AsyncLogger, company, member, settle
 from golem.runtime.live.render_worker import RenderWorker
 from golem.runtime.live.safety_status import report
@@ -108,6 +109,7 @@ def run_up(config: UpConfig) -> None:
         DdsError: the domain cannot be joined.
         ModuleFault: a module broke its contract; the safety gate, which hears no more commands, damps the robot.
     """
+    map_large_blocks()
     stack = load_stack(config.stack, profile=config.profile)
     with (
         interrupted() as stop,
