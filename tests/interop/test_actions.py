@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("cyclonedds")
 pytest.importorskip("rosbags")
 
-from tests.interop.peers import Ros, until
+from tests.interop.peers import Ros, joined, until
 from tests.interop.rows import cdr
 
 from golem.middleware.ros.action_client import DdsActionClient
@@ -108,6 +108,13 @@ def test_a_client_of_ros_that_dies_leaves_its_goal(
     for goal in handler.goals:
         goal.succeed(Pick.Result())
     assert outcome(other, node) is GoalStatus.SUCCEEDED
+
+
+def test_a_client_of_ros_sees_that_its_server_has_gone(node: DdsNode, ros: Ros, domain: int) -> None:
+    with joined(domain) as serving:
+        serving.action_server(NAME, PICK, Handler())
+        assert ros.do("give", serving, **GOAL)["accepted"]
+    assert not ros.do("give", node, **GOAL)["found"]
 
 
 class Theirs:
