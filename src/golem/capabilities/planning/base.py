@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
-from golem.capabilities.collision.obstacles import World
-from golem.capabilities.planning.rules import Rule
 from golem.errors import GolemError
 from golem.types import UPPER, Array, Side
+
+if TYPE_CHECKING:
+    # Numba takes a second to import, and a stack that plans nothing does without it.
+    from golem.capabilities.collision.obstacles import World
+    from golem.capabilities.planning.rules import Rule
 
 NUM_JOINTS = UPPER.stop - UPPER.start
 """Joints that are planned for: torso, left arm (7), right arm (7)."""
