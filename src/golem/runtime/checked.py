@@ -94,6 +94,7 @@ class CheckedPlanner:
         if refused:
             raise refused[0]
         self._contract.kind("the plan", plan, Plan)
+        assert plan is not None
         n = len(self._contract.array("times", plan.times, *np.shape(plan.times)))
         for name in ("q", "dq"):
             self._contract.array(name, getattr(plan, name), n, NUM_JOINTS)

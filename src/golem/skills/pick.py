@@ -13,7 +13,8 @@ from golem.errors import ConfigError
 from golem.interfaces.payloads import Detections, GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
-from golem.skills.poses import at_height, lifted, retracted
+from golem.skills.poses import lifted, retracted
+from golem.skills.travel import LineTravel, PlannedTravel, Travel
 from golem.types import SIDES, Array, LocalizedObject, Side
 
 Hand = Literal["left", "right", "either"]
@@ -58,6 +59,8 @@ class PickConfig:
         comfort: x, y in base_link around which the arm works best [m]; the nearest object is taken first.
         attempts: how often a method that looks again may try to grasp and pull one object.
         candidates: how many objects it may try.
+        travel: `planned` goes around what the head camera shows, in postures from which the way down is straight;
+            `lines` goes up, across and down, blind to what is in the way.
         clearance: height of the gripper above the object when it arrives and when it leaves [m].
         travel_height: minimum height of the gripper when it moves across, in odom [m]; clears the tray's walls.
         travel_speed: between places [m/s].
@@ -81,6 +84,7 @@ class PickConfig:
     comfort: tuple[float, float] = (0.45, -0.12)
     attempts: int = 2
     candidates: int = 3
+    travel: Literal["lines", "planned"] = "lines"
     clearance: float = 0.15
     travel_height: float = 0.08
     travel_speed: float = 0.25
@@ -117,6 +121,7 @@ class Pick:
         """Take distances, speeds and forces from `config`."""
         self._config = config or PickConfig()
         self._method: GraspMethod
+        self._travel: Travel
         self._looks_again = False
 
     def timeout(self, goal: PickGoal) -> float:
@@ -126,6 +131,9 @@ class Pick:
     async def run(self, context: Context, goal: PickGoal) -> SkillResult:
         """Pick one object with whatever grasp method the stack chose; see `Skill`."""
         self._method = context.grasp_method()
+        lines = LineTravel(context, self._config.travel_height, self._config.tolerance)
+        planned = self._config.travel == "planned"
+        self._travel = PlannedTravel(context, lines, self._config.tolerance) if planned else lines
         try:
             return await self._pursue(context, goal)
         except SkillCancelled:
@@ -136,7 +144,6 @@ class Pick:
     async def _pursue(self, context: Context, goal: PickGoal) -> SkillResult:
         """Go through the stages, and home, whether they succeeded or not."""
         timings: dict[str, float] = {"start": context.t}
-        homes = {side: context.arms[side].pose for side in SIDES}
         tried: list[_Attempt] = []
         reason = f"The {goal.label} was dropped in the {goal.container}."
         result = SkillResult(True, "done", None, reason, timings)
@@ -151,7 +158,7 @@ class Pick:
                 context.hands[side].open(self._config.release_gap)
         timings["total"] = context.t - timings.pop("start")
         for side in _hands(goal, tried):
-            await self._travel(context, side, homes[side])
+            await self._travel.home(side, self._config.travel_speed)
         if result.success:
             context.say("done", f"The {goal.label} is in the {goal.container}.")
         return result
@@ -176,8 +183,7 @@ class Pick:
                     raise
                 context.say(failure.stage, f"{failure} Leaving it for the next {attempt.label}.")
                 context.hands[attempt.side].open(self._config.release_gap)
-                T = context.arms[attempt.side].commanded
-                await self._travel(context, attempt.side, lifted(T, self._config.clearance))
+                await self._back_off(context, attempt.side)
 
     async def _detect(self, context: Context, goal: PickGoal) -> tuple[list[_Attempt], LocalizedObject]:
         """Look once with the head camera: the reachable objects, the most comfortable first, and the container."""
@@ -205,6 +211,7 @@ class Pick:
             attempts = [a for a in attempts if self._serves(context, a.side, container)] or attempts
         attempts.sort(key=lambda a: self._discomfort(context, a.side, a.target))
         chosen = attempts[: self._config.candidates]
+        self._travel.look([attempt.target.position for attempt in chosen])
         text = f"{len(attempts)} {goal.label}s in reach."
         context.say("detect", text, target=chosen[0].target.position.tolist())
         return chosen, container
@@ -249,7 +256,8 @@ class Pick:
         grasp = grasps[0]
         context.say("approach", "Bringing the hand over it.", target=grasp.T_odom_gripper[:3, 3].tolist())
         context.hands[attempt.side].open(grasp.gap)
-        await self._travel(context, attempt.side, lifted(grasp.T_odom_gripper, self._config.clearance))
+        T = grasp.T_odom_gripper
+        await self._travel.over(attempt.side, lifted(T, self._config.clearance), T, self._config.travel_speed)
         return grasp
 
     async def _take(
@@ -276,14 +284,15 @@ class Pick:
                     raise
                 context.say(failure.stage, f"{failure} Trying again.")
                 context.hands[attempt.side].open(grasp.gap)
+                await self._back_off(context, attempt.side)
                 above = lifted(grasp.T_odom_gripper, self._config.clearance)
-                await self._travel(context, attempt.side, above)
+                await self._travel.line(attempt.side, above, self._config.travel_speed, failure.stage)
 
     async def _descend(self, context: Context, attempt: _Attempt, grasp: Grasp) -> None:
         """Open loop: go straight down to the grasp as proposed, and close."""
         arm = context.arms[attempt.side]
         context.say("descend", "Straight down to the proposed grasp.")
-        await arm.move(grasp.T_odom_gripper, self._config.descend_speed)
+        await self._travel.line(attempt.side, grasp.T_odom_gripper, self._config.descend_speed, "descend")
         left = await arm.settle(self._config.tolerance, 2.0)
         if left > 2.0 * self._config.tolerance:
             raise StageFailed(
@@ -346,9 +355,11 @@ class Pick:
         centred[:3, 3] += hand.status.offset * centred[:3, 1]
         await arm.move(centred, self._config.pull_speed)
         context.say("extract", "Pulling straight out.")
-        await arm.move(
+        await self._travel.line(
+            attempt.side,
             retracted(arm.commanded, self._config.pull),
             self._config.pull_speed,
+            "extract",
             stop=lambda: not hand.status.holding,
         )
         await arm.move(
@@ -365,20 +376,16 @@ class Pick:
         arm, hand = context.arms[attempt.side], context.hands[attempt.side]
         T = arm.commanded.copy()
         T[:3, 3] = container.position + (0.0, 0.0, self._config.drop_height)
-        await self._travel(context, attempt.side, T)
+        await self._travel.carry(attempt.side, T, self._config.travel_speed)
         if not hand.status.holding:
             raise StageFailed("place", "grasp_method", f"The {attempt.label} was lost on the way.")
         hand.open(self._config.release_gap)
         await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
 
-    async def _travel(self, context: Context, side: Side, T_goal: Array) -> None:
-        """Go to `T_goal` (4, 4) by way of the travel height: up first, down last, never across below it."""
+    async def _back_off(self, context: Context, side: Side) -> None:
+        """Go straight up, away from what was not taken, with the fingers open."""
         arm = context.arms[side]
-        start = arm.commanded
-        height = max(start[2, 3], T_goal[2, 3], self._config.travel_height)
-        for T in (at_height(start, height), at_height(T_goal, height), T_goal):
-            await arm.move(T, self._config.travel_speed)
-        await arm.settle(self._config.tolerance, 1.0)
+        await arm.move(lifted(arm.commanded, self._config.clearance), self._config.travel_speed)
 
 
 def _hands(goal: PickGoal, tried: Sequence[_Attempt]) -> list[Side]:

@@ -1,24 +1,29 @@
-"""Motions of the arms that are planned before they begin: around what is in the way, and along lines that are checked."""
+"""Motions of the arms that are planned before they begin: around what is in the way, and along checked lines."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from threading import Event
 
 import numpy as np
 
+from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.goal_postures import POSITION, GoalPostures
 from golem.capabilities.arms.line_check import LineChecker
 from golem.capabilities.collision.obstacles import World
-from golem.capabilities.collision.scene_cloud import scene_world
+from golem.capabilities.collision.scene_cloud import cleared, scene_world
 from golem.capabilities.planning.base import Held, Plan, PlanningError, Refusal, Request
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
+from golem.capabilities.planning.plan_kernel import WORLD
 from golem.capabilities.planning.rules import Rule
 from golem.skills.context import Context
 from golem.types import SIDES, Array, Side
 
 SCREW: Array = np.array([[0.0, 0.0, z, 0.010] for z in (-0.005, 0.005, 0.015, 0.025)])
 """Balls that hold a screw of 30 mm between the fingertips, in the grasp frame [m]."""
+TOUCHING = 0.015
+"""What the cloud shows this near to the robot, where it stands already, is not in its way [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,28 +92,58 @@ class PlannedMotion:
             StageFailed: the motors do not report, or the safety gate stays shut.
         """
         context = self._context
-        q = np.clip(context.commanded_joints, self._robot.lower, self._robot.upper)
+        q, world = self._start(held)
         T = np.linalg.inv(context.T_odom_base)
-        in_base = {side: T @ pose for side, pose in targets.items()}
+        in_base: dict[Side, Array] = {side: T @ pose for side, pose in targets.items()}
         lines = [Then(one.side, T @ one.T_odom_gripper, one.speed) for one in then]
-        given_up = False
 
-        def think() -> Plan:
-            goals = self._goal_postures(q, in_base, lines, rules, held)
-            return self._planner.plan(
-                Request(q, goals, self.world, rules, held, hand_speed=hand_speed, stop=lambda: given_up)
-            )
+        def think() -> Request:
+            goals = self._goal_postures(q, world, in_base, lines, rules, held)
+            return Request(q, goals, world, rules, held, hand_speed=hand_speed)
 
+        plan = await self._planned(think)
+        await self._follow(plan, tuple(targets))
+        return plan
+
+    async def to_joints(self, goal: Array, sides: Sequence[Side], hand_speed: float) -> Plan:
+        """Bring torso and arms to the joints `goal` (15,) [rad], around what is in the way; see `to`.
+
+        The arms of `sides` move, with the torso; an arm that is not among them stays.
+        """
+        q, world = self._start()
+        columns = [0, *(j for side in sides for j in range(*ARM_COLUMNS[side].indices(len(q))))]
+        wanted = q.copy()
+        wanted[columns] = goal[columns]
+        plan = await self._planned(lambda: Request(q, wanted[None], world, hand_speed=hand_speed))
+        await self._follow(plan, sides)
+        return plan
+
+    def _start(self, held: Sequence[Held] = ()) -> tuple[Array, World]:
+        """Return the joints to plan from, and the world without what the robot would touch there: it is there."""
+        q = np.clip(self._context.commanded_joints, self._robot.lower, self._robot.upper)
+        world = self.world
+        if world.cloud is not None and JointSpace(self._robot, q, world, held=held).verdict(q) == WORLD:
+            balls = self._robot.model(held).placed(np.ascontiguousarray(q))
+            world = World(world.obstacles, cleared(world.cloud, balls, TOUCHING))
+        return q, world
+
+    async def _planned(self, request: Callable[[], Request]) -> Plan:
+        """Return the plan for `request()`; a planner on a thread of its own is told when the skill is cancelled."""
+        given_up = Event()
         try:
-            plan = await context.think(think, self._planner.latency)
+            return await self._context.think(
+                lambda: self._planner.plan(replace(request(), stop=given_up.is_set)), self._planner.latency
+            )
         except BaseException:
-            given_up = True  # a planner on a thread of its own is told
+            given_up.set()
             raise
+
+    async def _follow(self, plan: Plan, sides: Sequence[Side]) -> None:
+        context = self._context
         await context.follow(plan.times, plan.q, plan.dq)
-        for side in targets:
+        for side in sides:
             here = self._goals.pose(side, plan.q[-1])
             context.arms[side].stays_at(context.T_odom_base @ here)
-        return plan
 
     async def line(
         self,
@@ -139,6 +174,7 @@ class PlannedMotion:
     def _goal_postures(
         self,
         q: Array,
+        world: World,
         targets: Mapping[Side, Array],
         lines: Sequence[Then],
         rules: Sequence[Rule],
@@ -149,7 +185,7 @@ class PlannedMotion:
         Raises:
             PlanningError: there is none.
         """
-        space = JointSpace(self._robot, q, self.world, rules, held)
+        space = JointSpace(self._robot, q, world, rules, held)
         itself = JointSpace(self._robot, q, held=held)
         found: list[str] = []
 
@@ -176,4 +212,6 @@ class PlannedMotion:
                 Refusal.UNREACHABLE,
                 f"The {which} hand gets no nearer than {self._goals.nearest * 1e3:.0f} mm to where it is to go.",
             )
-        raise PlanningError(Refusal.GOAL, f"The {which} hand cannot be where it is to go: {found[-1]}.".replace("..", "."))
+        raise PlanningError(
+            Refusal.GOAL, f"The {which} hand cannot be where it is to go: {found[-1]}.".replace("..", ".")
+        )

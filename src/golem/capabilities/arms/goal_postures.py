@@ -119,4 +119,3 @@ class GoalPostures:
                 break
         self.nearest = min(self.nearest, float(position))
         return command.q.copy() if position < POSITION and rotation < ROTATION else None
-

@@ -1,4 +1,4 @@
-"""What inverse kinematics would do of a straight line, before anything moves: the largest deviation, and what is hit."""
+"""What would become of a straight line, before anything moves: the largest deviation, and what would be hit."""
 
 from __future__ import annotations
 

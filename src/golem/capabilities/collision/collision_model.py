@@ -88,9 +88,7 @@ class CollisionModel:
         if world is not None:
             free = np.flatnonzero(~out)
             hit = np.empty(len(free), np.bool_)
-            world_kernel.world_collides_each(
-                Q[free], self.ints, self.floats, *world.arrays(), margin, hit
-            )
+            world_kernel.world_collides_each(Q[free], self.ints, self.floats, *world.arrays(), margin, hit)
             out[free] = hit
         return out
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from golem.capabilities.collision.obstacles import REACH, World, cloud_grid
+from golem.capabilities.collision.obstacles import REACH, CloudGrid, World, cell_steps, cloud_grid
 from golem.capabilities.collision.world_kernel import Points
 from golem.types import Array
 
@@ -36,14 +36,19 @@ def scene_world(points: Points, spheres: Array, spared: Sequence[tuple[Array, fl
         shape = np.ceil((REACH[1] - REACH[0]) / CELL).astype(np.int64) + 1
         flat = np.ravel_multi_index(tuple(index.T), tuple(shape))
         kept = kept[np.bincount(flat)[flat] >= LEAST]
-    grid = cloud_grid(kept, CELL)
-    own = np.zeros(len(grid.balls), bool)
+    return World(cloud=cleared(cloud_grid(kept, CELL), spheres, ROBOT_MARGIN))
+
+
+def cleared(grid: CloudGrid, spheres: Array, margin: float) -> CloudGrid:
+    """Return the grid without the cells that are nearer than `margin` [m] to `spheres` (m, 4)."""
+    near = np.zeros(len(grid.balls), bool)
     for x, y, z, r in spheres:
-        reach = r + ROBOT_MARGIN
-        own |= ((grid.balls[:, :3] - (x, y, z)) ** 2).sum(axis=1) < reach * reach
-    if own.any():
-        # Its cells are emptied by gridding again what is left.
-        cell = np.floor((kept - grid.frame[:3]) / CELL).astype(np.int64)
-        kept = kept[~own[grid.cells[tuple(cell.T)]]]
-        grid = cloud_grid(kept, CELL)
-    return World(cloud=grid)
+        reach = r + margin + grid.balls[:, 3]
+        near |= ((grid.balls[:, :3] - (x, y, z)) ** 2).sum(axis=1) < reach * reach
+    if not near.any():
+        return grid
+    left = np.flatnonzero(~near)
+    renumbered = np.full(len(near) + 1, -1, np.int32)  # the last is that of empty cells, -1
+    renumbered[left] = np.arange(len(left))
+    cells = renumbered[grid.cells]
+    return CloudGrid(grid.balls[left], cells, cell_steps(cells), grid.frame, grid.dropped)

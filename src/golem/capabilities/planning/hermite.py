@@ -8,7 +8,7 @@ from golem.types import Array
 
 
 def interpolate(times: Array, points: Array, velocities: Array | None, s: Array) -> Array:
-    """Return (m, n) the joints of a trajectory at the times `s` (m,) [s]: cubic Hermite, or straight without velocities.
+    """Return (m, n) the joints of a trajectory at `s` (m,) [s]: cubic Hermite, or straight without velocities.
 
     Args:
         times: (k,) of its points, increasing.

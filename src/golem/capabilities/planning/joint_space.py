@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from golem.capabilities.collision import sphere_kernel
 from golem.capabilities.collision.collision_model import CollisionModel
@@ -72,7 +73,9 @@ class PlanningRobot:
 
     def model(self, held: Sequence[Held] = ()) -> CollisionModel:
         """Return the spheres of the robot, holding what it holds; those of what was held last are kept."""
-        key = tuple((one.side, np.asarray(one.balls, float).tobytes()) for one in held)
+        key: tuple[tuple[Side, bytes], ...] = tuple(
+            (one.side, np.asarray(one.balls, float).tobytes()) for one in held
+        )
         if key not in self._models:
             robot = self._robot
             for one in held:
@@ -137,14 +140,14 @@ class JointSpace:
         """Return 0 if the posture `q` (15,) is free, else why not; see `reason`."""
         return int(plan_kernel.verdict(np.ascontiguousarray(q, float), self.space))
 
-    def verdicts(self, Q: Array) -> Array:
+    def verdicts(self, Q: Array) -> NDArray[np.int64]:
         """Return (m,) the verdict on each row of `Q` (m, 15)."""
         out = np.empty(len(Q), np.int64)
         plan_kernel.verdicts(np.ascontiguousarray(Q, float), self.space, out)
         return out
 
     def free_line(self, a: Array, b: Array, step: float) -> bool:
-        """Return whether the straight line from `a` to `b` is free, but for `a`, in steps of `step` [rad in a joint]."""
+        """Return whether the line from `a` to `b` is free, `a` left out, in steps of `step` [rad in a joint]."""
         free, parts = plan_kernel.free_steps(a, b, step, self.space)
         return free == parts
 
@@ -161,8 +164,14 @@ class JointSpace:
         if verdict == RANGE:
             over = np.maximum(self.space.lower - q, q - self.space.upper)
             j = int(over.argmax())
-            return f"{JOINT_NAMES[UPPER][j]} is {over[j]:.3f} rad beyond the range that the safety gate allows"
-        words = {FREE: "nothing is in the way", ITSELF: "the robot touches itself", WORLD: "something is in the way"}
+            return (
+                f"{JOINT_NAMES[UPPER][j]} is {over[j]:.3f} rad beyond the range that the safety gate allows"
+            )
+        words = {
+            FREE: "nothing is in the way",
+            ITSELF: "the robot touches itself",
+            WORLD: "something is in the way",
+        }
         return words[verdict] if verdict < RULE else f"it breaks a rule: {self.rules[verdict - RULE]}"
 
     def _centre_of_mass(self, model: CollisionModel, q: Array) -> Array:

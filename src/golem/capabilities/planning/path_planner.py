@@ -141,7 +141,11 @@ class PathPlanner(ABC):
         effort.spend(len(goals))
         if verdicts.all():
             reason = space.reason(int(verdicts[0]), goals[0])
-            text = "The goal may not be gone to" if len(goals) == 1 else f"None of {len(goals)} goals may be gone to"
+            text = (
+                "The goal may not be gone to"
+                if len(goals) == 1
+                else f"None of {len(goals)} goals may be gone to"
+            )
             raise PlanningError(Refusal.GOAL, f"{text}: {reason}.")
         goals = goals[verdicts == 0]
         rng = np.random.default_rng(request.seed)
@@ -181,10 +185,7 @@ def fine_points(times: Array, q: Array, dq: Array) -> Array:
     # A cubic between points at different speeds covers its length unevenly, by half as much again at most.
     parts = np.maximum(1, np.ceil(1.5 * gaps / FINE)).astype(int)
     s = np.concatenate(
-        [
-            t0 + (t1 - t0) * np.arange(k) / k
-            for t0, t1, k in zip(times, times[1:], parts, strict=False)
-        ]
+        [t0 + (t1 - t0) * np.arange(k) / k for t0, t1, k in zip(times, times[1:], parts, strict=False)]
         + [times[-1:]]
     )
     return interpolate(times, q, dq, s)

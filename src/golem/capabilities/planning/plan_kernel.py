@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from golem.capabilities.collision.sphere_kernel import Indices, Ints, bodies_collide, place
 from golem.capabilities.collision.world_kernel import Cells, bodies_hit_world
@@ -116,9 +115,9 @@ def verdicts(Q: Array, space: Space, out: Indices) -> None:
 
 @njit(cache=True, nogil=True)
 def free_steps(a: Array, b: Array, step: float, space: Space) -> tuple[int, int]:
-    """Return how many of the equal steps from `a` to `b`, none longer than `step` in a joint, are free, and of how many.
+    """Return how many steps from `a` to `b` are free, and of how many; none is longer than `step` in a joint.
 
-    `a` is not looked at.
+    The steps are equal, and `a` is not looked at.
     """
     parts = max(1, int(np.ceil(np.abs(b - a).max() / step)))
     q = np.empty(len(a))
@@ -249,5 +248,3 @@ def speeds_along(cap: Array, lengths: Array, tangents: Array, accel: Array) -> A
         i = m - 2 - k
         v[i] = min(v[i], np.sqrt(v[i + 1] ** 2 + 2.0 * pull[i] * lengths[i]))
     return v
-
-

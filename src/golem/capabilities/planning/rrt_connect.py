@@ -68,7 +68,9 @@ class RrtConnect(PathPlanner):
         while effort.left > 0 and size.max() < NODES:
             samples = np.where(moving, rng.uniform(space.space.lower, space.space.upper, (BATCH, n)), q)
             checks[0] = 0
-            met = plan_kernel.grow(samples, nodes, parents, size, c.reach, c.step, weight, space.space, checks)
+            met = plan_kernel.grow(
+                samples, nodes, parents, size, c.reach, c.step, weight, space.space, checks
+            )
             effort.spend(int(checks[0]))
             if met:
                 one, other = (_branch(nodes[k], parents[k], int(size[k]) - 1) for k in (0, 1))

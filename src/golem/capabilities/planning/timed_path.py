@@ -94,7 +94,9 @@ def time_path(points: Array, limits: MotionLimits, hands: Array) -> tuple[Array,
     middle = 0.5 * (lengths[1:] + lengths[:-1])
     curvature = np.zeros_like(points)
     curvature[1:-1] = np.diff(tangents, axis=0) / middle[:, None]
-    both = np.maximum(np.abs(tangents[np.r_[0, : len(tangents)]]), np.abs(tangents[np.r_[: len(tangents), -1]]))
+    both = np.maximum(
+        np.abs(tangents[np.r_[0, : len(tangents)]]), np.abs(tangents[np.r_[: len(tangents), -1]])
+    )
     with np.errstate(divide="ignore"):
         cap = (SLACK * limits.speed / both).min(axis=1)
         cap = np.minimum(cap, np.sqrt((CURVED * limits.accel / np.abs(curvature)).min(axis=1)))
