@@ -16,7 +16,7 @@ from golem.types import NUM_JOINTS, SIDES, UPPER, Array, Side
 # As in `solve`: free of speed limits, one tick of dt = 1 s is one bounded Gauss-Newton step.
 _OFFLINE = TaskSpaceConfig(
     arm_speed=0.5, torso_speed=0.2, posture_weight=1e-7, torso_weight=1e-6, palm_speed=0.2, palm_turn=1.0,
-    error_damping=1e-2,
+    error_damping=1e-2, collision_rows=0,
 )  # fmt: skip
 # Slower: it goes around its own links instead of through them.
 _AROUND = replace(_OFFLINE, collision_rows=6, clearance=0.002, collision_gain=0.5, arm_speed=0.25)
