@@ -90,7 +90,7 @@ SLOTS: dict[str, Slot] = {
         },
     ),
     "planner": Slot(
-        "golem.capabilities.planning.base:Planner",
+        "golem.capabilities.planning.base:ArmPlanner",
         {
             "rrt_connect": "golem.capabilities.planning.rrt_connect:RrtConnect",
             "straight": "golem.capabilities.planning.straight:Straight",

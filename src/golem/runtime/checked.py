@@ -8,7 +8,7 @@ from golem.capabilities.arms.base import check_pose
 from golem.capabilities.arms.trajectory import check_trajectory
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, ServoLaw, ServoStatus, ServoStep
 from golem.capabilities.navigation.base import Navigator, NavInputs
-from golem.capabilities.planning.base import NUM_JOINTS, Plan, Planner, PlanningError, Request
+from golem.capabilities.planning.base import NUM_JOINTS, ArmPlanner, Plan, PlanRefused, PlanRequest
 from golem.interfaces.nav_payloads import NavStep
 from golem.interfaces.payloads import JointTrajectory
 from golem.runtime.contract_check import ContractCheck
@@ -68,25 +68,25 @@ class CheckedServoLaw:
 
 
 class CheckedPlanner:
-    """A `Planner` whose faults name the module; what it refuses goes further as it is.
+    """An `ArmPlanner` whose faults name the module; what it refuses goes further as it is.
 
     Attributes:
-        latency: see `Planner`.
+        latency: see `ArmPlanner`.
     """
 
-    def __init__(self, planner: Planner, contract: ContractCheck) -> None:
+    def __init__(self, planner: ArmPlanner, contract: ContractCheck) -> None:
         """Watch `planner`."""
         self._planner, self._contract = planner, contract
         self.latency = contract.number("latency", planner.latency, minimum=0.0)
 
-    def plan(self, request: Request) -> Plan:
-        """Return the planner's trajectory; see `Planner`."""
-        refused: list[PlanningError] = []
+    def plan(self, request: PlanRequest) -> Plan:
+        """Return the planner's trajectory; see `ArmPlanner`."""
+        refused: list[PlanRefused] = []
 
         def ask() -> Plan | None:
             try:
                 return self._planner.plan(request)
-            except PlanningError as refusal:
+            except PlanRefused as refusal:
                 refused.append(refusal)
                 return None
 

@@ -13,7 +13,7 @@ from golem.capabilities.arms.base import check_pose
 from golem.capabilities.arms.line import Line
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper
 from golem.capabilities.perception.lift import scene_of
-from golem.capabilities.planning.base import Planner
+from golem.capabilities.planning.base import ArmPlanner
 from golem.interfaces import topics
 from golem.interfaces.payloads import (
     Feedback,
@@ -49,7 +49,7 @@ class Modules:
 
     grasp_method: Callable[[], GraspMethod]
     skill: Callable[[str], Skill[Context, Any]]
-    planner: Callable[[], Planner]
+    planner: Callable[[], ArmPlanner]
     worker: Executor | None = None
 
 

@@ -13,7 +13,7 @@ from golem.capabilities.arms.goal_postures import POSITION, GoalPostures
 from golem.capabilities.arms.line_check import LineChecker
 from golem.capabilities.collision.obstacles import World
 from golem.capabilities.collision.scene_cloud import cleared, scene_world
-from golem.capabilities.planning.base import Held, Plan, PlanningError, Refusal, Request
+from golem.capabilities.planning.base import Held, Plan, PlanRefused, PlanRequest, Refusal
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.plan_kernel import WORLD
 from golem.capabilities.planning.rules import Rule
@@ -88,7 +88,7 @@ class PlannedMotion:
             held: what the hands hold.
 
         Raises:
-            PlanningError: there is no such way; nothing has moved.
+            PlanRefused: there is no such way; nothing has moved.
             StageFailed: the motors do not report, or the safety gate stays shut.
         """
         context = self._context
@@ -97,9 +97,9 @@ class PlannedMotion:
         in_base: dict[Side, Array] = {side: T @ pose for side, pose in targets.items()}
         lines = [Then(one.side, T @ one.T_odom_gripper, one.speed) for one in then]
 
-        def think() -> Request:
+        def think() -> PlanRequest:
             goals = self._goal_postures(q, world, in_base, lines, rules, held)
-            return Request(q, goals, world, rules, held, hand_speed=hand_speed)
+            return PlanRequest(q, goals, world, rules, held, hand_speed=hand_speed)
 
         plan = await self._planned(think)
         await self._follow(plan, tuple(targets))
@@ -114,7 +114,7 @@ class PlannedMotion:
         columns = [0, *(j for side in sides for j in range(*ARM_COLUMNS[side].indices(len(q))))]
         wanted = q.copy()
         wanted[columns] = goal[columns]
-        plan = await self._planned(lambda: Request(q, wanted[None], world, hand_speed=hand_speed))
+        plan = await self._planned(lambda: PlanRequest(q, wanted[None], world, hand_speed=hand_speed))
         await self._follow(plan, sides)
         return plan
 
@@ -127,7 +127,7 @@ class PlannedMotion:
             world = World(world.obstacles, cleared(world.cloud, balls, TOUCHING))
         return q, world
 
-    async def _planned(self, request: Callable[[], Request]) -> Plan:
+    async def _planned(self, request: Callable[[], PlanRequest]) -> Plan:
         """Return the plan for `request()`; a planner on a thread of its own is told when the skill is cancelled."""
         given_up = Event()
         try:
@@ -163,7 +163,7 @@ class PlannedMotion:
             avoid: whether the world counts, not the robot itself alone.
 
         Raises:
-            PlanningError: it cannot; nothing has moved.
+            PlanRefused: it cannot; nothing has moved.
         """
         context = self._context
         q = context.commanded_joints
@@ -183,7 +183,7 @@ class PlannedMotion:
         """Return (k, 15) postures to plan to, from which the lines can be gone.
 
         Raises:
-            PlanningError: there is none.
+            PlanRefused: there is none.
         """
         space = JointSpace(self._robot, q, world, rules, held)
         itself = JointSpace(self._robot, q, held=held)
@@ -197,7 +197,7 @@ class PlannedMotion:
             try:
                 for line in lines:
                     self._lines.check(line.side, line.T_odom_gripper, goal, line.speed, space=itself)
-            except PlanningError as error:
+            except PlanRefused as error:
                 found.append(str(error))
                 return False
             return True
@@ -208,10 +208,10 @@ class PlannedMotion:
             return goals
         which = " and ".join(targets)
         if not found or self._goals.nearest > POSITION:
-            raise PlanningError(
+            raise PlanRefused(
                 Refusal.UNREACHABLE,
                 f"The {which} hand gets no nearer than {self._goals.nearest * 1e3:.0f} mm to where it is to go.",
             )
-        raise PlanningError(
+        raise PlanRefused(
             Refusal.GOAL, f"The {which} hand cannot be where it is to go: {found[-1]}.".replace("..", ".")
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from golem.capabilities.planning.base import Held, PlanningError, Refusal
+from golem.capabilities.planning.base import Held, PlanRefused, Refusal
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
 from golem.skills.poses import at_height
@@ -142,25 +142,25 @@ class PlannedTravel:
         """Go if the hand can keep to the line; see `Travel`."""
         try:
             await self._motion.line(side, T_goal, speed, stop)
-        except PlanningError as refusal:
+        except PlanRefused as refusal:
             raise failed(stage, refusal) from refusal
 
     async def home(self, side: Side, speed: float) -> None:
         """Go back to the joints it began with, or, where no way is found, along lines; see `Travel`."""
         try:
             await self._motion.to_joints(self._home, [side], speed)
-        except PlanningError:
+        except PlanRefused:
             await self._lines.home(side, speed)
 
     async def _to(self, stage: str, side: Side, T: Array, speed: float, **options: object) -> None:
         try:
             await self._motion.to({side: T}, speed, **options)  # pyright: ignore[reportArgumentType]
-        except PlanningError as refusal:
+        except PlanRefused as refusal:
             raise failed(stage, refusal) from refusal
         await self._context.arms[side].settle(self._tolerance, 1.0)
 
 
-def failed(stage: str, refusal: PlanningError) -> StageFailed:
+def failed(stage: str, refusal: PlanRefused) -> StageFailed:
     """Return the failure of `stage` that a refusal is: the arm's where it does not reach, else the planner's."""
     slot = "upper_body" if refusal.refusal in ARM_BLAMED else "planner"
     return StageFailed(stage, slot, str(refusal))

@@ -9,7 +9,7 @@ import numpy as np
 from golem.capabilities.arms.base import check_joints
 from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.line import Line
-from golem.capabilities.planning.base import PlanningError, Refusal
+from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.capabilities.planning.joint_space import JointSpace
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import NUM_JOINTS, UPPER, Array, Side
@@ -73,7 +73,7 @@ class LineChecker:
 
         Raises:
             TargetError: the goal is no rigid transform, or `q` no joints.
-            PlanningError: the hand would leave the line, or touch something; says by how much, or what.
+            PlanRefused: the hand would leave the line, or touch something; says by how much, or what.
         """
         full = np.zeros(NUM_JOINTS)
         full[UPPER] = q
@@ -92,7 +92,7 @@ class LineChecker:
             turned = max(turned, float(np.arccos(np.clip(here[:3, 2] @ wanted[:3, 2], -1.0, 1.0))))
         path = np.array(rows)
         if worst > deviation or turned > tilt:
-            raise PlanningError(
+            raise PlanRefused(
                 Refusal.OFF_LINE,
                 f"The {side} hand would leave the straight line of {line.length * 1e3:.0f} mm by {worst * 1e3:.1f} mm "
                 f"and {np.rad2deg(turned):.1f} deg, after {100 * late:.0f} % of it{self._stopped()}.",
@@ -101,7 +101,7 @@ class LineChecker:
             verdicts = space.verdicts(path[1:])
             if verdicts.any():
                 k = int(np.flatnonzero(verdicts)[0])
-                raise PlanningError(
+                raise PlanRefused(
                     Refusal.NO_PATH,
                     f"The {side} hand cannot go straight for {line.length * 1e3:.0f} mm: after "
                     f"{100 * line.fraction((k + 1) * DT):.0f} % of it, "

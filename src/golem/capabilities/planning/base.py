@@ -42,7 +42,7 @@ class Refusal(StrEnum):
     """The hand cannot keep to the straight line."""
 
 
-class PlanningError(GolemError):
+class PlanRefused(GolemError):
     """There is no plan; nothing has moved.
 
     Attributes:
@@ -51,8 +51,12 @@ class PlanningError(GolemError):
 
     def __init__(self, refusal: Refusal, reason: str) -> None:
         """Say why there is none, in a word and in a sentence."""
-        super().__init__(reason)
+        super().__init__(refusal, reason)
         self.refusal = refusal
+
+    def __str__(self) -> str:
+        """Return the sentence."""
+        return str(self.args[1])
 
 
 def _never() -> bool:
@@ -73,7 +77,7 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class PlanRequest:
     """What is asked of a planner.
 
     Attributes:
@@ -122,7 +126,7 @@ class Plan:
 
 
 @runtime_checkable
-class Planner(Protocol):
+class ArmPlanner(Protocol):
     """Finds a way for torso and arms that touches nothing, and times it.
 
     It is passive and deterministic: the same request gets the same answer. The trajectory keeps the range that the
@@ -134,20 +138,20 @@ class Planner(Protocol):
 
     latency: float
 
-    def plan(self, request: Request) -> Plan:
+    def plan(self, request: PlanRequest) -> Plan:
         """Return a trajectory from `request.q` to one of `request.goals`.
 
         Raises:
-            PlanningError: there is none; `refusal` says why.
+            PlanRefused: there is none; `refusal` says why.
         """
         ...
 
 
-def check_request(request: Request) -> tuple[Array, Array]:
+def check_request(request: PlanRequest) -> tuple[Array, Array]:
     """Return `q` (15,) and `goals` (k, 15) of a request as arrays of float64.
 
     Raises:
-        PlanningError: a shape is wrong, a number is not finite, or a bound has no meaning.
+        PlanRefused: a shape is wrong, a number is not finite, or a bound has no meaning.
     """
     q, goals = np.asarray(request.q, np.float64), np.asarray(request.goals, np.float64)
     if q.shape != (NUM_JOINTS,):
@@ -161,9 +165,9 @@ def check_request(request: Request) -> tuple[Array, Array]:
     if not (0.0 < request.speed <= 1.0 and request.hand_speed > 0.0):
         raise _bad("The speed of a plan is a share in (0, 1], and its hand_speed positive.")
     if request.effort < 1:
-        raise PlanningError(Refusal.NO_TIME, "No effort is left to plan with; allow one posture at least.")
+        raise PlanRefused(Refusal.NO_TIME, "No effort is left to plan with; allow one posture at least.")
     return q, goals
 
 
-def _bad(reason: str) -> PlanningError:
-    return PlanningError(Refusal.BAD_INPUT, reason)
+def _bad(reason: str) -> PlanRefused:
+    return PlanRefused(Refusal.BAD_INPUT, reason)

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.planning.base import NUM_JOINTS, Plan, PlanningError, Refusal, Request, check_request
+from golem.capabilities.planning.base import (
+    NUM_JOINTS,
+    Plan,
+    PlanRefused,
+    PlanRequest,
+    Refusal,
+    check_request,
+)
 from golem.capabilities.planning.hermite import interpolate
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.timed_path import MotionLimits, round_corners, time_path
@@ -71,7 +78,7 @@ class Effort:
         left: what may still be looked at.
     """
 
-    def __init__(self, request: Request) -> None:
+    def __init__(self, request: PlanRequest) -> None:
         """Begin with all the effort of `request`."""
         self.used, self._most, self._stop = 0, request.effort, request.stop
 
@@ -84,18 +91,18 @@ class Effort:
         """Count `checks` more.
 
         Raises:
-            PlanningError: the caller has given up.
+            PlanRefused: the caller has given up.
         """
         self.used += checks
         if self._stop():
-            raise PlanningError(Refusal.STOPPED, "The caller gave the plan up.")
+            raise PlanRefused(Refusal.STOPPED, "The caller gave the plan up.")
 
 
 class PathPlanner(ABC):
-    """A planner that finds a path first and times it then; see `Planner` for the contract.
+    """A planner that finds a path first and times it then; see `ArmPlanner` for the contract.
 
     Attributes:
-        latency: see `Planner`.
+        latency: see `ArmPlanner`.
         config: the options.
         robot: what of the robot does not change.
         speed, accel: (15,) limits of the joints [rad/s, rad/s^2].
@@ -117,11 +124,11 @@ class PathPlanner(ABC):
         """Return the corners (k, 15), k >= 2, of a free path from `q` (15,) to one of `goals` (m, 15).
 
         Raises:
-            PlanningError: none was found.
+            PlanRefused: none was found.
         """
 
-    def plan(self, request: Request) -> Plan:
-        """Return a trajectory; see `Planner`."""
+    def plan(self, request: PlanRequest) -> Plan:
+        """Return a trajectory; see `ArmPlanner`."""
         q, goals = check_request(request)
         c, effort = self.config, Effort(request)
         rules, held = tuple(request.rules), tuple(request.held)
@@ -130,7 +137,7 @@ class PathPlanner(ABC):
         effort.spend(1)
         start = space.verdict(q)
         if start:
-            raise PlanningError(
+            raise PlanRefused(
                 Refusal.START, f"The arms cannot set out from where they are: {space.reason(start, q)}."
             )
         still = np.abs(goals - q).max(axis=1) <= STILL
@@ -146,7 +153,7 @@ class PathPlanner(ABC):
                 if len(goals) == 1
                 else f"None of {len(goals)} goals may be gone to"
             )
-            raise PlanningError(Refusal.GOAL, f"{text}: {reason}.")
+            raise PlanRefused(Refusal.GOAL, f"{text}: {reason}.")
         goals = goals[verdicts == 0]
         rng = np.random.default_rng(request.seed)
         limits = MotionLimits(request.speed * self.speed, self.accel, request.hand_speed)
@@ -158,7 +165,7 @@ class PathPlanner(ABC):
             plan = self._timed(space, corners, limits, effort)
             if plan is not None:
                 return plan
-        raise PlanningError(Refusal.NO_PATH, f"No path held in {c.attempts} checks at steps of {FINE} rad.")
+        raise PlanRefused(Refusal.NO_PATH, f"No path held in {c.attempts} checks at steps of {FINE} rad.")
 
     def _timed(self, space: JointSpace, corners: Array, limits: MotionLimits, effort: Effort) -> Plan | None:
         """Return the trajectory along `corners`, or None if it or they are not free in fine steps."""
@@ -182,8 +189,8 @@ class PathPlanner(ABC):
 def fine_points(times: Array, q: Array, dq: Array) -> Array:
     """Return (m, n) postures on a trajectory, its points among them, no two neighbours farther apart than `FINE`."""
     gaps = np.abs(np.diff(q, axis=0)).max(axis=1)
-    # A cubic between points at different speeds covers its length unevenly, by half as much again at most.
-    parts = np.maximum(1, np.ceil(1.5 * gaps / FINE)).astype(int)
+    # A cubic that sets off from rest is up to twice as fast as its mean.
+    parts = np.maximum(1, np.ceil(2.0 * gaps / FINE)).astype(int)
     s = np.concatenate(
         [t0 + (t1 - t0) * np.arange(k) / k for t0, t1, k in zip(times, times[1:], parts, strict=False)]
         + [times[-1:]]

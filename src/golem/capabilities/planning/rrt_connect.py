@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from golem.capabilities.planning import plan_kernel
-from golem.capabilities.planning.base import PlanningError, Refusal
+from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.capabilities.planning.joint_space import JointSpace
 from golem.capabilities.planning.path_planner import STILL, Effort, PathPlanner, PathPlannerConfig
 from golem.capabilities.planning.straight import straight_line
@@ -20,15 +20,17 @@ NODES = 20_000
 
 
 @dataclass(frozen=True)
-class RrtConnectConfig(PathPlannerConfig):
+class RrtConnectConfig:
     """Options of `RrtConnect`.
 
     Attributes:
+        path: margins, limits and effort.
         step: between two checks of the search [rad in a joint].
         reach: longest edge of a tree [rad in a joint].
         shortcuts: how often two points of the path are tried to be joined.
     """
 
+    path: PathPlannerConfig = field(default_factory=PathPlannerConfig)
     step: float = 0.05
     reach: float = 0.8
     shortcuts: int = 80
@@ -37,17 +39,16 @@ class RrtConnectConfig(PathPlannerConfig):
 class RrtConnect(PathPlanner):
     """Two trees of postures, from the start and from the goals, that grow towards each other."""
 
-    config: RrtConnectConfig
-
     def __init__(self, config: RrtConnectConfig | None = None) -> None:
         """Lay out the robot's tables; compiles the kernels where they are not cached."""
-        super().__init__(config or RrtConnectConfig())
+        self._options = config or RrtConnectConfig()
+        super().__init__(self._options.path)
 
     def find(
         self, space: JointSpace, q: Array, goals: Array, rng: np.random.Generator, effort: Effort
     ) -> Array:
         """Return the corners of a path; see `PathPlanner`."""
-        line = straight_line(space, q, goals, effort, self.config.step)
+        line = straight_line(space, q, goals, effort, self._options.step)
         if line is not None:
             return line
         return self._shortened(space, self._search(space, q, goals, rng, effort), rng, effort)
@@ -55,7 +56,7 @@ class RrtConnect(PathPlanner):
     def _search(
         self, space: JointSpace, q: Array, goals: Array, rng: np.random.Generator, effort: Effort
     ) -> Array:
-        c, n = self.config, len(q)
+        c, n = self._options, len(q)
         goals = goals[space.verdicts(goals) == 0]
         moving = (np.abs(goals - q) > STILL).any(axis=0)
         nodes = np.empty((2, NODES, n))
@@ -75,7 +76,7 @@ class RrtConnect(PathPlanner):
             if met:
                 one, other = (_branch(nodes[k], parents[k], int(size[k]) - 1) for k in (0, 1))
                 return np.concatenate([one[::-1], other[1:]])
-        raise PlanningError(
+        raise PlanRefused(
             Refusal.NO_PATH,
             f"No path was found within {effort.used} postures and {int(size.sum())} nodes; move the goal, or allow "
             "more effort.",
@@ -83,7 +84,7 @@ class RrtConnect(PathPlanner):
 
     def _shortened(self, space: JointSpace, path: Array, rng: np.random.Generator, effort: Effort) -> Array:
         """Return the path with corners cut off where two of its points can be joined by a straight line."""
-        for _ in range(self.config.shortcuts):
+        for _ in range(self._options.shortcuts):
             if len(path) <= 2 or effort.left <= 0:
                 break
             at = np.concatenate(([0.0], np.cumsum(self._durations(path))))
@@ -95,8 +96,8 @@ class RrtConnect(PathPlanner):
                 path[k] + (path[k + 1] - path[k]) * (x - at[k]) / (at[k + 1] - at[k])
                 for k, x in ((i, s), (j, t))
             )
-            effort.spend(int(np.abs(b - a).max() / self.config.step) + 1)
-            if space.free_line(a, b, self.config.step):
+            effort.spend(int(np.abs(b - a).max() / self._options.step) + 1)
+            if space.free_line(a, b, self._options.step):
                 path = _without_repeats(np.concatenate([path[: i + 1], [a, b], path[j + 1 :]]))
         return path
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.planning.base import PlanningError, Refusal
+from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.capabilities.planning.joint_space import JointSpace
 from golem.capabilities.planning.path_planner import FINE, Effort, PathPlanner
 from golem.types import Array
@@ -19,7 +19,7 @@ class Straight(PathPlanner):
         """Return start and goal; see `PathPlanner`."""
         line = straight_line(space, q, goals, effort, FINE)
         if line is None:
-            raise PlanningError(Refusal.NO_PATH, "Something is in the way of a straight line to every goal.")
+            raise PlanRefused(Refusal.NO_PATH, "Something is in the way of a straight line to every goal.")
         return line
 
 
