@@ -119,11 +119,10 @@ class JointSpace:
         """
         self.robot, self.rules = robot, tuple(rules)
         model = robot.model(held)
-        com = self._centre_of_mass(model, q)
         rows = np.zeros((len(self.rules), plan_kernel.ROW))
         for row, rule in zip(rows, self.rules, strict=True):
             side: Side = "left" if isinstance(rule, Balanced) else rule.side
-            row[:] = rule.row(*robot.hands[side], com)
+            row[:] = rule.row(*robot.hands[side], self.centre_of_mass(q))
         self.space = Space(
             model.ints, model.floats, *(world or World()).arrays(), robot.lower, robot.upper, rows,
             robot.masses, np.array(margins),
@@ -174,7 +173,9 @@ class JointSpace:
         }
         return words[verdict] if verdict < RULE else f"it breaks a rule: {self.rules[verdict - RULE]}"
 
-    def _centre_of_mass(self, model: CollisionModel, q: Array) -> Array:
+    def centre_of_mass(self, q: Array) -> Array:
+        """Return (3,) the robot's centre of mass in base_link at `q` (15,), with straight legs [m]."""
+        model = self.robot.model()
         n = len(model.joints)
         R, p = np.empty((n + 1, 9)), np.empty((n + 1, 3))
         sphere_kernel.place(np.ascontiguousarray(q, float), model.ints, model.floats, R, p)
