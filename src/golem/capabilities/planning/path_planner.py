@@ -119,9 +119,17 @@ class PathPlanner(ABC):
 
     @abstractmethod
     def find(
-        self, space: JointSpace, q: Array, goals: Array, rng: np.random.Generator, effort: Effort
+        self,
+        space: JointSpace,
+        q: Array,
+        goals: Array,
+        rng: np.random.Generator,
+        effort: Effort,
+        attempt: int,
     ) -> Array:
         """Return the corners (k, 15), k >= 2, of a free path from `q` (15,) to one of `goals` (m, 15).
+
+        The path of an earlier `attempt` did not hold in fine steps; the first is 0.
 
         Raises:
             PlanRefused: none was found.
@@ -161,7 +169,7 @@ class PathPlanner(ABC):
             extra = c.search_margin if attempt < c.attempts - 1 else 0.0
             wide = space.shrunk((extra, c.world_margin + extra))
             ends_free = wide.verdict(q) == 0 and (wide.verdicts(goals) == 0).any()
-            corners = self.find(wide if ends_free else space, q, goals, rng, effort)
+            corners = self.find(wide if ends_free else space, q, goals, rng, effort, attempt)
             plan = self._timed(space, corners, limits, effort)
             if plan is not None:
                 return plan

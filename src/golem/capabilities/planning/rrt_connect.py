@@ -9,7 +9,7 @@ import numpy as np
 from golem.capabilities.planning import plan_kernel
 from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.capabilities.planning.joint_space import JointSpace
-from golem.capabilities.planning.path_planner import STILL, Effort, PathPlanner, PathPlannerConfig
+from golem.capabilities.planning.path_planner import FINE, STILL, Effort, PathPlanner, PathPlannerConfig
 from golem.capabilities.planning.straight import straight_line
 from golem.types import Array
 
@@ -45,16 +45,24 @@ class RrtConnect(PathPlanner):
         super().__init__(self._options.path)
 
     def find(
-        self, space: JointSpace, q: Array, goals: Array, rng: np.random.Generator, effort: Effort
+        self,
+        space: JointSpace,
+        q: Array,
+        goals: Array,
+        rng: np.random.Generator,
+        effort: Effort,
+        attempt: int,
     ) -> Array:
         """Return the corners of a path; see `PathPlanner`."""
-        line = straight_line(space, q, goals, effort, self._options.step)
+        # A path that just touches a rule may slip through between two checks: the next one is checked more finely.
+        step = max(FINE, self._options.step * 0.5**attempt)
+        line = straight_line(space, q, goals, effort, step)
         if line is not None:
             return line
-        return self._shortened(space, self._search(space, q, goals, rng, effort), rng, effort)
+        return self._shortened(space, self._search(space, q, goals, rng, effort, step), rng, effort, step)
 
     def _search(
-        self, space: JointSpace, q: Array, goals: Array, rng: np.random.Generator, effort: Effort
+        self, space: JointSpace, q: Array, goals: Array, rng: np.random.Generator, effort: Effort, step: float
     ) -> Array:
         c, n = self._options, len(q)
         goals = goals[space.verdicts(goals) == 0]
@@ -69,9 +77,7 @@ class RrtConnect(PathPlanner):
         while effort.left > 0 and size.max() < NODES:
             samples = np.where(moving, rng.uniform(space.space.lower, space.space.upper, (BATCH, n)), q)
             checks[0] = 0
-            met = plan_kernel.grow(
-                samples, nodes, parents, size, c.reach, c.step, weight, space.space, checks
-            )
+            met = plan_kernel.grow(samples, nodes, parents, size, c.reach, step, weight, space.space, checks)
             effort.spend(int(checks[0]))
             if met:
                 one, other = (_branch(nodes[k], parents[k], int(size[k]) - 1) for k in (0, 1))
@@ -82,7 +88,9 @@ class RrtConnect(PathPlanner):
             "more effort.",
         )
 
-    def _shortened(self, space: JointSpace, path: Array, rng: np.random.Generator, effort: Effort) -> Array:
+    def _shortened(
+        self, space: JointSpace, path: Array, rng: np.random.Generator, effort: Effort, step: float
+    ) -> Array:
         """Return the path with corners cut off where two of its points can be joined by a straight line."""
         for _ in range(self._options.shortcuts):
             if len(path) <= 2 or effort.left <= 0:
@@ -96,8 +104,8 @@ class RrtConnect(PathPlanner):
                 path[k] + (path[k + 1] - path[k]) * (x - at[k]) / (at[k + 1] - at[k])
                 for k, x in ((i, s), (j, t))
             )
-            effort.spend(int(np.abs(b - a).max() / self._options.step) + 1)
-            if space.free_line(a, b, self._options.step):
+            effort.spend(int(np.abs(b - a).max() / step) + 1)
+            if space.free_line(a, b, step):
                 path = _without_repeats(np.concatenate([path[: i + 1], [a, b], path[j + 1 :]]))
         return path
 

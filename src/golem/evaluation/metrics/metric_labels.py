@@ -78,6 +78,12 @@ METRICS: dict[str, Metric] = {
     "frame_p99": Metric("CPU time of a scan with all between two, 99 % quantile", "ms", 1e3),
     "plans_per_second": Metric("plans per second"),
     "in_time": Metric("share of plans in time", "%", 100.0),
+    "claim_picked": Metric("right when it says a screw is in the tray", "%", 100.0),
+    "claim_tight": Metric("right when it says a screw is tight", "%", 100.0),
+    "claim_jammed": Metric("right when it says a screw is jammed", "%", 100.0),
+    "claim_nothing_there": Metric("right when it says there is no screw", "%", 100.0),
+    "claim_out_of_reach": Metric("right when it says a screw is out of reach", "%", 100.0),
+    "claim_tray_missing": Metric("right when it says there is no tray", "%", 100.0),
     "cpu_per_plan": Metric("CPU time of a plan", "ms", 1e3),
 }
 """Name -> how it is shown."""

@@ -7,7 +7,7 @@ that `golem compare` of two runs says what balancing costs.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
+from golem.evaluation.episodes.pick_claims import claims
 from golem.evaluation.harness.sweep import read_sweep
 from golem.interfaces import topics
 from golem.middleware.bus import News
@@ -28,7 +29,8 @@ from golem.robots.mujoco.gl import shared_context
 from golem.robots.worlds.conditions import LayoutKind
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import FAULT, SkillResult
-from golem.skills.pick import PickGoal
+from golem.skills.pick_config import PickGoal
+from golem.skills.pick_report import PickReport
 from golem.slots import KEYS
 from golem.stack import Stack, load_stack
 from golem.types import Side
@@ -115,12 +117,16 @@ class PickRung(Rung[PickOptions]):
                         False, HANGS.stage, f"lower_body: {stack.choice('lower_body').use}", HANGS.detail
                     )
                 running.executor.run(running.executor.t + RELEASED)
+            before = oracle.fasteners()
             watch = _Watch(running, oracle, BalanceRecorder(robot) if self.balances else None)
             result = running.execute("pick", self._goal, watch=watch)
             running.executor.run(running.executor.t + SETTLE, watch.look)
             if artefacts is not None and watch.recorder is not None:
                 watch.recorder.trace().save(artefacts / TRACE)
-            return _judge(stack, result, oracle, watch, lost(running, watch.recorder))
+            outcome = _judge(stack, result, oracle, watch, lost(running, watch.recorder))
+            said = result.value if isinstance(result.value, PickReport) else PickReport()
+            right = claims(said, before, bool(oracle.screws_in_tray()))
+            return replace(outcome, series={**outcome.series, **right})
         finally:
             oracle.close()
             robot.close()

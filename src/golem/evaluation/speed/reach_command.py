@@ -22,7 +22,7 @@ from golem.capabilities.arms.task_space import TaskSpaceConfig
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.errors import ConfigError
 from golem.figures import blank_figure, pixels
-from golem.skills.pick import PickConfig
+from golem.skills.pick_config import PickConfig
 from golem.types import NUM_JOINTS, SIDES, UPPER, Array, Side
 
 NEAR = 0.002
@@ -170,7 +170,7 @@ def picture(found: dict[Side, Reached]) -> NDArray[np.uint8]:
     """
     grid = found["right"].map
     heights = [-0.12, -0.04, 0.04, 0.20, 0.40]
-    figure = blank_figure(1300, 620, facecolor="white")
+    figure = blank_figure(1300, 400, facecolor="white")
     axes = figure.subplots(2, len(heights), sharex=True, sharey=True)
     x0, x1, y0, y1, _, _ = PickConfig().workspace
     for column, z in enumerate(heights):
@@ -192,7 +192,8 @@ def picture(found: dict[Side, Reached]) -> NDArray[np.uint8]:
                 ax.plot([a, b, b, a, a], [x0, x0, x1, x1, x0], lw=0.8, c="0.3")
             ax.set_title(f"{name}, z = {z:.2f} m", fontsize=9)
             ax.set_aspect("equal")
-            ax.invert_xaxis() if not (row or column) else None
+            if row == column == 0:
+                ax.invert_xaxis()
     figure.supxlabel(
         "y in base_link [m]; blue: left hand, orange: right hand, darker: more margin, x: touches itself"
     )
