@@ -10,7 +10,7 @@ from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.pick_config import PickConfig, PickGoal
-from golem.skills.pick_report import Outcome, PickFailed, PickReport, outcome_of, slipped
+from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, outcome_of, slipped
 from golem.skills.pick_targets import Attempt, TargetChoice
 from golem.skills.poses import lifted, retracted
 from golem.skills.travel import LineTravel, PlannedTravel, Travel
@@ -62,7 +62,7 @@ class Pick:
             self._travel.look([attempt.target.position for attempt in attempts])
             attempt = await self._take_one(context, attempts, timings, tried)
             await self._place(context, attempt, container)
-            self._report.outcome = self._report.tried[-1].outcome = Outcome.PICKED.value
+            self._report.outcome = self._report.tried[-1].outcome = PickOutcome.PICKED.value
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
             self._note(failure)
@@ -189,10 +189,10 @@ class Pick:
                         self._heights.append(tried.z)
                     elif step.status is ServoStatus.LOST:
                         text = f"The palm camera lost the {attempt.label}."
-                        raise PickFailed(Outcome.NOTHING_THERE, "servo", "localizer", text)
+                        raise PickFailed(PickOutcome.NOTHING_THERE, "servo", "localizer", text)
                     elif step.status is ServoStatus.STALLED:
                         text = "The hand makes no progress towards the target."
-                        raise PickFailed(Outcome.OUT_OF_REACH, "servo", "upper_body", text)
+                        raise PickFailed(PickOutcome.OUT_OF_REACH, "servo", "upper_body", text)
                 if not closing or hand.status.state is GripState.CLOSING:
                     arm.approach(step.T_odom_gripper, self._config.servo_speed)
                 await context.tick()
@@ -211,7 +211,7 @@ class Pick:
         status = context.hands[attempt.side].status
         if not status.holding:
             text = f"The fingers hold nothing (gap {status.gap * 1e3:.0f} mm)."
-            raise PickFailed(Outcome.NOTHING_THERE, "grasp", "grasp_method", text)
+            raise PickFailed(PickOutcome.NOTHING_THERE, "grasp", "grasp_method", text)
 
     async def _extract(self, context: Context, attempt: Attempt) -> None:
         """Pull straight out against the approach direction, then lift; the grip must hold."""
@@ -246,7 +246,7 @@ class Pick:
         await self._travel.carry(attempt.side, T, self._config.travel_speed)
         if not hand.status.holding:
             text = f"The {attempt.label} was lost on the way."
-            raise PickFailed(Outcome.SLIPPED, "place", "grasp_method", text)
+            raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", text)
         hand.open(self._config.release_gap)
         await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
 

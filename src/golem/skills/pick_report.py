@@ -14,7 +14,7 @@ RISEN = 0.003
 standard deviations of the height that the palm camera measures]."""
 
 
-class Outcome(StrEnum):
+class PickOutcome(StrEnum):
     """How a pick, or one of its attempts, ended."""
 
     PICKED = "picked"
@@ -44,14 +44,14 @@ class Tried:
     Attributes:
         side: hand that tried it.
         x, y, z: where it was last seen, in odom [m].
-        outcome: one of `Outcome`.
+        outcome: one of `PickOutcome`.
     """
 
     side: Side
     x: float
     y: float
     z: float
-    outcome: str = Outcome.FAILED.value
+    outcome: str = PickOutcome.FAILED.value
 
 
 @dataclass
@@ -59,11 +59,11 @@ class PickReport:
     """What a pick found out.
 
     Attributes:
-        outcome: one of `Outcome`, of the whole.
+        outcome: one of `PickOutcome`, of the whole.
         tried: every object that was approached, in order.
     """
 
-    outcome: str = Outcome.FAILED.value
+    outcome: str = PickOutcome.FAILED.value
     tried: list[Tried] = field(default_factory=list[Tried])
 
 
@@ -74,32 +74,32 @@ class PickFailed(StageFailed):
         outcome: what it says.
     """
 
-    def __init__(self, outcome: Outcome, stage: str, slot: str, reason: str) -> None:
+    def __init__(self, outcome: PickOutcome, stage: str, slot: str, reason: str) -> None:
         """Say what it says, which `stage` failed, whose module is responsible, and why."""
         super().__init__(stage, slot, reason)
         self.outcome = outcome
 
 
 _REFUSED = {
-    Refusal.UNREACHABLE: Outcome.OUT_OF_REACH,
-    Refusal.OFF_LINE: Outcome.OUT_OF_REACH,
-    Refusal.GOAL: Outcome.BLOCKED,
-    Refusal.START: Outcome.BLOCKED,
-    Refusal.NO_PATH: Outcome.BLOCKED,
+    Refusal.UNREACHABLE: PickOutcome.OUT_OF_REACH,
+    Refusal.OFF_LINE: PickOutcome.OUT_OF_REACH,
+    Refusal.GOAL: PickOutcome.BLOCKED,
+    Refusal.START: PickOutcome.BLOCKED,
+    Refusal.NO_PATH: PickOutcome.BLOCKED,
 }
 
 
-def outcome_of(failure: StageFailed) -> Outcome:
+def outcome_of(failure: StageFailed) -> PickOutcome:
     """Return what a failure says."""
     if isinstance(failure, PickFailed):
         return failure.outcome
     if isinstance(failure.__cause__, PlanRefused):
-        return _REFUSED.get(failure.__cause__.refusal, Outcome.FAILED)
-    return Outcome.FAILED
+        return _REFUSED.get(failure.__cause__.refusal, PickOutcome.FAILED)
+    return PickOutcome.FAILED
 
 
-def slipped(heights: list[float]) -> Outcome:
+def slipped(heights: list[float]) -> PickOutcome:
     """Return what a screw that slipped is, by the heights [m] at which it was seen before each pull."""
     if len(heights) < 2:
-        return Outcome.SLIPPED
-    return Outcome.JAMMED if max(heights[1:]) - heights[0] > RISEN else Outcome.TIGHT
+        return PickOutcome.SLIPPED
+    return PickOutcome.JAMMED if max(heights[1:]) - heights[0] > RISEN else PickOutcome.TIGHT

@@ -10,7 +10,7 @@ from golem.capabilities.arms.reach_map import load_map
 from golem.interfaces.payloads import Detections
 from golem.skills.context import Context
 from golem.skills.pick_config import PickConfig, PickGoal
-from golem.skills.pick_report import Outcome, PickFailed, Tried
+from golem.skills.pick_report import PickFailed, PickOutcome, Tried
 from golem.types import SIDES, Array, LocalizedObject, Side
 
 
@@ -43,7 +43,7 @@ class TargetChoice:
         sides: tuple[Side, ...] = SIDES if goal.side == "either" else (goal.side,)
         with context.watch("head", goal.label, goal.container) as eye:
             end = context.t + self._config.look_timeout
-            problem, outcome = "The head camera gave no detections in time.", Outcome.FAILED
+            problem, outcome = "The head camera gave no detections in time.", PickOutcome.FAILED
             while True:
                 sightings = await eye.look(end - context.t)
                 if sightings is None:
@@ -60,8 +60,8 @@ class TargetChoice:
                 seen = any(o.label == goal.label for o in sightings.objects)
                 missing = goal.container if attempts else f"reachable {goal.label}"
                 problem = f"The head camera shows no {missing}."
-                outcome = Outcome.OUT_OF_REACH if seen else Outcome.NOTHING_THERE
-                outcome = Outcome.TRAY_MISSING if container is None and seen else outcome
+                outcome = PickOutcome.OUT_OF_REACH if seen else PickOutcome.NOTHING_THERE
+                outcome = PickOutcome.TRAY_MISSING if container is None and seen else outcome
         if goal.side == "either":
             attempts = [a for a in attempts if self._serves(context, a.side, container)] or attempts
         attempts.sort(key=lambda a: self._discomfort(context, a.side, a.target))

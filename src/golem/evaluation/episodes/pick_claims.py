@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.capabilities.arms.reach_map import load_map
-from golem.skills.pick_report import Outcome, PickReport, Tried
+from golem.skills.pick_report import PickOutcome, PickReport, Tried
 from golem.types import SIDES, Array
 
 SEEN = 0.025
@@ -57,11 +57,11 @@ def claims(report: PickReport, fasteners: Sequence[Fastener], in_tray: bool) -> 
 
 def _whole(outcome: str, fasteners: Sequence[Fastener]) -> bool | None:
     """Return whether a claim about the whole work place, which has a tray, is right."""
-    if outcome == Outcome.TRAY_MISSING:
+    if outcome == PickOutcome.TRAY_MISSING:
         return False
-    if outcome == Outcome.NOTHING_THERE:
+    if outcome == PickOutcome.NOTHING_THERE:
         return not fasteners
-    if outcome == Outcome.OUT_OF_REACH:
+    if outcome == PickOutcome.OUT_OF_REACH:
         served = (load_map().serves(side, f.in_base) for f in fasteners if f.loose for side in SIDES)
         return not any(served)
     return None
@@ -69,18 +69,18 @@ def _whole(outcome: str, fasteners: Sequence[Fastener]) -> bool | None:
 
 def _one(tried: Tried, fasteners: Sequence[Fastener], in_tray: bool) -> bool | None:
     """Return whether a claim about one screw is right."""
-    if tried.outcome == Outcome.PICKED:
+    if tried.outcome == PickOutcome.PICKED:
         return in_tray
-    wide = tried.outcome == Outcome.OUT_OF_REACH
+    wide = tried.outcome == PickOutcome.OUT_OF_REACH
     near = _nearest(tried, fasteners, LOOKED if wide else SEEN)
-    if tried.outcome == Outcome.NOTHING_THERE:
+    if tried.outcome == PickOutcome.NOTHING_THERE:
         return near is None
     if near is None:
-        return None if tried.outcome not in (Outcome.TIGHT, Outcome.JAMMED) else False
+        return None if tried.outcome not in (PickOutcome.TIGHT, PickOutcome.JAMMED) else False
     if wide:
         return not load_map().serves(tried.side, near.in_base)
-    if tried.outcome in (Outcome.TIGHT, Outcome.JAMMED):
-        return near.loose == (tried.outcome == Outcome.JAMMED)
+    if tried.outcome in (PickOutcome.TIGHT, PickOutcome.JAMMED):
+        return near.loose == (tried.outcome == PickOutcome.JAMMED)
     return None
 
 
