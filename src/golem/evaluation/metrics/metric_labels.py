@@ -33,6 +33,8 @@ METRICS: dict[str, Metric] = {
     "grasp_miss": Metric("horizontal distance, hand to screw", "mm", 1e3),
     "grasp_depth": Metric("fingertips below the screw's head", "mm", 1e3),
     "grasp_tilt": Metric("approach off vertical", "deg", _DEG),
+    "pull_beside": Metric("hand beside the straight line while pulling, at most", "mm", 1e3),
+    "pull_turn": Metric("hand turned while pulling, at most", "deg", _DEG),
     "peak_force": Metric("peak force", "N"),
     "peak_lean": Metric("peak lean (pitch)", "deg", _DEG),
     "peak_tilt": Metric("peak tilt (any direction)", "deg", _DEG),

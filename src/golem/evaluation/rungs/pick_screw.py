@@ -19,6 +19,7 @@ from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, Trial
 from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
 from golem.evaluation.episodes.pick_claims import claims
+from golem.evaluation.episodes.pull import straightness
 from golem.evaluation.harness.sweep import read_sweep
 from golem.interfaces import topics
 from golem.middleware.bus import News
@@ -33,7 +34,7 @@ from golem.skills.pick_config import PickGoal
 from golem.skills.pick_report import PickReport
 from golem.slots import KEYS
 from golem.stack import Stack, load_stack
-from golem.types import Side
+from golem.types import Array, Side
 
 SLOT = "grasp_method"
 """What the methods of these rungs are."""
@@ -176,6 +177,9 @@ class _Watch:
         self._news = News(running.bus, topics.FEEDBACK)
         self.grasp: GraspTruth | None = None
         self.picture: bytes | None = None
+        self.pull: list[Array] = []
+        self._side: Side = "right"
+        self._stage = ""
 
     def look(self) -> bool:
         """Look on after the errand; it is never a reason to end."""
@@ -186,10 +190,15 @@ class _Watch:
     def __call__(self) -> None:
         self.look()
         feedback = self._news.read()
+        if self._stage == "extract":
+            self.pull.append(self._oracle.gripper(self._side))
         if feedback is None:
             return
+        if feedback.stage != self._stage:
+            self._stage = feedback.stage
+            self.pull = [] if self._stage == "extract" else self.pull
         if feedback.stage == "grasp" and not feedback.data.get("failed"):
-            side: Side = feedback.data.get("side", "right")
+            self._side = side = feedback.data.get("side", "right")
             self.grasp = self._oracle.grasp(side, self._running.commanded(side))
         if feedback.stage == DONE or feedback.data.get("failed"):
             self.picture = self._oracle.picture()
@@ -201,6 +210,9 @@ def _judge(
     """Say whether a screw is in the tray and the robot still there, and if not, which module lost it."""
     truth = watch.grasp
     series = {} if truth is None else {f"grasp_{name}": value for name, value in asdict(truth).items()}
+    pulled = straightness(watch.pull)
+    if pulled is not None:
+        series |= {"pull_beside": pulled[0], "pull_turn": pulled[1]}
     if watch.recorder is not None:
         series |= balance(watch.recorder.trace())
     if loss is not None and result.stage not in ABORTED:
