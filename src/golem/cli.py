@@ -124,7 +124,7 @@ MODEL_COMMANDS = ("export", "spheres")
 
 
 def _bench(words: list[str]) -> int:
-    """Print performance figures next to their references; `bench dds`: two processes; `bench arms`: collision, IK."""
+    """Print figures of performance next to their references; `bench dds`: two processes; `bench arms`: IK, plans."""
     _prepare_graphics()
     if words[:1] == ["arms"]:
         from golem.evaluation.speed.arms_bench import ArmsBenchConfig, run_arms_bench
@@ -138,6 +138,14 @@ def _bench(words: list[str]) -> int:
         from golem.evaluation.speed.bench import BenchConfig, run_bench
 
         run_bench(_parse(BenchConfig, "bench", words))
+    return 0
+
+
+def _reach(words: list[str]) -> int:
+    """Show where the hands can be: table, picture, and the map that skills ask."""
+    from golem.evaluation.speed.reach_command import ReachConfig, run_reach
+
+    run_reach(_parse(ReachConfig, "reach", words))
     return 0
 
 
@@ -308,6 +316,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "results": _results,
     "model": _model,
     "bench": _bench,
+    "reach": _reach,
     "train": _train,
     "twin": _twin,
     "safety": _safety,

@@ -28,7 +28,7 @@ from golem.robots.mujoco.spectator import SpectatorView
 from golem.run import Narrator, no_display, on_air, shown
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import CANCELLED, SkillResult
-from golem.skills.pick import PickGoal
+from golem.skills.pick_config import PickGoal
 from golem.stack import load_stack
 
 FPS = 10.0

@@ -89,6 +89,13 @@ SLOTS: dict[str, Slot] = {
             "pink_ik": "golem.capabilities.arms.pink_ik:PinkIK",
         },
     ),
+    "planner": Slot(
+        "golem.capabilities.planning.base:ArmPlanner",
+        {
+            "rrt_connect": "golem.capabilities.planning.rrt_connect:RrtConnect",
+            "straight": "golem.capabilities.planning.straight:Straight",
+        },
+    ),
     "localizer": Slot(
         "golem.capabilities.perception.base:Localizer",
         {"onnx": "golem.capabilities.perception.onnx_detector:OnnxDetector"},
@@ -132,6 +139,7 @@ KEYS: dict[str, StackKey] = {
     "hand": StackKey("hand", "magpie"),
     "lower_body": StackKey("lower_body", "hold"),
     "upper_body": StackKey("upper_body", "diff_ik"),
+    "planner": StackKey("planner", "rrt_connect"),
     "localizer": StackKey("localizer", "onnx"),
     "grasp_method": StackKey("grasp_method", "visual_servo"),
     "odometry": StackKey("odometry", "legs"),

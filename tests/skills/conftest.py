@@ -10,6 +10,7 @@ import pytest
 
 from golem.capabilities.grasping.base import GraspMethod
 from golem.capabilities.grasping.visual_servo import VisualServo
+from golem.capabilities.planning.straight import Straight
 from golem.interfaces import topics
 from golem.interfaces.payloads import Detections, GripState, HandStatus
 from golem.middleware.bus import Bus
@@ -38,6 +39,7 @@ def modules(**given: Any) -> Modules:
     default: dict[str, Any] = {
         "grasp_method": VisualServo,
         "skill": SkillTable(Stack()).make,
+        "planner": Straight,
     }
     return Modules(**default | given)
 

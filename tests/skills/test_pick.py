@@ -67,9 +67,10 @@ def assert_safe(world: Any, side: Side = "right") -> None:
     np.testing.assert_allclose(world.context.arms[side].commanded[:3, 3], [0.35, -0.2, 0.1], atol=1e-9)
 
 
-def failed(result: SkillResult, stage: str, slot: str, words: str) -> None:
+def failed(result: SkillResult, stage: str, slot: str, words: str, outcome: str = "") -> None:
     """Check how a pick failed."""
     assert (result.success, result.stage, result.slot) == (False, stage, slot), result
+    assert outcome in ("", result.value.outcome), result
     assert words in result.reason
     assert result.timings["total"] > 0.0 and "start" not in result.timings
 
@@ -223,23 +224,25 @@ def test_a_head_camera_that_says_nothing_is_the_localizers_failure(world: Any) -
 
 
 @pytest.mark.parametrize(
-    ("labels", "words"),
+    ("labels", "words", "outcome"),
     [
-        (["tray"], "no reachable screw"),
-        (["screw"], "no tray"),
-        ([], "no reachable screw"),
-        (["nut"], "screw"),
+        (["tray"], "no reachable screw", "nothing_there"),
+        (["screw"], "no tray", "tray_missing"),
+        ([], "no reachable screw", "nothing_there"),
+        (["nut"], "screw", "nothing_there"),
     ],
 )
-def test_what_is_not_seen_is_named(labels: list[str], words: str, world: Any, thing: Any) -> None:
+def test_what_is_not_seen_is_named(
+    labels: list[str], words: str, outcome: str, world: Any, thing: Any
+) -> None:
     world.objects["head"] = lambda: [thing(label, SCREW, world.t) for label in labels]
-    failed(picked(world), "detect", "localizer", words)
+    failed(picked(world), "detect", "localizer", words, outcome)
 
 
 @pytest.mark.parametrize("place", [(0.43, 0.25, -0.03), (0.9, -0.1, -0.03), (0.43, -0.14, -0.4)])
 def test_what_is_out_of_reach_is_left_alone(place: tuple[float, ...], world: Any, thing: Any) -> None:
     stocked(world, thing, screw=np.array(place))
-    failed(picked(world), "detect", "localizer", "no reachable screw")
+    failed(picked(world), "detect", "localizer", "no reachable screw", "out_of_reach")
     assert_safe(world)
 
 
@@ -256,7 +259,7 @@ def test_a_method_without_a_grasp_fails_in_approach(full: Any) -> None:
 
 def test_a_screw_the_palm_camera_never_sees_is_lost(full: Any) -> None:
     full.objects["right_hand"] = lambda: []
-    failed(picked(full), "servo", "localizer", "lost the screw")
+    failed(picked(full), "servo", "localizer", "lost the screw", "nothing_there")
     assert_safe(full)
 
 
@@ -292,19 +295,31 @@ def test_an_open_loop_method_is_not_tried_again(full: Any) -> None:
 
 def test_two_empty_grips_are_a_failure(full: Any) -> None:
     full.grips = [False, False, True]
-    failed(picked(full), "grasp", "grasp_method", "hold nothing")
+    failed(picked(full), "grasp", "grasp_method", "hold nothing", "nothing_there")
     assert_safe(full)
 
 
 def test_a_screw_that_slips_while_it_is_pulled(full: Any) -> None:
     full.loses = lambda: full.stages[-1:] == ["extract"]
-    failed(picked(full), "extract", "grasp_method", "slipped out")
+    result = picked(full)
+    failed(result, "extract", "grasp_method", "slipped out", "tight")
+    assert np.linalg.norm(np.array([result.value.tried[0].x, result.value.tried[0].y]) - SCREW[:2]) < 0.003
     assert_safe(full)
+
+
+def test_a_screw_that_rose_before_it_slipped_is_jammed(full: Any, thing: Any) -> None:
+    def lifted() -> list[Any]:
+        rise = 0.008 if full.stages.count("servo") > 1 else 0.0
+        return [thing("screw", SCREW + (0.0, 0.0, rise), full.t)]
+
+    full.objects["right_hand"] = lifted
+    full.loses = lambda: full.stages[-1:] == ["extract"]
+    failed(picked(full), "extract", "grasp_method", "slipped out", "jammed")
 
 
 def test_a_screw_lost_on_the_way(full: Any) -> None:
     full.loses = lambda: full.stages[-1:] == ["place"]
-    failed(picked(full), "place", "grasp_method", "lost on the way")
+    failed(picked(full), "place", "grasp_method", "lost on the way", "slipped")
     assert_safe(full)
 
 

@@ -14,7 +14,7 @@ from golem.errors import GolemError
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.spectator import Shot, SpectatorView
 from golem.runtime.lockstep import build
-from golem.skills.pick import PickGoal
+from golem.skills.pick_config import PickGoal
 from golem.stack import Stack, load_stack
 
 PULL = Shot(look_at=(0.30, 0.0, 0.90), azimuth=55.0, elevation=-12.0, distance=2.6, fovy=45.0)

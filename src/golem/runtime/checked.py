@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from golem.capabilities.arms.base import check_pose
+from golem.capabilities.arms.trajectory import check_trajectory
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, ServoLaw, ServoStatus, ServoStep
 from golem.capabilities.navigation.base import Navigator, NavInputs
+from golem.capabilities.planning.base import NUM_JOINTS, ArmPlanner, Plan, PlanRefused, PlanRequest
 from golem.interfaces.nav_payloads import NavStep
+from golem.interfaces.payloads import JointTrajectory
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import MIN_RATE
 from golem.types import Array, LocalizedObject, PlanarPose, Twist
@@ -60,6 +65,41 @@ class CheckedServoLaw:
         self._contract.array("target", step.target, 3)
         self._contract.number("sigma", step.sigma, minimum=0.0)
         return step
+
+
+class CheckedPlanner:
+    """An `ArmPlanner` whose faults name the module; what it refuses goes further as it is.
+
+    Attributes:
+        latency: see `ArmPlanner`.
+    """
+
+    def __init__(self, planner: ArmPlanner, contract: ContractCheck) -> None:
+        """Watch `planner`."""
+        self._planner, self._contract = planner, contract
+        self.latency = contract.number("latency", planner.latency, minimum=0.0)
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """Return the planner's trajectory; see `ArmPlanner`."""
+        refused: list[PlanRefused] = []
+
+        def ask() -> Plan | None:
+            try:
+                return self._planner.plan(request)
+            except PlanRefused as refusal:
+                refused.append(refusal)
+                return None
+
+        plan = self._contract.call(ask)
+        if refused:
+            raise refused[0]
+        self._contract.kind("the plan", plan, Plan)
+        assert plan is not None
+        n = len(self._contract.array("times", plan.times, *np.shape(plan.times)))
+        for name in ("q", "dq"):
+            self._contract.array(name, getattr(plan, name), n, NUM_JOINTS)
+        self._contract.call(check_trajectory, JointTrajectory(0.0, plan.times, plan.q, plan.dq), request.q)
+        return plan
 
 
 class CheckedNavigator:

@@ -5,6 +5,7 @@ In lock-step they share one process, one bus and one clock; live, each has its o
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -24,7 +25,7 @@ from golem.robots.model.kinematics import Kinematics
 from golem.robots.unitree import motion_switcher
 from golem.robots.unitree.motion_switcher import MotionSwitcher
 from golem.runtime import nodes, perception_nodes
-from golem.runtime.checked import CheckedGraspMethod, CheckedNavigator
+from golem.runtime.checked import CheckedGraspMethod, CheckedNavigator, CheckedPlanner
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Phase, Placed
 from golem.runtime.gantry_release import GantryReleaseNode
@@ -201,6 +202,7 @@ class StackNodes:
         modules = Modules(
             grasp_method=lambda: CheckedGraspMethod(*make("grasp_method")),
             skill=self.skills.make,
+            planner=functools.cache(lambda: CheckedPlanner(*make("planner"))),
             worker=pools.get("grasp_method"),
         )
         self.context = Context(bus, Kinematics(), nodes.SkillNode.period, modules)

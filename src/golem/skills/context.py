@@ -13,6 +13,7 @@ from golem.capabilities.arms.base import check_pose
 from golem.capabilities.arms.line import Line
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper
 from golem.capabilities.perception.lift import scene_of
+from golem.capabilities.planning.base import ArmPlanner
 from golem.interfaces import topics
 from golem.interfaces.payloads import (
     Feedback,
@@ -42,11 +43,13 @@ class Modules:
     Attributes:
         grasp_method: makes a new one.
         skill: makes a new skill, by its name in the stack.
+        planner: the planner, made when it is first asked for.
         worker: where slow modules think; None is on the clock, at the price of the latency that they declare.
     """
 
     grasp_method: Callable[[], GraspMethod]
     skill: Callable[[str], Skill[Context, Any]]
+    planner: Callable[[], ArmPlanner]
     worker: Executor | None = None
 
 
@@ -103,6 +106,10 @@ class Arm:
     def sent(self) -> bool:
         """Whether the arm is being sent anywhere."""
         return self._commanded is not None
+
+    def stays_at(self, T: Array) -> None:
+        """Take `T` (4, 4), in odom, for where the arm was sent: a trajectory has brought it there."""
+        self._commanded, self._velocity = T, np.zeros(3)
 
     def forget(self) -> None:
         """Forget where the arm was sent."""
@@ -262,6 +269,16 @@ class Context:
             raise StageFailed("move", "robot", "The motors do not report.")
         return state.q[UPPER]
 
+    @property
+    def commanded_joints(self) -> Array:
+        """(15,) joints of torso, left arm, right arm that the motors are being sent to [rad].
+
+        Raises:
+            StageFailed: the motors do not report.
+        """
+        command = self.bus.latest(topics.ARM_COMMAND)
+        return self.joints if command is None else command.q
+
     def publish(self, topic: Topic[T], value: T) -> None:
         """Send `value` on `topic` now."""
         self.bus.publish(topic, value, self.t)
@@ -315,14 +332,14 @@ class Context:
             yaw: heading of the gripper's x axis about the vertical that suits the arm best [rad].
         """
         scene, gripper = self.scene("head"), Gripper(side, self.arms[side].pose, yaw)
-        return await self._think(lambda: method.propose(target, scene, gripper), method.latency)
+        return await self.think(lambda: method.propose(target, scene, gripper), method.latency)
 
     def scene(self, camera: str) -> Array:
         """Return the (n, 3) points in odom that the newest frame of `camera` shows [m]; n is 0 before the first."""
         frame = self.bus.latest(topics.rgbd_images(camera))
         return np.zeros((0, 3)) if frame is None else scene_of(frame)
 
-    async def _think(self, function: Callable[[], T], latency: float) -> T:
+    async def think(self, function: Callable[[], T], latency: float) -> T:
         """Return what `function()` does: after `latency` [s] of robot time, or, live, when the worker is done."""
         if self.modules.worker is None:
             result = function()

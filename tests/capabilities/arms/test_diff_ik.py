@@ -12,7 +12,7 @@ from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.line import Line
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.arms.solve import downward
-from golem.capabilities.arms.task_space import TaskSpaceConfig
+from golem.capabilities.arms.task_space import NEAR, TaskSpaceConfig
 from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.sphere_robot import load_spheres
 from golem.errors import ConfigError
@@ -298,7 +298,8 @@ def test_the_report_says_how_well_the_arms_stand(ik: DiffIK) -> None:
     for i, side in enumerate(SIDES):
         assert 0.0 < report.margin[i] < ik.kinematics.margin(side, ik.q)
         assert report.manipulability[i] == pytest.approx(ik.kinematics.manipulability(side, ik.q), rel=1e-6)
-    assert report.clearance == np.inf
+    assert 0.0 < report.clearance < NEAR
+    assert DiffIK(TaskSpaceConfig(collision_rows=0)).report().clearance == np.inf
 
 
 def test_steps_are_damped_at_a_singularity() -> None:

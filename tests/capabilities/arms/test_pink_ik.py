@@ -9,13 +9,14 @@ from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.pink_ik import PinkIK
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.arms.solve import downward
+from golem.capabilities.arms.task_space import TaskSpaceConfig
 from golem.errors import MissingExtra
 from golem.types import NUM_JOINTS, UPPER
 
 
 def test_pink_and_the_lean_program_agree() -> None:
     pytest.importorskip("pink", reason="needs the extra 'pink'")
-    lean, reference = DiffIK(), PinkIK()
+    lean, reference = DiffIK(TaskSpaceConfig(collision_rows=0)), PinkIK()
     q = np.zeros(NUM_JOINTS)
     q[UPPER] = posture("ready")
     goals = [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -17,7 +18,10 @@ _STILL = 1e-9
 
 
 class PinkIK(TaskSpaceController):
-    """Weighted-task differential IK through Pink's tasks and limits: the paper's way, and a check on `DiffIK`."""
+    """Weighted-task differential IK through Pink's tasks and limits: the paper's way, and a check on `DiffIK`.
+
+    It has no rows for collisions: `collision_rows` counts as 0.
+    """
 
     def __init__(self, config: TaskSpaceConfig | None = None) -> None:
         """Build the model and Pink's tasks.
@@ -32,7 +36,7 @@ class PinkIK(TaskSpaceController):
             import pink.tasks
         except ImportError as error:
             raise MissingExtra("pin-pink", "pink") from error
-        super().__init__(config)
+        super().__init__(replace(config or TaskSpaceConfig(), collision_rows=0))
         c = self.config
         self._pink = pink
         model = self.kinematics.model

@@ -15,7 +15,7 @@ from golem.types import NUM_JOINTS, SIDES, UPPER, Array, Side
 # only break ties.
 _OFFLINE = TaskSpaceConfig(
     arm_speed=0.5, torso_speed=0.2, posture_weight=1e-8, torso_weight=1e-6, palm_speed=0.2, palm_turn=1.0,
-    error_damping=1e-2, limit_margin=0.05,
+    error_damping=1e-2, limit_margin=0.05, collision_rows=0,
 )  # fmt: skip
 _ITERATIONS = 120
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -75,8 +76,8 @@ class TaskSpaceConfig:
     singular_value: float = 0.03
     singular_damping: float = 1e-3
     limit_margin: float = 0.002
-    collision_rows: int = 0
-    clearance: float = 0.005
+    collision_rows: int = 6
+    clearance: float = 0.002
     collision_gain: float = 0.2
     palm_speed: float = 1.0
     palm_turn: float = 2.0
@@ -314,6 +315,7 @@ def _norm(v: Array) -> float:
     return float(np.sqrt(v @ v))
 
 
+@functools.cache
 def _spheres() -> CollisionModel:
     # Numba takes a second to import, and arms without collision rows do without it.
     from golem.capabilities.collision.collision_model import CollisionModel

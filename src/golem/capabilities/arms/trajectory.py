@@ -6,16 +6,19 @@ the straight line. On the way to a first point that is not due at once it starts
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from golem.capabilities.arms.base import NUM_UPPER, TargetError, check_dt
+from golem.capabilities.planning.hermite import interpolate
+from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import ArmCommand, JointTrajectory
-from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import UPPER, Array
 
-SHARE = 0.9
-"""Share of the model's velocity limits that is used: the safety gate stops beyond it."""
+FASTEST = 0.9
+"""Share of the gate's slew rate, which clips what is faster, that is used."""
 NEAR = 0.1
 """How far the joints may be from a first point that is due at once [rad] [own: servo lag and sag of a laden arm]."""
 
@@ -28,10 +31,8 @@ class TrajectoryFollower:
     """
 
     def __init__(self) -> None:
-        """Take the limits from the model."""
-        limits = load_limits()
-        self._lower, self._upper = limits.lower[UPPER], limits.upper[UPPER]
-        self._speed = SHARE * limits.velocity[UPPER]
+        """Take the limits that the safety gate enforces."""
+        self._lower, self._upper, self._speed = gate_limits()
         self.q: Array = np.zeros(NUM_UPPER)
         self._t = 0.0
         self._times: Array = np.zeros(1)
@@ -61,24 +62,22 @@ class TrajectoryFollower:
         check_dt(dt)
         wanted = self._at(t - self._t)
         room = self._speed * dt
-        near = np.clip(wanted, self.q - room, self.q + room)
-        self.q = np.clip(near, self._lower, self._upper)
+        # A joint that starts beyond its range comes back at its speed.
+        inside = np.clip(wanted, self._lower, self._upper)
+        self.q = np.clip(inside, self.q - room, self.q + room)
         limited = bool(np.abs(self.q - wanted).max() > 1e-9)
         return ArmCommand(self.q.copy(), np.zeros(2), np.zeros(2), limited)
 
     def _at(self, s: float) -> Array:
         """Return the joints (15,) of the trajectory `s` [s] after its beginning."""
-        times, points = self._times, self._points
-        if s >= times[-1] or len(times) == 1:
-            return points[-1]
-        i = max(int(np.searchsorted(times, s, side="right")) - 1, 0)
-        span = times[i + 1] - times[i]
-        u = max(s - times[i], 0.0) / span
-        a, b = points[i], points[i + 1]
-        if self._velocities is None:
-            return a + u * (b - a)
-        va, vb = span * self._velocities[i], span * self._velocities[i + 1]
-        return a + u * va + u**2 * (3.0 * (b - a) - 2.0 * va - vb) + u**3 * (2.0 * (a - b) + va + vb)
+        return interpolate(self._times, self._points, self._velocities, np.array([s]))[0]
+
+
+@functools.cache
+def gate_limits() -> tuple[Array, Array, Array]:
+    """Return (15,) the range of the joints and their speed that the safety gate lets through [rad, rad/s]."""
+    gate = SafetyLimits.from_profile()
+    return gate.lower[UPPER], gate.upper[UPPER], FASTEST * gate.slew[UPPER]
 
 
 def check_trajectory(trajectory: JointTrajectory, q: Array) -> None:
@@ -102,14 +101,13 @@ def check_trajectory(trajectory: JointTrajectory, q: Array) -> None:
     finite = [np.isfinite(array).all() for array in (times, points, velocities) if array is not None]
     if not all(finite):
         raise TargetError("A trajectory contains NaN or infinity.")
-    limits = load_limits()
-    _check_range(points, limits.lower[UPPER], limits.upper[UPPER], "is sent to", "rad")
+    lower, upper, fastest = gate_limits()
+    _check_range(points, lower, upper, "is sent to", "rad")
     if times[0] > 0.0:
         times, points = np.concatenate(([0.0], times)), np.vstack((q, points))
     else:
         near = np.full(NUM_UPPER, NEAR)
         _check_range(points[:1] - q, -near, near, "is to start at once with an offset of", "rad")
-    fastest = SHARE * limits.velocity[UPPER]
     speeds = np.diff(points, axis=0) / np.diff(times)[:, None]
     for asked in (speeds, velocities):
         if asked is not None:

@@ -78,7 +78,7 @@ class CollisionModel:
             return True
         if world is None:
             return False
-        return world_kernel.world_collides(q, self.ints, self.floats, self._moving, *world.arrays(), margin)
+        return world_kernel.world_collides(q, self.ints, self.floats, *world.arrays(), margin)
 
     def collides_each(self, Q: Array, margin: float = 0.0, world: World | None = None) -> NDArray[np.bool_]:
         """Return (m,) whether each row of `Q` (m, n) collides, see `collides`."""
@@ -88,9 +88,7 @@ class CollisionModel:
         if world is not None:
             free = np.flatnonzero(~out)
             hit = np.empty(len(free), np.bool_)
-            world_kernel.world_collides_each(
-                Q[free], self.ints, self.floats, self._moving, *world.arrays(), margin, hit
-            )
+            world_kernel.world_collides_each(Q[free], self.ints, self.floats, *world.arrays(), margin, hit)
             out[free] = hit
         return out
 

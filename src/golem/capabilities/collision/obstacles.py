@@ -99,10 +99,15 @@ def cloud_grid(points: Points, cell: float = 0.02, bounds: Array = REACH) -> Clo
     count = world_kernel.number_cells(points, frame, cells)
     balls = np.zeros((count, 4))
     kept = world_kernel.fill_balls(points, frame, cells, balls)
+    return CloudGrid(balls, cells, cell_steps(cells), frame, len(points) - kept)
+
+
+def cell_steps(cells: Cells) -> Cells:
+    """Return how many cells away from each cell the nearest is that is not empty, -1; diagonals count one."""
     steps = np.full(cells.shape, 255, np.int32)
-    if count:
+    if (cells >= 0).any():
         ndimage.distance_transform_cdt(cells < 0, metric="chessboard", distances=steps)
-    return CloudGrid(balls, cells, steps, frame, len(points) - kept)
+    return steps
 
 
 class World:

@@ -98,11 +98,12 @@ def views(ints: Ints, floats: Array) -> tuple[Any, ...]:
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _put(R: Array, p: Array, b: int, local: Array, i: int, out: Array) -> None:
+def put(R: Array, p: Array, b: int, local: Array, i: int, out: Array) -> None:
+    """Write ball `i` of `local`, a flat table, into `out` (4,) where body `b` carries it."""
     x, y, z = local[4 * i], local[4 * i + 1], local[4 * i + 2]
     for k in range(3):
-        out[i, k] = R[b, 3 * k] * x + R[b, 3 * k + 1] * y + R[b, 3 * k + 2] * z + p[b, k]
-    out[i, 3] = local[4 * i + 3]
+        out[k] = R[b, 3 * k] * x + R[b, 3 * k + 1] * y + R[b, 3 * k + 2] * z + p[b, k]
+    out[3] = local[4 * i + 3]
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -126,24 +127,22 @@ def _spread(
     if not done[c]:
         done[c] = 1
         for i in range(cluster_first[c], cluster_first[c + 1]):
-            _put(R, p, cluster_body[c], balls, i, placed)
+            put(R, p, cluster_body[c], balls, i, placed[i])
 
 
 @njit(cache=True, nogil=True)
-def collides(q: Array, ints: Ints, floats: Array, margin: float) -> bool:
-    """Return whether two tested spheres come as near as `margin` [m] at `q`; stops at the first."""
-    n, links, clusters, spheres = ints[0], ints[1], ints[2], ints[3]
+def bodies_collide(R: Array, p: Array, ints: Ints, floats: Array, margin: float) -> bool:
+    """Return whether two tested spheres come as near as `margin` [m], the bodies being where `place` put them."""
+    links, clusters, spheres = ints[1], ints[2], ints[3]
     tables = views(ints, floats)
     link_body, cluster_first, cluster_body, link_pairs, link_pair_first = tables[:5]
     cluster_pairs, cluster_pair_first, sphere_pairs, link_balls, cluster_balls, balls, allowed = tables[5:]
-    R, p = np.empty((n + 1, 9)), np.empty((n + 1, 3))
-    place(q, ints, floats, R, p)
     room = np.empty((links + clusters + spheres, 4))
     placed_links, placed_clusters = room[:links], room[links : links + clusters]
     placed = room[links + clusters :]
     done = np.zeros(2 * clusters, np.uint8)
     for i in range(links):
-        _put(R, p, link_body[i], link_balls, i, placed_links)
+        put(R, p, link_body[i], link_balls, i, placed_links[i])
     for i in range(ints[4]):
         reach = margin - allowed[i]
         if not _near(placed_links, link_pairs[2 * i], placed_links, link_pairs[2 * i + 1], reach):
@@ -153,7 +152,7 @@ def collides(q: Array, ints: Ints, floats: Array, margin: float) -> bool:
             for c in (a, b):
                 if not done[clusters + c]:
                     done[clusters + c] = 1
-                    _put(R, p, cluster_body[c], cluster_balls, c, placed_clusters)
+                    put(R, p, cluster_body[c], cluster_balls, c, placed_clusters[c])
             if not _near(placed_clusters, a, placed_clusters, b, reach):
                 continue
             _spread(a, cluster_first, cluster_body, balls, R, p, placed, done)
@@ -162,6 +161,15 @@ def collides(q: Array, ints: Ints, floats: Array, margin: float) -> bool:
                 if _near(placed, sphere_pairs[2 * k], placed, sphere_pairs[2 * k + 1], reach):
                     return True
     return False
+
+
+@njit(cache=True, nogil=True)
+def collides(q: Array, ints: Ints, floats: Array, margin: float) -> bool:
+    """Return whether two tested spheres come as near as `margin` [m] at `q`; stops at the first."""
+    n = ints[0]
+    R, p = np.empty((n + 1, 9)), np.empty((n + 1, 3))
+    place(q, ints, floats, R, p)
+    return bodies_collide(R, p, ints, floats, margin)
 
 
 @njit(cache=True, nogil=True)
@@ -179,7 +187,7 @@ def place_spheres(q: Array, ints: Ints, floats: Array, R: Array, p: Array, place
     place(q, ints, floats, R, p)
     for c in range(ints[2]):
         for i in range(cluster_first[c], cluster_first[c + 1]):
-            _put(R, p, cluster_body[c], balls, i, placed)
+            put(R, p, cluster_body[c], balls, i, placed[i])
 
 
 @njit(cache=True, nogil=True)
@@ -201,9 +209,9 @@ def pair_distances(
     allowed = tables[11]
     near_links, near_clusters = np.empty((links, 4)), np.empty((clusters, 4))
     for i in range(links):
-        _put(placed_R, placed_p, link_body[i], link_balls, i, near_links)
+        put(placed_R, placed_p, link_body[i], link_balls, i, near_links[i])
     for i in range(clusters):
-        _put(placed_R, placed_p, cluster_body[i], cluster_balls, i, near_clusters)
+        put(placed_R, placed_p, cluster_body[i], cluster_balls, i, near_clusters[i])
     for i in range(ints[4]):
         best = cutoff - allowed[i]
         spheres[i, 0] = spheres[i, 1] = -1

@@ -11,7 +11,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from golem.capabilities.collision.sphere_kernel import Indices, Ints, add_gradient, place_spheres
+from golem.capabilities.collision.sphere_kernel import (
+    Indices,
+    Ints,
+    add_gradient,
+    place,
+    place_spheres,
+    put,
+    views,
+)
 from golem.types import Array
 
 Cells = NDArray[np.int32]
@@ -212,11 +220,11 @@ def ball_distances(
 
 
 @njit(cache=True, nogil=True)
-def world_collides(
-    q: Array,
+def bodies_hit_world(
+    R: Array,
+    p: Array,
     ints: Ints,
     floats: Array,
-    moving: Indices,
     shapes: Array,
     balls: Array,
     cells: Cells,
@@ -224,14 +232,44 @@ def world_collides(
     frame: Array,
     margin: float,
 ) -> bool:
-    """Return whether one of the spheres `moving` (k,) comes as near as `margin` [m] to the world at `q`."""
-    n = ints[0]
-    placed, out = np.empty((ints[3], 4)), np.empty(3)
-    place_spheres(q, ints, floats, np.empty((n + 1, 9)), np.empty((n + 1, 3)), placed)
-    for i in moving:
-        if _to_world(placed[i], shapes, balls, cells, steps, frame, margin + 1e-9, out) <= margin:
-            return True
+    """Return whether a moving sphere comes as near as `margin` [m] to the world, the bodies being where they are put.
+
+    A cluster's ball is asked first, and its spheres only where that is near.
+    """
+    tables = views(ints, floats)
+    cluster_first, cluster_body, cluster_balls, spheres = tables[1], tables[2], tables[9], tables[10]
+    out, placed = np.empty(3), np.empty((1, 4))
+    for c in range(ints[2]):
+        b = cluster_body[c]
+        if b == 0:
+            continue
+        put(R, p, b, cluster_balls, c, placed[0])
+        if _to_world(placed[0], shapes, balls, cells, steps, frame, margin + 1e-9, out) > margin:
+            continue
+        for i in range(cluster_first[c], cluster_first[c + 1]):
+            put(R, p, b, spheres, i, placed[0])
+            if _to_world(placed[0], shapes, balls, cells, steps, frame, margin + 1e-9, out) <= margin:
+                return True
     return False
+
+
+@njit(cache=True, nogil=True)
+def world_collides(
+    q: Array,
+    ints: Ints,
+    floats: Array,
+    shapes: Array,
+    balls: Array,
+    cells: Cells,
+    steps: Cells,
+    frame: Array,
+    margin: float,
+) -> bool:
+    """Return whether a sphere of a moving body comes as near as `margin` [m] to the world at `q`."""
+    n = ints[0]
+    R, p = np.empty((n + 1, 9)), np.empty((n + 1, 3))
+    place(q, ints, floats, R, p)
+    return bodies_hit_world(R, p, ints, floats, shapes, balls, cells, steps, frame, margin)
 
 
 @njit(cache=True, nogil=True)
@@ -239,7 +277,6 @@ def world_collides_each(
     Q: Array,
     ints: Ints,
     floats: Array,
-    moving: Indices,
     shapes: Array,
     balls: Array,
     cells: Cells,
@@ -250,7 +287,7 @@ def world_collides_each(
 ) -> None:
     """Write into `out` (m,) whether each row of `Q` (m, n) collides with the world."""
     for i in range(len(Q)):
-        out[i] = world_collides(Q[i], ints, floats, moving, shapes, balls, cells, steps, frame, margin)
+        out[i] = world_collides(Q[i], ints, floats, shapes, balls, cells, steps, frame, margin)
 
 
 @njit(cache=True, nogil=True)

@@ -32,6 +32,7 @@ SUITES: dict[str, str] = {
     "hand": f"{_HERE}.hand_suite:HandSuite",
     "lower_body": f"{_HERE}.leg_suite:LegSuite",
     "upper_body": f"{_HERE}.arm_suite:ArmSuite",
+    "planner": f"{_HERE}.planner_suite:PlannerSuite",
     "localizer": f"{_HERE}.localizer_suite:LocalizerSuite",
     "grasp_method": f"{_HERE}.grasp_suite:GraspSuite",
     "odometry": f"{_HERE}.odometry_suite:OdometrySuite",

@@ -45,7 +45,7 @@ _COMPARE = {
     "navigator": "golem ladder --rung navigate-line --use navigator={name}.py:{cls} -n 10 --out runs/{name}",
     **{
         slot: f"golem ladder --method visual_servo --use {slot}={{name}}.py:{{cls}} -n 10 --out runs/{{name}}"
-        for slot in ("servo", "hand", "upper_body", "localizer")
+        for slot in ("servo", "hand", "upper_body", "planner", "localizer")
     },
 }
 """Measures the module on a rung of the ladder; there is none for a robot, and none for a skill but `pick`."""

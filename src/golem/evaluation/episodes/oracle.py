@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from golem.evaluation.episodes.pick_claims import Fastener
 from golem.robots.model import magpie_model
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.engine import MujocoRobot
@@ -53,6 +54,21 @@ class Oracle:
             x, y, z, _ = T_tray_world @ (*self._robot.data.body(name).xpos, 1.0)
             if abs(x) <= half_x and abs(y) <= half_y and -0.01 <= z <= height:
                 found.append(name)
+        return found
+
+    def fasteners(self) -> list[Fastener]:
+        """Return the fasteners of the pack's near edge that are in their places before anything happens."""
+        scene = self._robot.scene
+        layout, loose = scene.layout, {draw.slot for draw in scene.draws}
+        T_base_world = np.linalg.inv(self._robot.truth.base().T_world_base)
+        spots = layout.fasteners()
+        found = []
+        for slot in layout.reachable(0.5 * layout.size_y):
+            if slot not in layout.empty_holes or slot in loose:
+                world = layout.pose() @ (*spots[slot], 0.0, 1.0)
+                found.append(
+                    Fastener((self._T_odom_world @ world)[:3], (T_base_world @ world)[:3], slot in loose)
+                )
         return found
 
     def gripper(self, side: Side) -> Array:

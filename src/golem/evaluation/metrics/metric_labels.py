@@ -33,6 +33,8 @@ METRICS: dict[str, Metric] = {
     "grasp_miss": Metric("horizontal distance, hand to screw", "mm", 1e3),
     "grasp_depth": Metric("fingertips below the screw's head", "mm", 1e3),
     "grasp_tilt": Metric("approach off vertical", "deg", _DEG),
+    "pull_beside": Metric("hand beside the straight line while pulling, at most", "mm", 1e3),
+    "pull_turn": Metric("hand turned while pulling, at most", "deg", _DEG),
     "peak_force": Metric("peak force", "N"),
     "peak_lean": Metric("peak lean (pitch)", "deg", _DEG),
     "peak_tilt": Metric("peak tilt (any direction)", "deg", _DEG),
@@ -78,6 +80,12 @@ METRICS: dict[str, Metric] = {
     "frame_p99": Metric("CPU time of a scan with all between two, 99 % quantile", "ms", 1e3),
     "plans_per_second": Metric("plans per second"),
     "in_time": Metric("share of plans in time", "%", 100.0),
+    "claim_picked": Metric("right when it says a screw is in the tray", "%", 100.0),
+    "claim_tight": Metric("right when it says a screw is tight", "%", 100.0),
+    "claim_jammed": Metric("right when it says a screw is jammed", "%", 100.0),
+    "claim_nothing_there": Metric("right when it says there is no screw", "%", 100.0),
+    "claim_out_of_reach": Metric("right when it says a screw is out of reach", "%", 100.0),
+    "claim_tray_missing": Metric("right when it says there is no tray", "%", 100.0),
     "cpu_per_plan": Metric("CPU time of a plan", "ms", 1e3),
 }
 """Name -> how it is shown."""

@@ -7,7 +7,7 @@ that `golem compare` of two runs says what balancing costs.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,8 @@ from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
+from golem.evaluation.episodes.pick_claims import claims
+from golem.evaluation.episodes.pull import straightness
 from golem.evaluation.harness.sweep import read_sweep
 from golem.interfaces import topics
 from golem.middleware.bus import News
@@ -28,10 +30,11 @@ from golem.robots.mujoco.gl import shared_context
 from golem.robots.worlds.conditions import LayoutKind
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import FAULT, SkillResult
-from golem.skills.pick import PickGoal
+from golem.skills.pick_config import PickGoal
+from golem.skills.pick_report import PickReport
 from golem.slots import KEYS
 from golem.stack import Stack, load_stack
-from golem.types import Side
+from golem.types import Array, Side
 
 SLOT = "grasp_method"
 """What the methods of these rungs are."""
@@ -115,12 +118,16 @@ class PickRung(Rung[PickOptions]):
                         False, HANGS.stage, f"lower_body: {stack.choice('lower_body').use}", HANGS.detail
                     )
                 running.executor.run(running.executor.t + RELEASED)
+            before = oracle.fasteners()
             watch = _Watch(running, oracle, BalanceRecorder(robot) if self.balances else None)
             result = running.execute("pick", self._goal, watch=watch)
             running.executor.run(running.executor.t + SETTLE, watch.look)
             if artefacts is not None and watch.recorder is not None:
                 watch.recorder.trace().save(artefacts / TRACE)
-            return _judge(stack, result, oracle, watch, lost(running, watch.recorder))
+            outcome = _judge(stack, result, oracle, watch, lost(running, watch.recorder))
+            said = result.value if isinstance(result.value, PickReport) else PickReport()
+            right = claims(said, before, bool(oracle.screws_in_tray()))
+            return replace(outcome, series={**outcome.series, **right})
         finally:
             oracle.close()
             robot.close()
@@ -170,6 +177,9 @@ class _Watch:
         self._news = News(running.bus, topics.FEEDBACK)
         self.grasp: GraspTruth | None = None
         self.picture: bytes | None = None
+        self.pull: list[Array] = []
+        self._side: Side = "right"
+        self._stage = ""
 
     def look(self) -> bool:
         """Look on after the errand; it is never a reason to end."""
@@ -180,10 +190,15 @@ class _Watch:
     def __call__(self) -> None:
         self.look()
         feedback = self._news.read()
+        if self._stage == "extract":
+            self.pull.append(self._oracle.gripper(self._side))
         if feedback is None:
             return
+        if feedback.stage != self._stage:
+            self._stage = feedback.stage
+            self.pull = [] if self._stage == "extract" else self.pull
         if feedback.stage == "grasp" and not feedback.data.get("failed"):
-            side: Side = feedback.data.get("side", "right")
+            self._side = side = feedback.data.get("side", "right")
             self.grasp = self._oracle.grasp(side, self._running.commanded(side))
         if feedback.stage == DONE or feedback.data.get("failed"):
             self.picture = self._oracle.picture()
@@ -195,6 +210,9 @@ def _judge(
     """Say whether a screw is in the tray and the robot still there, and if not, which module lost it."""
     truth = watch.grasp
     series = {} if truth is None else {f"grasp_{name}": value for name, value in asdict(truth).items()}
+    pulled = straightness(watch.pull)
+    if pulled is not None:
+        series |= {"pull_beside": pulled[0], "pull_turn": pulled[1]}
     if watch.recorder is not None:
         series |= balance(watch.recorder.trace())
     if loss is not None and result.stage not in ABORTED:

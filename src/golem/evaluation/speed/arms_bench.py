@@ -1,4 +1,4 @@
-"""`golem bench arms`: collision checks and ticks of inverse kinematics, in CPU time of this thread."""
+"""`golem bench arms`: collision checks, ticks of inverse kinematics and plans, in CPU time of this thread."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from golem.capabilities.collision.pack_robot import our_robot
 from golem.capabilities.collision.sphere_robot import SphereRobot, load_spheres
 from golem.errors import ConfigError, MissingExtra
 from golem.evaluation.speed.bench import Figure, figure, ik_figure, timed
+from golem.evaluation.speed.plan_bench import planning_table
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import UPPER, Array
 
@@ -33,14 +34,16 @@ NEAR = 0.02
 
 @dataclass(frozen=True)
 class ArmsBenchConfig:
-    """Time collision checks and inverse kinematics, and count what the spheres get wrong."""
+    """Time collision checks, inverse kinematics and plans, and count what spheres and planner get wrong."""
 
     postures: int = 10000
     """Postures of torso and arms: a third around `ready`, a third anywhere, a third of them near contact."""
     ticks: int = 4000
     """Ticks of inverse kinematics."""
+    plans: int = 500
+    """Planning queries; 0 leaves the planning table out."""
     seed: int = 0
-    """Of the postures."""
+    """Of the postures and the queries."""
     json: bool = False
     """Print the figures as a last line of JSON."""
 
@@ -51,8 +54,8 @@ def run_arms_bench(config: ArmsBenchConfig) -> list[Figure]:
     Raises:
         ConfigError: a number is out of range.
     """
-    if config.postures < 9 or config.ticks < 1 or config.seed < 0:
-        raise ConfigError("--postures must be 9 or more, --ticks 1 or more, and --seed 0 or more.")
+    if config.postures < 9 or config.ticks < 1 or min(config.seed, config.plans) < 0:
+        raise ConfigError("--postures must be 9 or more, --ticks 1 or more, --plans and --seed 0 or more.")
     robot = load_spheres()
     model = CollisionModel(robot, JOINT_NAMES[UPPER])
     Q = bench_postures(model, config.postures, config.seed)
@@ -81,7 +84,7 @@ def run_arms_bench(config: ArmsBenchConfig) -> list[Figure]:
         figure("six nearest pairs and their gradients", near, 1e6, "us", ""),
     ]
     for name, options in (
-        ("diff_ik", TaskSpaceConfig()),
+        ("diff_ik", TaskSpaceConfig(collision_rows=0)),
         ("diff_ik, 6 rows", TaskSpaceConfig(collision_rows=6)),
     ):
         wanted = "300 us wanted" if options.collision_rows else "70 us wanted"
@@ -106,6 +109,8 @@ def run_arms_bench(config: ArmsBenchConfig) -> list[Figure]:
         f"{len(Q)} postures, {int(truth.sum())} collide by the meshes: {missed} missed, {false} false alarms "
         f"({100 * false / max(1, int((~truth).sum())):.1f} % of the free ones)."
     )
+    if config.plans:
+        figures += planning_table(config.plans, config.seed)
     if config.json:
         print(json.dumps([asdict(f) for f in figures]))
     return figures

@@ -28,7 +28,7 @@ from golem.robots.mujoco.config import MujocoConfig, World
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.lockstep import build, start_posture
 from golem.runtime.perception_nodes import CameraNode, LocalizerNode
-from golem.skills.pick import PickGoal
+from golem.skills.pick_config import PickGoal
 from golem.stack import load_stack
 from golem.types import NUM_JOINTS, TICK, UPPER, Array, Imu, LowCommand, LowState, RgbdImage
 

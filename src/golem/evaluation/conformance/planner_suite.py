@@ -1,0 +1,138 @@
+"""What a planner promises: see `golem.capabilities.planning.base`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from golem.capabilities.arms.postures import posture
+from golem.capabilities.arms.trajectory import check_trajectory
+from golem.capabilities.collision.obstacles import Obstacle, World
+from golem.capabilities.planning.base import ArmPlanner, Plan, PlanRefused, PlanRequest
+from golem.capabilities.planning.joint_space import PlanningRobot
+from golem.capabilities.planning.path_planner import fine_points
+from golem.evaluation.conformance import samples
+from golem.evaluation.conformance.base import Candidate, check
+from golem.evaluation.conformance.suite import Suite
+from golem.interfaces.payloads import JointTrajectory
+from golem.runtime.contract_check import ContractCheck
+
+MEETS = 1e-6
+"""How far a trajectory may begin and end from where it shall [rad]."""
+ALLOWED = 1.0
+"""CPU time beyond its latency that a plan may take [s], as the bench of the shipped planner has it."""
+
+
+class PlannerSuite(Suite):
+    """Inputs are requests, answers plans, or the refusal."""
+
+    slot, contracts, forgets = "planner", (ArmPlanner,), False
+
+    def declared(self, contract: ContractCheck, module: Any) -> None:
+        """Check the latency."""
+        contract.number("latency", module.latency, minimum=0.0)
+
+    def allowed(self, module: ArmPlanner) -> float:
+        """Return its latency, and the time that needs no declaration [s]."""
+        return module.latency + ALLOWED
+
+    def inputs(self) -> Sequence[PlanRequest]:
+        """Return ways between named postures, before a pack."""
+        names = ("home", "ready_right", "ready", "ready_left", "home", "ready", "home")
+        return [PlanRequest(posture(a), posture(b), _pack()) for a, b in zip(names, names[1:], strict=False)]
+
+    def edges(self) -> Mapping[str, Sequence[PlanRequest]]:
+        """Return ways of no length, goals that cannot be gone to, and no effort."""
+        one = self.inputs()[0]
+        beyond = one.goals + 3.0
+        return {
+            "a way of no length": [replace(one, goals=one.q)],
+            "a goal beyond the joints' range": [replace(one, goals=beyond)],
+            "two goals, one of which cannot be gone to": [replace(one, goals=np.array([beyond, one.goals]))],
+            "a start in the pack": [replace(one, world=_pack(0.3))],
+            "no effort": [replace(one, effort=0)],
+        }
+
+    def spoiled(self) -> Mapping[str, PlanRequest]:
+        """Return requests with a NaN each."""
+        one = self.inputs()[0]
+        return {
+            "the start": replace(one, q=samples.with_nan(one.q)),
+            "the goal": replace(one, goals=samples.with_nan(one.goals)),
+        }
+
+    def call(self, module: ArmPlanner, given: PlanRequest) -> Plan | PlanRefused:
+        """Return its plan or its refusal; of what is not finite, raise the refusal."""
+        try:
+            return module.plan(given)
+        except PlanRefused as refusal:
+            if not (np.isfinite(given.q).all() and np.isfinite(given.goals).all()):
+                raise
+            return refusal
+
+    def judge(self, contract: ContractCheck, answer: Any) -> None:
+        """Check a plan."""
+        if isinstance(answer, PlanRefused):
+            return
+        contract.kind("the plan", answer, Plan)
+        n = len(answer.times)
+        contract.array("times", answer.times, n)
+        contract.array("q", answer.q, n, 15)
+        contract.array("dq", answer.dq, n, 15)
+
+    @check
+    def meets_start_and_goal(self, candidate: Candidate) -> None:
+        """A trajectory begins where the arms are and ends at a goal, at rest at both ends."""
+        for given, plan in self._plans(candidate):
+            goals = np.atleast_2d(given.goals)
+            off = (
+                float(np.abs(plan.q[0] - given.q).max()),
+                float(np.abs(goals - plan.q[-1]).max(axis=1).min()),
+            )
+            if max(off) > MEETS or float(np.abs(plan.dq[[0, -1]]).max()) > MEETS:
+                raise candidate.fault(
+                    f"it begins {off[0]:.2g} rad off and ends {off[1]:.2g} rad off, or moves there"
+                )
+
+    @check
+    def can_be_followed(self, candidate: Candidate) -> None:
+        """A trajectory keeps the range and the speed that the safety gate lets through."""
+        for given, plan in self._plans(candidate):
+            trajectory = JointTrajectory(0.0, plan.times, plan.q, plan.dq)
+            candidate.contract.call(check_trajectory, trajectory, given.q)
+
+    @check
+    def touches_nothing(self, candidate: Candidate) -> None:
+        """No posture of a trajectory touches the robot itself or the world."""
+        model = PlanningRobot().model()
+        for given, plan in self._plans(candidate):
+            Q = fine_points(plan.times, plan.q, plan.dq)
+            hit = model.collides_each(Q, 0.0, given.world)
+            if hit.any():
+                raise candidate.fault(
+                    f"{int(hit.sum())} of {len(Q)} postures of a trajectory touch something"
+                )
+
+    @check
+    def gives_up_when_told(self, candidate: Candidate) -> None:
+        """A caller that has given up gets a refusal, not a plan."""
+        given = replace(self.inputs()[0], stop=lambda: True)
+        answer = candidate.contract.call(self.call, candidate.make(), given)
+        if not isinstance(answer, PlanRefused):
+            raise candidate.fault("it plans on though `stop` says True")
+
+    def _plans(self, candidate: Candidate) -> list[tuple[PlanRequest, Plan]]:
+        pairs = zip(self.inputs(), self.answers_of(candidate), strict=True)
+        found = [(given, answer) for given, answer in pairs if isinstance(answer, Plan)]
+        if not found:
+            raise candidate.fault("it finds no way between named postures, none of which is barred")
+        return found
+
+
+def _pack(near: float = 1.02) -> World:
+    T = np.eye(4)
+    T[:3, 3] = near, 0.0, -0.15 if near > 0.9 else 0.25
+    return World([Obstacle("box", T, (0.6, 1.0, 0.075))])

@@ -1,0 +1,90 @@
+"""What a pick is asked, and its distances, speeds and forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from golem.errors import ConfigError
+
+Hand = Literal["left", "right", "either"]
+
+
+@dataclass(frozen=True)
+class PickGoal:
+    """What to pick.
+
+    Attributes:
+        label: class of the object.
+        container: class of what it is dropped into.
+        side: which hand; `either` takes the one that reaches the object and the container.
+    """
+
+    label: str = "screw"
+    container: str = "tray"
+    side: Hand = "right"
+
+    def __post_init__(self) -> None:
+        """Check that there is something to look for.
+
+        Raises:
+            ConfigError: a class is empty.
+        """
+        if not (self.label and self.container):
+            raise ConfigError("A pick names the class of the object and that of its container.")
+
+
+@dataclass(frozen=True)
+class PickConfig:
+    """Distances, speeds and forces.
+
+    Attributes:
+        workspace: where `lines` looks for objects: x_min, x_max, y_min, y_max, z_min, z_max in base_link [m], for the
+            right arm (y is mirrored for the left). The paper's box (x <= 0.60, |y| <= 0.45, -0.05 <= z <= 0.60) but
+            for z, which reaches 0.10 m deeper. `planned` asks the map of reach instead.
+        yaw: heading of the gripper's x axis when it points down [rad], right arm; mirrored for the left.
+        container_radius: objects nearer than this to the container's middle lie in it and are left there [m].
+        comfort: x, y in base_link around which the arm works best [m]; the nearest object is taken first.
+        attempts: how often a method that looks again may try to grasp and pull one object.
+        candidates: how many objects it may try.
+        travel: `planned` goes around what the head camera shows, in postures from which the way down is straight;
+            `lines` goes up, across and down, blind to what is in the way.
+        clearance: height of the gripper above the object when it arrives and when it leaves [m].
+        travel_height: minimum height of the gripper when it moves across, in odom [m]; clears the tray's walls.
+        travel_speed: between places [m/s].
+        descend_speed: straight down to an open-loop grasp [m/s].
+        servo_speed: limit of the visual servo [m/s].
+        servo_timeout: time after which the servo is given up [s].
+        force: force of each finger [N].
+        close_timeout: time the fingers may take [s].
+        pull: length of the straight extraction [m]; longer than any screw.
+        pull_speed: how fast [m/s].
+        tolerance: distance from a commanded pose at which the arm counts as arrived [m].
+        drop_height: height of the fingertips above the container's floor when they open [m].
+        release_gap: opening that lets go [m].
+        look_timeout: time a camera may take to show the object [s].
+        timeout: time after which the pick is given up [s]; the paper's grasps took 75 +- 16 s by the clock.
+    """
+
+    workspace: tuple[float, float, float, float, float, float] = (0.30, 0.60, -0.30, 0.10, -0.15, 0.60)
+    yaw: float = -1.5707963267948966
+    container_radius: float = 0.15
+    comfort: tuple[float, float] = (0.45, -0.12)
+    attempts: int = 2
+    candidates: int = 3
+    travel: Literal["lines", "planned"] = "lines"
+    clearance: float = 0.15
+    travel_height: float = 0.08
+    travel_speed: float = 0.25
+    descend_speed: float = 0.10
+    servo_speed: float = 0.15
+    servo_timeout: float = 20.0
+    force: float = 16.0
+    close_timeout: float = 2.5
+    pull: float = 0.06
+    pull_speed: float = 0.05
+    tolerance: float = 0.006
+    drop_height: float = 0.10
+    release_gap: float = 0.060
+    look_timeout: float = 3.0
+    timeout: float = 90.0

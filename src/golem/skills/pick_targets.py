@@ -1,0 +1,111 @@
+"""Which objects a pick tries, with which hand, and in which order: one look with the head camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.capabilities.arms.reach_map import load_map
+from golem.interfaces.payloads import Detections
+from golem.skills.context import Context
+from golem.skills.pick_config import PickConfig, PickGoal
+from golem.skills.pick_report import PickFailed, PickOutcome, Tried
+from golem.types import SIDES, Array, LocalizedObject, Side
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """An object to take, where to, and with which hand."""
+
+    label: str
+    container: str
+    side: Side
+    target: LocalizedObject
+
+    @property
+    def first_seen(self) -> Tried:
+        """What is known of it before it was tried."""
+        x, y, z = (float(v) for v in self.target.position)
+        return Tried(self.side, x, y, z)
+
+
+class TargetChoice:
+    """Looks once and chooses."""
+
+    def __init__(self, config: PickConfig) -> None:
+        """Take workspace and comfort from `config`."""
+        self._config = config
+
+    async def look(self, context: Context, goal: PickGoal) -> tuple[list[Attempt], LocalizedObject]:
+        """Look once with the head camera: the reachable objects, the most comfortable first, and the container."""
+        context.say("detect", f"Looking for a {goal.label} and a {goal.container}.")
+        sides: tuple[Side, ...] = SIDES if goal.side == "either" else (goal.side,)
+        with context.watch("head", goal.label, goal.container) as eye:
+            end = context.t + self._config.look_timeout
+            problem, outcome = "The head camera gave no detections in time.", PickOutcome.FAILED
+            while True:
+                sightings = await eye.look(end - context.t)
+                if sightings is None:
+                    raise PickFailed(outcome, "detect", "localizer", problem)
+                containers = [o for o in sightings.objects if o.label == goal.container]
+                container = max(containers, key=lambda o: o.detection.score, default=None)
+                attempts = [
+                    Attempt(goal.label, goal.container, side, o)
+                    for side in sides
+                    for o in self._reachable(context, goal, side, sightings, container)
+                ]
+                if attempts and container is not None:
+                    break
+                seen = any(o.label == goal.label for o in sightings.objects)
+                missing = goal.container if attempts else f"reachable {goal.label}"
+                problem = f"The head camera shows no {missing}."
+                outcome = PickOutcome.OUT_OF_REACH if seen else PickOutcome.NOTHING_THERE
+                outcome = PickOutcome.TRAY_MISSING if container is None and seen else outcome
+        if goal.side == "either":
+            attempts = [a for a in attempts if self._serves(context, a.side, container)] or attempts
+        attempts.sort(key=lambda a: self._discomfort(context, a.side, a.target))
+        chosen = attempts[: self._config.candidates]
+        text = f"{len(attempts)} {goal.label}s in reach."
+        context.say("detect", text, target=chosen[0].target.position.tolist())
+        return chosen, container
+
+    def _reachable(
+        self,
+        context: Context,
+        goal: PickGoal,
+        side: Side,
+        sightings: Detections,
+        container: LocalizedObject | None,
+    ) -> list[LocalizedObject]:
+        """Return the objects within the workspace of a hand, without those that lie in the container already."""
+        x0, x1, y0, y1, z0, z1 = self._config.workspace
+
+        def wanted(o: LocalizedObject) -> bool:
+            if o.label != goal.label:
+                return False
+            if container is not None:
+                apart = np.hypot(*(o.position - container.position)[:2])
+                if apart < self._config.container_radius:
+                    return False
+            x, y, z = p = _in_base(context, side, o.position)
+            if self._config.travel == "planned":
+                return load_map().serves("right", p)
+            return x0 <= x <= x1 and y0 <= y <= y1 and z0 <= z <= z1
+
+        return [o for o in sightings.objects if wanted(o)]
+
+    def _serves(self, context: Context, side: Side, container: LocalizedObject) -> bool:
+        """Return whether a hand need not reach across the body to the container."""
+        return bool(_in_base(context, side, container.position)[1] <= self._config.workspace[3])
+
+    def _discomfort(self, context: Context, side: Side, o: LocalizedObject) -> float:
+        x, y, _ = _in_base(context, side, o.position)
+        return float(np.hypot(x - self._config.comfort[0], y - self._config.comfort[1]))
+
+
+def _in_base(context: Context, side: Side, position: Array) -> Array:
+    """Return (3,) `position` in base_link [m], mirrored for the left hand as if it were the right."""
+    T = context.T_odom_base
+    p = T[:3, :3].T @ (position - T[:3, 3])
+    return p if side == "right" else p * (1.0, -1.0, 1.0)

@@ -1,0 +1,217 @@
+"""Motions of the arms that are planned before they begin: around what is in the way, and along checked lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from threading import Event
+
+import numpy as np
+
+from golem.capabilities.arms.base import ARM_COLUMNS
+from golem.capabilities.arms.goal_postures import POSITION, GoalPostures
+from golem.capabilities.arms.line_check import LineChecker
+from golem.capabilities.collision.obstacles import World
+from golem.capabilities.collision.scene_cloud import cleared, scene_world
+from golem.capabilities.planning.base import Held, Plan, PlanRefused, PlanRequest, Refusal
+from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
+from golem.capabilities.planning.plan_kernel import WORLD
+from golem.capabilities.planning.rules import Rule
+from golem.skills.context import Context
+from golem.types import SIDES, Array, Side
+
+SCREW: Array = np.array([[0.0, 0.0, z, 0.010] for z in (-0.005, 0.005, 0.015, 0.025)])
+"""Balls that hold a screw of 30 mm between the fingertips, in the grasp frame [m]."""
+TOUCHING = 0.015
+"""What the cloud shows this near to the robot, where it stands already, is not in its way [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Then:
+    """A straight line that a hand is to be able to go after a planned motion.
+
+    Attributes:
+        side: which hand.
+        T_odom_gripper: (4, 4) where the line ends, in odom.
+        speed: how fast [m/s].
+    """
+
+    side: Side
+    T_odom_gripper: Array
+    speed: float
+
+
+class PlannedMotion:
+    """Plans with the stack's planner and moves through the context.
+
+    Attributes:
+        world: what stands around, in base_link; empty until `look` was called.
+    """
+
+    def __init__(self, context: Context) -> None:
+        """Plan for `context`."""
+        self._context = context
+        self._planner = context.modules.planner()
+        self._robot, self._goals, self._lines = PlanningRobot(), GoalPostures(), LineChecker()
+        self.world = World()
+
+    def look(self, spared: Sequence[tuple[Array, float]] = ()) -> int:
+        """Take what the head camera shows now for the world; return how many cells of it are occupied.
+
+        Args:
+            spared: what the hand is to go to: centres (3,) in odom and radii [m].
+        """
+        context = self._context
+        T = np.linalg.inv(context.T_odom_base)
+        points = context.scene("head") @ T[:3, :3].T + T[:3, 3]
+        spheres = self._robot.model().placed(np.ascontiguousarray(context.joints))
+        self.world = scene_world(
+            points, spheres, [(T[:3, :3] @ centre + T[:3, 3], radius) for centre, radius in spared]
+        )
+        return 0 if self.world.cloud is None else len(self.world.cloud.balls)
+
+    async def to(
+        self,
+        targets: Mapping[Side, Array],
+        hand_speed: float,
+        then: Sequence[Then] = (),
+        rules: Sequence[Rule] = (),
+        held: Sequence[Held] = (),
+    ) -> Plan:
+        """Bring hands to poses, around what is in the way; return the way that was gone.
+
+        Args:
+            targets: (4, 4) poses of the grasp frames in odom, by side; a hand without one stays.
+            hand_speed: how fast the hands may move [m/s].
+            then: lines that shall be possible from there.
+            rules: what the way has to keep.
+            held: what the hands hold.
+
+        Raises:
+            PlanRefused: there is no such way; nothing has moved.
+            StageFailed: the motors do not report, or the safety gate stays shut.
+        """
+        context = self._context
+        q, world = self._start(held)
+        T = np.linalg.inv(context.T_odom_base)
+        in_base: dict[Side, Array] = {side: T @ pose for side, pose in targets.items()}
+        lines = [Then(one.side, T @ one.T_odom_gripper, one.speed) for one in then]
+
+        def think() -> PlanRequest:
+            goals = self._goal_postures(q, world, in_base, lines, rules, held)
+            return PlanRequest(q, goals, world, rules, held, hand_speed=hand_speed)
+
+        plan = await self._planned(think)
+        await self._follow(plan, tuple(targets))
+        return plan
+
+    async def to_joints(self, goal: Array, sides: Sequence[Side], hand_speed: float) -> Plan:
+        """Bring torso and arms to the joints `goal` (15,) [rad], around what is in the way; see `to`.
+
+        The arms of `sides` move, with the torso; an arm that is not among them stays.
+        """
+        q, world = self._start()
+        columns = [0, *(j for side in sides for j in range(*ARM_COLUMNS[side].indices(len(q))))]
+        wanted = q.copy()
+        wanted[columns] = goal[columns]
+        plan = await self._planned(lambda: PlanRequest(q, wanted[None], world, hand_speed=hand_speed))
+        await self._follow(plan, sides)
+        return plan
+
+    def _start(self, held: Sequence[Held] = ()) -> tuple[Array, World]:
+        """Return the joints to plan from, and the world without what the robot would touch there: it is there."""
+        q = np.clip(self._context.commanded_joints, self._robot.lower, self._robot.upper)
+        world = self.world
+        if world.cloud is not None and JointSpace(self._robot, q, world, held=held).verdict(q) == WORLD:
+            balls = self._robot.model(held).placed(np.ascontiguousarray(q))
+            world = World(world.obstacles, cleared(world.cloud, balls, TOUCHING))
+        return q, world
+
+    async def _planned(self, request: Callable[[], PlanRequest]) -> Plan:
+        """Return the plan for `request()`; a planner on a thread of its own is told when the skill is cancelled."""
+        given_up = Event()
+        try:
+            return await self._context.think(
+                lambda: self._planner.plan(replace(request(), stop=given_up.is_set)), self._planner.latency
+            )
+        except BaseException:
+            given_up.set()
+            raise
+
+    async def _follow(self, plan: Plan, sides: Sequence[Side]) -> None:
+        context = self._context
+        await context.follow(plan.times, plan.q, plan.dq)
+        for side in sides:
+            here = self._goals.pose(side, plan.q[-1])
+            context.arms[side].stays_at(context.T_odom_base @ here)
+
+    async def line(
+        self,
+        side: Side,
+        T_goal: Array,
+        v_max: float,
+        stop: Callable[[], bool] = lambda: False,
+        avoid: bool = False,
+    ) -> None:
+        """Go straight to `T_goal` (4, 4) in odom, if the hand can keep to the line; see `Arm.move`.
+
+        Args:
+            side: which hand.
+            T_goal: where to.
+            v_max: speed [m/s].
+            stop: asked every tick.
+            avoid: whether the world counts, not the robot itself alone.
+
+        Raises:
+            PlanRefused: it cannot; nothing has moved.
+        """
+        context = self._context
+        q = context.commanded_joints
+        space = JointSpace(self._robot, q, self.world if avoid else None)
+        self._lines.check(side, np.linalg.inv(context.T_odom_base) @ T_goal, q, v_max, space=space)
+        await context.arms[side].move(T_goal, v_max, stop=stop)
+
+    def _goal_postures(
+        self,
+        q: Array,
+        world: World,
+        targets: Mapping[Side, Array],
+        lines: Sequence[Then],
+        rules: Sequence[Rule],
+        held: Sequence[Held],
+    ) -> Array:
+        """Return (k, 15) postures to plan to, from which the lines can be gone.
+
+        Raises:
+            PlanRefused: there is none.
+        """
+        space = JointSpace(self._robot, q, world, rules, held)
+        itself = JointSpace(self._robot, q, held=held)
+        found: list[str] = []
+
+        def free(goal: Array) -> bool:
+            verdict = space.verdict(goal)
+            if verdict:
+                found.append(space.reason(verdict, goal))
+                return False
+            try:
+                for line in lines:
+                    self._lines.check(line.side, line.T_odom_gripper, goal, line.speed, space=itself)
+            except PlanRefused as error:
+                found.append(str(error))
+                return False
+            return True
+
+        left, right = (targets.get(side) for side in SIDES)
+        goals = self._goals.find(left, right, q, free)
+        if len(goals):
+            return goals
+        which = " and ".join(targets)
+        if not found or self._goals.nearest > POSITION:
+            raise PlanRefused(
+                Refusal.UNREACHABLE,
+                f"The {which} hand gets no nearer than {self._goals.nearest * 1e3:.0f} mm to where it is to go.",
+            )
+        raise PlanRefused(
+            Refusal.GOAL, f"The {which} hand cannot be where it is to go: {found[-1]}.".replace("..", ".")
+        )

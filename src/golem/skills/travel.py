@@ -1,0 +1,166 @@
+"""How a skill brings a hand from one place to another: along lines at a safe height, or along planned ways."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from golem.capabilities.planning.base import Held, PlanRefused, Refusal
+from golem.skills.base import StageFailed
+from golem.skills.context import Context
+from golem.skills.poses import at_height
+from golem.types import SIDES, Array, Side
+
+SPARED = 0.06
+"""Radius around an object that the hand goes to within which nothing is in its way [m]."""
+ARM_BLAMED = (Refusal.UNREACHABLE, Refusal.OFF_LINE)
+
+
+def _never() -> bool:
+    return False
+
+
+class Travel(Protocol):
+    """Moves hands; every pose is that of a grasp frame in odom, (4, 4)."""
+
+    def look(self, targets: Sequence[Array]) -> None:
+        """Take the world from what the head camera shows now; `targets` (3,) in odom are what is to be gone to."""
+        ...
+
+    async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
+        """Bring an empty hand above an object, from where it can go straight down to `T_object` and up again.
+
+        Raises:
+            StageFailed: it cannot be brought there.
+        """
+        ...
+
+    async def carry(self, side: Side, T_goal: Array, speed: float) -> None:
+        """Bring a hand that holds something to a pose.
+
+        Raises:
+            StageFailed: it cannot be brought there.
+        """
+        ...
+
+    async def line(
+        self, side: Side, T_goal: Array, speed: float, stage: str, stop: Callable[[], bool] = _never
+    ) -> None:
+        """Go straight to a pose; ends early once `stop()` is true.
+
+        Raises:
+            StageFailed: the hand cannot keep to the line; it has not moved, and `stage` is what failed.
+        """
+        ...
+
+    async def home(self, side: Side, speed: float) -> None:
+        """Bring a hand back to where it was when this was made; it goes whatever is in the way."""
+        ...
+
+
+class LineTravel:
+    """Up to a height, across, and down, blind to what is in the way."""
+
+    def __init__(self, context: Context, height: float, tolerance: float) -> None:
+        """Remember where the hands are.
+
+        Args:
+            context: whose hands.
+            height: least height of a hand that moves across, in odom [m].
+            tolerance: distance from a pose at which the arm counts as arrived [m].
+        """
+        self._context, self._height, self._tolerance = context, height, tolerance
+        self._homes = {side: context.arms[side].pose for side in SIDES}
+
+    def look(self, targets: Sequence[Array]) -> None:
+        """Look at nothing."""
+
+    async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
+        """Go up, across and down; see `Travel`."""
+        await self._go(side, T_above, speed)
+
+    async def carry(self, side: Side, T_goal: Array, speed: float) -> None:
+        """Go up, across and down; see `Travel`."""
+        await self._go(side, T_goal, speed)
+
+    async def line(
+        self, side: Side, T_goal: Array, speed: float, stage: str, stop: Callable[[], bool] = _never
+    ) -> None:
+        """Go, unchecked; see `Travel`."""
+        await self._context.arms[side].move(T_goal, speed, stop=stop)
+
+    async def home(self, side: Side, speed: float) -> None:
+        """Go up, across and down; see `Travel`."""
+        await self._go(side, self._homes[side], speed)
+
+    async def _go(self, side: Side, T_goal: Array, speed: float) -> None:
+        arm = self._context.arms[side]
+        start = arm.commanded
+        height = max(start[2, 3], T_goal[2, 3], self._height)
+        for T in (at_height(start, height), at_height(T_goal, height), T_goal):
+            await arm.move(T, speed)
+        await arm.settle(self._tolerance, 1.0)
+
+
+class PlannedTravel:
+    """Around what the head camera shows, with lines that are checked before the hand moves."""
+
+    def __init__(self, context: Context, lines: LineTravel, tolerance: float) -> None:
+        """Remember where the arms are.
+
+        Args:
+            context: whose hands.
+            lines: the way home when there is no planned one.
+            tolerance: distance from a pose at which the arm counts as arrived [m].
+        """
+        # Numba takes a second to import, and lines do without it.
+        from golem.skills.planned_motion import PlannedMotion
+
+        self._context, self._lines, self._tolerance = context, lines, tolerance
+        self._motion = PlannedMotion(context)
+        self._home = context.commanded_joints.copy()
+
+    def look(self, targets: Sequence[Array]) -> None:
+        """Take the head camera's cloud for the world; see `Travel`."""
+        self._motion.look([(target, SPARED) for target in targets])
+
+    async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
+        """Go there in a posture from which the way down and up again is straight; see `Travel`."""
+        from golem.skills.planned_motion import Then
+
+        await self._to("approach", side, T_above, speed, then=[Then(side, T_object, speed)])
+
+    async def carry(self, side: Side, T_goal: Array, speed: float) -> None:
+        """Go around what is in the way of the hand and of the screw; see `Travel`."""
+        from golem.skills.planned_motion import SCREW
+
+        await self._to("place", side, T_goal, speed, held=[Held(side, SCREW)])
+
+    async def line(
+        self, side: Side, T_goal: Array, speed: float, stage: str, stop: Callable[[], bool] = _never
+    ) -> None:
+        """Go if the hand can keep to the line; see `Travel`."""
+        try:
+            await self._motion.line(side, T_goal, speed, stop)
+        except PlanRefused as refusal:
+            raise failed(stage, refusal) from refusal
+
+    async def home(self, side: Side, speed: float) -> None:
+        """Go back to the joints it began with, or, where no way is found, along lines; see `Travel`."""
+        try:
+            await self._motion.to_joints(self._home, [side], speed)
+        except PlanRefused:
+            await self._lines.home(side, speed)
+
+    async def _to(self, stage: str, side: Side, T: Array, speed: float, **options: object) -> None:
+        try:
+            await self._motion.to({side: T}, speed, **options)  # pyright: ignore[reportArgumentType]
+        except PlanRefused as refusal:
+            raise failed(stage, refusal) from refusal
+        await self._context.arms[side].settle(self._tolerance, 1.0)
+
+
+def failed(stage: str, refusal: PlanRefused) -> StageFailed:
+    """Return the failure of `stage` that a refusal is: the arm's where it does not reach, else the planner's."""
+    slot = "upper_body" if refusal.refusal in ARM_BLAMED else "planner"
+    return StageFailed(stage, slot, str(refusal))

@@ -1,0 +1,162 @@
+"""Planned motions through the real node of the arms: there, along lines, refused, and stopped at every stage."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import numpy as np
+import pytest
+
+from golem.capabilities.arms.diff_ik import DiffIK
+from golem.capabilities.arms.postures import posture
+from golem.capabilities.arms.solve import downward
+from golem.capabilities.collision.obstacles import Obstacle, World
+from golem.capabilities.planning.base import PlanRefused, Refusal
+from golem.capabilities.planning.rrt_connect import RrtConnect
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState, GateStatus
+from golem.middleware.bus import Bus
+from golem.robots.model.kinematics import Kinematics
+from golem.runtime.contract_check import ContractCheck
+from golem.runtime.nodes import UpperBodyNode
+from golem.skills.base import SkillResult
+from golem.skills.context import Context, Modules
+from golem.skills.planned_motion import PlannedMotion, Then
+from golem.skills.runner import SkillRun
+from golem.types import NUM_JOINTS, UPPER, Array, BaseEstimate, Imu, LowState
+
+PERIOD = 0.01
+DONE = SkillResult(True, "done", None, "There.")
+OVER: Array = downward(0.45, -0.12, 0.10, -0.5 * np.pi)
+STILL = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
+
+
+class Rig:
+    """Arms that are always where they were sent, under an open gate."""
+
+    def __init__(self, planner: RrtConnect) -> None:
+        self.bus, self.t, self.q = Bus(), 0.0, posture("home")
+        self.node = UpperBodyNode(self.bus, DiffIK(), ContractCheck("upper_body", "diff_ik"))
+        modules = Modules(lambda: pytest.fail(), lambda name: pytest.fail(), lambda: planner)
+        self.context = Context(self.bus, Kinematics(), PERIOD, modules)
+        self.step()
+
+    def step(self) -> None:
+        self.t += PERIOD
+        q = np.zeros(NUM_JOINTS)
+        q[UPPER] = self.q
+        zero = np.zeros(NUM_JOINTS)
+        self.bus.publish(topics.BASE, BaseEstimate(self.t, np.eye(4)), self.t)
+        self.bus.publish(topics.LOW_STATE, LowState(self.t, q, zero, zero, STILL), self.t)
+        self.bus.deliver(self.t)
+        self.node.step(self.t)
+        self.bus.publish(topics.SAFETY, GateStatus(self.t, GateState.ACTIVE), self.t)
+        self.bus.deliver(self.t + 0.5 * PERIOD)
+        command = self.bus.latest(topics.ARM_COMMAND)
+        if command is not None:
+            self.q = command.q.copy()
+        self.context.refresh(self.t)
+
+    def run(self, skill: Coroutine[None, None, SkillResult], ticks: int = 2000) -> SkillRun:
+        """Run a skill to its end, or for so many ticks."""
+        run = SkillRun("scripted", skill)
+        for _ in range(ticks):
+            if run.result is not None:
+                break
+            self.step()
+            run.step()
+        return run
+
+
+@pytest.fixture(scope="module")
+def planner() -> RrtConnect:
+    return RrtConnect()
+
+
+@pytest.fixture
+def rig(planner: RrtConnect) -> Rig:
+    return Rig(planner)
+
+
+async def _over(
+    context: Context, prepare: Callable[[PlannedMotion], Any] = lambda motion: None
+) -> SkillResult:
+    motion = PlannedMotion(context)
+    prepare(motion)
+    down = OVER.copy()
+    down[2, 3] -= 0.1
+    await motion.to({"right": OVER}, 0.25, then=[Then("right", down, 0.1)])
+    await motion.line("right", down, 0.1)
+    return DONE
+
+
+def test_a_hand_gets_there_and_goes_straight_down(rig: Rig) -> None:
+    assert rig.run(_over(rig.context)).result == DONE
+    pose = rig.context.kinematics.pose("right_gripper")
+    np.testing.assert_allclose(pose[:3, 3], [0.45, -0.12, 0.0], atol=1e-3)
+    assert pose[2, 2] < -np.cos(np.deg2rad(0.5))
+
+
+def test_back_to_the_joints_it_came_from(rig: Rig) -> None:
+    home = rig.q.copy()
+
+    async def there_and_back(context: Context) -> SkillResult:
+        await _over(context)
+        await PlannedMotion(context).to_joints(home, ["right"], 0.25)
+        return DONE
+
+    assert rig.run(there_and_back(rig.context)).result == DONE
+    np.testing.assert_allclose(rig.q, home, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("at", "world", "refusal", "words"),
+    [
+        ((0.95, -0.12, 0.1), (), Refusal.UNREACHABLE, r"gets no nearer than \d+ mm"),
+        ((0.45, -0.12, 0.1), ((0.45, -0.12, 0.1),), Refusal.GOAL, "something is in the way"),
+    ],
+)
+def test_what_cannot_be_is_refused_and_nothing_moves(
+    rig: Rig, at: tuple[float, ...], world: tuple[tuple[float, ...], ...], refusal: Refusal, words: str
+) -> None:
+    refusals: list[PlanRefused] = []
+
+    async def there(context: Context) -> SkillResult:
+        motion, T = PlannedMotion(context), OVER.copy()
+        T[:3, 3] = at
+        boxes: list[Obstacle] = []
+        for corner in world:
+            boxes.append(Obstacle("box", T.copy(), (0.05, 0.05, 0.05)))
+            boxes[-1].T_base_obstacle[:3, 3] = corner
+        motion.world = World(boxes)
+        try:
+            await motion.to({"right": T}, 0.25)
+        except PlanRefused as refused:
+            refusals.append(refused)
+        return DONE
+
+    before = rig.q.copy()
+    assert rig.run(there(rig.context)).result == DONE
+    assert refusals[0].refusal is refusal
+    assert re.search(words, str(refusals[0]))
+    np.testing.assert_array_equal(rig.q, before)
+
+
+def test_cancelled_at_every_stage_the_arms_stay_where_they_are(planner: RrtConnect) -> None:
+    whole = Rig(planner)
+    whole.run(_over(whole.context))
+    length = round(whole.t / PERIOD)
+    for ticks in (1, 3, 8, *np.linspace(10, length - 5, 6).astype(int)):
+        rig = Rig(planner)
+        run = rig.run(_over(rig.context), int(ticks))
+        run.cancel()
+        assert run.result is not None and run.result.stage == "cancelled"
+        rig.context.release_arms()
+        rig.step()
+        rig.step()
+        stopped = rig.q.copy()
+        for _ in range(30):
+            rig.step()
+        np.testing.assert_allclose(rig.q, stopped, atol=1e-4)
