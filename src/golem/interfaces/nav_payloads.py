@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,15 +31,33 @@ class OccupancyGrid:
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """What a LiDAR hit in one revolution.
+    """What a LiDAR hit in one scan, the robot itself left out.
 
     Attributes:
-        t: time of the measurement [s].
-        points: (n, 3) in odom [m].
+        t: time of the scan's end [s].
+        points: (n, 3) in odom, finite [m].
+        origin: (3,) where the sensor was in odom at the scan's end [m].
+        floor: (3,) plane of the floor, z = floor[0] x + floor[1] y + floor[2] in odom [m].
     """
 
     t: float
     points: Array
+    origin: Array
+    floor: Array
+
+    @property
+    def heights(self) -> Array:
+        """(n,) height of each point above the floor [m]."""
+        return self.points[:, 2] - self.points[:, :2] @ self.floor[:2] - self.floor[2]
+
+    def seen_from(self, T: PlanarPose) -> Scan:
+        """Return it in the frame in which odom is at `T`."""
+        c, s = math.cos(T.yaw), math.sin(T.yaw)
+        turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        shift = np.array([T.x, T.y, 0.0])
+        slope = self.floor[:2] @ turned[:2, :2]
+        floor = np.array([*slope, self.floor[2] - slope @ shift[:2]])
+        return Scan(self.t, self.points @ turned + shift, self.origin @ turned + shift, floor)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +65,12 @@ class NavGoal:
     """Where a skill wants the robot to be.
 
     Attributes:
-        pose: of base_link in odom; None: nowhere any more.
+        pose: of base_link; None: nowhere any more.
+        frame: what the pose is given in; in `map` it stays where it is in the hall when odom drifts.
     """
 
     pose: PlanarPose | None
+    frame: Literal["odom", "map"] = "odom"
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +82,16 @@ class NavStep:
         arrived: whether the robot stands at the goal, as well as it can.
         left: where the goal is as seen from the robot, by the navigator's own smoothed estimate.
         failure: one sentence why the goal cannot be reached; None while it may.
+        path: (n, 2) places of the way that it means to go, in the frame of the goal [m]; None where it has none.
+        note: what it does, in a word or two, for people: `follow`, `wait`.
     """
 
     twist: Twist
     arrived: bool
     left: PlanarPose
     failure: str | None = None
+    path: Array | None = None
+    note: str = ""
 
     @classmethod
     def failed(cls, reason: str, left: PlanarPose) -> NavStep:

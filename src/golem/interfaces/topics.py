@@ -32,6 +32,7 @@ from golem.types import (
     LowCommand,
     LowState,
     PalmTargets,
+    PlanarPose,
     RgbdImage,
     Side,
     Twist,
@@ -75,8 +76,10 @@ EXTERNAL_ODOMETRY = Topic("odometry/external", ExternalOdometry)
 """From an odometry outside of this stack."""
 MAP = Topic("map", OccupancyGrid)
 """From whatever maps; a stack without it never sends any."""
+MAP_POSE = Topic("map/pose", PlanarPose)
+"""Where the frame of the map is in odom, from whatever maps."""
 SCAN = Topic("scan", Scan)
-"""From a LiDAR; a robot without one never sends any."""
+"""From a LiDAR that an odometry locates; a robot without one never sends any."""
 NAV_GOAL = Topic("navigation/goal", NavGoal)
 """From the running skill, whenever it changes."""
 NAV_STEP = Topic("navigation/step", NavStep)

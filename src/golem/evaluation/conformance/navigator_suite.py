@@ -28,6 +28,9 @@ RESTING = 600
 NEAR, TURNED = 0.1, 0.15
 """How far from the goal a robot that has arrived may stand [m], [rad] [own]."""
 
+FLOOR = np.array([0.0, 0.0, -1.0])
+"""Plane of the floor."""
+
 
 class NavigatorInput(NamedTuple):
     """What it is shown, and where it shall go."""
@@ -46,7 +49,7 @@ def surroundings(t: float) -> tuple[OccupancyGrid, Scan]:
     cells = np.zeros((160, 160), dtype=np.int8)
     cells[120] = 100
     wall = np.stack((np.linspace(-2.0, 2.0, 80), np.full(80, 2.0), np.full(80, 0.5)), axis=1)
-    return OccupancyGrid(t, PlanarPose(-4.0, -4.0, 0.0), 0.05, cells), Scan(t, wall)
+    return OccupancyGrid(t, PlanarPose(-4.0, -4.0, 0.0), 0.05, cells), Scan(t, wall, np.array([0.0, 0.0, 0.7]), FLOOR)
 
 
 class NavigatorSuite(Suite):
@@ -91,7 +94,7 @@ class NavigatorSuite(Suite):
             NavigatorInput(NavInputs(here, i > 2, grid, scan)) for i in range(20)
         ]
         cases["a scan without points"] = [
-            NavigatorInput(NavInputs(here, False, None, Scan(0.1, np.zeros((0, 3)))))
+            NavigatorInput(NavInputs(here, False, None, Scan(0.1, np.zeros((0, 3)), np.zeros(3), FLOOR)))
         ]
         return cases
 
