@@ -124,6 +124,7 @@ SLOTS: dict[str, Slot] = {
     "skill": Slot(
         "golem.skills.base:Skill",
         {
+            "navigate": "golem.skills.navigate:Navigate",
             "pick": "golem.skills.pick:Pick",
             "stand": "golem.skills.walk:Stand",
             "walk": "golem.skills.walk:Walk",

@@ -31,10 +31,12 @@ class MapperNode:
             return
         call = self._contract.call
         call(self._mapper.add_scan, scan)
-        place = self._contract.kind("T_odom_map", call(lambda: self._mapper.T_odom_map), PlanarPose)
-        for name in ("x", "y", "yaw"):
-            self._contract.number(f"T_odom_map.{name}", getattr(place, name))
-        self._bus.publish(topics.MAP_POSE, place, t)
+        place = call(lambda: self._mapper.T_odom_map)
+        if place is not None:
+            self._contract.kind("T_odom_map", place, PlanarPose)
+            for name in ("x", "y", "yaw"):
+                self._contract.number(f"T_odom_map.{name}", getattr(place, name))
+            self._bus.publish(topics.MAP_POSE, place, t)
         if t < self._due - 1e-9:
             return
         self._due = t + self._every

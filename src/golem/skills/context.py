@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -206,6 +207,16 @@ class LegsInterface:
             raise StageFailed("walk", "odometry", f"The odometry has been silent for {age:.1f} s.")
         return self._context.T_odom_base if odometry is None else odometry.T_odom_base
 
+    @property
+    def doubt(self) -> str:
+        """How far off the odometry believes its place to be, as the end of a sentence; empty where it does not say."""
+        odometry = self._context.bus.latest(topics.ODOMETRY)
+        if odometry is None or odometry.covariance is None:
+            return ""
+        place = math.sqrt(max(0.0, float(np.linalg.eigvalsh(odometry.covariance[:2, :2])[-1])))
+        turn = math.degrees(math.sqrt(max(0.0, float(odometry.covariance[5, 5]))))
+        return f", by an odometry that is sure of its place to {100.0 * place:.1f} cm and {turn:.1f} deg"
+
     def drive(self, twist: Twist) -> None:
         """Move the base with `twist`; it has to be repeated every 0.5 s, or the robot stands."""
         self._context.publish(topics.TWIST, twist)
@@ -249,6 +260,23 @@ class Context:
         """(4, 4) estimated pose of base_link in odom."""
         base = self.bus.latest(topics.BASE)
         return np.eye(4) if base is None else base.T_odom_base
+
+    @property
+    def mapped(self) -> bool:
+        """Whether there is a map, and the robot's place in it is known."""
+        return self.bus.latest(topics.MAP) is not None and self.bus.latest(topics.MAP_POSE) is not None
+
+    @property
+    def T_odom_map(self) -> PlanarPose:
+        """Where the frame of the map is in odom.
+
+        Raises:
+            StageFailed: nobody says.
+        """
+        place = self.bus.latest(topics.MAP_POSE)
+        if place is None:
+            raise StageFailed("navigate", "mapper", "The robot's place in the map is not known.")
+        return place
 
     @property
     def joints(self) -> Array:
@@ -333,9 +361,9 @@ class Context:
             await self.tick()
         return job.result()
 
-    def navigate(self, goal: PlanarPose) -> Navigation:
-        """Let the stack's navigator bring base_link to `goal`, in odom, for as long as what is returned is open."""
-        return Navigation(self, goal)
+    def navigate(self, goal: PlanarPose, frame: Literal["odom", "map"] = "odom") -> Navigation:
+        """Let the stack's navigator bring base_link to `goal`, in `frame`, while what is returned is open."""
+        return Navigation(self, goal, frame)
 
     async def run(self, name: str, goal: object, timeout: float | None = None) -> SkillResult:
         """Pursue `goal` with another skill of the stack, and return how that ended; its feedback is heard as its own.

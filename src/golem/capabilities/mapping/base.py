@@ -21,8 +21,8 @@ class Mapper(Protocol):
     rate: float
 
     @property
-    def T_odom_map(self) -> PlanarPose:
-        """Where the map's frame is in odom: at its origin, unless the map was made before this run."""
+    def T_odom_map(self) -> PlanarPose | None:
+        """Where the map's frame is in odom: at its origin, unless the map was made before; None while not known."""
         ...
 
     def reset(self) -> None:
@@ -34,7 +34,7 @@ class Mapper(Protocol):
         ...
 
     def grid(self) -> OccupancyGrid | None:
-        """Return the map of the floor as it is now, its origin in odom; None before anything was seen."""
+        """Return the map of the floor as it is now, its origin in odom; None while there is none."""
         ...
 
     def locate(self, guess: PlanarPose) -> str:

@@ -70,7 +70,9 @@ def save_map(path: Path, stored: StoredMap) -> None:
         base.parent.mkdir(parents=True, exist_ok=True)
         header = f"P5\n{columns} {rows}\n255\n".encode()
         base.with_name(f"{base.name}.pgm").write_bytes(header + image[::-1].tobytes())
-        base.with_name(f"{base.name}.yaml").write_text(yaml.safe_dump(facts, sort_keys=False), encoding="utf-8")
+        base.with_name(f"{base.name}.yaml").write_text(
+            yaml.safe_dump(facts, sort_keys=False), encoding="utf-8"
+        )
         with base.with_name(f"{base.name}{CLOUD}").open("wb") as file:
             np.savez_compressed(file, cloud=stored.cloud.astype(np.float32), floor=np.float64(stored.floor))
     except OSError as error:
@@ -89,10 +91,14 @@ def load_map(path: Path) -> StoredMap:
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise ConfigError(f"The map '{file}' cannot be read: {error}.") from error
     if not isinstance(facts, dict) or not isinstance(facts.get("image"), str):
-        raise ConfigError(f"'{file}' is no map: a YAML file of map_server names an image, resolution and origin.")
+        raise ConfigError(
+            f"'{file}' is no map: a YAML file of map_server names an image, resolution and origin."
+        )
     resolution = _number(file, facts, "resolution", None)
     if not resolution > 0.0:
-        raise ConfigError(f"The map '{file}' has the resolution {resolution:g}; it is a positive number of metres.")
+        raise ConfigError(
+            f"The map '{file}' has the resolution {resolution:g}; it is a positive number of metres."
+        )
     origin = facts.get("origin")
     if not (isinstance(origin, list) and len(origin) == 3 and all(_finite(v) for v in origin)):
         raise ConfigError(f"The map '{file}' has the origin {origin}; it is [x, y, yaw].")

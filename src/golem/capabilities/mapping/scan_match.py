@@ -94,7 +94,10 @@ def search(field: DistanceField, points: Array, guess: PlanarPose, around: tuple
         cost = field.coarse(turned[None] + np.column_stack([dx, dy])[:, None]).mean(axis=1)
         i = int(cost.argmin())
         if cost[i] < best:
-            best, found = float(cost[i]), PlanarPose(guess.x + float(dx[i]), guess.y + float(dy[i]), wrap(yaw))
+            best, found = (
+                float(cost[i]),
+                PlanarPose(guess.x + float(dx[i]), guess.y + float(dy[i]), wrap(yaw)),
+            )
     return found
 
 

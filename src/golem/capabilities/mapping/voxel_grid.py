@@ -1,4 +1,4 @@
-"""The mapper `grid`: voxels from every scan, the map of the floor from the voxels, and the place in a map from before."""
+"""The mapper `grid`: voxels from every scan, the map of the floor from the voxels, the place in a map from before."""
 
 from __future__ import annotations
 
@@ -65,7 +65,12 @@ class GridConfig:
             ("reach", self.reach, 0.5 <= self.reach <= 100.0, "from 0.5 to 100 m"),
             ("band", self.band, 0.0 < low < high <= 2.2, "two heights, the lower first, of at most 2.2 m"),
             ("rays", self.rays, self.rays >= 1, "at least 1"),
-            ("around", self.around, 0.0 <= min(self.around) and max(self.around) <= 5.0, "at most 5 m and rad"),
+            (
+                "around",
+                self.around,
+                0.0 <= min(self.around) and max(self.around) <= 5.0,
+                "at most 5 m and rad",
+            ),
             ("follow", self.follow, self.follow > 0.0, "a positive time in seconds"),
             ("gain", self.gain, 0.0 <= self.gain <= 1.0, "a share from 0 to 1"),
             ("guess", self.guess, all(map(math.isfinite, self.guess)), "three finite numbers"),
@@ -97,9 +102,9 @@ class VoxelGridMapper:
         self.reset()
 
     @property
-    def T_odom_map(self) -> PlanarPose:
+    def T_odom_map(self) -> PlanarPose | None:
         """Where the map's frame is in odom; see `Mapper`."""
-        return self._T_odom_map
+        return self._T_odom_map if self._located or self.stored is None else None
 
     def reset(self) -> None:
         """Forget what was seen; see `Mapper`."""
@@ -129,10 +134,10 @@ class VoxelGridMapper:
 
     def grid(self) -> OccupancyGrid | None:
         """Return the map of the floor; see `Mapper`."""
-        if self.voxels.empty or self.floor is None:
-            return None if self.stored is None else self._overlaid(self.stored)
+        if self.voxels.empty or self.floor is None or self.T_odom_map is None:
+            return None
         cells = self.voxels.flatten(self.floor)
-        if self.stored is not None and self._located:
+        if self.stored is not None:
             return self._overlaid(self.stored)
         corner = PlanarPose(float(self.voxels.corner[0]), float(self.voxels.corner[1]), 0.0)
         return OccupancyGrid(self._t, corner, self.config.resolution, cells.copy())
@@ -158,7 +163,9 @@ class VoxelGridMapper:
         grid = self.grid()
         if grid is None or self.floor is None:
             return None
-        return StoredMap(grid.origin, grid.resolution, grid.cells, self.voxels.occupied(), float(self.floor[2]))
+        return StoredMap(
+            grid.origin, grid.resolution, grid.cells, self.voxels.occupied(), float(self.floor[2])
+        )
 
     def _follow(self) -> None:
         """Find the place in the map from before at first, and correct it from time to time."""
@@ -196,17 +203,15 @@ class VoxelGridMapper:
     def _overlaid(self, stored: StoredMap) -> OccupancyGrid:
         """Return the map from before with what this run saw drawn into it."""
         cells = stored.cells.copy()
-        if not self.voxels.empty and self._located:
-            live = self.voxels.cells
-            corner = PlanarPose(float(self.voxels.corner[0]), float(self.voxels.corner[1]), 0.0)
-            T = (self._T_odom_map @ stored.origin).to(corner)
-            cos, sin = math.cos(T.yaw), math.sin(T.yaw)
-            for value in (FREE, FULL):
-                r, c = np.nonzero(live == value)
-                at = (np.column_stack([c, r]) + 0.5) * self.config.resolution
-                at = at @ np.array([[cos, sin], [-sin, cos]]) + (T.x, T.y)
-                column, row = np.floor(at / stored.resolution).astype(int).T
-                inside = (row >= 0) & (row < cells.shape[0]) & (column >= 0) & (column < cells.shape[1])
-                cells[row[inside], column[inside]] = value
-        t = self._t if math.isfinite(self._t) else 0.0
-        return OccupancyGrid(t, self._T_odom_map @ stored.origin, stored.resolution, cells)
+        live = self.voxels.cells
+        corner = PlanarPose(float(self.voxels.corner[0]), float(self.voxels.corner[1]), 0.0)
+        T = (self._T_odom_map @ stored.origin).to(corner)
+        cos, sin = math.cos(T.yaw), math.sin(T.yaw)
+        for value in (FREE, FULL):
+            r, c = np.nonzero(live == value)
+            at = (np.column_stack([c, r]) + 0.5) * self.config.resolution
+            at = at @ np.array([[cos, sin], [-sin, cos]]) + (T.x, T.y)
+            column, row = np.floor(at / stored.resolution).astype(int).T
+            inside = (row >= 0) & (row < cells.shape[0]) & (column >= 0) & (column < cells.shape[1])
+            cells[row[inside], column[inside]] = value
+        return OccupancyGrid(self._t, self._T_odom_map @ stored.origin, stored.resolution, cells)

@@ -26,7 +26,9 @@ UNKNOWN, FREE, FULL = -1, 0, 100
 
 
 @njit(cache=True, nogil=True)
-def mark(voxels: Voxels, stamps: Stamps, points: Array, corner: Array, resolution: float, number: int) -> None:
+def mark(
+    voxels: Voxels, stamps: Stamps, points: Array, corner: Array, resolution: float, number: int
+) -> None:
     """Count each voxel that a point (n, 3) lies in as hit; `corner` (3,) is that of voxel [0, 0, 0]."""
     rows, columns, layers = voxels.shape
     for i in range(len(points)):
@@ -40,7 +42,13 @@ def mark(voxels: Voxels, stamps: Stamps, points: Array, corner: Array, resolutio
 
 @njit(cache=True, nogil=True)
 def clear(
-    voxels: Voxels, stamps: Stamps, points: Array, origin: Array, corner: Array, resolution: float, number: int
+    voxels: Voxels,
+    stamps: Stamps,
+    points: Array,
+    origin: Array,
+    corner: Array,
+    resolution: float,
+    number: int,
 ) -> None:
     """Count each voxel as free that a ray from `origin` (3,) to a point (n, 3) passes (Amanatides and Woo, 1987).
 

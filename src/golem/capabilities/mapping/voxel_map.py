@@ -67,7 +67,13 @@ class VoxelMap:
         """Bring `cells` up to date, by the plane of the floor (3,), and return them."""
         if self._changed is not None:
             voxel_kernel.flatten(
-                self.voxels, self.cells, self._changed, self.corner, self.resolution, floor, np.array(self.band)
+                self.voxels,
+                self.cells,
+                self._changed,
+                self.corner,
+                self.resolution,
+                floor,
+                np.array(self.band),
             )
             self._changed = None
         return self.cells
@@ -100,12 +106,17 @@ class VoxelMap:
             if size.max() * self.resolution > LARGEST:
                 return False
             shape = (int(size[1]), int(size[0]))
-            self.voxels, self._stamps = np.zeros((*shape, layers), np.int8), np.zeros((*shape, layers), np.uint16)
+            self.voxels, self._stamps = (
+                np.zeros((*shape, layers), np.int8),
+                np.zeros((*shape, layers), np.uint16),
+            )
             self.cells = np.full(shape, voxel_kernel.UNKNOWN, np.int8)
             return True
         rows, columns, _ = self.voxels.shape
         top = self.corner[:2] + self.resolution * np.array([columns, rows])
-        before = np.where(low < self.corner[:2], np.ceil((self.corner[:2] - low + MARGIN) / self.resolution), 0)
+        before = np.where(
+            low < self.corner[:2], np.ceil((self.corner[:2] - low + MARGIN) / self.resolution), 0
+        )
         after = np.where(high >= top, np.ceil((high - top + MARGIN) / self.resolution), 0)
         (c0, r0), (c1, r1) = before.astype(int), after.astype(int)
         if not (r0 or r1 or c0 or c1):

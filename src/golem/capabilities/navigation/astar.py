@@ -20,12 +20,15 @@ Cell = tuple[int, int]
 """Row and column."""
 
 
-def astar(cost: Array, start: Cell, goal: Cell, beta: float, closed: float) -> tuple[NDArray[np.int64], float] | None:
+def astar(
+    cost: Array, start: Cell, goal: Cell, beta: float, closed: float
+) -> tuple[NDArray[np.int64], float] | None:
     """Return the cheapest way.
 
     Args:
         cost: (rows, columns) C of each cell, not negative.
-        start, goal: inside; the start's own cost does not count.
+        start: first cell, inside; its own cost does not count.
+        goal: last cell, inside.
         beta: weight of C against length, not negative.
         closed: cells with a cost of this and more cannot be entered.
 
@@ -52,7 +55,9 @@ def astar(cost: Array, start: Cell, goal: Cell, beta: float, closed: float) -> t
 
 
 @njit(cache=True, nogil=True)
-def _search(cost: Array, start: int, goal: int, beta: float, closed: float, parents: NDArray[np.int32]) -> float:
+def _search(
+    cost: Array, start: int, goal: int, beta: float, closed: float, parents: NDArray[np.int32]
+) -> float:
     """Fill in the parent of every cell on the way (-1 for the start), and return the sum; infinite without a way."""
     rows, columns = cost.shape
     goal_row, goal_column = goal // columns, goal % columns

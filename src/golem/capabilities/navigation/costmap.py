@@ -56,8 +56,8 @@ class Costmap:
         origin: pose of the corner of cell [0, 0] in the frame of the map.
         resolution: side of a cell [m].
         shape: rows and columns.
-        cost: (rows, columns) 0 to 254, by the distance d [m] of a cell's middle from the nearest obstacle's: `LETHAL` at
-            0, `INSCRIBED` up to the inscribed radius r, then 252 exp(-decay (d - r)), and at least `unknown` where
+        cost: (rows, columns) 0 to 254, by the distance d [m] of a cell's middle from the nearest obstacle's: `LETHAL`
+            at 0, `INSCRIBED` up to the inscribed radius r, then 252 exp(-decay (d - r)), and at least `unknown` where
             nobody has looked.
         clearance: (rows, columns) d, at most 10 m.
     """

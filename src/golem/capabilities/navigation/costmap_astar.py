@@ -1,4 +1,4 @@
-"""The navigator `costmap_astar`: a way by A* over the costmap, twists that follow it, and what to do when it is blocked.
+"""The navigator `costmap_astar`: a way by A* over the costmap, twists along it, and what to do when it is blocked.
 
 Close to the goal `goto` takes over, which measures every stop and corrects what is left with small steps.
 """
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from golem.capabilities.navigation.base import NavInputs
 from golem.capabilities.navigation.behaviour import Action, Fallback, InSequence, Status
 from golem.capabilities.navigation.costmap import CostmapConfig
-from golem.capabilities.navigation.footprint import HOME, Footprint
+from golem.capabilities.navigation.footprint import HOME
 from golem.capabilities.navigation.goto import GoTo, GoToConfig
 from golem.capabilities.navigation.local_controller import LocalController, LocalControllerConfig
 from golem.capabilities.navigation.route import find_way

@@ -32,7 +32,7 @@ class LocalControllerConfig:
     backward: float = 0.2
     sideways: float = 0.25
     turn: float = 0.5
-    look: float = 0.8
+    look: float = 1.1
     horizon: float = 1.6
     margin: float = 0.06
     slow: float = 0.35
@@ -74,7 +74,13 @@ class LocalController:
         )
 
     def follow(
-        self, pose: PlanarPose, way: Way, goal: PlanarPose, footprint: Footprint, clearance: Array, frame: Array
+        self,
+        pose: PlanarPose,
+        way: Way,
+        goal: PlanarPose,
+        footprint: Footprint,
+        clearance: Array,
+        frame: Array,
     ) -> Twist | None:
         """Return the best twist; None where each leads into an obstacle.
 
@@ -83,7 +89,8 @@ class LocalController:
             way: where to go.
             goal: where that ends.
             footprint: of the robot.
-            clearance, frame: of the window around the robot, see `rollout.score`.
+            clearance: of the window around the robot, see `rollout.score`.
+            frame: of that window.
         """
         i, _ = way.nearest(pose)
         left = way.left(i)
@@ -120,7 +127,13 @@ class LocalController:
         return float(clearance[row[inside], column[inside]].min(initial=10.0))
 
     def _score(
-        self, twists: Array, pose: PlanarPose, footprint: Footprint, clearance: Array, frame: Array, aim: Array
+        self,
+        twists: Array,
+        pose: PlanarPose,
+        footprint: Footprint,
+        clearance: Array,
+        frame: Array,
+        aim: Array,
     ) -> tuple[Array, Array]:
         scores, hits = np.empty(len(twists)), np.empty(len(twists))
         score(

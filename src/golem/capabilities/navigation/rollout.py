@@ -41,7 +41,8 @@ def score(
         weights: (4,) per metre from the aim, per radian off its heading, of nearness, and the clearance that is asked
             for [m].
         horizon: (2,) length and step [s].
-        scores, hits: (n,) written; `hits` is the time of the first contact [s], infinite without one.
+        scores: (n,) written.
+        hits: (n,) written: the time of the first contact [s], infinite without one.
     """
     rows, columns = clearance.shape
     steps = int(round(horizon[0] / horizon[1]))

@@ -37,7 +37,7 @@ def find_way(
     cells: list[Cell] = [(int(row[i]), int(column[i])) for i in range(2)]
     for cell in cells:
         _open(cost, cell, footprint.reach / costmap.resolution)
-    found = astar(cost, *cells, beta, INSCRIBED)
+    found = astar(cost, cells[0], cells[1], beta, INSCRIBED)
     if found is None:
         return f"There is no way to ({goal.x:.2f}, {goal.y:.2f}) on the map: it is walled in, or the gaps are too narrow."
     points = costmap.places(found[0])

@@ -49,7 +49,9 @@ def surroundings(t: float) -> tuple[OccupancyGrid, Scan]:
     cells = np.zeros((160, 160), dtype=np.int8)
     cells[120] = 100
     wall = np.stack((np.linspace(-2.0, 2.0, 80), np.full(80, 2.0), np.full(80, 0.5)), axis=1)
-    return OccupancyGrid(t, PlanarPose(-4.0, -4.0, 0.0), 0.05, cells), Scan(t, wall, np.array([0.0, 0.0, 0.7]), FLOOR)
+    return OccupancyGrid(t, PlanarPose(-4.0, -4.0, 0.0), 0.05, cells), Scan(
+        t, wall, np.array([0.0, 0.0, 0.7]), FLOOR
+    )
 
 
 class NavigatorSuite(Suite):

@@ -10,10 +10,10 @@ import numpy as np
 
 from golem.types import Array
 
-AREA = (1.7, 4.7, -2.4, 2.6)
+AREA = (1.8, 4.3, -2.4, 2.6)
 """x and y bounds of where obstacles stand [m]."""
 WAY = 0.75
-"""Distance from all obstacles that a way from start to goal has everywhere [m]: the robot's half width and some more."""
+"""Distance from obstacles that a way from start to goal has everywhere [m]: the robot's half width and some more."""
 START, GOAL = (0.0, 0.0), (6.0, 0.0)
 """Places between which there is a way [m]."""
 TRIES = 400
