@@ -35,6 +35,7 @@ SUITES: dict[str, str] = {
     "localizer": f"{_HERE}.localizer_suite:LocalizerSuite",
     "grasp_method": f"{_HERE}.grasp_suite:GraspSuite",
     "odometry": f"{_HERE}.odometry_suite:OdometrySuite",
+    "mapper": f"{_HERE}.mapper_suite:MapperSuite",
     "navigator": f"{_HERE}.navigator_suite:NavigatorSuite",
     "skill": f"{_HERE}.skill_suite:SkillSuite",
 }
