@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from golem.types import Array, PlanarPose, Twist
+
+HERE = PlanarPose(0.0, 0.0, 0.0)
+"""The origin of a frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,12 +24,34 @@ class OccupancyGrid:
         origin: pose in odom of the corner of cell [0, 0]; columns go along its x, rows along its y.
         resolution: side of a cell [m].
         cells: (rows, columns) int8: 0 free to 100 occupied, -1 unknown.
+        T_odom_map: where the map's own frame is in odom.
     """
 
     t: float
     origin: PlanarPose
     resolution: float
     cells: NDArray[np.int8]
+    T_odom_map: PlanarPose = HERE
+
+    @property
+    def in_map(self) -> OccupancyGrid:
+        """It in its own frame."""
+        return replace(self, origin=self.T_odom_map.to(self.origin), T_odom_map=HERE)
+
+
+@dataclass(frozen=True, slots=True)
+class MapPlace:
+    """Where the map is.
+
+    Attributes:
+        t: time [s].
+        T_odom_map: the map's frame in odom of the odometry, by which skills and navigator go.
+        T_map_estimate: odom of the base estimate in the map's frame: what /tf says from `map` to `odom`.
+    """
+
+    t: float
+    T_odom_map: PlanarPose
+    T_map_estimate: PlanarPose
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +96,21 @@ class NavGoal:
 
     pose: PlanarPose | None
     frame: Literal["odom", "map"] = "odom"
+
+
+@dataclass(frozen=True, slots=True)
+class NavPath:
+    """The way that a navigator means to go.
+
+    Attributes:
+        t: time [s].
+        points: (n, 2) places [m]; n is 0 where it has none any more.
+        frame: what they are given in.
+    """
+
+    t: float
+    points: Array
+    frame: Literal["odom", "map"]
 
 
 @dataclass(frozen=True, slots=True)

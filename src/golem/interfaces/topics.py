@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from golem.interfaces.lidar import ExternalOdometry, LidarImu, LidarScan
-from golem.interfaces.nav_payloads import NavGoal, NavStep, OccupancyGrid, Scan
+from golem.interfaces.nav_payloads import MapPlace, NavGoal, NavPath, NavStep, OccupancyGrid, Scan
 from golem.interfaces.payloads import (
     ArmCommand,
     DetectionRequest,
@@ -32,7 +32,6 @@ from golem.types import (
     LowCommand,
     LowState,
     PalmTargets,
-    PlanarPose,
     RgbdImage,
     Side,
     Twist,
@@ -76,14 +75,16 @@ EXTERNAL_ODOMETRY = Topic("odometry/external", ExternalOdometry)
 """From an odometry outside of this stack."""
 MAP = Topic("map", OccupancyGrid)
 """From whatever maps; a stack without it never sends any."""
-MAP_POSE = Topic("map/pose", PlanarPose)
-"""Where the frame of the map is in odom, from whatever maps."""
+MAP_POSE = Topic("map/pose", MapPlace)
+"""From whatever maps, with every scan, while the place in the map is known."""
 SCAN = Topic("scan", Scan)
 """From a LiDAR that an odometry locates; a robot without one never sends any."""
 NAV_GOAL = Topic("navigation/goal", NavGoal)
 """From the running skill, whenever it changes."""
 NAV_STEP = Topic("navigation/step", NavStep)
 """From the navigator while it has a goal."""
+NAV_PATH = Topic("navigation/path", NavPath)
+"""From the navigator whenever it has found another way."""
 FEEDBACK = Topic("skill/feedback", Feedback)
 """Of the running skill."""
 ONBOARD_LEGS = Topic("onboard/legs", LegCommand)

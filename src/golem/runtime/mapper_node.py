@@ -6,7 +6,7 @@ import numpy as np
 
 from golem.capabilities.mapping.base import Mapper
 from golem.interfaces import topics
-from golem.interfaces.nav_payloads import OccupancyGrid
+from golem.interfaces.nav_payloads import HERE, MapPlace, OccupancyGrid
 from golem.middleware.bus import Bus, News
 from golem.runtime.contract_check import ContractCheck
 from golem.types import TICK, PlanarPose
@@ -36,7 +36,7 @@ class MapperNode:
             self._contract.kind("T_odom_map", place, PlanarPose)
             for name in ("x", "y", "yaw"):
                 self._contract.number(f"T_odom_map.{name}", getattr(place, name))
-            self._bus.publish(topics.MAP_POSE, place, t)
+            self._bus.publish(topics.MAP_POSE, MapPlace(t, place, self._estimate_in_map(place)), t)
         if t < self._due - 1e-9:
             return
         self._due = t + self._every
@@ -48,3 +48,11 @@ class MapperNode:
                 raise self._contract.fault(f"cells are {cells.dtype}, the contract asks for int8")
             self._contract.number("resolution", grid.resolution, minimum=1e-3)
             self._bus.publish(topics.MAP, grid, t)
+
+    def _estimate_in_map(self, T_odom_map: PlanarPose) -> PlanarPose:
+        """Return where odom of the base estimate is in the map: /tf has base_link in that odom."""
+        odometry, base = self._bus.latest(topics.ODOMETRY), self._bus.latest(topics.BASE)
+        if odometry is None or base is None:
+            return T_odom_map.to(HERE)
+        T_map_base = T_odom_map.to(PlanarPose.of(odometry.T_odom_base))
+        return T_map_base @ PlanarPose.of(base.T_odom_base).to(HERE)

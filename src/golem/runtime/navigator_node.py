@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import replace
 
 from golem.capabilities.mapping.robot_filter import RobotFilter
 from golem.capabilities.navigation.base import Navigator, NavInputs
 from golem.capabilities.navigation.footprint import Footprint
 from golem.errors import ModuleFault
 from golem.interfaces import topics
-from golem.interfaces.nav_payloads import NavGoal, NavStep, OccupancyGrid
+from golem.interfaces.nav_payloads import HERE, NavGoal, NavPath, NavStep, OccupancyGrid
 from golem.interfaces.payloads import ModuleFaultMsg
 from golem.middleware.bus import Bus, News
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import SkillNode
 from golem.skills.base import StageFailed
-from golem.skills.context import LegsInterface
+from golem.skills.legs_interface import LegsInterface
 from golem.skills.runner import LACKS
-from golem.types import PlanarPose, Twist
+from golem.types import Array, PlanarPose, Twist
 
 ZERO = Twist()
 BODY_MARGIN = 0.01
@@ -65,6 +64,7 @@ class NavigatorNode:
         self._robot: RobotFilter | None = None
         self._footprint: Footprint | None = None
         self._footprint_due = 0.0
+        self._shown: Array | None = None
         self._grid: tuple[OccupancyGrid | None, OccupancyGrid | None] = None, None
         self._pursue(NavGoal(None))
 
@@ -90,6 +90,9 @@ class NavigatorNode:
             return
         newest = self._bus.latest(topics.NAV_STEP)
         if newest is not None and self._bus.count(topics.NAV_STEP) > self._seen:
+            if newest.path is not None and newest.path is not self._shown:
+                self._shown = newest.path
+                self._bus.publish(topics.NAV_PATH, NavPath(t, newest.path, self._frame), t)
             self._legs.drive(ZERO if newest.ended else newest.twist)
 
     def _pursue(self, goal: NavGoal) -> None:
@@ -122,15 +125,15 @@ class NavigatorNode:
     def _thought(self, dt: float) -> Callable[[], NavStep]:
         """Return what computes one step from what is known now."""
         status = self._legs.status
-        T = PlanarPose(0.0, 0.0, 0.0)
+        T = HERE
         if self._frame == "map":
             place = self._bus.latest(topics.MAP_POSE)
             if place is None:
                 raise StageFailed("navigate", "mapper", "The robot's place in the map is not known.")
-            T = place.to(T)
+            T = place.T_odom_map.to(HERE)
         grid, scan = self._bus.latest(topics.MAP), self._bus.latest(topics.SCAN)
         if self._frame == "map":
-            grid = self._grid_in_map(grid, T)
+            grid = self._grid_in_map(grid)
             scan = None if scan is None else scan.seen_from(T)
         pose = T @ PlanarPose.of(self._legs.pose) @ status.rest
         inputs = NavInputs(pose, status.moving, grid, scan, self._room())
@@ -143,10 +146,10 @@ class NavigatorNode:
 
         return think
 
-    def _grid_in_map(self, grid: OccupancyGrid | None, T_map_odom: PlanarPose) -> OccupancyGrid | None:
+    def _grid_in_map(self, grid: OccupancyGrid | None) -> OccupancyGrid | None:
         """Return a map in its own frame; the same object for the same map."""
         if grid is not self._grid[0]:
-            moved = None if grid is None else replace(grid, origin=T_map_odom @ grid.origin)
+            moved = None if grid is None else grid.in_map
             self._grid = grid, moved
         return self._grid[1]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -19,21 +18,18 @@ from golem.interfaces.payloads import (
     Feedback,
     HandGoal,
     HandStatus,
-    LegStatus,
 )
 from golem.middleware.bus import Bus, Topic
 from golem.robots.model.kinematics import Kinematics
 from golem.skills.base import Skill, SkillResult, StageFailed, Tick, expect
 from golem.skills.detection_stream import DetectionStream
 from golem.skills.joint_motion import follow
+from golem.skills.legs_interface import LegsInterface
 from golem.skills.navigation import Navigation
 from golem.skills.pursuit import call
-from golem.types import UPPER, Array, LocalizedObject, PalmTargets, PlanarPose, Side, Twist
+from golem.types import UPPER, Array, LocalizedObject, PalmTargets, PlanarPose, Side
 
 T = TypeVar("T")
-
-ODOMETRY_TIMEOUT = 0.5
-"""Age of the newest odometry from which on it says nothing about where the robot is [s]."""
 
 
 @dataclass(frozen=True)
@@ -170,58 +166,6 @@ class Arm:
         self._context.send_palms()
 
 
-class LegsInterface:
-    """The lower body, as a skill commands and reads it."""
-
-    def __init__(self, context: Context) -> None:
-        """Speak for the legs."""
-        self._context = context
-
-    @property
-    def reporting(self) -> bool:
-        """Whether they have said anything yet."""
-        return self._context.bus.latest(topics.LEG_STATUS) is not None
-
-    @property
-    def status(self) -> LegStatus:
-        """What the base layer of the legs reports now.
-
-        Raises:
-            StageFailed: it has not reported yet.
-        """
-        status = self._context.bus.latest(topics.LEG_STATUS)
-        if status is None:
-            raise StageFailed("walk", "lower_body", "The legs do not report.")
-        return status
-
-    @property
-    def pose(self) -> Array:
-        """(4, 4) pose of base_link in odom by the odometry, or by the base estimate in a stack without one.
-
-        Raises:
-            StageFailed: the odometry has fallen silent.
-        """
-        odometry = self._context.bus.latest(topics.ODOMETRY)
-        if odometry is not None and self._context.t - odometry.t > ODOMETRY_TIMEOUT:
-            age = self._context.t - odometry.t
-            raise StageFailed("walk", "odometry", f"The odometry has been silent for {age:.1f} s.")
-        return self._context.T_odom_base if odometry is None else odometry.T_odom_base
-
-    @property
-    def doubt(self) -> str:
-        """How far off the odometry believes its place to be, as the end of a sentence; empty where it does not say."""
-        odometry = self._context.bus.latest(topics.ODOMETRY)
-        if odometry is None or odometry.covariance is None:
-            return ""
-        place = math.sqrt(max(0.0, float(np.linalg.eigvalsh(odometry.covariance[:2, :2])[-1])))
-        turn = math.degrees(math.sqrt(max(0.0, float(odometry.covariance[5, 5]))))
-        return f", by an odometry that is sure of its place to {100.0 * place:.1f} cm and {turn:.1f} deg"
-
-    def drive(self, twist: Twist) -> None:
-        """Move the base with `twist`; it has to be repeated every 0.5 s, or the robot stands."""
-        self._context.publish(topics.TWIST, twist)
-
-
 class Context:
     """The world as a skill sees it.
 
@@ -276,7 +220,7 @@ class Context:
         place = self.bus.latest(topics.MAP_POSE)
         if place is None:
             raise StageFailed("navigate", "mapper", "The robot's place in the map is not known.")
-        return place
+        return place.T_odom_map
 
     @property
     def joints(self) -> Array:

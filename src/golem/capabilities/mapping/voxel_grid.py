@@ -214,4 +214,5 @@ class VoxelGridMapper:
             column, row = np.floor(at / stored.resolution).astype(int).T
             inside = (row >= 0) & (row < cells.shape[0]) & (column >= 0) & (column < cells.shape[1])
             cells[row[inside], column[inside]] = value
-        return OccupancyGrid(self._t, self._T_odom_map @ stored.origin, stored.resolution, cells)
+        T = self._T_odom_map
+        return OccupancyGrid(self._t, T @ stored.origin, stored.resolution, cells, T)

@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Protocol
 
 
-class Status(Enum):
+class BehaviourStatus(Enum):
     """How a behaviour stands."""
 
     RUNNING = "running"
@@ -22,7 +22,7 @@ class Status(Enum):
 class Behaviour(Protocol):
     """One node of a tree."""
 
-    def tick(self, dt: float) -> Status:
+    def tick(self, dt: float) -> BehaviourStatus:
         """Go on for `dt` [s]."""
         ...
 
@@ -34,14 +34,14 @@ class Behaviour(Protocol):
 class Action:
     """A leaf that runs a function of the time since it began [s]."""
 
-    def __init__(self, function: Callable[[float], Status]) -> None:
+    def __init__(self, function: Callable[[float], BehaviourStatus]) -> None:
         """Run `function`."""
         self._function, self._t = function, 0.0
 
-    def tick(self, dt: float) -> Status:
+    def tick(self, dt: float) -> BehaviourStatus:
         """Call the function; see `Behaviour`."""
         status = self._function(self._t)
-        self._t = self._t + dt if status is Status.RUNNING else 0.0
+        self._t = self._t + dt if status is BehaviourStatus.RUNNING else 0.0
         return status
 
     def reset(self) -> None:
@@ -52,19 +52,19 @@ class Action:
 class Composite:
     """Ticks one child after the other, as long as each ends with `goes_on`."""
 
-    goes_on: Status
+    goes_on: BehaviourStatus
 
     def __init__(self, *children: Behaviour) -> None:
         """Take the children in their order."""
         self._children, self._at = children, 0
 
-    def tick(self, dt: float) -> Status:
+    def tick(self, dt: float) -> BehaviourStatus:
         """Tick the child whose turn it is; see `Behaviour`."""
         status = self._children[self._at].tick(dt)
         if status is self.goes_on and self._at + 1 < len(self._children):
             self._at += 1
-            return Status.RUNNING
-        if status is not Status.RUNNING:
+            return BehaviourStatus.RUNNING
+        if status is not BehaviourStatus.RUNNING:
             self.reset()
         return status
 
@@ -78,10 +78,10 @@ class Composite:
 class InSequence(Composite):
     """Succeeds when all of its children did, fails with the first that does."""
 
-    goes_on = Status.SUCCESS
+    goes_on = BehaviourStatus.SUCCESS
 
 
 class Fallback(Composite):
     """Succeeds with the first of its children that does, fails when all did."""
 
-    goes_on = Status.FAILURE
+    goes_on = BehaviourStatus.FAILURE

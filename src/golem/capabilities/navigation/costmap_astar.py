@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, field
 
 from golem.capabilities.navigation.base import NavInputs
-from golem.capabilities.navigation.behaviour import Action, Fallback, InSequence, Status
+from golem.capabilities.navigation.behaviour import Action, Fallback, InSequence, BehaviourStatus
 from golem.capabilities.navigation.costmap import CostmapConfig
 from golem.capabilities.navigation.footprint import HOME
 from golem.capabilities.navigation.goto import GoTo, GoToConfig
@@ -225,28 +225,28 @@ class CostmapAstar:
     def _recover(self, left: PlanarPose, dt: float) -> NavStep:
         """Go on with the recovery; when it has ended, follow again."""
         self._twist = ZERO
-        if self._recovery.tick(dt) is not Status.RUNNING:
+        if self._recovery.tick(dt) is not BehaviourStatus.RUNNING:
             self._recovering = False
         return NavStep(self._twist, False, left, None, self._path, "recover")
 
-    def _wait(self, since: float) -> Status:
-        return Status.SUCCESS if since >= self.config.wait else Status.RUNNING
+    def _wait(self, since: float) -> BehaviourStatus:
+        return BehaviourStatus.SUCCESS if since >= self.config.wait else BehaviourStatus.RUNNING
 
-    def _replanned(self, since: float) -> Status:
+    def _replanned(self, since: float) -> BehaviourStatus:
         """Succeed if there is a way, and a twist along it."""
         self._plan()
         if self._way is None:
-            return Status.FAILURE
+            return BehaviourStatus.FAILURE
         s = self._surroundings
         twist = self._local.follow(self._pose, self._way, self._goal, self._footprint, s.clearance, s.frame)
-        return Status.FAILURE if twist is None else Status.SUCCESS
+        return BehaviourStatus.FAILURE if twist is None else BehaviourStatus.SUCCESS
 
-    def _clear(self, since: float) -> Status:
+    def _clear(self, since: float) -> BehaviourStatus:
         """Forget what the scan saw beside the map, and look again."""
         self._surroundings.drop_new()
-        return Status.SUCCESS
+        return BehaviourStatus.SUCCESS
 
-    def _back_up(self, since: float) -> Status:
+    def _back_up(self, since: float) -> BehaviourStatus:
         """Go back while that is free."""
         if since == 0.0 or self._backed is None:
             self._backed = self._pose
@@ -255,9 +255,9 @@ class CostmapAstar:
         twist = Twist(-self.config.local.backward, 0.0, 0.0)
         if math.hypot(gone.x, gone.y) >= self.config.back or since > 4.0 * self.config.back / -twist.vx:
             self._backed = None
-            return Status.SUCCESS
+            return BehaviourStatus.SUCCESS
         if not self._local.clear(twist, self._pose, self._footprint, s.clearance, s.frame):
             self._backed = None
-            return Status.FAILURE
+            return BehaviourStatus.FAILURE
         self._twist = twist
-        return Status.RUNNING
+        return BehaviourStatus.RUNNING

@@ -39,7 +39,7 @@ def find_way(
         _open(cost, cell, footprint.reach / costmap.resolution)
     found = astar(cost, cells[0], cells[1], beta, INSCRIBED)
     if found is None:
-        return f"There is no way to ({goal.x:.2f}, {goal.y:.2f}) on the map: it is walled in, or the gaps are too narrow."
+        return f"There is no way to ({goal.x:.2f}, {goal.y:.2f}) on the map: it is walled in, or the gaps are narrow."
     points = costmap.places(found[0])
     points[0], points[-1] = places
     return Way(points)

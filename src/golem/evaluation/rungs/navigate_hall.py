@@ -10,13 +10,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
+import cv2
 import numpy as np
 
 from golem import registry
+from golem.capabilities.navigation.map_picture import GOAL, TRACK, WAY, MapPicture
 from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, legs_stack
-from golem.evaluation.episodes.floor_picture import floor_picture
 from golem.evaluation.episodes.survey import survey
 from golem.interfaces import topics
 from golem.provenance import stack_facts
@@ -192,7 +193,7 @@ def judge(
         there = PlanarPose.of(believed.T_odom_base)
         series["odometry_error"] = math.hypot(*_off(true, there))
         place = bus.latest(topics.MAP_POSE)
-        there = there if place is None else place.to(there)
+        there = there if place is None else place.T_odom_map.to(there)
         drift = series["place_error"] = math.hypot(*_off(true, there))
         series["place_yaw"] = abs(true.to(there).yaw)
         rest = there.to(goal)
@@ -236,6 +237,14 @@ def _off(one: PlanarPose, other: PlanarPose) -> tuple[float, float]:
 
 
 def _picture(episode: Episode, track: Array, goal: PlanarPose) -> bytes | None:
-    """Return the map with the way and the walk; None where there is no map."""
-    grid, step = episode.running.bus.latest(topics.MAP), episode.running.bus.latest(topics.NAV_STEP)
-    return None if grid is None else floor_picture(grid, None if step is None else step.path, track, goal)
+    """Return the map with the way and the walk as PNG; None where there is no map."""
+    bus = episode.running.bus
+    grid, step, place = bus.latest(topics.MAP), bus.latest(topics.NAV_STEP), bus.latest(topics.MAP_POSE)
+    if grid is None or place is None:
+        return None
+    picture = MapPicture(grid.in_map)
+    if step is not None and step.path is not None:
+        picture.line(step.path, WAY)
+    picture.line(track, TRACK)
+    picture.pose(goal, GOAL)
+    return cv2.imencode(".png", picture.rgb()[..., ::-1])[1].tobytes()
