@@ -28,7 +28,7 @@ INTERRUPTED = 130
 
 
 def _demo(words: list[str]) -> int:
-    """The robot pulls loosened screws and drops them in a tray, in front of you; --walk: it finds its way to the pack."""
+    """The robot pulls loosened screws from a pack in front of you; --walk: it finds its way to one."""
     _prepare_graphics()
     from golem.demo import DemoConfig, run_demo
 

@@ -67,7 +67,7 @@ def run_walk_demo(
     with closing(built):
         robot = shown(running, built)
         print(
-            f"The robot stands in a hall, {math.hypot(GOAL.x, GOAL.y):.0f} m from where it is to work, and has no map.\n"
+            f"The robot stands in a hall, {math.hypot(GOAL.x, GOAL.y):.0f} m from its goal, and has no map.\n"
             f"It shall find its way around walls and obstacles by its LiDAR (profile {profile}, seed {seed}).",
             flush=True,
         )

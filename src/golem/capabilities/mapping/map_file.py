@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import cv2
 import numpy as np
@@ -33,15 +34,15 @@ class StoredMap:
         origin: pose of the corner of cell [0, 0] in the map's frame.
         resolution: side of a cell [m].
         cells: (rows, columns) int8, see `OccupancyGrid`.
-        cloud: (n, 3) middles of the occupied voxels in the map's frame [m]; (0, 3) where there is no such file.
-        floor: height of the floor in the map's frame [m].
+        cloud: (n, 3) middles of the occupied voxels in the map's frame [m]; n is 0 where there is no such file.
+        walls: (n, 2) places of upright surfaces, finer than the cells, in the map's frame [m]; likewise.
     """
 
     origin: PlanarPose
     resolution: float
     cells: NDArray[np.int8]
     cloud: Array
-    floor: float = 0.0
+    walls: Array
 
 
 def save_map(path: Path, stored: StoredMap) -> None:
@@ -74,7 +75,7 @@ def save_map(path: Path, stored: StoredMap) -> None:
             yaml.safe_dump(facts, sort_keys=False), encoding="utf-8"
         )
         with base.with_name(f"{base.name}{CLOUD}").open("wb") as file:
-            np.savez_compressed(file, cloud=stored.cloud.astype(np.float32), floor=np.float64(stored.floor))
+            np.savez_compressed(file, cloud=stored.cloud.astype(np.float32), walls=stored.walls)
     except OSError as error:
         raise OutputError(f"The map '{path}' cannot be written: {error.strerror}.") from error
 
@@ -108,17 +109,23 @@ def load_map(path: Path) -> StoredMap:
         raise ConfigError(f"The map '{file}' has the mode '{mode}'; choose from trinary, scale, raw.")
     image = _image(file.parent / facts["image"])
     cells = _cells(image, bool(facts.get("negate", 0)), occupied, free, str(mode))
-    cloud, floor = np.zeros((0, 3)), 0.0
-    beside = file.with_suffix(CLOUD)
-    if beside.is_file():
-        try:
-            with np.load(beside) as stored:
-                cloud, floor = stored["cloud"].astype(np.float64), float(stored["floor"])
-        except (OSError, ValueError, KeyError) as error:
-            raise ConfigError(f"The voxels of the map, '{beside}', cannot be read: {error}.") from error
-        if cloud.ndim != 2 or cloud.shape[1] != 3 or not np.isfinite(cloud).all() or not math.isfinite(floor):
-            raise ConfigError(f"The voxels of the map, '{beside}', are no (n, 3) finite points.")
-    return StoredMap(PlanarPose(*(float(v) for v in origin)), resolution, cells, cloud, floor)
+    cloud, walls = _beside(file.with_suffix(CLOUD))
+    return StoredMap(PlanarPose(*(float(v) for v in origin)), resolution, cells, cloud, walls)
+
+
+def _beside(file: Path) -> tuple[Array, Array]:
+    """Return the voxels and walls of the file beside a map; none where there is no such file."""
+    if not file.is_file():
+        return np.zeros((0, 3)), np.zeros((0, 2))
+    try:
+        with np.load(file) as stored:
+            cloud, walls = stored["cloud"].astype(np.float64), stored["walls"].astype(np.float64)
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+        raise ConfigError(f"The voxels of the map, '{file}', cannot be read: {error}.") from error
+    for points, width in ((cloud, 3), (walls, 2)):
+        if points.ndim != 2 or points.shape[1] != width or not np.isfinite(points).all():
+            raise ConfigError(f"The voxels of the map, '{file}', are no (n, {width}) finite points.")
+    return cloud, walls
 
 
 def _image(file: Path) -> NDArray[np.uint8]:

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from golem.capabilities.mapping.map_file import StoredMap, load_map
-from golem.capabilities.mapping.scan_match import DistanceField, Match, refine, search
+from golem.capabilities.mapping.scan_match import Landmarks, Match
 from golem.capabilities.mapping.voxel_kernel import FREE, FULL
 from golem.capabilities.mapping.voxel_map import VoxelMap
+from golem.capabilities.mapping.wall_means import WallMeans
 from golem.interfaces.nav_payloads import OccupancyGrid, Scan
 from golem.options import require
 from golem.types import Array, PlanarPose
@@ -22,6 +23,10 @@ FIT = 0.6
 """Share of a scan's points that must be where the map has something for its place to count as found."""
 FAR_OFF = 0.3
 """Correction above which a match is taken for a mistake while the robot is being followed [m]."""
+UPRIGHT = (0.3, 2.0)
+"""Heights above the floor between which points are compared with a map from before [m]."""
+EVERY = 0.3
+"""Time between two scans whose points are kept to be compared with later [s]."""
 FEWEST = 200
 """Points that a scan must have to be looked for."""
 
@@ -96,9 +101,9 @@ class VoxelGridMapper:
         """
         self.config = config or GridConfig()
         self.stored = load_map(Path(self.config.file)) if self.config.file else None
-        self._field: DistanceField | None = None
+        self._marks: Landmarks | None = None
         if self.stored is not None:
-            self._field = DistanceField(self._landmarks(self.stored))
+            self._marks = Landmarks(_landmarks(self.stored))
         self.reset()
 
     @property
@@ -109,7 +114,9 @@ class VoxelGridMapper:
     def reset(self) -> None:
         """Forget what was seen; see `Mapper`."""
         self.voxels = VoxelMap(self.config.resolution, self.config.band)
+        self.walls = WallMeans(self.config.resolution)
         self.floor: Array | None = None
+        self._summed = -math.inf
         self._T_odom_map = PlanarPose(0.0, 0.0, 0.0)
         self._located = False
         self._t = -math.inf
@@ -128,8 +135,11 @@ class VoxelGridMapper:
         self.floor = plane = scan.floor
         self.voxels.add(points, np.asarray(scan.origin, np.float64), plane, self.config.rays)
         height = points[:, 2] - points[:, :2] @ plane[:2] - plane[2]
-        walls = points[(height > 0.3) & (height < 2.0), :2]
-        self._newest = walls[:: max(1, len(walls) // 800)]
+        upright = points[(height > UPRIGHT[0]) & (height < UPRIGHT[1]), :2]
+        if self.stored is None and scan.t >= self._summed + EVERY:
+            self._summed = scan.t
+            self.walls.add(upright)
+        self._newest = upright[:: max(1, len(upright) // 800)]
         self._follow()
 
     def grid(self) -> OccupancyGrid | None:
@@ -144,12 +154,12 @@ class VoxelGridMapper:
 
     def locate(self, guess: PlanarPose) -> str:
         """Look for the robot's place in the map from before; see `Mapper`. `guess` is where odom's origin is in it."""
-        if self._field is None:
+        if self._marks is None:
             return "There is no map from before; give the mapper one with its option file."
         if len(self._newest) < FEWEST:
             return "No scan with enough points has come yet."
         few = self._newest[:: max(1, len(self._newest) // 200)]
-        match = refine(self._field, self._newest, search(self._field, few, guess, self.config.around))
+        match = self._marks.refine(self._newest, self._marks.search(few, guess, self.config.around))
         if match.share < FIT:
             return (
                 f"Only {100 * match.share:.0f} % of the scan fits the map near ({guess.x:.1f}, {guess.y:.1f}); "
@@ -163,13 +173,12 @@ class VoxelGridMapper:
         grid = self.grid()
         if grid is None or self.floor is None:
             return None
-        return StoredMap(
-            grid.origin, grid.resolution, grid.cells, self.voxels.occupied(), float(self.floor[2])
-        )
+        places = self.walls.places() if self.stored is None else self.stored.walls
+        return StoredMap(grid.origin, grid.resolution, grid.cells, self.voxels.occupied(), places)
 
     def _follow(self) -> None:
         """Find the place in the map from before at first, and correct it from time to time."""
-        if self._field is None or self._t - self._followed < self.config.follow or len(self._newest) < FEWEST:
+        if self._marks is None or self._t - self._followed < self.config.follow or len(self._newest) < FEWEST:
             return
         self._followed = self._t
         if not self._located:
@@ -177,7 +186,7 @@ class VoxelGridMapper:
             self.locate(PlanarPose(*self.config.guess))
             return
         T_map_odom = self._T_odom_map.to(PlanarPose(0.0, 0.0, 0.0))
-        match = refine(self._field, self._newest, T_map_odom)
+        match = self._marks.refine(self._newest, T_map_odom)
         off = T_map_odom.to(match.pose)
         if match.share >= FIT and math.hypot(off.x, off.y) < FAR_OFF and abs(off.yaw) < 0.1:
             self._place(match, self.config.gain)
@@ -187,18 +196,6 @@ class VoxelGridMapper:
         origin = PlanarPose(0.0, 0.0, 0.0)
         T_map_odom = self._T_odom_map.to(origin).toward(match.pose, share)
         self._T_odom_map, self._located = T_map_odom.to(origin), True
-
-    def _landmarks(self, stored: StoredMap) -> Array:
-        """Return the (n, 2) places that scans are compared with."""
-        height = stored.cloud[:, 2] - stored.floor
-        walls = stored.cloud[(height > 0.3) & (height < 2.0), :2]
-        if len(walls):
-            return walls
-        r, c = np.nonzero(stored.cells > 50)
-        cells = (np.column_stack([c, r]) + 0.5) * stored.resolution
-        cos, sin = math.cos(stored.origin.yaw), math.sin(stored.origin.yaw)
-        turned = cells @ np.array([[cos, sin], [-sin, cos]]) + (stored.origin.x, stored.origin.y)
-        return turned if len(turned) else np.zeros((1, 2))
 
     def _overlaid(self, stored: StoredMap) -> OccupancyGrid:
         """Return the map from before with what this run saw drawn into it."""
@@ -216,3 +213,14 @@ class VoxelGridMapper:
             cells[row[inside], column[inside]] = value
         T = self._T_odom_map
         return OccupancyGrid(self._t, T @ stored.origin, stored.resolution, cells, T)
+
+
+def _landmarks(stored: StoredMap) -> Array:
+    """Return the (n, 2) places that scans are compared with: of a file without any, the occupied cells."""
+    if len(stored.walls):
+        return stored.walls
+    r, c = np.nonzero(stored.cells > 50)
+    cells = (np.column_stack([c, r]) + 0.5) * stored.resolution
+    cos, sin = math.cos(stored.origin.yaw), math.sin(stored.origin.yaw)
+    turned = cells @ np.array([[cos, sin], [-sin, cos]]) + (stored.origin.x, stored.origin.y)
+    return turned if len(turned) else np.zeros((1, 2))

@@ -9,12 +9,12 @@ import math
 from dataclasses import dataclass, field
 
 from golem.capabilities.navigation.base import NavInputs
-from golem.capabilities.navigation.behaviour import Action, Fallback, InSequence, BehaviourStatus
-from golem.capabilities.navigation.costmap import CostmapConfig
+from golem.capabilities.navigation.behaviour import Action, BehaviourStatus, Fallback, InSequence
+from golem.capabilities.navigation.costmap import Costmap, CostmapConfig
 from golem.capabilities.navigation.footprint import HOME
 from golem.capabilities.navigation.goto import GoTo, GoToConfig
 from golem.capabilities.navigation.local_controller import LocalController, LocalControllerConfig
-from golem.capabilities.navigation.route import find_way
+from golem.capabilities.navigation.route import find_way, way_cost
 from golem.capabilities.navigation.surroundings import Surroundings
 from golem.capabilities.navigation.way import Way
 from golem.finite import check_finite
@@ -23,6 +23,12 @@ from golem.options import require
 from golem.types import Array, PlanarPose, Twist
 
 ZERO = Twist()
+KEEP = 0.85
+"""Share of the present way's cost below which another one is taken."""
+ASIDE = 0.5
+"""Distance from the present way from which on another one is taken [m]."""
+PROGRESS = 0.2
+"""Way within `CostmapAstarConfig.stuck` that counts as progress [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +43,7 @@ class CostmapAstarConfig:
         stale: age of the newest scan or map from which on the robot stands [s].
         lost: time it waits for scan or map, or for a place in the costmap, before it gives up [s].
         patience: time without a way on before it recovers [s].
+        stuck: time without progress after which it recovers [s].
         wait: time that it waits for the way to become free [s].
         back: how far it backs up [m].
         rounds: recoveries before it gives up.
@@ -50,6 +57,7 @@ class CostmapAstarConfig:
     stale: float = 0.6
     lost: float = 5.0
     patience: float = 2.0
+    stuck: float = 10.0
     wait: float = 4.0
     back: float = 0.3
     rounds: int = 3
@@ -63,7 +71,7 @@ class CostmapAstarConfig:
         Raises:
             ConfigError: one of them cannot be meant.
         """
-        times = ("replan", "stale", "lost", "patience", "wait", "near", "back")
+        times = ("replan", "stale", "lost", "patience", "stuck", "wait", "near", "back")
         rows = ((name, getattr(self, name)) for name in times)
         require(
             "costmap_astar option ",
@@ -117,6 +125,7 @@ class CostmapAstar:
         self._recovery.reset()
         self._pose = PlanarPose(0.0, 0.0, 0.0)
         self._backed: PlanarPose | None = None
+        self._mark, self._marked = PlanarPose(math.inf, 0.0, 0.0), 0.0
 
     def step(self, inputs: NavInputs, dt: float) -> NavStep:
         """Return the twist of this step; see `Navigator`."""
@@ -148,8 +157,19 @@ class CostmapAstar:
         twist = self._local.follow(pose, self._way, self._goal, self._footprint, s.clearance, s.frame)
         if twist is None:
             return self._stand(left, dt, "The way is blocked.")
+        if self._is_stuck(dt):
+            self._blocked = math.inf
+            return self._stand(left, dt, "It makes no progress.")
         self._blocked = max(0.0, self._blocked - dt)
         return NavStep(twist, False, left, None, self._path, "follow")
+
+    def _is_stuck(self, dt: float) -> bool:
+        """Return whether the robot has hardly moved for too long."""
+        gone = self._mark.to(self._pose)
+        if math.hypot(gone.x, gone.y) > PROGRESS:
+            self._mark, self._marked = self._pose, 0.0
+        self._marked += dt
+        return self._marked > self.config.stuck
 
     @property
     def _path(self) -> Array | None:
@@ -183,7 +203,19 @@ class CostmapAstar:
         if costmap is None:
             return
         found = find_way(costmap, self._pose, self._goal, self._footprint, self.config.beta)
-        self._way, self._why = (None, found) if isinstance(found, str) else (found, "")
+        if isinstance(found, str):
+            self._way, self._why = None, found
+        elif self._way is None or self._better(costmap, found, self._way):
+            self._way, self._why = found, ""
+
+    def _better(self, costmap: Costmap, new: Way, old: Way) -> bool:
+        """Return whether a new way is worth leaving the old one: of two that cost the same one is gone to its end."""
+        i, aside = old.nearest(self._pose)
+        if aside > ASIDE:
+            return True
+        beta = self.config.beta
+        rest = way_cost(costmap, old.points[i:], beta)
+        return way_cost(costmap, new.points, beta) < KEEP * rest
 
     def _may_approach(self, left: PlanarPose) -> bool:
         """Return whether the goal is near, and nothing stands between."""
@@ -226,7 +258,7 @@ class CostmapAstar:
         """Go on with the recovery; when it has ended, follow again."""
         self._twist = ZERO
         if self._recovery.tick(dt) is not BehaviourStatus.RUNNING:
-            self._recovering = False
+            self._recovering, self._marked = False, 0.0
         return NavStep(self._twist, False, left, None, self._path, "recover")
 
     def _wait(self, since: float) -> BehaviourStatus:

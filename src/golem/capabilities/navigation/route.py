@@ -45,6 +45,15 @@ def find_way(
     return Way(points)
 
 
+def way_cost(costmap: Costmap, points: Array, beta: float) -> float:
+    """Return what places (n, 2) in their order cost by the paper's equation, in cells; infinite where one is closed."""
+    cost = costmap.at(points[1:])
+    if len(points) < 2 or (cost >= LETHAL).any():
+        return float("inf")
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1) / costmap.resolution
+    return float((steps * (1.0 + beta * cost)).sum())
+
+
 def _open(cost: Array, cell: Cell, radius: float) -> None:
     """Let ways lead through what is no obstacle itself within `radius` [cells] of a cell, at the highest cost."""
     n = int(radius) + 1

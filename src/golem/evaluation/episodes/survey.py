@@ -10,8 +10,9 @@ import numpy as np
 
 from golem.capabilities.mapping.floor_plane import FloorPlane
 from golem.capabilities.mapping.map_file import save_map
+from golem.capabilities.mapping.robot_filter import RobotFilter
 from golem.capabilities.mapping.voxel_grid import VoxelGridMapper
-from golem.capabilities.odometry.base import lidar_in_base, of_the_world
+from golem.capabilities.odometry.base import lidar_in_base
 from golem.interfaces.nav_payloads import Scan
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.lidar_sensor import LidarMoment, LidarSensor
@@ -45,7 +46,7 @@ def survey(robot: MujocoRobot, seed: int, path: Path) -> None:
     joint = int(scene.model.joint("base").qposadr[0])
     start: Array = robot.data.qpos.copy()
     height = float(start[joint + 2])  # pyright: ignore[reportCallIssue, reportArgumentType]
-    T_base_lidar = lidar_in_base(0.0)
+    T_base_lidar, joints, filter = lidar_in_base(0.0), robot.joints()[0], RobotFilter()
     for place in PLACES:
         qpos = start.copy()
         half = 0.5 * place.yaw
@@ -58,7 +59,8 @@ def survey(robot: MujocoRobot, seed: int, path: Path) -> None:
                 if scan is None:
                     continue
                 points = scan.points.astype(np.float64)
-                points = points[of_the_world(points, T_base_lidar)] @ T[:3, :3].T + T[:3, 3]
+                in_base = points @ T_base_lidar[:3, :3].T + T_base_lidar[:3, 3]
+                points = points[~filter.own(in_base, joints)] @ T[:3, :3].T + T[:3, 3]
                 mapper.add_scan(Scan(scan.t, points, T[:3, 3], floor.update(points, T[:3, 3])))
         t += 1.0
     stored = mapper.stored_map()
