@@ -16,9 +16,9 @@ from golem.types import Array
 
 Voxels = NDArray[np.int8]
 Stamps = NDArray[np.uint16]
-HIT, MISS, MOST, LEAST = 4, 1, 20, -8
+HIT, MISS, MOST, LEAST = 4, 1, 12, -8
 """Steps of the log odds per hit and per ray that passes, and their bounds [own: a person who walked on is forgotten
-after 2 s, the edge of a board that one scan in four hits is not]."""
+after some seconds, the edge of a board that one scan in four hits is not]."""
 OCCUPIED = 6
 """Steps from which a voxel counts as occupied: two hits."""
 UNKNOWN, FREE, FULL = -1, 0, 100
