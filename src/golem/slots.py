@@ -119,7 +119,9 @@ SLOTS: dict[str, Slot] = {
         {
             "goto": "golem.capabilities.navigation.goto:GoTo",
             "costmap_astar": "golem.capabilities.navigation.costmap_astar:CostmapAstar",
+            "nav2": "golem.capabilities.navigation.nav2:Nav2",
         },
+        ("nav2",),
     ),
     "skill": Slot(
         "golem.skills.base:Skill",

@@ -13,7 +13,11 @@ from golem.types import PlanarPose
 
 def map_view(bus: Bus) -> NDArray[np.uint8] | None:
     """Return (height, width, 3) RGB; None in a stack without a map."""
-    grid, place, odometry = (bus.latest(t) for t in (topics.MAP, topics.MAP_POSE, topics.ODOMETRY))
+    grid, place, odometry = (
+        bus.latest(topics.MAP),
+        bus.latest(topics.MAP_POSE),
+        bus.latest(topics.ODOMETRY),
+    )
     if grid is None or place is None or odometry is None:
         return None
     T_map_odom = place.T_odom_map.to(PlanarPose(0.0, 0.0, 0.0))

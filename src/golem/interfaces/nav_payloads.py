@@ -142,3 +142,46 @@ class NavStep:
     def ended(self) -> bool:
         """Whether there is nothing more to do."""
         return self.arrived or self.failure is not None
+
+
+Nav2State = Literal["absent", "rejected", "active", "succeeded", "aborted", "canceled"]
+"""How a goal that was given to Nav2 stands; absent: nobody offers the action."""
+
+
+@dataclass(frozen=True, slots=True)
+class Nav2Goal:
+    """A goal for Nav2.
+
+    Attributes:
+        number: tells goals apart.
+        pose: where to, in the frame of the goal that the navigator pursues.
+    """
+
+    number: int
+    pose: PlanarPose
+
+
+@dataclass(frozen=True, slots=True)
+class Nav2Reply:
+    """How a goal stands.
+
+    Attributes:
+        number: of the goal.
+        state: how it stands.
+    """
+
+    number: int
+    state: Nav2State
+
+
+@dataclass(frozen=True, slots=True)
+class Nav2Twist:
+    """What Nav2's controller commands.
+
+    Attributes:
+        t: when it came [s].
+        twist: in base_link.
+    """
+
+    t: float
+    twist: Twist

@@ -5,7 +5,17 @@ from __future__ import annotations
 from functools import cache
 
 from golem.interfaces.lidar import ExternalOdometry, LidarImu, LidarScan
-from golem.interfaces.nav_payloads import MapPlace, NavGoal, NavPath, NavStep, OccupancyGrid, Scan
+from golem.interfaces.nav_payloads import (
+    MapPlace,
+    Nav2Goal,
+    Nav2Reply,
+    Nav2Twist,
+    NavGoal,
+    NavPath,
+    NavStep,
+    OccupancyGrid,
+    Scan,
+)
 from golem.interfaces.payloads import (
     ArmCommand,
     DetectionRequest,
@@ -85,6 +95,12 @@ NAV_STEP = Topic("navigation/step", NavStep)
 """From the navigator while it has a goal."""
 NAV_PATH = Topic("navigation/path", NavPath)
 """From the navigator whenever it has found another way."""
+NAV2_GOAL = Topic("nav2/goal", Nav2Goal)
+"""From a navigator that leaves the way to Nav2."""
+NAV2_REPLY = Topic("nav2/reply", Nav2Reply)
+"""From whoever speaks to Nav2, at every change."""
+NAV2_TWIST = Topic("nav2/cmd_vel", Nav2Twist)
+"""From Nav2's controller."""
 FEEDBACK = Topic("skill/feedback", Feedback)
 """Of the running skill."""
 ONBOARD_LEGS = Topic("onboard/legs", LegCommand)

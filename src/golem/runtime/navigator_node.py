@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Literal
 
 from golem.capabilities.mapping.robot_filter import RobotFilter
 from golem.capabilities.navigation.base import Navigator, NavInputs
@@ -99,7 +100,7 @@ class NavigatorNode:
         """Forget the previous goal, with every step that was on its way."""
         self._bus.withdraw(topics.NAV_STEP)
         self._goal = self._unstarted = goal.pose
-        self._frame = goal.frame
+        self._frame: Literal["odom", "map"] = goal.frame
         self._seen = self._bus.count(topics.NAV_STEP)
         self._ticks, self._stepped_at = 0, -1
         self._job: Future[NavStep] | None = None

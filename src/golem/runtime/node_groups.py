@@ -30,6 +30,7 @@ from golem.runtime.executor import Phase, Placed
 from golem.runtime.gantry_release import GantryReleaseNode
 from golem.runtime.lower_body_node import CheckedLowerBody, LowerBodyNode
 from golem.runtime.mapper_node import MapperNode
+from golem.runtime.nav2_link import BusNav2
 from golem.runtime.navigator_node import NavigatorNode
 from golem.runtime.odometry_node import LidarNode, OdometryNode
 from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode, stack_loco_api
@@ -193,7 +194,7 @@ class StackNodes:
         self.stack, self.bus = stack, bus
         make = ModuleFactory(stack).make
         self.skills = SkillTable(stack)
-        navigator, navigator_contract = make("navigator")
+        navigator, navigator_contract = make("navigator", nav2=BusNav2(bus))
         estimator, estimator_contract = make("estimator")
         odometry, odometry_contract = make("odometry")
         localizer, contract = make("localizer")

@@ -46,9 +46,9 @@ class ScanNode:
         scan = self._scans.read()
         if scan is None or not self._track or _frozen(scan, self._before):
             return
-        self._before = scan
         posed = self._posed(scan)
         if posed is not None:
+            self._before = scan
             self._bus.publish(topics.SCAN, posed, t)
 
     def _keep(self, pose: Odometry, T_base_lidar: Array) -> None:

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.spatial import cKDTree
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from golem.types import Array, PlanarPose, wrap
 
@@ -44,7 +45,7 @@ class Landmarks:
     def __init__(self, places: Array) -> None:
         """Take (n, 2) places [m]; n is at least 1."""
         self._places = places
-        self._tree = cKDTree(places)
+        self._tree = KDTree(places)
         n = min(NEIGHBOURS, len(places))
         around = places[self._tree.query(places, n)[1].reshape(len(places), n)]
         off = around - around.mean(axis=1, keepdims=True)
@@ -87,7 +88,7 @@ class Landmarks:
         x, reach = np.array([pose.x, pose.y, pose.yaw]), 0.5
         for _ in range(ROUNDS):
             at = _moved(points, x)
-            distance, index = self._tree.query(at, distance_upper_bound=reach)
+            distance, index = self._nearest(at, reach)
             kept = np.isfinite(distance)
             if kept.sum() < 3:
                 break
@@ -101,12 +102,17 @@ class Landmarks:
             x, reach = x + step, max(0.15, 0.7 * reach)
             if np.abs(step).max() < 1e-5:
                 break
-        distance, index = self._tree.query(_moved(points, x), distance_upper_bound=0.15)
+        distance, index = self._nearest(_moved(points, x), 0.15)
         near = np.isfinite(distance)
         off = _moved(points, x)[near] - self._middles[index[near]]
         across = (self._normals[index[near]] * off).sum(axis=1)
         residual = float(np.sqrt(np.mean(across**2))) if near.any() else FAR
         return Match(PlanarPose(float(x[0]), float(x[1]), wrap(float(x[2]))), float(near.mean()), residual)
+
+    def _nearest(self, points: Array, reach: float) -> tuple[Array, NDArray[np.int64]]:
+        """Return the (n,) distance of the landmark nearest to each point (n, 2), infinite beyond `reach`, and which."""
+        distance, index = self._tree.query(points, distance_upper_bound=reach)
+        return np.asarray(distance, np.float64), np.asarray(index, np.int64)
 
     def _coarse(self, points: Array) -> Array:
         """Return the (...,) distance of points (..., 2) from the nearest landmark, by its cell."""

@@ -68,17 +68,17 @@ class GridConfig:
             "mapper option ",
             ("resolution", self.resolution, 0.01 <= self.resolution <= 0.5, "from 0.01 to 0.5 m"),
             ("reach", self.reach, 0.5 <= self.reach <= 100.0, "from 0.5 to 100 m"),
-            ("band", self.band, 0.0 < low < high <= 2.2, "two heights, the lower first, of at most 2.2 m"),
+            ("band", high, 0.0 < low < high <= 2.2, "two heights, the lower first, of at most 2.2 m"),
             ("rays", self.rays, self.rays >= 1, "at least 1"),
             (
                 "around",
-                self.around,
+                max(self.around),
                 0.0 <= min(self.around) and max(self.around) <= 5.0,
                 "at most 5 m and rad",
             ),
             ("follow", self.follow, self.follow > 0.0, "a positive time in seconds"),
             ("gain", self.gain, 0.0 <= self.gain <= 1.0, "a share from 0 to 1"),
-            ("guess", self.guess, all(map(math.isfinite, self.guess)), "three finite numbers"),
+            ("guess", sum(self.guess), all(map(math.isfinite, self.guess)), "three finite numbers"),
         )
 
 
@@ -223,4 +223,4 @@ def _landmarks(stored: StoredMap) -> Array:
     cells = (np.column_stack([c, r]) + 0.5) * stored.resolution
     cos, sin = math.cos(stored.origin.yaw), math.sin(stored.origin.yaw)
     turned = cells @ np.array([[cos, sin], [-sin, cos]]) + (stored.origin.x, stored.origin.y)
-    return turned if len(turned) else np.zeros((1, 2))
+    return np.asarray(turned, np.float64) if len(turned) else np.zeros((1, 2))

@@ -57,7 +57,9 @@ class VoxelMap:
         box = self._box(points, origin)
         arguments = self.corner, self.resolution, self._number
         voxel_kernel.mark(self.voxels, self._stamps, points, *arguments)
-        voxel_kernel.clear(self.voxels, self._stamps, points[self._number % every :: every], origin, *arguments)
+        voxel_kernel.clear(
+            self.voxels, self._stamps, points[self._number % every :: every], origin, *arguments
+        )
         old = box if self._changed is None else self._changed
         self._changed = np.array(
             [min(box[0], old[0]), max(box[1], old[1]), min(box[2], old[2]), max(box[3], old[3])]

@@ -29,9 +29,8 @@ class WallMeans:
         rows = np.column_stack([points, np.ones(len(points))])
         every, where = np.unique(np.concatenate([self._keys, keys]), return_inverse=True)
         stacked = np.concatenate([self._sums, rows])
-        self._sums = np.column_stack(
-            [np.bincount(where, stacked[:, a], minlength=len(every)) for a in range(3)]
-        )
+        sums = [np.bincount(where, stacked[:, a], minlength=len(every)) for a in range(3)]
+        self._sums = np.asarray(np.column_stack(sums), np.float64)
         self._keys = every
 
     def places(self) -> Array:

@@ -104,7 +104,7 @@ class Costmap:
         """Return the (n, 2) middles of cells (n, 2), row and column each, in the frame of the map [m]."""
         local = (cells[:, ::-1] + 0.5) * self.resolution
         c, s = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
-        return local @ np.array([[c, s], [-s, c]]) + (self.origin.x, self.origin.y)
+        return np.asarray(local @ np.array([[c, s], [-s, c]]) + (self.origin.x, self.origin.y), np.float64)
 
     def corner(self, row: int, column: int) -> tuple[float, float]:
         """Return where the corner of a cell is in the frame of the map [m]."""

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from golem.capabilities.navigation.base import NavInputs
 from golem.capabilities.navigation.behaviour import Action, BehaviourStatus, Fallback, InSequence
 from golem.capabilities.navigation.costmap import Costmap, CostmapConfig
@@ -130,7 +132,7 @@ class CostmapAstar:
     def step(self, inputs: NavInputs, dt: float) -> NavStep:
         """Return the twist of this step; see `Navigator`."""
         pose = self._pose = inputs.pose
-        check_finite("the pose", (pose.x, pose.y, pose.yaw))
+        check_finite("the pose", np.array([pose.x, pose.y, pose.yaw]))
         left = pose.to(self._goal)
         self._footprint = inputs.footprint or HOME
         missing = self._look(inputs, dt)

@@ -53,7 +53,8 @@ class MapPicture:
 
     def rgb(self) -> NDArray[np.uint8]:
         """Return the picture, (height, width, 3)."""
-        return np.ascontiguousarray(cv2.rotate(self._image, cv2.ROTATE_90_COUNTERCLOCKWISE)[:, ::-1])
+        turned = cv2.rotate(self._image, cv2.ROTATE_90_COUNTERCLOCKWISE)[:, ::-1]
+        return np.ascontiguousarray(turned, np.uint8)
 
     def _pixels(self, points: Array) -> NDArray[np.int32]:
         o = self._grid.origin

@@ -42,6 +42,7 @@ SUITES: dict[str, str] = {
 """Slot -> `module:Class` of its suite, imported when it is used."""
 OPTIONS: dict[tuple[str, str], Mapping[str, object]] = {
     ("lower_body", "policy"): {"file": "almi_stand"},
+    ("navigator", "nav2"): {"near": 2000.0},
     ("lower_body", "handover"): {"walk": {"use": "almi"}, "stand": {"use": "hold"}},
 }
 """What shipped modules without default options are checked with."""
