@@ -20,7 +20,7 @@ LAYERS = (
     ("skills",),
     ("stack", "runtime", "provenance"),
     ("evaluation", "training", "dashboard", "doctor", "option_list"),
-    ("run", "demo", "cli", "__main__"),
+    ("run", "demo", "demo_walk", "cli", "__main__"),
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 NOT_AT_RUN_TIME = "training"

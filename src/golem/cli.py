@@ -28,11 +28,20 @@ INTERRUPTED = 130
 
 
 def _demo(words: list[str]) -> int:
-    """The robot finds loosened screws, pulls them and drops them in the tray, in front of you."""
+    """The robot pulls loosened screws from a pack in front of you; --walk: it finds its way to one."""
     _prepare_graphics()
     from golem.demo import DemoConfig, run_demo
 
-    return 0 if run_demo(_parse(DemoConfig, "demo", words)).success else FAILED
+    config = _parse(DemoConfig, "demo", words)
+    if config.walk:
+        from golem.demo_walk import STACK, run_walk_demo
+
+        stack = STACK if config.stack == DemoConfig.stack else config.stack
+        walked = run_walk_demo(
+            stack, config.profile, config.seed, config.out, config.port, config.headless, config.record
+        )
+        return 0 if walked.success else FAILED
+    return 0 if run_demo(config).success else FAILED
 
 
 def _run(words: list[str]) -> int:

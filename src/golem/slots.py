@@ -117,13 +117,23 @@ SLOTS: dict[str, Slot] = {
             "topic": "golem.capabilities.odometry.external_topic:ExternalTopic",
         },
     ),
+    "mapper": Slot(
+        "golem.capabilities.mapping.base:Mapper",
+        {"grid": "golem.capabilities.mapping.voxel_grid:VoxelGridMapper"},
+    ),
     "navigator": Slot(
         "golem.capabilities.navigation.base:Navigator",
-        {"goto": "golem.capabilities.navigation.goto:GoTo"},
+        {
+            "goto": "golem.capabilities.navigation.goto:GoTo",
+            "costmap_astar": "golem.capabilities.navigation.costmap_astar:CostmapAstar",
+            "nav2": "golem.capabilities.navigation.nav2:Nav2",
+        },
+        ("nav2",),
     ),
     "skill": Slot(
         "golem.skills.base:Skill",
         {
+            "navigate": "golem.skills.navigate:Navigate",
             "pick": "golem.skills.pick:Pick",
             "stand": "golem.skills.walk:Stand",
             "walk": "golem.skills.walk:Walk",
@@ -143,6 +153,8 @@ KEYS: dict[str, StackKey] = {
     "localizer": StackKey("localizer", "onnx"),
     "grasp_method": StackKey("grasp_method", "visual_servo"),
     "odometry": StackKey("odometry", "legs"),
+    # Runs where the stack listens to the LiDAR.
+    "mapper": StackKey("mapper", "grid"),
     "navigator": StackKey("navigator", "goto"),
     # Takes the legs when `lower_body` fails.
     "fallback": StackKey("lower_body", "hold", standing="almi"),

@@ -18,9 +18,9 @@ from golem.options import check_values, read_yaml
 from golem.robots.base import Standing
 from golem.slots import KEYS, PARTS
 
-HOIST, GROUND, ONBOARD = "hoist", "ground", "onboard"
-"""What a module's class may say that it `requires`: a robot that hangs, one that stands on its feet, or the robot's own
-computer."""
+HOIST, GROUND, ONBOARD, SCAN = "hoist", "ground", "onboard", "scan"
+"""What a module's class may say that it `requires`: a robot that hangs, one that stands on its feet, the robot's own
+computer, or scans of a LiDAR (a navigator)."""
 WORDS = ("profile", "limits")
 """Keys of a stack file whose values are one word."""
 SKILLS = "skills"

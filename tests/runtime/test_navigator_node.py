@@ -113,7 +113,7 @@ def test_a_latency_delays_every_step_and_a_new_goal_hears_no_old_one() -> None:
 def test_map_and_scan_are_shown_where_there_are_any() -> None:
     rig = Rig(Counts())
     grid = OccupancyGrid(0.0, HERE, 0.05, np.zeros((2, 3), np.int8))
-    scan = Scan(0.0, np.zeros((4, 3)))
+    scan = Scan(0.0, np.zeros((4, 3)), np.zeros(3), np.zeros(3))
     rig.bus.publish(topics.MAP, grid, 0.0)
     rig.bus.publish(topics.SCAN, scan, 0.0)
     rig.go(AHEAD)

@@ -15,9 +15,12 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from golem.dashboard.balance_chart import SPAN, balance_chart
+from golem.dashboard.map_view import map_view
 from golem.dashboard.status import CLASS_COLOURS, Status, camera_picture, read_status
 from golem.errors import OutputError
+from golem.interfaces import topics
 from golem.interfaces.payloads import GateState
+from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.spectator import Shot, SpectatorView
@@ -112,16 +115,20 @@ class Film:
             (height, width, 3) RGB.
         """
         status = read_status(running)
+        if running.bus.latest(topics.MAP) is not None:
+            self._view.follow(BASE_LINK)
         shot = "close" if status.stage in CLOSE_STAGES else "wide"
         picture = _resized(self._view.picture(shot), self._size)
-        insets = [camera_picture(running, self._view, camera) for camera in ("right_hand", "head")]
-        picture = self._compose(picture, insets, status)
+        floor = map_view(running.bus)
+        cameras = {"palm camera": "right_hand", "head camera": "head"} if floor is None else {}
+        insets = {label: camera_picture(running, self._view, name) for label, name in cameras.items()}
+        picture = self._compose(picture, insets if floor is None else {"map": floor}, status)
         packed = cv2.imencode(".png", picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
         self._frames.append(packed)
         return picture
 
     def _compose(
-        self, picture: NDArray[np.uint8], insets: list[NDArray[np.uint8]], status: Status
+        self, picture: NDArray[np.uint8], insets: dict[str, NDArray[np.uint8]], status: Status
     ) -> NDArray[np.uint8]:
         """Lay insets and words over a picture."""
         image = Image.fromarray(picture)
@@ -130,8 +137,8 @@ class Film:
         unit = height / 540
         bar = round(44 * unit)
         top, edge = height - bar, round(10 * unit)
-        for inset, label in zip(insets, ("palm camera", "head camera"), strict=True):
-            w = round(200 * unit)
+        for label, inset in insets.items():
+            w = round((200 if len(insets) > 1 else 260) * unit)
             h = round(w * inset.shape[0] / inset.shape[1])
             x, y = width - w - edge, top - h - edge
             draw.rectangle((x - 2, y - 2, x + w + 1, y + h + 1), fill=INK)

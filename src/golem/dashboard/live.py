@@ -20,6 +20,7 @@ import numpy as np
 import viser
 
 from golem.dashboard.balance_chart import SPAN, balance_chart
+from golem.dashboard.map_view import map_view
 from golem.dashboard.panel import Button, Panel
 from golem.dashboard.stage import Stage
 from golem.dashboard.status import Timeline, camera_picture, read_status
@@ -246,6 +247,9 @@ class LiveView:
             chart = balance_chart(self._recorder.trace(), CHART)
             if chart is not None:
                 self._panel.show_picture("balance", chart)
+        floor = map_view(self._running.bus)
+        if floor is not None:
+            self._panel.show_picture("map", floor)
         for camera, label in CAMERAS.items():
             picture = camera_picture(self._running, self._view, camera)
             height = round(CAMERA_WIDTH * picture.shape[0] / picture.shape[1])

@@ -40,6 +40,7 @@ RUNGS: dict[str, str] = {
     "walk-slope": "golem.evaluation.rungs.walk_rough:WalkSlope",
     "walk-rubble": "golem.evaluation.rungs.walk_rough:WalkRubble",
     "navigate-line": "golem.evaluation.rungs.navigate_line:NavigateLine",
+    "navigate": "golem.evaluation.rungs.navigate_hall:NavigateRung",
     "base-estimation": "golem.evaluation.rungs.base_estimation:BaseEstimation",
     "odometry": "golem.evaluation.rungs.odometry:OdometryRung",
     "mpc-rate": "golem.evaluation.rungs.mpc_rate:MpcRate",

@@ -170,10 +170,14 @@ class Odometry:
     Attributes:
         t: time of the measurement [s].
         T_odom_base: (4, 4) pose of base_link in odom.
+        T_base_lidar: (4, 4) pose of lidar_link in base_link as the source takes it to be; None of one without LiDAR.
+        covariance: (6, 6) of the error of `T_odom_base`, see `OdometryEstimate`; None of a source that has none.
     """
 
     t: float
     T_odom_base: Array
+    T_base_lidar: Array | None = None
+    covariance: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)

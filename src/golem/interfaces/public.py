@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from golem.interfaces import images, lidar_convert, onboard_legs, ros_safety, topics
+from golem.interfaces import images, lidar_convert, nav_convert, onboard_legs, ros_safety, topics
 from golem.interfaces import ros_convert as convert
 from golem.interfaces.payloads import Exposure
 from golem.interfaces.rows import ActionRow, Role, ServiceRow, TopicRow
@@ -135,7 +135,7 @@ TOPICS: tuple[TopicRow, ...] = (
           "Every moving link in its parent.",
           topics.LOW_STATE, on_demand=True, thinned=True),
     TopicRow("/tf", "tf2_msgs/msg/TFMessage", "stack", (), DEFAULT, 50, "odom",
-          "base_link in odom, by the base estimate.",
+          "base_link in odom, by the base estimate; odom in map, where there is a map.",
           topics.BASE, _base_link, on_demand=True, thinned=True),
     TopicRow("/tf_static", "tf2_msgs/msg/TFMessage", "robot", ("stack",), LATCHED, None, "",
           "Sensor frames; those of the cameras are where their calibration claims them."),
@@ -176,6 +176,12 @@ TOPICS: tuple[TopicRow, ...] = (
     TopicRow("/odom", "nav_msgs/msg/Odometry", "stack", (), DEFAULT, 50, "odom",
           "Pose of base_link in odom and its velocity in base_link.",
           topics.BASE, on_demand=True, thinned=True),
+    TopicRow("/map", "nav_msgs/msg/OccupancyGrid", "stack", (), LATCHED, None, nav_convert.MAP_FRAME,
+          "The map of the floor twice a second, where the stack listens to the LiDAR.",
+          topics.MAP, nav_convert.occupancy_grid, on_demand=True),
+    TopicRow("/plan", "nav_msgs/msg/Path", "stack", (), DEFAULT, None, nav_convert.MAP_FRAME,
+          "The way that the navigator means to go.",
+          topics.NAV_PATH, nav_convert.path, on_demand=True),
     TopicRow("/Odometry", "nav_msgs/msg/Odometry", "user", ("stack",), DEFAULT, None, "",
           "An odometry from outside, as FAST-LIO names it; `odometry: {use: topic}` goes by it.",
           topics.EXTERNAL_ODOMETRY, lidar_convert.odometry, lidar_convert.to_odometry),
@@ -221,6 +227,8 @@ ACTIONS: tuple[ActionRow, ...] = (
     ActionRow("/skill/pick", "golem_interfaces/action/Pick", "stack",
            "Find an object, grasp it, pull it straight out and drop it in a container."),
     ActionRow("/skill/walk", "golem_interfaces/action/Walk", "stack", "Walk to a pose and stand there."),
+    ActionRow("/skill/navigate", "golem_interfaces/action/Walk", "stack",
+           "Walk to a pose, in `map`, `odom` or `base_link`, around what is in the way."),
     ActionRow("/skill/stand", "golem_interfaces/action/Stand", "stack", "Stand for a while."),
 )
 

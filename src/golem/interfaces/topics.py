@@ -5,7 +5,17 @@ from __future__ import annotations
 from functools import cache
 
 from golem.interfaces.lidar import ExternalOdometry, LidarImu, LidarScan
-from golem.interfaces.nav_payloads import NavGoal, NavStep, OccupancyGrid, Scan
+from golem.interfaces.nav_payloads import (
+    MapPlace,
+    Nav2Goal,
+    Nav2Reply,
+    Nav2Twist,
+    NavGoal,
+    NavPath,
+    NavStep,
+    OccupancyGrid,
+    Scan,
+)
 from golem.interfaces.payloads import (
     ArmCommand,
     DetectionRequest,
@@ -75,12 +85,22 @@ EXTERNAL_ODOMETRY = Topic("odometry/external", ExternalOdometry)
 """From an odometry outside of this stack."""
 MAP = Topic("map", OccupancyGrid)
 """From whatever maps; a stack without it never sends any."""
+MAP_POSE = Topic("map/pose", MapPlace)
+"""From whatever maps, with every scan, while the place in the map is known."""
 SCAN = Topic("scan", Scan)
-"""From a LiDAR; a robot without one never sends any."""
+"""From a LiDAR that an odometry locates; a robot without one never sends any."""
 NAV_GOAL = Topic("navigation/goal", NavGoal)
 """From the running skill, whenever it changes."""
 NAV_STEP = Topic("navigation/step", NavStep)
 """From the navigator while it has a goal."""
+NAV_PATH = Topic("navigation/path", NavPath)
+"""From the navigator whenever it has found another way."""
+NAV2_GOAL = Topic("nav2/goal", Nav2Goal)
+"""From a navigator that leaves the way to Nav2."""
+NAV2_REPLY = Topic("nav2/reply", Nav2Reply)
+"""From whoever speaks to Nav2, at every change."""
+NAV2_TWIST = Topic("nav2/cmd_vel", Nav2Twist)
+"""From Nav2's controller."""
 FEEDBACK = Topic("skill/feedback", Feedback)
 """Of the running skill."""
 ONBOARD_LEGS = Topic("onboard/legs", LegCommand)

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Literal
 
+from golem.capabilities.mapping.robot_filter import RobotFilter
 from golem.capabilities.navigation.base import Navigator, NavInputs
+from golem.capabilities.navigation.footprint import Footprint
 from golem.errors import ModuleFault
 from golem.interfaces import topics
-from golem.interfaces.nav_payloads import NavGoal, NavStep
+from golem.interfaces.nav_payloads import HERE, NavGoal, NavPath, NavStep, OccupancyGrid
 from golem.interfaces.payloads import ModuleFaultMsg
 from golem.middleware.bus import Bus, News
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import SkillNode
 from golem.skills.base import StageFailed
-from golem.skills.context import LegsInterface
+from golem.skills.legs_interface import LegsInterface
 from golem.skills.runner import LACKS
-from golem.types import PlanarPose, Twist
+from golem.types import Array, PlanarPose, Twist
 
 ZERO = Twist()
+BODY_MARGIN = 0.01
+"""By how much the robot's footprint is wider than its spheres [m]: these are conservative already."""
 
 
 class NavigatorNode:
@@ -57,6 +62,11 @@ class NavigatorNode:
         self._latency = 0.0 if self._worker is not None else navigator.latency
         self._every = max(1, round(1.0 / (navigator.rate * self.period)))
         self._goals = News(bus, topics.NAV_GOAL)
+        self._robot: RobotFilter | None = None
+        self._footprint: Footprint | None = None
+        self._footprint_due = 0.0
+        self._shown: Array | None = None
+        self._grid: tuple[OccupancyGrid | None, OccupancyGrid | None] = None, None
         self._pursue(NavGoal(None))
 
     def step(self, t: float) -> None:
@@ -81,12 +91,16 @@ class NavigatorNode:
             return
         newest = self._bus.latest(topics.NAV_STEP)
         if newest is not None and self._bus.count(topics.NAV_STEP) > self._seen:
+            if newest.path is not None and newest.path is not self._shown:
+                self._shown = newest.path
+                self._bus.publish(topics.NAV_PATH, NavPath(t, newest.path, self._frame), t)
             self._legs.drive(ZERO if newest.ended else newest.twist)
 
     def _pursue(self, goal: NavGoal) -> None:
         """Forget the previous goal, with every step that was on its way."""
         self._bus.withdraw(topics.NAV_STEP)
         self._goal = self._unstarted = goal.pose
+        self._frame: Literal["odom", "map"] = goal.frame
         self._seen = self._bus.count(topics.NAV_STEP)
         self._ticks, self._stepped_at = 0, -1
         self._job: Future[NavStep] | None = None
@@ -112,12 +126,18 @@ class NavigatorNode:
     def _thought(self, dt: float) -> Callable[[], NavStep]:
         """Return what computes one step from what is known now."""
         status = self._legs.status
-        inputs = NavInputs(
-            PlanarPose.of(self._legs.pose) @ status.rest,
-            status.moving,
-            self._bus.latest(topics.MAP),
-            self._bus.latest(topics.SCAN),
-        )
+        T = HERE
+        if self._frame == "map":
+            place = self._bus.latest(topics.MAP_POSE)
+            if place is None:
+                raise StageFailed("navigate", "mapper", "The robot's place in the map is not known.")
+            T = place.T_odom_map.to(HERE)
+        grid, scan = self._bus.latest(topics.MAP), self._bus.latest(topics.SCAN)
+        if self._frame == "map":
+            grid = self._grid_in_map(grid)
+            scan = None if scan is None else scan.seen_from(T)
+        pose = T @ PlanarPose.of(self._legs.pose) @ status.rest
+        inputs = NavInputs(pose, status.moving, grid, scan, self._room())
         goal, self._unstarted = self._unstarted, None
 
         def think() -> NavStep:
@@ -126,6 +146,24 @@ class NavigatorNode:
             return self._navigator.step(inputs, dt)
 
         return think
+
+    def _grid_in_map(self, grid: OccupancyGrid | None) -> OccupancyGrid | None:
+        """Return a map in its own frame; the same object for the same map."""
+        if grid is not self._grid[0]:
+            moved = None if grid is None else grid.in_map
+            self._grid = grid, moved
+        return self._grid[1]
+
+    def _room(self) -> Footprint | None:
+        """Return the footprint of the robot, seen anew twice a second; None in a stack without LiDAR."""
+        state = self._bus.latest(topics.LOW_STATE)
+        if state is None or self._bus.latest(topics.SCAN) is None:
+            return None
+        if self._footprint is None or state.t >= self._footprint_due or state.t < self._footprint_due - 1.0:
+            self._robot = self._robot or RobotFilter()
+            self._footprint = Footprint.around(self._robot.balls(state.q), BODY_MARGIN)
+            self._footprint_due = state.t + 0.5
+        return self._footprint
 
     def _give_up(self, message: ModuleFaultMsg, t: float) -> None:
         self._bus.publish(topics.MODULE_FAULT, message, t)

@@ -30,9 +30,12 @@ from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Phase, Placed
 from golem.runtime.gantry_release import GantryReleaseNode
 from golem.runtime.lower_body_node import CheckedLowerBody, LowerBodyNode
+from golem.runtime.mapper_node import MapperNode
+from golem.runtime.nav2_link import BusNav2
 from golem.runtime.navigator_node import NavigatorNode
 from golem.runtime.odometry_node import LidarNode, OdometryNode
 from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode, stack_loco_api
+from golem.runtime.scan_node import ScanNode
 from golem.runtime.skill_table import SkillTable
 from golem.skills.base import Routine
 from golem.skills.context import Context, Modules
@@ -40,7 +43,7 @@ from golem.skills.pursuit import pursue
 from golem.skills.runner import SkillRun
 from golem.skills.spec import as_goal
 from golem.slots import KEYS
-from golem.stack import Stack
+from golem.stack import SCAN, Stack
 from golem.types import SIDES, Array, Side
 
 LEGS_ALONE = ("legs",)
@@ -70,13 +73,15 @@ class ModuleFactory:
 
 
 def hears_lidar(stack: Stack) -> bool:
-    """Return whether the odometry of `stack` goes by the LiDAR or its IMU.
+    """Return whether `stack` listens to the LiDAR: its odometry does, or its navigator needs scans.
 
     Raises:
-        ConfigError, ModuleFault: its class cannot be loaded.
+        ConfigError, ModuleFault: a class cannot be loaded.
     """
     sources = getattr(registry.load("odometry", stack.choice("odometry").use), "sources", ())
-    return bool({"imu", "scan"} & set(sources))
+    return bool({"imu", "scan"} & set(sources)) or SCAN in registry.requires(
+        "navigator", stack.choice("navigator").use
+    )
 
 
 class RobotNodes:
@@ -190,7 +195,7 @@ class StackNodes:
         self.stack, self.bus = stack, bus
         make = ModuleFactory(stack).make
         self.skills = SkillTable(stack)
-        navigator, navigator_contract = make("navigator")
+        navigator, navigator_contract = make("navigator", nav2=BusNav2(bus))
         estimator, estimator_contract = make("estimator")
         odometry, odometry_contract = make("odometry")
         localizer, contract = make("localizer")
@@ -231,8 +236,11 @@ class StackNodes:
             (Phase.CONTROL, self.legs),
             (Phase.CONTROL, nodes.UpperBodyNode(bus, *make("upper_body"))),
         ]
-        if tuple(odometry.sources) != LEGS_ALONE:
+        if tuple(odometry.sources) != LEGS_ALONE or hears_lidar(stack):
             self.nodes.append((Phase.PERCEIVE, OdometryNode(bus, odometry, odometry_contract)))
+        if hears_lidar(stack):
+            self.nodes.append((Phase.PERCEIVE, ScanNode(bus)))
+            self.nodes.append((Phase.PERCEIVE, MapperNode(bus, *make("mapper"))))
         for side in SIDES:
             hand, hand_contract = make("hand", side=side)
             self.nodes.append((Phase.CONTROL, nodes.HandNode(bus, hand, side, hand_contract)))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from golem.capabilities.odometry.base import LidarOdometry, OdometryEstimate
 from golem.interfaces import topics
 from golem.interfaces.lidar import LegOdometry
@@ -48,7 +50,9 @@ class OdometryNode:
         if estimate is not None:
             self._contract.kind("the estimate", estimate, OdometryEstimate)
             T = self._contract.array("T_odom_base", estimate.T_odom_base, 4, 4)
-            self._bus.publish(topics.ODOMETRY, Odometry(float(estimate.t), T), t)
+            T_lidar = self._contract.array("T_base_lidar", estimate.T_base_lidar, 4, 4)
+            known = estimate.covariance if np.isfinite(estimate.covariance).all() else None
+            self._bus.publish(topics.ODOMETRY, Odometry(float(estimate.t), T, T_lidar, known), t)
 
     def _add_legs(self, t: float) -> None:
         state, base = self._bus.latest(topics.LOW_STATE), self._bus.latest(topics.BASE)

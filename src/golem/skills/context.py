@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -19,21 +19,18 @@ from golem.interfaces.payloads import (
     Feedback,
     HandGoal,
     HandStatus,
-    LegStatus,
 )
 from golem.middleware.bus import Bus, Topic
 from golem.robots.model.kinematics import Kinematics
 from golem.skills.base import Skill, SkillResult, StageFailed, Tick, expect
 from golem.skills.detection_stream import DetectionStream
 from golem.skills.joint_motion import follow
+from golem.skills.legs_interface import LegsInterface
 from golem.skills.navigation import Navigation
 from golem.skills.pursuit import call
-from golem.types import UPPER, Array, LocalizedObject, PalmTargets, PlanarPose, Side, Twist
+from golem.types import UPPER, Array, LocalizedObject, PalmTargets, PlanarPose, Side
 
 T = TypeVar("T")
-
-ODOMETRY_TIMEOUT = 0.5
-"""Age of the newest odometry from which on it says nothing about where the robot is [s]."""
 
 
 @dataclass(frozen=True)
@@ -176,48 +173,6 @@ class Arm:
         self._context.send_palms()
 
 
-class LegsInterface:
-    """The lower body, as a skill commands and reads it."""
-
-    def __init__(self, context: Context) -> None:
-        """Speak for the legs."""
-        self._context = context
-
-    @property
-    def reporting(self) -> bool:
-        """Whether they have said anything yet."""
-        return self._context.bus.latest(topics.LEG_STATUS) is not None
-
-    @property
-    def status(self) -> LegStatus:
-        """What the base layer of the legs reports now.
-
-        Raises:
-            StageFailed: it has not reported yet.
-        """
-        status = self._context.bus.latest(topics.LEG_STATUS)
-        if status is None:
-            raise StageFailed("walk", "lower_body", "The legs do not report.")
-        return status
-
-    @property
-    def pose(self) -> Array:
-        """(4, 4) pose of base_link in odom by the odometry, or by the base estimate in a stack without one.
-
-        Raises:
-            StageFailed: the odometry has fallen silent.
-        """
-        odometry = self._context.bus.latest(topics.ODOMETRY)
-        if odometry is not None and self._context.t - odometry.t > ODOMETRY_TIMEOUT:
-            age = self._context.t - odometry.t
-            raise StageFailed("walk", "odometry", f"The odometry has been silent for {age:.1f} s.")
-        return self._context.T_odom_base if odometry is None else odometry.T_odom_base
-
-    def drive(self, twist: Twist) -> None:
-        """Move the base with `twist`; it has to be repeated every 0.5 s, or the robot stands."""
-        self._context.publish(topics.TWIST, twist)
-
-
 class Context:
     """The world as a skill sees it.
 
@@ -256,6 +211,23 @@ class Context:
         """(4, 4) estimated pose of base_link in odom."""
         base = self.bus.latest(topics.BASE)
         return np.eye(4) if base is None else base.T_odom_base
+
+    @property
+    def mapped(self) -> bool:
+        """Whether there is a map, and the robot's place in it is known."""
+        return self.bus.latest(topics.MAP) is not None and self.bus.latest(topics.MAP_POSE) is not None
+
+    @property
+    def T_odom_map(self) -> PlanarPose:
+        """Where the frame of the map is in odom.
+
+        Raises:
+            StageFailed: nobody says.
+        """
+        place = self.bus.latest(topics.MAP_POSE)
+        if place is None:
+            raise StageFailed("navigate", "mapper", "The robot's place in the map is not known.")
+        return place.T_odom_map
 
     @property
     def joints(self) -> Array:
@@ -350,9 +322,9 @@ class Context:
             await self.tick()
         return job.result()
 
-    def navigate(self, goal: PlanarPose) -> Navigation:
-        """Let the stack's navigator bring base_link to `goal`, in odom, for as long as what is returned is open."""
-        return Navigation(self, goal)
+    def navigate(self, goal: PlanarPose, frame: Literal["odom", "map"] = "odom") -> Navigation:
+        """Let the stack's navigator bring base_link to `goal`, in `frame`, while what is returned is open."""
+        return Navigation(self, goal, frame)
 
     async def run(self, name: str, goal: object, timeout: float | None = None) -> SkillResult:
         """Pursue `goal` with another skill of the stack, and return how that ended; its feedback is heard as its own.

@@ -6,19 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from golem.errors import ConfigError
 from golem.options import require
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
+from golem.skills.pose_goal import FIRST_REPORT, MARGIN, check_numbers, check_reach, go_to
 from golem.types import PlanarPose, Twist
 
 ZERO = Twist()
-MAX_TIMEOUT = 3600.0
-"""Longest walk [s] [own: what is given more time is a mistake, or needs a map]."""
-FIRST_REPORT = 0.1
-"""Time the legs get to report at all [s]."""
-MARGIN = 10.0
-"""Time a skill of this file gets on top of what its goal says [s]: it ends by itself unless it hangs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +37,7 @@ class WalkGoal:
         Raises:
             ConfigError: one is not finite, or there is no time to walk in.
         """
-        rows = [(name, getattr(self, name)) for name in ("x", "y", "yaw", "timeout")]
-        require("goal of a walk: its ", *((name, v, math.isfinite(v), "a finite number") for name, v in rows))
-        fine = 0.0 < self.timeout <= MAX_TIMEOUT
-        require(
-            "", ("timeout of a walk", self.timeout, fine, f"a positive time of at most {MAX_TIMEOUT:g} s")
-        )
+        check_numbers(self.x, self.y, self.yaw, self.timeout)
 
 
 class Walk:
@@ -72,55 +61,14 @@ class Walk:
             return SkillResult(False, failure.stage, failure.slot, str(failure))
 
     async def _pursue(self, context: Context, goal: WalkGoal) -> SkillResult:
-        start = context.t
         # Of a robot that was built a moment ago they do so at its first tick.
         await context.until(lambda: context.legs.reporting, FIRST_REPORT)
         target = PlanarPose(goal.x, goal.y, goal.yaw)
         if goal.frame == "base_link":
             target = PlanarPose.of(context.legs.pose) @ target
-        check_reach(context, target, goal.timeout)
-        said = -math.inf
-        with context.navigate(target) as way:
-            while True:
-                await context.tick()
-                status, step, left = context.legs.status, way.newest, way.remaining
-                distance, turn = math.hypot(left.x, left.y), math.degrees(left.yaw)
-                if step is not None and step.arrived:
-                    text = f"Standing {distance * 1e3:.0f} mm and {turn:.1f} deg from the goal."
-                    context.say("done", text, left=[left.x, left.y, left.yaw])
-                    return SkillResult(True, "done", None, text, {"walk": context.t - start})
-                if step is not None and step.failure is not None:
-                    raise StageFailed("walk", "navigator", step.failure)
-                if context.t - start >= goal.timeout:
-                    text = f"Not at the goal after {goal.timeout:g} s: {distance:.2f} m and {turn:.0f} deg are left."
-                    if status.applied == ZERO and status.reason:
-                        raise StageFailed(
-                            "walk", "lower_body", f"{text} The legs do not move: {status.reason}."
-                        )
-                    raise StageFailed("walk", "navigator", text)
-                if context.t - said >= 1.0:
-                    said = context.t
-                    context.say("walk", f"{distance:.2f} m to go.", left=[left.x, left.y, left.yaw])
-
-
-def check_reach(context: Context, target: PlanarPose, timeout: float) -> None:
-    """Check that the legs can walk, and get to `target`, in odom, within `timeout` [s] at all.
-
-    Raises:
-        ConfigError: they cannot.
-        StageFailed: they do not report, or the place of the robot is unknown.
-    """
-    legs = context.legs.status
-    if legs.speed == 0.0:
-        raise ConfigError(
-            f"The legs, '{legs.controller}', do not walk; give the stack a lower_body that does, such as almi."
-        )
-    left = PlanarPose.of(context.legs.pose).to(target)
-    distance, reach = math.hypot(left.x, left.y), legs.speed * timeout
-    if distance > reach:
-        raise ConfigError(
-            f"It is {distance:.3g} m away; at {legs.speed:.2g} m/s the legs get {reach:.3g} m within {timeout:g} s."
-        )
+        left = PlanarPose.of(context.legs.pose).to(target)
+        check_reach(context, math.hypot(left.x, left.y), goal.timeout)
+        return await go_to(context, target, "odom", goal.timeout, "walk")
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,7 @@ CALLS = {
     "localizer": "locate",
     "grasp_method": "propose",
     "odometry": "estimate",
+    "mapper": "grid",
     "navigator": "step",
 }
 """The method of each slot that a mutant breaks."""
@@ -213,7 +214,7 @@ def _holds_nan(given: tuple[Any, ...]) -> bool:
 GENERAL: dict[str, Mutant] = {
     "raises": Mutant("answers_soundly", _raises),
     "ends the process": Mutant("answers_soundly", _exits),
-    "returns nothing": Mutant("answers_soundly", _nothing, never=("odometry",)),
+    "returns nothing": Mutant("answers_soundly", _nothing, never=("odometry", "mapper")),
     "returns NaN": Mutant("answers_soundly", _of(lambda a: a * np.nan)),
     "counts over all instances": Mutant("repeats_itself", _counts_over_all),
     "never forgets": Mutant(
@@ -227,14 +228,14 @@ GENERAL: dict[str, Mutant] = {
     "draws from numpy": Mutant("draws_no_shared_randomness", _first(np.random.rand)),
     "draws from the system": Mutant("draws_no_shared_randomness", _first(np.random.default_rng)),
     "writes into its input": Mutant(
-        "leaves_inputs_alone", _writes_input, never=("robot", "navigator", "localizer", "odometry")
+        "leaves_inputs_alone", _writes_input, never=("robot", "navigator", "localizer", "odometry", "mapper")
     ),
     "returns one buffer": Mutant(
-        "leaves_answers_alone", _one_buffer, never=("hand", "navigator", "localizer")
+        "leaves_answers_alone", _one_buffer, never=("hand", "navigator", "localizer", "mapper")
     ),
     "is slow": Mutant("keeps_its_time", _slow, only=("estimator", "hand")),
     "lets NaN through": Mutant(
-        "stops_nan", _lets_nan_through, never=("robot", "localizer", "grasp_method", "odometry")
+        "stops_nan", _lets_nan_through, never=("robot", "localizer", "grasp_method", "odometry", "mapper")
     ),
 }
 
@@ -326,6 +327,15 @@ OWN: dict[tuple[str, str], tuple[str, Change]] = {
     ),
     ("odometry", "stamps with its own time"): ("stamps_are_of_now", changed(t=lambda t: t - 1.0)),
     ("odometry", "is surer than sure"): ("answers_soundly", changed(covariance=-np.eye(6))),
+    ("mapper", "forgets the walls"): (
+        "sees_the_floor_and_the_walls",
+        changed(cells=lambda cells: np.minimum(cells, 0)),
+    ),
+    ("mapper", "puts the map elsewhere"): (
+        "sees_the_floor_and_the_walls",
+        changed(origin=lambda o: dataclasses.replace(o, x=o.x + 2.0)),
+    ),
+    ("mapper", "counts in bytes"): ("answers_soundly", changed(cells=lambda cells: cells.astype(np.uint8))),
     ("navigator", "arrives at once"): ("arrives", changed(arrived=True)),
     ("navigator", "never arrives"): ("arrives", changed(arrived=False)),
     ("navigator", "walks the other way"): (

@@ -35,6 +35,7 @@ GOOD: dict[str, Candidate] = {
     "localizer": Candidate("localizer", "spots", DarkSpots),
     "grasp_method": candidate("grasp_method", "centroid"),
     "odometry": candidate("odometry", "legs"),
+    "mapper": candidate("mapper", "grid"),
     "navigator": candidate("navigator", "goto"),
     "skill": Candidate("skill", "counts", Counts),
 }
@@ -103,7 +104,9 @@ def test_a_module_that_lacks_a_method_is_named(slot: str) -> None:
     assert {finding.status for finding in report.findings[2:]} == {"skipped"}
 
 
-@pytest.mark.parametrize(("slot", "method"), (CALLS | {"robot": "advance", "odometry": "add_scan"}).items())
+@pytest.mark.parametrize(
+    ("slot", "method"), (CALLS | {"robot": "advance", "odometry": "add_scan", "mapper": "add_scan"}).items()
+)
 def test_a_method_that_takes_other_arguments_is_named(slot: str, method: str) -> None:
     report = examine(broken(slot, lambda module: setattr(module, method, lambda: None)))
     assert named(report) == ["has_every_member"] and "takes ()" in report.failed[0].reason

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from golem.capabilities.navigation.footprint import Footprint
 from golem.interfaces.nav_payloads import NavStep, OccupancyGrid, Scan
 from golem.types import PlanarPose
 
@@ -14,17 +15,20 @@ class NavInputs:
     """What a navigator is shown.
 
     Attributes:
-        pose: where base_link would come to rest in odom if the robot stopped now, as well as the robot knows.
+        pose: where base_link would come to rest in the frame of the goal (odom, or map) if the robot stopped now, as
+            well as the robot knows.
         moving: whether the lower body moves the base, commanded or for its balance: only while it does not, the robot
             stays where it is.
-        grid: the newest map; None in a stack that makes none.
-        scan: the newest scan; None in a stack that has no LiDAR.
+        grid: the newest map, its origin in that frame; None in a stack that makes none.
+        scan: the newest scan, in that frame; None in a stack that has no LiDAR.
+        footprint: the room that the robot takes up on the floor, its arms where they are; None where nobody says.
     """
 
     pose: PlanarPose
     moving: bool
     grid: OccupancyGrid | None = None
     scan: Scan | None = None
+    footprint: Footprint | None = None
 
 
 @runtime_checkable
@@ -41,7 +45,7 @@ class Navigator(Protocol):
     latency: float
 
     def start(self, goal: PlanarPose) -> None:
-        """Pursue `goal`, in odom, from the next step on; of earlier ones counts what they taught about legs."""
+        """Pursue `goal`, in odom or map, from the next step on; of earlier ones counts what they taught about legs."""
         ...
 
     def step(self, inputs: NavInputs, dt: float) -> NavStep:

@@ -36,12 +36,14 @@ SUITES: dict[str, str] = {
     "localizer": f"{_HERE}.localizer_suite:LocalizerSuite",
     "grasp_method": f"{_HERE}.grasp_suite:GraspSuite",
     "odometry": f"{_HERE}.odometry_suite:OdometrySuite",
+    "mapper": f"{_HERE}.mapper_suite:MapperSuite",
     "navigator": f"{_HERE}.navigator_suite:NavigatorSuite",
     "skill": f"{_HERE}.skill_suite:SkillSuite",
 }
 """Slot -> `module:Class` of its suite, imported when it is used."""
 OPTIONS: dict[tuple[str, str], Mapping[str, object]] = {
     ("lower_body", "policy"): {"file": "almi_stand"},
+    ("navigator", "nav2"): {"near": 2000.0},
     ("lower_body", "handover"): {"walk": {"use": "almi"}, "stand": {"use": "hold"}},
 }
 """What shipped modules without default options are checked with."""

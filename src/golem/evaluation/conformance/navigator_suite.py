@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +14,7 @@ from golem.capabilities.navigation.base import Navigator, NavInputs
 from golem.evaluation.conformance import samples
 from golem.evaluation.conformance.base import Candidate, check
 from golem.evaluation.conformance.suite import Suite
-from golem.interfaces.nav_payloads import NavStep, OccupancyGrid, Scan
+from golem.interfaces.nav_payloads import Nav2Reply, NavStep, OccupancyGrid, Scan
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.navigator_node import NavigatorNode
 from golem.runtime.nodes import MIN_RATE
@@ -28,6 +30,24 @@ RESTING = 600
 NEAR, TURNED = 0.1, 0.15
 """How far from the goal a robot that has arrived may stand [m], [rad] [own]."""
 
+FLOOR = np.array([0.0, 0.0, -1.0])
+"""Plane of the floor."""
+
+
+class _ArrivedNav2:
+    """See `golem.capabilities.navigation.nav2.Nav2Link`."""
+
+    def send(self, pose: PlanarPose) -> None:
+        """Take a goal."""
+
+    def reply(self) -> Nav2Reply:
+        """Say that the robot is there."""
+        return Nav2Reply(1, "succeeded")
+
+    def twist(self) -> None:
+        """Command nothing."""
+        return
+
 
 class NavigatorInput(NamedTuple):
     """What it is shown, and where it shall go."""
@@ -36,17 +56,27 @@ class NavigatorInput(NamedTuple):
     goal: PlanarPose = GOAL
 
 
-def at(pose: PlanarPose, moving: bool, goal: PlanarPose = GOAL) -> NavigatorInput:
-    """Return a robot at `pose` without map and scan."""
-    return NavigatorInput(NavInputs(pose, moving), goal)
+def at(pose: PlanarPose, moving: bool, goal: PlanarPose = GOAL, t: float = 0.1) -> NavigatorInput:
+    """Return a robot at `pose` in an empty hall, with a scan of time `t` [s]."""
+    grid, scan = surroundings(t)
+    return NavigatorInput(NavInputs(pose, moving, grid, scan), goal)
 
 
 def surroundings(t: float) -> tuple[OccupancyGrid, Scan]:
-    """Return an empty map of 8 m with a wall parallel to the way at y = 2 m, and a scan of that wall."""
+    """Return an empty map of 8 m with a wall parallel to the way at y = 2 m, and a scan of that wall at `t` [s]."""
+    grid, scan = _hall()
+    return grid, replace(scan, t=t)
+
+
+@lru_cache(maxsize=1)
+def _hall() -> tuple[OccupancyGrid, Scan]:
+    t = 0.1
     cells = np.zeros((160, 160), dtype=np.int8)
     cells[120] = 100
     wall = np.stack((np.linspace(-2.0, 2.0, 80), np.full(80, 2.0), np.full(80, 0.5)), axis=1)
-    return OccupancyGrid(t, PlanarPose(-4.0, -4.0, 0.0), 0.05, cells), Scan(t, wall)
+    return OccupancyGrid(t, PlanarPose(-4.0, -4.0, 0.0), 0.05, cells), Scan(
+        t, wall, np.array([0.0, 0.0, 0.7]), FLOOR
+    )
 
 
 class NavigatorSuite(Suite):
@@ -57,6 +87,10 @@ class NavigatorSuite(Suite):
     def __init__(self) -> None:
         """Step at 100 Hz until the module says what it wants."""
         self._period = 1.0 / MAX_RATE
+
+    def context(self) -> Mapping[str, object]:
+        """Return a Nav2 that has arrived as soon as it is asked: the rest is the navigator's."""
+        return {"nav2": _ArrivedNav2()}
 
     def declared(self, contract: ContractCheck, module: Any) -> None:
         """Check rate and latency."""
@@ -72,7 +106,8 @@ class NavigatorSuite(Suite):
 
     def inputs(self) -> Sequence[NavigatorInput]:
         """Return a robot on its way."""
-        return [at(PlanarPose(0.004 * i, 0.001 * i, 0.02 * math.sin(0.2 * i)), i > 2) for i in range(60)]
+        poses = (PlanarPose(0.004 * i, 0.001 * i, 0.02 * math.sin(0.2 * i)) for i in range(60))
+        return [at(pose, i > 2, t=0.1 * (1 + i // 5)) for i, pose in enumerate(poses)]
 
     def edges(self) -> Mapping[str, Sequence[NavigatorInput]]:
         """Return goals where the robot is, behind it, far away, headings that wrap, and a map and scans."""
@@ -90,8 +125,9 @@ class NavigatorSuite(Suite):
         cases["a wall next to the way"] = [
             NavigatorInput(NavInputs(here, i > 2, grid, scan)) for i in range(20)
         ]
+        cases["neither map nor scan"] = [NavigatorInput(NavInputs(here, i > 2)) for i in range(20)]
         cases["a scan without points"] = [
-            NavigatorInput(NavInputs(here, False, None, Scan(0.1, np.zeros((0, 3)))))
+            NavigatorInput(NavInputs(here, False, None, Scan(0.1, np.zeros((0, 3)), np.zeros(3), FLOOR)))
         ]
         return cases
 
@@ -123,8 +159,10 @@ class NavigatorSuite(Suite):
         module, contract = candidate.make(), candidate.contract
         contract.call(module.start, GOAL)
         pose, moving, answers = PlanarPose(0.0, 0.0, 0.0), False, list[NavStep]()
-        for _ in range(round(PATIENCE / self._period)):
-            answer = contract.call(self.call, module, at(pose, moving))
+        for i in range(round(PATIENCE / self._period)):
+            # A new scan ten times a second, as a LiDAR has it.
+            t = 0.1 * (1 + math.floor(10.0 * self._period * i))
+            answer = contract.call(self.call, module, at(pose, moving, t=t))
             answers.append(answer)
             if answer.ended:
                 break

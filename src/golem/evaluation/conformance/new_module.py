@@ -19,6 +19,12 @@ SLOT_HELP = f"Which slot the module is for: {', '.join(SUITES)}."
 _STACKS = {
     "skill": "skills:\n  {name}: {{use: {name}.py:{cls}}}\n",
     "lower_body": "robot: {{use: mujoco, support: ground}}\nlower_body: {{use: {name}.py:{cls}}}\n",
+    "mapper": """robot: {{use: mujoco, support: ground, world: furnished}}
+lower_body: {{use: almi}}
+odometry: {{use: lio}}
+mapper: {{use: {name}.py:{cls}}}
+navigator: {{use: costmap_astar}}
+""",
     "navigator": """robot: {{use: mujoco, support: ground, world: open}}
 lower_body: {{use: almi}}
 navigator: {{use: {name}.py:{cls}}}
@@ -35,6 +41,7 @@ _RUN = {
     "skill": "golem run {name}.yaml --skill {name}",
     "robot": "golem run {name}.yaml --skill stand",
     "lower_body": "golem run {name}.yaml --skill stand",
+    "mapper": "golem run {name}.yaml --skill navigate --x 2",
     "navigator": "golem run {name}.yaml --skill walk --x 1",
 }
 _COMPARE = {
@@ -42,6 +49,7 @@ _COMPARE = {
     "lower_body": "golem ladder --rung push --method almi {name}.py:{cls} -n 10 --out runs/{name}",
     "estimator": "golem ladder --rung base-estimation --method random_walk_kf {name}.py:{cls} --out runs/{name}",
     "odometry": "golem ladder --rung odometry --method legs {name}.py:{cls} -n 1 --out runs/{name}",
+    "mapper": "golem ladder --rung navigate --map none --use mapper={name}.py:{cls} -n 10 --out runs/{name}",
     "navigator": "golem ladder --rung navigate-line --use navigator={name}.py:{cls} -n 10 --out runs/{name}",
     **{
         slot: f"golem ladder --method visual_servo --use {slot}={{name}}.py:{{cls}} -n 10 --out runs/{{name}}"

@@ -37,6 +37,7 @@ class MujocoConfig:
         slope: inclination of the ramp [rad].
         rubble: height of the highest tile [m]; the others are drawn from 0 to it.
         people: how many people walk about in the furnished hall.
+        obstacles: how many walls and obstacles stand in the lane of the furnished hall, a way left between them.
         self_collision: whether limbs stop each other; they do unless this is False.
         feet: what the soles are to the floor.
         cone: friction cone of the solver; by default the pack's bores need an elliptic one, other worlds do without.
@@ -59,6 +60,7 @@ class MujocoConfig:
     slope: float = math.radians(5.0)
     rubble: float = 0.03
     people: int = 0
+    obstacles: int = 0
     self_collision: bool | None = None
     feet: Feet = "spheres"
     cone: Literal["pyramidal", "elliptic"] | None = None
@@ -78,6 +80,7 @@ class MujocoConfig:
             ("slope", self.slope, 0.0, 0.5),
             ("rubble", self.rubble, 0.0, 0.2),
             ("people", self.people, 0, 20),
+            ("obstacles", self.obstacles, 0, 12),
             ("noslip", self.noslip, 0, 100),
             ("friction", self.friction, 0.01, 5.0),
             ("payload", self.payload[0], 0.0, 20.0),

@@ -192,6 +192,7 @@ def _add_terrain(spec: mujoco.MjSpec, config: MujocoConfig, seed: int) -> tuple[
     """Add the ground of a world without a pack to work on, and return the people on it."""
     if config.world == "furnished":
         furnished.add_furnished_hall(spec, stream(seed, "world/furniture"))
+        furnished.add_course(spec, stream(seed, "world/course"), config.obstacles)
         return furnished.add_people(spec, stream(seed, "world/people"), config.people)
     if config.world == "corridor":
         furnished.add_corridor(spec)

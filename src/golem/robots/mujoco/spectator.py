@@ -93,6 +93,7 @@ class SpectatorView:
         """
         self._model, self._data = robot.scene.model, robot.data
         self._shots = dict(shots or {})
+        self._views = {name: shot.view() for name, shot in self._shots.items()}
         self._infos = [shot.info(name, size) for name, shot in self._shots.items()]
         # A picture only for the eye: half the robot's own resolution is what an inset shows.
         self._infos += [_halved(info) for info in robot.cameras.values()]
@@ -123,11 +124,16 @@ class SpectatorView:
         """Return (3,) a point of the odom frame in the world: odom is where the pelvis was at the start."""
         return np.asarray(point, dtype=float) + self._origin
 
+    def follow(self, body: str) -> None:
+        """Move the spectator's cameras along with a body: they look at it as they looked at the world's origin."""
+        x, y, _ = self.position(body)
+        for name, shot in self._shots.items():
+            self._views[name].lookat[:2] = shot.look_at[0] + x, shot.look_at[1] + y
+
     def picture(self, name: str) -> NDArray[np.uint8]:
         """Return (height, width, 3) what a shot, or a camera of the robot, shows now."""
         if self._rig is None:
-            views = {name: shot.view() for name, shot in self._shots.items()}
-            self._rig = CameraRig(self._model, self._infos, fancy=self._fancy, views=views)
+            self._rig = CameraRig(self._model, self._infos, fancy=self._fancy, views=self._views)
         if name not in self._shots:
             return self._rig.render(self._data, name)[0]
         # The lights belong to the model, and the robot's cameras see by them too.

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from golem.robots.worlds import hall, parts
+from golem.robots.worlds.obstacle_course import draw_course
 from golem.types import Array
 
 LANE = (-1.2, 7.0, -1.0, 3.4)
@@ -112,6 +113,16 @@ def add_people(spec: mujoco.MjSpec, rng: np.random.Generator, count: int) -> tup
         x = np.array([rng.uniform(-0.5, 1.5), rng.uniform(4.0, 7.0)])
         people.append(Person(name, np.column_stack([x, y]), rng.uniform(*SPEED), rng.random()))
     return tuple(people)
+
+
+def add_course(spec: mujoco.MjSpec, rng: np.random.Generator, count: int) -> None:
+    """Add `count` walls and obstacles to the lane of the furnished hall; a way is left between them."""
+    body = spec.worldbody.add_body(name="course")
+    for one in draw_course(rng, count):
+        size = (float(one.size[0]), float(one.size[2])) if one.round else tuple(one.size.tolist())
+        at = (float(one.place[0]), float(one.place[1]), float(one.size[2]))
+        turn = (float(np.cos(one.yaw / 2)), 0.0, 0.0, float(np.sin(one.yaw / 2)))
+        _solid(body, size, at, kind=_CYLINDER if one.round else _BOX, quat=turn)
 
 
 def _ground(spec: mujoco.MjSpec, half: float) -> None:

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -58,7 +59,7 @@ def _pick_goal(message: golem_interfaces.Pick_Goal) -> tuple[str, Fields]:
     return "pick", {"label": message.label, "container": message.container, "side": message.side}
 
 
-def _walk_goal(message: golem_interfaces.Walk_Goal) -> tuple[str, Fields]:
+def _walk_goal(message: golem_interfaces.Walk_Goal, skill: str = "walk") -> tuple[str, Fields]:
     T, timeout = convert.matrix(message.pose.pose), convert.seconds(message.timeout)
     yaw = math.atan2(T[1, 0], T[0, 0])
     goal: Fields = {
@@ -67,7 +68,7 @@ def _walk_goal(message: golem_interfaces.Walk_Goal) -> tuple[str, Fields]:
         "yaw": yaw,
         "frame": message.pose.header.frame_id,
     }
-    return "walk", goal if timeout == 0.0 else goal | {"timeout": timeout}
+    return skill, goal if timeout == 0.0 else goal | {"timeout": timeout}
 
 
 def _stand_goal(message: golem_interfaces.Stand_Goal) -> tuple[str, Fields]:
@@ -78,6 +79,7 @@ GOALS: dict[str, Callable[[Any], tuple[str, Fields]]] = {
     RUN: _run_goal,
     "/skill/pick": _pick_goal,
     "/skill/walk": _walk_goal,
+    "/skill/navigate": partial(_walk_goal, skill="navigate"),
     "/skill/stand": _stand_goal,
 }
 """What reads the goals of each action; only a skill with an action of its own needs a line here."""

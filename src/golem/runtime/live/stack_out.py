@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from golem.interfaces import public, topics
 from golem.interfaces import ros_convert as convert
+from golem.interfaces.nav_convert import MAP_FRAME
 from golem.interfaces.payloads import HandGoal
 from golem.middleware.bus import Bus
 from golem.middleware.ros.msgs import golem_interfaces
 from golem.middleware.ros.msgs.nav_msgs import Odometry
 from golem.middleware.ros.msgs.std_srvs import Trigger_Response
+from golem.middleware.ros.msgs.tf2_msgs import TFMessage
 from golem.middleware.wire.convert import encode_low_command
 from golem.robots.model import magpie_model
 from golem.robots.model.imu_mount import sensed_base_rate
@@ -35,12 +39,21 @@ def encoders(bus: Bus, mode_machine: Callable[[], int]) -> Encoders:
         state = bus.latest(topics.LOW_STATE)
         return None if state is None else convert.odometry(estimate, sensed_base_rate(state))
 
+    def frames(estimate: BaseEstimate) -> TFMessage:
+        """Return where base_link is in odom, and odom in the map."""
+        pairs, poses = [("odom", public.BASE_FRAME)], [estimate.T_odom_base]
+        place = bus.latest(topics.MAP_POSE)
+        if place is not None:
+            pairs.append((MAP_FRAME, "odom"))
+            poses.append(place.T_map_estimate.matrix())
+        return convert.transforms(estimate.t, pairs, np.array(poses))
+
     def request(command: LowCommand) -> bytes | None:
         """Return what the stack wants of the motors, with the time of the state that it answers."""
         state = bus.latest(topics.LOW_STATE)
         return None if state is None else encode_low_command(command, mode_machine(), answers=state.t)
 
-    return {"/odom": odometry, "/safety/lowcmd_in": request}
+    return {"/odom": odometry, "/tf": frames, "/safety/lowcmd_in": request}
 
 
 def hand_services(bus: Bus, side: Side, now: Callable[[], float]) -> dict[str, Callable[[Any], Any]]:

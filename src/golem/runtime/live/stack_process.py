@@ -28,6 +28,7 @@ from golem.runtime.live import stack_out as out
 from golem.runtime.live.bridge import incoming, outgoing
 from golem.runtime.live.clock import RobotClock
 from golem.runtime.live.legs_monitor import LegsMonitor
+from golem.runtime.live.nav2_bridge import Nav2Bridge
 from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.onboard_bridge import AnswersIn, CallsOut, Identities
 from golem.runtime.live.rejected import RejectedMessages
@@ -102,6 +103,7 @@ class StackProcess:
         self.side: StackNodes | None = None
         self.restarts, self.refused = 0, RejectedMessages("states of the robot", tell)
         self._executor: Executor | None = None
+        self._bridge: Nav2Bridge | None = None
         self._mode_machine = 0
         self._pools = pools
         self._gantry = RemoteGantry(node) if stack.on_ground and not real else None
@@ -156,6 +158,14 @@ class StackProcess:
         self._executor.advance(state.t, CATCH_UP)
         self._heard = self._clock()
 
+    def _nav2(self, bus: Bus) -> list[Placed]:
+        """Return what speaks to Nav2, where the navigator leaves the way to it."""
+        if self._stack.choice("navigator").use != "nav2":
+            return []
+        if self._bridge is None:
+            self._bridge = Nav2Bridge(bus, self._node, self._now)
+        return [(Phase.RECEIVE, self._bridge)]
+
     def _build(self, t: float) -> Executor:
         """Build every module anew, for a robot whose time begins anew at `t` [s]."""
         bus, endpoints = self._bus, self._endpoints
@@ -175,6 +185,7 @@ class StackProcess:
             (Phase.RECEIVE, self._gate),
             (Phase.RECEIVE, self._lidar_imu),
             (Phase.RECEIVE, AnswersIn(bus, service, self._calls, identities)),
+            *self._nav2(bus),
             *side.nodes,
             *outgoing(bus, endpoints, out.encoders(bus, lambda: self._mode_machine)),
             (Phase.SEND, CallsOut(bus, service, self._calls, identities)),

@@ -202,10 +202,10 @@ class Walk_Feedback(Message):
 
 @dataclass(slots=True, eq=False)
 class Walk_Goal(Message):
-    """Walk to a pose on the floor and stand there.
+    """Walk to a pose on the floor and stand there; "map" is for /skill/navigate alone.
 
     Attributes:
-        pose: goal of base_link [m]: x, y and yaw count; frame_id "odom" or "base_link"
+        pose: of base_link [m]: x, y and yaw count; frame_id odom, base_link or map
         timeout: time after which the skill gives up; 0 is its own default
     """
 

@@ -1,0 +1,1 @@
+"""Maps of what LiDARs see: voxels, the floor, and files of both."""

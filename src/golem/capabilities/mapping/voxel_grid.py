@@ -1,0 +1,226 @@
+"""The mapper `grid`: voxels from every scan, the map of the floor from the voxels, the place in a map from before."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from golem.capabilities.mapping.map_file import StoredMap, load_map
+from golem.capabilities.mapping.scan_match import Landmarks, Match
+from golem.capabilities.mapping.voxel_kernel import FREE, FULL
+from golem.capabilities.mapping.voxel_map import VoxelMap
+from golem.capabilities.mapping.wall_means import WallMeans
+from golem.interfaces.nav_payloads import OccupancyGrid, Scan
+from golem.options import require
+from golem.types import Array, PlanarPose
+
+LATE = 5.0
+"""Time by which a scan may be ahead of the one before [s]: more is another clock."""
+FIT = 0.6
+"""Share of a scan's points that must be where the map has something for its place to count as found."""
+FAR_OFF = 0.3
+"""Correction above which a match is taken for a mistake while the robot is being followed [m]."""
+UPRIGHT = (0.3, 2.0)
+"""Heights above the floor between which points are compared with a map from before [m]."""
+EVERY = 0.3
+"""Time between two scans whose points are kept to be compared with later [s]."""
+FEWEST = 200
+"""Points that a scan must have to be looked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class GridConfig:
+    """Options of the mapper `grid`.
+
+    Attributes:
+        resolution: side of a voxel [m].
+        reach: distance from the sensor up to which points count [m].
+        band: lowest and highest height above the floor at which something is in the robot's way [m].
+        rays: of so many points one clears the way to it.
+        file: a map from before, `PATH.yaml` as ROS's map_server has it; empty for none.
+        guess: where base_link roughly is in that map when the run begins: x, y [m], heading [rad].
+        around: how far off the guess may be: [m], [rad].
+        follow: time between two corrections of the place in that map [s].
+        gain: share of a correction that is made.
+    """
+
+    resolution: float = 0.05
+    reach: float = 10.0
+    band: tuple[float, float] = (0.12, 1.9)
+    rays: int = 4
+    file: str = ""
+    guess: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    around: tuple[float, float] = (0.8, 0.4)
+    follow: float = 1.0
+    gain: float = 0.3
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ConfigError: one of them cannot be meant.
+        """
+        low, high = self.band
+        require(
+            "mapper option ",
+            ("resolution", self.resolution, 0.01 <= self.resolution <= 0.5, "from 0.01 to 0.5 m"),
+            ("reach", self.reach, 0.5 <= self.reach <= 100.0, "from 0.5 to 100 m"),
+            ("band", high, 0.0 < low < high <= 2.2, "two heights, the lower first, of at most 2.2 m"),
+            ("rays", self.rays, self.rays >= 1, "at least 1"),
+            (
+                "around",
+                max(self.around),
+                0.0 <= min(self.around) and max(self.around) <= 5.0,
+                "at most 5 m and rad",
+            ),
+            ("follow", self.follow, self.follow > 0.0, "a positive time in seconds"),
+            ("gain", self.gain, 0.0 <= self.gain <= 1.0, "a share from 0 to 1"),
+            ("guess", sum(self.guess), all(map(math.isfinite, self.guess)), "three finite numbers"),
+        )
+
+
+class VoxelGridMapper:
+    """See `Mapper`; one scan costs some milliseconds.
+
+    Attributes:
+        config: its options.
+        rate: grids per second [Hz].
+        stored: the map from before; None where the options name none.
+    """
+
+    rate = 2.0
+
+    def __init__(self, config: GridConfig | None = None) -> None:
+        """Read the map from before, if there is one.
+
+        Raises:
+            ConfigError: it cannot be read.
+        """
+        self.config = config or GridConfig()
+        self.stored = load_map(Path(self.config.file)) if self.config.file else None
+        self._marks: Landmarks | None = None
+        if self.stored is not None:
+            self._marks = Landmarks(_landmarks(self.stored))
+        self.reset()
+
+    @property
+    def T_odom_map(self) -> PlanarPose | None:
+        """Where the map's frame is in odom; see `Mapper`."""
+        return self._T_odom_map if self._located or self.stored is None else None
+
+    def reset(self) -> None:
+        """Forget what was seen; see `Mapper`."""
+        self.voxels = VoxelMap(self.config.resolution, self.config.band)
+        self.walls = WallMeans(self.config.resolution)
+        self.floor: Array | None = None
+        self._summed = -math.inf
+        self._T_odom_map = PlanarPose(0.0, 0.0, 0.0)
+        self._located = False
+        self._t = -math.inf
+        self._followed = -math.inf
+        self._newest: Array = np.zeros((0, 2))
+
+    def add_scan(self, scan: Scan) -> None:
+        """Take one scan; see `Mapper`."""
+        fresh = self._t < scan.t < (math.inf if self._t == -math.inf else self._t + LATE)
+        if not fresh or not np.isfinite([*scan.origin, *scan.floor]).all():
+            return
+        points = np.asarray(scan.points, np.float64)
+        near = ((points - scan.origin) ** 2).sum(axis=1) < self.config.reach**2
+        points = np.ascontiguousarray(points[near])  # what is not finite is not near
+        self._t = scan.t
+        self.floor = plane = scan.floor
+        self.voxels.add(points, np.asarray(scan.origin, np.float64), plane, self.config.rays)
+        height = points[:, 2] - points[:, :2] @ plane[:2] - plane[2]
+        upright = points[(height > UPRIGHT[0]) & (height < UPRIGHT[1]), :2]
+        if self.stored is None and scan.t >= self._summed + EVERY:
+            self._summed = scan.t
+            self.walls.add(upright)
+        self._newest = upright[:: max(1, len(upright) // 800)]
+        self._follow()
+
+    def grid(self) -> OccupancyGrid | None:
+        """Return the map of the floor; see `Mapper`."""
+        if self.voxels.empty or self.floor is None or self.T_odom_map is None:
+            return None
+        cells = self.voxels.flatten(self.floor)
+        if self.stored is not None:
+            return self._overlaid(self.stored)
+        corner = PlanarPose(float(self.voxels.corner[0]), float(self.voxels.corner[1]), 0.0)
+        return OccupancyGrid(self._t, corner, self.config.resolution, cells.copy())
+
+    def locate(self, guess: PlanarPose) -> str:
+        """Look for the robot's place in the map from before; see `Mapper`. `guess` is where odom's origin is in it."""
+        if self._marks is None:
+            return "There is no map from before; give the mapper one with its option file."
+        if len(self._newest) < FEWEST:
+            return "No scan with enough points has come yet."
+        few = self._newest[:: max(1, len(self._newest) // 200)]
+        match = self._marks.refine(self._newest, self._marks.search(few, guess, self.config.around))
+        if match.share < FIT:
+            return (
+                f"Only {100 * match.share:.0f} % of the scan fits the map near ({guess.x:.1f}, {guess.y:.1f}); "
+                "give a better guess, or another map."
+            )
+        self._place(match, 1.0)
+        return ""
+
+    def stored_map(self) -> StoredMap | None:
+        """Return what was seen so far, to be saved, in odom; None before anything was."""
+        grid = self.grid()
+        if grid is None or self.floor is None:
+            return None
+        places = self.walls.places() if self.stored is None else self.stored.walls
+        return StoredMap(grid.origin, grid.resolution, grid.cells, self.voxels.occupied(), places)
+
+    def _follow(self) -> None:
+        """Find the place in the map from before at first, and correct it from time to time."""
+        if self._marks is None or self._t - self._followed < self.config.follow or len(self._newest) < FEWEST:
+            return
+        self._followed = self._t
+        if not self._located:
+            # At the start base_link is at odom's origin.
+            self.locate(PlanarPose(*self.config.guess))
+            return
+        T_map_odom = self._T_odom_map.to(PlanarPose(0.0, 0.0, 0.0))
+        match = self._marks.refine(self._newest, T_map_odom)
+        off = T_map_odom.to(match.pose)
+        if match.share >= FIT and math.hypot(off.x, off.y) < FAR_OFF and abs(off.yaw) < 0.1:
+            self._place(match, self.config.gain)
+
+    def _place(self, match: Match, share: float) -> None:
+        """Go `share` of the way to where a scan in odom fits into the map."""
+        origin = PlanarPose(0.0, 0.0, 0.0)
+        T_map_odom = self._T_odom_map.to(origin).toward(match.pose, share)
+        self._T_odom_map, self._located = T_map_odom.to(origin), True
+
+    def _overlaid(self, stored: StoredMap) -> OccupancyGrid:
+        """Return the map from before with what this run saw drawn into it."""
+        cells = stored.cells.copy()
+        live = self.voxels.cells
+        corner = PlanarPose(float(self.voxels.corner[0]), float(self.voxels.corner[1]), 0.0)
+        T = (self._T_odom_map @ stored.origin).to(corner)
+        cos, sin = math.cos(T.yaw), math.sin(T.yaw)
+        for value in (FREE, FULL):
+            r, c = np.nonzero(live == value)
+            at = (np.column_stack([c, r]) + 0.5) * self.config.resolution
+            at = at @ np.array([[cos, sin], [-sin, cos]]) + (T.x, T.y)
+            column, row = np.floor(at / stored.resolution).astype(int).T
+            inside = (row >= 0) & (row < cells.shape[0]) & (column >= 0) & (column < cells.shape[1])
+            cells[row[inside], column[inside]] = value
+        T = self._T_odom_map
+        return OccupancyGrid(self._t, T @ stored.origin, stored.resolution, cells, T)
+
+
+def _landmarks(stored: StoredMap) -> Array:
+    """Return the (n, 2) places that scans are compared with: of a file without any, the occupied cells."""
+    if len(stored.walls):
+        return stored.walls
+    r, c = np.nonzero(stored.cells > 50)
+    cells = (np.column_stack([c, r]) + 0.5) * stored.resolution
+    cos, sin = math.cos(stored.origin.yaw), math.sin(stored.origin.yaw)
+    turned = cells @ np.array([[cos, sin], [-sin, cos]]) + (stored.origin.x, stored.origin.y)
+    return np.asarray(turned, np.float64) if len(turned) else np.zeros((1, 2))

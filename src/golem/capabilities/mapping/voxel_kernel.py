@@ -1,0 +1,126 @@
+"""Compiled voxel updates: hits, rays that clear, and the map of the floor; compiled once, then cached on disk.
+
+Voxels are log odds in steps, an int8 each, `voxels[row, column, layer]`; zero is unknown. Every scan has a number; a
+voxel's `stamp` is that of the last scan that changed it, so that one scan counts once, and a hit before a ray.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from golem.types import Array
+
+Voxels = NDArray[np.int8]
+Stamps = NDArray[np.uint16]
+HIT, MISS, MOST, LEAST = 4, 1, 12, -8
+"""Steps of the log odds per hit and per ray that passes, and their bounds [own: a person who walked on is forgotten
+after some seconds, the edge of a board that one scan in four hits is not]."""
+OCCUPIED = 6
+"""Steps from which a voxel counts as occupied: two hits."""
+UNKNOWN, FREE, FULL = -1, 0, 100
+"""What a cell of the floor's map may be; see `OccupancyGrid`."""
+
+
+@njit(cache=True, nogil=True)
+def mark(
+    voxels: Voxels, stamps: Stamps, points: Array, corner: Array, resolution: float, number: int
+) -> None:
+    """Count each voxel that a point (n, 3) lies in as hit; `corner` (3,) is that of voxel [0, 0, 0]."""
+    rows, columns, layers = voxels.shape
+    for i in range(len(points)):
+        c = int(math.floor((points[i, 0] - corner[0]) / resolution))
+        r = int(math.floor((points[i, 1] - corner[1]) / resolution))
+        k = int(math.floor((points[i, 2] - corner[2]) / resolution))
+        if 0 <= r < rows and 0 <= c < columns and 0 <= k < layers and stamps[r, c, k] != number:
+            stamps[r, c, k] = number
+            voxels[r, c, k] = min(voxels[r, c, k] + HIT, MOST)
+
+
+@njit(cache=True, nogil=True)
+def clear(
+    voxels: Voxels,
+    stamps: Stamps,
+    points: Array,
+    origin: Array,
+    corner: Array,
+    resolution: float,
+    number: int,
+) -> None:
+    """Count each voxel as free that a ray from `origin` (3,) to a point (n, 3) passes (Amanatides and Woo, 1987).
+
+    The two voxels before a point are left as they are: a ray that grazes a wall shall not clear it.
+    """
+    rows, columns, layers = voxels.shape
+    position, step = np.empty(3, np.int64), np.empty(3, np.int64)
+    t_next, t_step = np.empty(3), np.empty(3)
+    for i in range(len(points)):
+        length = 0.0
+        for a in range(3):
+            length += (points[i, a] - origin[a]) ** 2
+        length = math.sqrt(length)
+        if not length > resolution:
+            continue
+        for a in range(3):
+            along = (points[i, a] - origin[a]) / length
+            x = (origin[a] - corner[a]) / resolution
+            position[a] = int(math.floor(x))
+            step[a] = 1 if along > 0.0 else -1
+            if abs(along) < 1e-9:
+                t_next[a] = t_step[a] = np.inf
+            else:
+                t_step[a] = abs(resolution / along)
+                border = position[a] + (1 if along > 0.0 else 0)
+                t_next[a] = (border - x) * resolution / along
+        end = length - 2.0 * resolution
+        t = 0.0
+        while t < end:
+            c, r, k = position[0], position[1], position[2]
+            if 0 <= r < rows and 0 <= c < columns and 0 <= k < layers and stamps[r, c, k] != number:
+                stamps[r, c, k] = number
+                voxels[r, c, k] = max(voxels[r, c, k] - MISS, LEAST)
+            a = 0
+            if t_next[1] < t_next[a]:
+                a = 1
+            if t_next[2] < t_next[a]:
+                a = 2
+            t = t_next[a]
+            t_next[a] += t_step[a]
+            position[a] += step[a]
+
+
+@njit(cache=True, nogil=True)
+def flatten(
+    voxels: Voxels,
+    cells: NDArray[np.int8],
+    box: NDArray[np.int64],
+    corner: Array,
+    resolution: float,
+    floor: Array,
+    band: Array,
+) -> None:
+    """Write the map of the floor into `cells` (rows, columns), within the rows and columns of `box` (4,).
+
+    A cell is full where a voxel within the height `band` (2,) above the floor z = floor[0] x + floor[1] y + floor[2] is
+    occupied. It is free where the floor was seen, or something free not higher than the lower 0.5 m of the band.
+    """
+    layers = voxels.shape[2]
+    for r in range(box[0], box[1]):
+        for c in range(box[2], box[3]):
+            x, y = corner[0] + (c + 0.5) * resolution, corner[1] + (r + 0.5) * resolution
+            ground = (floor[0] * x + floor[1] * y + floor[2] - corner[2]) / resolution
+            low = max(0, int(math.ceil(ground + band[0] / resolution)))
+            high = min(layers, int(math.floor(ground + band[1] / resolution)))
+            seen, full = False, False
+            for k in range(max(0, int(ground) - 2), low):
+                seen = seen or voxels[r, c, k] != 0
+            for k in range(low, high):
+                v = voxels[r, c, k]
+                if v >= OCCUPIED:
+                    full = True
+                    break
+                seen = seen or (v < 0 and (k - low) * resolution < 0.5)
+            cells[r, c] = FULL if full else FREE if seen else UNKNOWN

@@ -1,0 +1,63 @@
+"""A picture of the floor from above, for people: the map, the way, the scan, where the robot went, and its goal."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.interfaces.nav_payloads import OccupancyGrid
+from golem.types import Array, PlanarPose
+
+Colour = tuple[int, int, int]
+UNKNOWN, FREE, FULL = 150, 245, 40
+WAY, TRACK, GOAL, ROBOT, SCAN = (0, 120, 200), (220, 0, 0), (0, 150, 0), (255, 140, 0), (230, 0, 180)
+EDGE = 8
+"""Cells around what is known that are shown."""
+
+
+class MapPicture:
+    """One picture, x upwards and y to the left; everything is given in the frame of the map's origin."""
+
+    def __init__(self, grid: OccupancyGrid, scale: int = 3) -> None:
+        """Draw the part of a map that is known, with `scale` pixels per cell."""
+        known = np.argwhere(grid.cells >= 0)
+        low = known.min(axis=0) if len(known) else np.zeros(2, int)
+        high = known.max(axis=0) + 1 if len(known) else np.array(grid.cells.shape)
+        low = np.maximum(low - EDGE, 0)
+        high = np.minimum(high + EDGE, grid.cells.shape)
+        cells = grid.cells[low[0] : high[0], low[1] : high[1]]
+        shade = np.where(cells < 0, UNKNOWN, np.where(cells > 50, FULL, FREE)).astype(np.uint8)
+        large = cv2.resize(shade, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
+        self._image = np.ascontiguousarray(cv2.cvtColor(large, cv2.COLOR_GRAY2RGB))
+        self._grid, self._low, self._scale = grid, low[::-1], scale
+
+    def line(self, points: Array, colour: Colour) -> None:
+        """Draw a line through places (n, 2) [m]."""
+        if len(points) > 1:
+            cv2.polylines(self._image, [self._pixels(points)], False, colour, 2)
+
+    def dots(self, points: Array, colour: Colour) -> None:
+        """Draw places (n, 2) [m]."""
+        rows, columns = self._image.shape[:2]
+        x, y = self._pixels(points).T
+        inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
+        self._image[y[inside], x[inside]] = colour
+
+    def pose(self, pose: PlanarPose, colour: Colour) -> None:
+        """Draw a pose as an arrow of half a metre."""
+        tip = pose @ PlanarPose(0.5, 0.0, 0.0)
+        a, b = self._pixels(np.array([[pose.x, pose.y], [tip.x, tip.y]]))
+        cv2.arrowedLine(self._image, a.tolist(), b.tolist(), colour, 2, tipLength=0.4)
+        cv2.circle(self._image, a.tolist(), 5, colour, -1)
+
+    def rgb(self) -> NDArray[np.uint8]:
+        """Return the picture, (height, width, 3)."""
+        turned = cv2.rotate(self._image, cv2.ROTATE_90_COUNTERCLOCKWISE)[:, ::-1]
+        return np.ascontiguousarray(turned, np.uint8)
+
+    def _pixels(self, points: Array) -> NDArray[np.int32]:
+        o = self._grid.origin
+        c, s = np.cos(o.yaw), np.sin(o.yaw)
+        local = (points - (o.x, o.y)) @ np.array([[c, -s], [s, c]]) / self._grid.resolution - self._low
+        return (np.clip(local, -1e4, 1e4) * self._scale).astype(np.int32)

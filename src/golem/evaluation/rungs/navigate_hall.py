@@ -1,0 +1,250 @@
+"""Rung `navigate`: 6 m through a hall with walls and obstacles, by the robot's own map; one navigator per method."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+
+from golem import registry
+from golem.capabilities.navigation.map_picture import GOAL, TRACK, WAY, MapPicture
+from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.episodes.contacts import ContactWatch
+from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, legs_stack
+from golem.evaluation.episodes.survey import survey
+from golem.interfaces import topics
+from golem.provenance import stack_facts
+from golem.runtime.lockstep import build_robot
+from golem.skills.navigate import NavigateGoal
+from golem.stack import Stack
+from golem.types import Array, PlanarPose, Twist, wrap
+
+MapKind = Literal["survey", "none"]
+SLOT = "navigator"
+"""What the methods of this rung are."""
+DISTANCE = 6.0
+"""Length of the way as the crow flies [m], from the paper."""
+SPREAD = (0.2, 0.4, math.radians(20.0))
+"""Bounds of where the robot starts, x, y [m] and heading [rad]; the goal is drawn off by it."""
+GUESS = (0.4, 0.4, math.radians(15.0))
+"""Bounds of the error of the guess where the robot is on the map."""
+TOLERANCE, TURNED = 0.25, 0.25
+"""True error up to which the robot has arrived [m], [rad]: the tolerance of the paper's authors."""
+SETTLE = 4.0
+"""Time before the robot sets out [s]."""
+TIMEOUT = 120.0
+"""Time it gets to arrive [s]."""
+
+
+@dataclass(frozen=True)
+class NavigateOptions:
+    """The hall and the rest of the stack."""
+
+    obstacles: int = 4
+    """Walls and obstacles in the way."""
+    people: int = 0
+    """How many people walk about beside the lane."""
+    map: tuple[MapKind, ...] = ("survey",)
+    """Maps the robot has when it begins: one of the hall without its obstacles, from before; or none."""
+    legs: str = "almi"
+    """The lower body that walks."""
+    odometry: str = "lio"
+    """The odometry by which the map is made."""
+
+
+@dataclass
+class Walked:
+    """What was seen of one walk from outside.
+
+    Attributes:
+        track: true places on the floor, in odom [m].
+        moving: whether the navigator's newest twist moved the robot.
+        stopped: true pose when the legs were last told to stand; None while they never were.
+        recoveries: how often the navigator began to recover.
+        note: what it did last.
+    """
+
+    track: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
+    moving: bool = False
+    stopped: PlanarPose | None = None
+    recoveries: int = 0
+    note: str = ""
+
+
+class NavigateRung(Rung[NavigateOptions]):
+    """Walk 6 m from a noisy start through a hall whose walls and obstacles are drawn by the seed, and stand at a pose.
+
+    With the case `survey` the robot has a map of the hall from before the obstacles were put up, and a rough guess of
+    where it stands in it; the goal is a place on that map. With `none` the goal is given from where the robot stands.
+    The error at the goal is that of the true pose. It is split into what the robot believed to be left (planner and
+    follower), how far it was from where it believed to be (odometry and mapper), and how far the last stop moved it.
+    """
+
+    name = "navigate"
+    Options = NavigateOptions
+    default_methods = ("costmap_astar",)
+    default_n = 20
+
+    def methods(self) -> tuple[str, ...]:
+        """Return the registered navigators."""
+        return registry.names(SLOT)
+
+    def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
+        """Return what determines a trial besides its seed; see `Rung`."""
+        return {
+            **stack_facts(self._stack(method, profile, overrides)),
+            "distance": DISTANCE,
+            "spread": SPREAD,
+        }
+
+    def cases(self, results: Results) -> Sequence[Case]:
+        """Return the maps the robot has."""
+        return [{"map": kind} for kind in self.options.map]
+
+    def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
+        """Run one trial; see `Rung`."""
+        stack = self._stack(spec.method, spec.profile, spec.overrides)
+        seed, known = episode_seed(spec.seed, spec.index), spec.case["map"] == "survey"
+        with TemporaryDirectory() as folder:
+            if known:
+                robot = build_robot(stack, seed)
+                survey(robot, seed, Path(folder) / "hall")
+                robot.close()
+                guess = (spec.rng("guess").uniform(-1.0, 1.0, 3) * GUESS).tolist()
+                stack = stack.with_options("mapper", file=f"{folder}/hall.yaml", guess=guess)
+            with closing(Episode(stack, seed, self.onlooker)) as episode:
+                return self._walk(spec, episode, known)
+
+    def _walk(self, spec: TrialSpec, episode: Episode, known: bool) -> TrialOutcome:
+        """Let the robot walk, and say what became of it."""
+        off = spec.rng("start").uniform(-1.0, 1.0, 3) * SPREAD
+        goal = PlanarPose(DISTANCE + float(off[0]), float(off[1]), float(off[2]))
+        walked, contacts = Walked(), ContactWatch(episode.robot)
+
+        def look() -> bool:
+            contacts(episode.t)
+            watch(episode, walked)
+            return episode.result is not None
+
+        episode.stand(SETTLE)
+        if not episode.over:
+            frame = "map" if known else "odom"
+            episode.start("navigate", NavigateGoal(goal.x, goal.y, goal.yaw, frame, TIMEOUT))
+        episode.run(TIMEOUT + SETTLE, look)
+        return judge(spec, episode, goal, walked, contacts)
+
+    def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
+        options = self.options
+        plant = {"world": "furnished", "obstacles": options.obstacles, "people": options.people}
+        use = {"estimator": "invariant_ekf", "odometry": options.odometry, **overrides}
+        return legs_stack(options.legs, profile, use, plant).with_choice(SLOT, method)
+
+
+def true_pose(episode: Episode) -> PlanarPose:
+    """Return where the robot really is in odom."""
+    truth = episode.robot.truth
+    return PlanarPose.of(np.linalg.inv(truth.T_world_odom) @ truth.base().T_world_base)
+
+
+def watch(episode: Episode, walked: Walked) -> None:
+    """Note what happens at one tick."""
+    step = episode.running.bus.latest(topics.NAV_STEP)
+    if step is None:
+        return
+    moving = step.twist != Twist()
+    if walked.moving and not moving:
+        walked.stopped = true_pose(episode)
+    walked.moving = moving
+    walked.recoveries += step.note == "recover" != walked.note
+    walked.note = step.note
+    if not walked.track or episode.t - 0.2 * len(walked.track) > SETTLE:
+        pose = true_pose(episode)
+        walked.track.append((pose.x, pose.y))
+
+
+def judge(
+    spec: TrialSpec, episode: Episode, goal: PlanarPose, walked: Walked, contacts: ContactWatch
+) -> TrialOutcome:
+    """Say where the robot ended, and which module lost it."""
+    bus, result, loss = episode.running.bus, episode.result, episode.loss
+    true = true_pose(episode)
+    left = goal.to(true)
+    radial, turned = math.hypot(left.x, left.y), abs(wrap(left.yaw))
+    track = np.array(walked.track or [(0.0, 0.0)])
+    gone = float(np.linalg.norm(np.diff(track[::5], axis=0), axis=1).sum())
+    series = {
+        "goal_x": left.x,
+        "goal_y": left.y,
+        "goal_radial": radial,
+        "goal_yaw": turned,
+        "distance": gone,
+        "contacts": float(len(contacts.touched)),
+        "recoveries": float(walked.recoveries),
+    }
+    drift, believed = 0.0, bus.latest(topics.ODOMETRY)
+    if believed is not None:
+        there = PlanarPose.of(believed.T_odom_base)
+        series["odometry_error"] = math.hypot(*_off(true, there))
+        place = bus.latest(topics.MAP_POSE)
+        there = there if place is None else place.T_odom_map.to(there)
+        drift = series["place_error"] = math.hypot(*_off(true, there))
+        series["place_yaw"] = abs(true.to(there).yaw)
+        rest = there.to(goal)
+        series["follower_error"] = math.hypot(rest.x, rest.y)
+    if walked.stopped is not None:
+        shift = walked.stopped.to(true)
+        series["stop_shift"] = math.hypot(shift.x, shift.y)
+    modules = {
+        key: f"{key}: {episode.running.stack.choice(key).use}" for key in ("lower_body", "odometry", "mapper")
+    }
+    # With a map the mapper answers for the place, which corrects the odometry by it.
+    lost = modules["mapper" if spec.case["map"] == "survey" else "odometry"]
+    module = navigator = f"{SLOT}: {spec.method}"
+    if loss is not None:
+        module = modules["lower_body"]
+    elif contacts.touched:
+        pair, t = next(iter(contacts.touched.items()))
+        loss = Loss("contact", f"{pair} at {t:.1f} s, {drift:.2f} m beside where it believed to be.")
+        module = lost if drift > 0.15 else navigator
+    elif result is None:
+        loss = Loss("timeout", f"It is {radial:.2f} m from the goal after {TIMEOUT:g} s.")
+    elif not result.success:
+        loss = Loss(result.stage, result.reason, result.trace)
+        module = modules.get(result.slot or "", navigator)
+    elif radial > TOLERANCE or turned > TURNED:
+        loss = Loss("goal", f"It stands {radial:.2f} m beside the goal and believes to be there.")
+        module = lost if drift > 0.5 * radial else navigator
+    picture = _picture(episode, track, goal) if loss is not None or spec.index == 0 else None
+    if loss is not None:
+        return TrialOutcome(
+            False, loss.stage, module, loss.detail, series=series, picture=picture, trace=loss.trace
+        )
+    detail = f"stands {1e3 * radial:.0f} mm and {math.degrees(turned):.1f} deg from the goal"
+    return TrialOutcome(True, DONE, None, detail, result.timings if result else {}, series, picture)
+
+
+def _off(one: PlanarPose, other: PlanarPose) -> tuple[float, float]:
+    """Return where `other` is as seen from `one` [m]."""
+    off = one.to(other)
+    return off.x, off.y
+
+
+def _picture(episode: Episode, track: Array, goal: PlanarPose) -> bytes | None:
+    """Return the map with the way and the walk as PNG; None where there is no map."""
+    bus = episode.running.bus
+    grid, step, place = bus.latest(topics.MAP), bus.latest(topics.NAV_STEP), bus.latest(topics.MAP_POSE)
+    if grid is None or place is None:
+        return None
+    picture = MapPicture(grid.in_map)
+    if step is not None and step.path is not None:
+        picture.line(step.path, WAY)
+    picture.line(track, TRACK)
+    picture.pose(goal, GOAL)
+    return cv2.imencode(".png", picture.rgb()[..., ::-1])[1].tobytes()

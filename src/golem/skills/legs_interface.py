@@ -1,0 +1,71 @@
+"""The lower body, as a skill commands and reads it, and where the robot is."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from golem.interfaces import topics
+from golem.interfaces.payloads import LegStatus
+from golem.skills.base import StageFailed
+from golem.types import Array, Twist
+
+if TYPE_CHECKING:
+    from golem.skills.context import Context
+
+ODOMETRY_TIMEOUT = 0.5
+"""Age of the newest odometry from which on it says nothing about where the robot is [s]."""
+
+
+class LegsInterface:
+    """The lower body, as a skill commands and reads it."""
+
+    def __init__(self, context: Context) -> None:
+        """Speak for the legs."""
+        self._context = context
+
+    @property
+    def reporting(self) -> bool:
+        """Whether they have said anything yet."""
+        return self._context.bus.latest(topics.LEG_STATUS) is not None
+
+    @property
+    def status(self) -> LegStatus:
+        """What the base layer of the legs reports now.
+
+        Raises:
+            StageFailed: it has not reported yet.
+        """
+        status = self._context.bus.latest(topics.LEG_STATUS)
+        if status is None:
+            raise StageFailed("walk", "lower_body", "The legs do not report.")
+        return status
+
+    @property
+    def pose(self) -> Array:
+        """(4, 4) pose of base_link in odom by the odometry, or by the base estimate in a stack without one.
+
+        Raises:
+            StageFailed: the odometry has fallen silent.
+        """
+        odometry = self._context.bus.latest(topics.ODOMETRY)
+        if odometry is not None and self._context.t - odometry.t > ODOMETRY_TIMEOUT:
+            age = self._context.t - odometry.t
+            raise StageFailed("walk", "odometry", f"The odometry has been silent for {age:.1f} s.")
+        return self._context.T_odom_base if odometry is None else odometry.T_odom_base
+
+    @property
+    def doubt(self) -> str:
+        """How far off the odometry believes its place to be, as the end of a sentence; empty where it does not say."""
+        odometry = self._context.bus.latest(topics.ODOMETRY)
+        if odometry is None or odometry.covariance is None:
+            return ""
+        place = math.sqrt(max(0.0, float(np.linalg.eigvalsh(odometry.covariance[:2, :2])[-1])))
+        turn = math.degrees(math.sqrt(max(0.0, float(odometry.covariance[5, 5]))))
+        return f", by an odometry that is sure of its place to {100.0 * place:.1f} cm and {turn:.1f} deg"
+
+    def drive(self, twist: Twist) -> None:
+        """Move the base with `twist`; it has to be repeated every 0.5 s, or the robot stands."""
+        self._context.publish(topics.TWIST, twist)

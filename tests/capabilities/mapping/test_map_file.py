@@ -1,0 +1,94 @@
+"""Maps on disk: what is written is read again, whatever ROS writes is read, and broken files are named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from golem.capabilities.mapping.map_file import StoredMap, load_map, save_map
+from golem.errors import ConfigError, OutputError
+from golem.types import PlanarPose
+
+
+def a_map() -> StoredMap:
+    cells = np.array([[0, 100, -1], [-1, 0, 0]], np.int8)
+    cloud = np.array([[0.1, 0.2, 0.3]], np.float32).astype(np.float64)
+    return StoredMap(PlanarPose(-1.0, 2.0, 0.1), 0.05, cells, cloud, np.array([[0.5, 0.25]]))
+
+
+def test_a_map_is_read_as_it_was_written(tmp_path: Path) -> None:
+    save_map(tmp_path / "new" / "hall", a_map())
+    read = load_map(tmp_path / "new" / "hall.yaml")
+    assert (read.cells == a_map().cells).all() and read.origin == a_map().origin
+    assert (
+        read.resolution == 0.05
+        and (read.cloud == a_map().cloud).all()
+        and (read.walls == a_map().walls).all()
+    )
+    facts = yaml.safe_load((tmp_path / "new" / "hall.yaml").read_text())
+    assert facts["free_thresh"] == 0.196 and facts["mode"] == "trinary" and facts["image"] == "hall.pgm"
+    pgm = (tmp_path / "new" / "hall.pgm").read_bytes()
+    assert pgm == b"P5\n3 2\n255\n" + bytes([205, 254, 254, 254, 0, 205])  # the last row of cells comes first
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 9), st.integers(1, 9), st.data())
+def test_any_cells_come_back(rows: int, columns: int, data: st.DataObject) -> None:
+    import tempfile
+
+    values = data.draw(
+        st.lists(st.sampled_from([-1, 0, 100]), min_size=rows * columns, max_size=rows * columns)
+    )
+    cells = np.array(values, np.int8).reshape(rows, columns)
+    with tempfile.TemporaryDirectory() as folder:
+        one = a_map()
+        save_map(Path(folder) / "m", StoredMap(one.origin, 0.1, cells, one.cloud, one.walls))
+        assert (load_map(Path(folder) / "m").cells == cells).all()
+
+
+def test_a_map_of_ros_without_voxels_is_read(tmp_path: Path) -> None:
+    (tmp_path / "m.pgm").write_bytes(b"P5\n2 1\n255\n" + bytes([0, 254]))
+    (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n")
+    read = load_map(tmp_path / "m.yaml")
+    assert read.cells.tolist() == [[100, 0]] and len(read.cloud) == len(read.walls) == 0
+
+
+BROKEN = {
+    "not yaml": "image: [",
+    "no image": "resolution: 0.1\n",
+    "no resolution": "image: m.pgm\norigin: [0, 0, 0]\n",
+    "negative resolution": "image: m.pgm\nresolution: -1\norigin: [0, 0, 0]\n",
+    "nan origin": "image: m.pgm\nresolution: 0.1\norigin: [.nan, 0, 0]\n",
+    "mode": "image: m.pgm\nresolution: 0.1\norigin: [0, 0, 0]\nmode: fancy\n",
+    "image away": "image: away.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n",
+    "image empty": "image: empty.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n",
+    "a list": "- 1\n",
+}
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_a_broken_map_is_refused_in_a_sentence(what: str, tmp_path: Path) -> None:
+    (tmp_path / "m.pgm").write_bytes(b"P5\n2 1\n255\n" + bytes([0, 254]))
+    (tmp_path / "empty.pgm").write_bytes(b"")
+    (tmp_path / "m.yaml").write_text(BROKEN[what])
+    with pytest.raises(ConfigError, match="map"):
+        load_map(tmp_path / "m.yaml")
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 nonsense", b"\x00" * 50])
+def test_broken_voxels_are_refused(content: bytes, tmp_path: Path) -> None:
+    save_map(tmp_path / "m", a_map())
+    (tmp_path / "m.npz").write_bytes(content)
+    with pytest.raises(ConfigError, match="voxels"):
+        load_map(tmp_path / "m")
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot be written"):
+        save_map(tmp_path / "file" / "m", a_map())
