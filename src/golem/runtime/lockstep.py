@@ -18,7 +18,7 @@ from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
 from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
-from golem.robots.base import HasGantry, Robot
+from golem.robots.base import HasGantry, HasLivingSensors, Robot
 from golem.robots.sensors.profiles import load_profile
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import FOREVER, Executor, in_order
@@ -66,7 +66,9 @@ class LockstepRunner:
         lidar = hears_lidar(stack)
         seen = partial(detection_requested, self.bus)
         self._robot = RobotNodes(self.bus, stack, robot, seen, lambda: lidar)
-        self._safety = SafetyNodes(self.bus, limits or SafetyLimits.from_profile(stack.limits), self.estop)
+        limits = limits or SafetyLimits.from_profile(stack.limits)
+        lives = isinstance(robot, HasLivingSensors) and robot.living
+        self._safety = SafetyNodes(self.bus, limits if lives else limits.still(), self.estop)
         self._stack = StackNodes(self.bus, stack, robot.calibration, gantry, LATENCY)
         placed = self._robot.nodes + self._safety.nodes + self._stack.nodes
         self.executor = Executor(self.bus, in_order(placed))

@@ -16,17 +16,12 @@ import math
 
 import numpy as np
 
-from golem.hardware.safety.base import (
-    Counters,
-    GateInputs,
-    GateMemory,
-    GateResult,
-    OperatorRequest,
-    Outgoing,
-    SafetyLimits,
-)
+from golem.hardware.safety.base import Counters, GateInputs, OperatorRequest, Outgoing, SafetyLimits
 from golem.hardware.safety.limiter import limit_command
+from golem.hardware.safety.memory import GateMemory, GateResult
 from golem.hardware.safety.monitor import examine, whole, whole_command
+from golem.hardware.safety.sender import SenderMemory, examine_command
+from golem.hardware.safety.senses import SensesMemory, sense
 from golem.interfaces.payloads import EstopMessage, Fault, GateState, Reason
 from golem.types import NUM_JOINTS, Array, BaseEstimate, LowCommand, LowState
 
@@ -46,8 +41,8 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     running = math.isfinite(inputs.t) and inputs.t >= memory.t
     t = inputs.t if running else memory.t if math.isfinite(memory.t) else 0.0
     estop, estop_fault = _estop(inputs.estop, memory.estop, t, limits)
-    state, counters, state_fault = _state(inputs.state, memory, t, limits)
-    command, command_fault = _command(inputs.command, memory.command, t, limits)
+    state, counters, senses, state_fault = _state(inputs, memory, t, limits)
+    command, sender, command_fault = _command(inputs.command, memory, t, limits)
     grounded, base_fault = _base(inputs.base, memory, t, limits)
     clock_fault = None if running else Fault(Reason.CLOCK)
     fault = clock_fault or _pause(memory, t, limits) or inputs.transport or estop_fault or state_fault
@@ -59,18 +54,18 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
         requested = Fault(Reason.REQUESTED) if inputs.request is OperatorRequest.STOP else None
         fault = fault or command_fault or base_fault or requested
         if fault is not None:
-            mode, (reason, detail), since, outgoing = GateState.STOP1, fault, t, None
+            mode, reason, detail, since, outgoing = GateState.STOP1, fault.reason, fault.detail, t, None
     elif mode.stopped:
         if edge is OperatorRequest.RESET and fault is None:
             mode, reason, detail, since = GateState.ARMED, None, "", t
         elif mode is GateState.STOP1 and t - since >= limits.damping_time:
             mode, since = GateState.STOP0, t
     else:
-        reason, detail = fault or (None, "")
+        reason, detail = (None, "") if fault is None else (fault.reason, fault.detail)
         new = GateState.ARMED if fault is None else GateState.INIT
         if new is GateState.ARMED and edge is OperatorRequest.ACTIVATE:
             if command_fault is not None:
-                reason, detail = command_fault
+                reason, detail = command_fault.reason, command_fault.detail
             elif state is not None:
                 new = GateState.ACTIVE
                 outgoing = Outgoing(state.q.astype(np.float64), np.zeros(NUM_JOINTS), limits.damping)
@@ -101,6 +96,9 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
             outgoing=outgoing,
             request=inputs.request,
             grounded=grounded,
+            senses=senses,
+            sender=sender,
+            sent=sent,
         ),
     )
 
@@ -163,24 +161,30 @@ def _estop(
 
 
 def _state(
-    new: LowState | None, memory: GateMemory, t: float, limits: SafetyLimits
-) -> tuple[LowState | None, Counters, Fault | None]:
-    old, counters = memory.state, memory.counters
+    inputs: GateInputs, memory: GateMemory, t: float, limits: SafetyLimits
+) -> tuple[LowState | None, Counters, SensesMemory, Fault | None]:
+    new, old, counters, senses = inputs.state, memory.state, memory.counters, memory.senses
     if new is not None:
         if not _stamped(new.t, t, limits):
-            return old, counters, Fault(Reason.STATE_TIME, f"stamp {new.t} at {t}")
+            return old, counters, senses, Fault(Reason.STATE_TIME, f"stamp {new.t} at {t}")
         if not whole(new):
-            return old, counters, Fault(Reason.STATE_INVALID)
+            return old, counters, senses, Fault(Reason.STATE_INVALID)
         if old is None or new.t > old.t:
-            counters, fault = examine(new, limits, counters)
-            if fault is not None:
-                return new, counters, fault
-            old = new
+            tick = new.t if inputs.tick is None else inputs.tick
+            sent = memory.sent if memory.mode is GateState.ACTIVE else None
+            senses, believed, odd = sense(new, tick, senses, limits, sent)
+            if believed:
+                counters, fault = examine(new, limits, counters)
+                if fault is not None:
+                    return new, counters, senses, fault
+                old = new
+            if odd is not None:
+                return old, counters, senses, odd
     if old is None:
-        return None, counters, Fault(Reason.STATE_MISSING)
+        return None, counters, senses, Fault(Reason.STATE_MISSING)
     if t - old.t > limits.state_age:
-        return old, counters, Fault(Reason.STATE_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
-    return old, counters, None
+        return old, counters, senses, Fault(Reason.STATE_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
+    return old, counters, senses, None
 
 
 def _base(
@@ -197,17 +201,22 @@ def _base(
 
 
 def _command(
-    new: LowCommand | None, old: LowCommand | None, t: float, limits: SafetyLimits
-) -> tuple[LowCommand | None, Fault | None]:
+    new: LowCommand | None, memory: GateMemory, t: float, limits: SafetyLimits
+) -> tuple[LowCommand | None, SenderMemory, Fault | None]:
+    old = memory.command
+    sender = memory.sender if memory.mode is GateState.ACTIVE else SenderMemory()
     if new is not None:
         if not _stamped(new.t, t, limits):
-            return old, Fault(Reason.COMMAND_TIME, f"stamp {new.t} at {t}")
+            return old, sender, Fault(Reason.COMMAND_TIME, f"stamp {new.t} at {t}")
         if not whole_command(new):
-            return old, Fault(Reason.COMMAND_INVALID)
+            return old, sender, Fault(Reason.COMMAND_INVALID)
         if old is None or new.t > old.t:
+            sender, fault = examine_command(new, sender, limits)
+            if fault is not None:
+                return new, sender, fault
             old = new
     if old is None:
-        return None, Fault(Reason.COMMAND_MISSING)
+        return None, sender, Fault(Reason.COMMAND_MISSING)
     if t - old.t > limits.command_age:
-        return old, Fault(Reason.COMMAND_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
-    return old, None
+        return old, sender, Fault(Reason.COMMAND_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
+    return old, sender, None

@@ -26,7 +26,8 @@ def limit_command(
     1. Gains: 0 <= k <= k_max, rising by at most `k_rate * dt`.
     2. Position: into the commanded range, then at most `slew * dt` away from the last one. Towards a range's end
        the rate is at most sqrt(2 a d), d the distance left, so that the joint can follow to a halt.
-    3. Torque, |kp (q_cmd - q) + kd (dq_cmd - dq) + tau| <= L: the damping term alone is kept within L by scaling
+    3. Feed-forward: at most `torque_rate * dt` away from the last one.
+    4. Torque, |kp (q_cmd - q) + kd (dq_cmd - dq) + tau| <= L: the damping term alone is kept within L by scaling
        kd, then `tau` gives way, then the position is pulled towards the measured one. Only this pull may exceed the
        slew limit, and it can only lower the torque. A position far away is thus never stored as a spring, and the
        gravity torque survives as long as possible.
@@ -59,6 +60,9 @@ def limit_command(
     share = bound / maximum(np.abs(damp), bound)
     damp *= share
     tau = minimum(maximum(command.tau, negative), bound)
+    if last.tau is not None:
+        step = limits.torque_rate * dt
+        tau = minimum(maximum(tau, last.tau - step), last.tau + step)
     rest = minimum(maximum(tau + damp, negative), bound)
     soft = maximum(kp, _MIN_STIFFNESS)
     reach = bound / soft
@@ -67,4 +71,4 @@ def limit_command(
 
     # Copies: whoever receives the command must not be able to reach into the memory.
     limited = LowCommand(t=t, q=q.copy(), dq=dq, tau=rest - damp, kp=kp.copy(), kd=kd * share)
-    return limited, Outgoing(q=q, kp=kp, kd=kd)
+    return limited, Outgoing(q, kp, kd, tau)

@@ -37,6 +37,8 @@ class SafetyConfig:
     """Limit profile to enforce: urdf or paper. The stack file's is not read here: the gate trusts no stack."""
     strict: bool = False
     """Stop a simulated robot as early as the real one for what is late: a busy machine then stops it."""
+    still: bool = False
+    """The sensors of the simulated robot have no noise (profile ideal): do not stop it where they stand still."""
     estop: EstopConfig = field(default_factory=EstopConfig)
     """The emergency stop. A real robot has none until its board is named."""
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
@@ -53,6 +55,10 @@ def run_safety(config: SafetyConfig) -> None:
     limits = SafetyLimits.from_profile(config.limits)
     if config.dds.robot and config.limits != ROBOT_LIMITS:
         raise ConfigError(f"The real robot is guarded with --limits {ROBOT_LIMITS}, not '{config.limits}'.")
+    if config.still:
+        if config.dds.robot:
+            raise ConfigError("A real robot's sensors never stand still: leave out --still.")
+        limits = limits.still()
     patient = not (config.strict or config.dds.robot)
     virtual = config.estop.use == "virtual"
     estop = None if virtual and config.dds.robot else config.estop.create()
@@ -68,6 +74,8 @@ def run_safety(config: SafetyConfig) -> None:
             participant, node, limits, estop, who=who, patient=patient, real=config.dds.robot
         )
         tell(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
+        if config.still:
+            tell("Sensors that stand still do not stop the robot: --still.")
         if estop is None:
             tell(
                 "No emergency stop is here, so the gate stays shut; "

@@ -69,10 +69,10 @@ class SafetyProcess:
         if patient:
             limits = sim_sync.relaxed_limits(limits)
         self._patient, self._damping, self._stall = patient, limits.damping, limits.stall
-        self._estop_age = limits.estop_age
+        self._estop_age, self._frozen = limits.estop_age, limits.frozen > 0.0
         self._node, self._clock, self._who = node, clock, who
         self._endpoints = endpoints = RoleEndpoints("safety", participant, node)
-        self._arrivals = Arrivals(endpoints, clock)
+        self._arrivals = Arrivals(endpoints, clock, limits)
         self.commands = self._arrivals.commands
         self._out = endpoints.writer("/lowcmd")
         # Best effort, as the robot's own reader may be: a reliable one does not see writers that are.
@@ -144,6 +144,7 @@ class SafetyProcess:
                 OperatorRequest.NONE if early else request,
                 self._base,
                 self._fault(moving),
+                self._arrivals.tick,
             )
         )
         self._steps += 1
@@ -252,6 +253,9 @@ class SafetyProcess:
         }
         for name, frame in newest.items():
             values[f"age of {name} [ms]"] = "never seen" if frame is None else f"{(now - frame.t) * 1e3:.0f}"
+        for name, frames in self._arrivals.damaged.items():
+            values[f"damaged frames of {name}"] = frames.dropped
+        values["check of sensors that stand still"] = "on" if self._frozen else "off: declared still"
         values["on-board controller"] = self._switcher.owner or "none"
         level = DiagnosticStatus.ERROR if self.status.stopped else DiagnosticStatus.OK
         if self.status.state in (GateState.INIT, GateState.ARMED):
