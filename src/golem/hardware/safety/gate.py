@@ -13,13 +13,14 @@ to ARMED, never back to motion. A command that is not finite stops the robot; on
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from golem.hardware.safety.base import Counters, GateInputs, OperatorRequest, Outgoing, SafetyLimits
 from golem.hardware.safety.limiter import limit_command
 from golem.hardware.safety.memory import GateMemory, GateResult
-from golem.hardware.safety.monitor import examine, whole, whole_command
+from golem.hardware.safety.monitor import examine, strained, whole, whole_command
 from golem.hardware.safety.sender import SenderMemory, examine_command
 from golem.hardware.safety.senses import SensesMemory, sense
 from golem.interfaces.payloads import EstopMessage, Fault, GateState, Reason
@@ -74,7 +75,7 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
 
     if mode is GateState.ACTIVE and state is not None and command is not None and outgoing is not None:
         dt = min(t - memory.t, limits.longest_tick)
-        sent, outgoing = limit_command(t, state, command, limits, outgoing, dt)
+        sent, outgoing = limit_command(t, state, command, limits, outgoing, dt, strained(counters))
     else:
         damps = mode in (GateState.ARMED, GateState.STOP1)
         sent = passive(t, state, limits.damping if damps else np.zeros(NUM_JOINTS))
@@ -211,10 +212,10 @@ def _command(
         if not whole_command(new):
             return old, sender, Fault(Reason.COMMAND_INVALID)
         if old is None or new.t > old.t:
-            sender, fault = examine_command(new, sender, limits)
+            sender, followed, fault = examine_command(new, sender, limits)
             if fault is not None:
                 return new, sender, fault
-            old = new
+            old = new if followed or old is None else replace(old, t=new.t)
     if old is None:
         return None, sender, Fault(Reason.COMMAND_MISSING)
     if t - old.t > limits.command_age:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from golem.hardware.safety.base import Outgoing, SafetyLimits
-from golem.types import NUM_JOINTS, LowCommand, LowState
+from golem.hardware.safety.monitor import at_rest
+from golem.types import NUM_JOINTS, Array, LowCommand, LowState
 
 # Arrays instead of numbers: numpy then skips a conversion, a third of such an operation's time.
 _ZERO = np.zeros(NUM_JOINTS)
@@ -17,7 +18,13 @@ _MIN_STIFFNESS = np.full(NUM_JOINTS, 1e-9)
 
 
 def limit_command(
-    t: float, state: LowState, command: LowCommand, limits: SafetyLimits, last: Outgoing, dt: float
+    t: float,
+    state: LowState,
+    command: LowCommand,
+    limits: SafetyLimits,
+    last: Outgoing,
+    dt: float,
+    strained: bool = False,
 ) -> tuple[LowCommand, Outgoing]:
     """Return the limited command and what the next tick's slew limits refer to.
 
@@ -39,10 +46,13 @@ def limit_command(
         limits: the limits.
         last: what the previous call returned.
         dt: time since then [s].
+        strained: whether a joint is too fast, or too close to the end of its range for its speed. Torque that drives
+            it on is then taken away, so that less is left for a stop to do.
     """
     minimum, maximum = np.minimum, np.maximum
     bound = limits.torque_command
     negative = -bound
+    highest, lowest = _spared(state, limits) if strained else (bound, negative)
 
     kp = minimum(maximum(command.kp, _ZERO), limits.kp_max)
     kp = minimum(kp, last.kp + limits.kp_rate * dt)
@@ -63,12 +73,20 @@ def limit_command(
     if last.tau is not None:
         step = limits.torque_rate * dt
         tau = minimum(maximum(tau, last.tau - step), last.tau + step)
-    rest = minimum(maximum(tau + damp, negative), bound)
+    rest = minimum(maximum(tau + damp, lowest), highest)
     soft = maximum(kp, _MIN_STIFFNESS)
-    reach = bound / soft
     center = state.q - rest / soft
-    q = minimum(maximum(q, center - reach), center + reach)
+    q = minimum(maximum(q, center + lowest / soft), center + highest / soft)
 
     # Copies: whoever receives the command must not be able to reach into the memory.
     limited = LowCommand(t=t, q=q.copy(), dq=dq, tau=rest - damp, kp=kp.copy(), kd=kd * share)
     return limited, Outgoing(q, kp, kd, tau)
+
+
+def _spared(state: LowState, limits: SafetyLimits) -> tuple[Array, Array]:
+    """Return the (27,) highest and lowest torque that drives no joint on that moves too fast or too far [N m]."""
+    q, dq, bound = state.q, state.dq, limits.torque_command
+    rest = at_rest(q, dq, limits.deceleration)
+    up = (dq > limits.velocity) | (rest > limits.state_upper)
+    down = (dq < -limits.velocity) | (rest < limits.state_lower)
+    return np.where(up, 0.0, bound), np.where(down, 0.0, -bound)

@@ -54,6 +54,12 @@ def at_rest(q: Array, dq: Array, deceleration: Array) -> Array:
     return q + dq * np.abs(dq) / (deceleration + deceleration)
 
 
+def strained(counters: Counters) -> bool:
+    """Return whether the newest sample was too fast, or would not come to rest within its range."""
+    c = counters
+    return c is not _SOUND and bool(c.velocity or c.leg_velocity or c.braking or c.leg_braking)
+
+
 def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[Counters, Fault | None]:
     """Compare one new sample with the limits.
 

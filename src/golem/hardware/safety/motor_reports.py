@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ class MotorReports:
     """
 
     on: NDArray[np.bool_]
-    error: NDArray[np.uint32]
+    error: NDArray[Any]
     temperature: Array
     voltage: Array
 
@@ -65,7 +66,7 @@ class MotorWatch:
         if off.any():
             return Fault(Reason.MOTOR_MODE, f"{_first(off)} has switched itself off")
         cold, hot = self._limits.temperature
-        outside = ~((reports.temperature >= cold) & (reports.temperature <= hot)).all(axis=1)
+        outside = np.logical_not(((reports.temperature >= cold) & (reports.temperature <= hot)).all(axis=1))
         if outside.any():
             said = " and ".join(f"{t:g}" for t in reports.temperature[int(np.argmax(outside))])
             return Fault(Reason.MOTOR_HOT, f"{_first(outside)} at {said} degrees")

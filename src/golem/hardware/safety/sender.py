@@ -36,7 +36,7 @@ class SenderMemory:
 
 def examine_command(
     new: LowCommand, memory: SenderMemory, limits: SafetyLimits
-) -> tuple[SenderMemory, Fault | None]:
+) -> tuple[SenderMemory, bool, Fault | None]:
     """Judge one new command.
 
     Args:
@@ -45,7 +45,7 @@ def examine_command(
         limits: what to compare with.
 
     Returns:
-        The new memory, and the fault if one has persisted.
+        The new memory, whether the command is to be followed, and the fault if one has persisted.
     """
     limp, held, reversals = 0, memory.held, memory.reversals
     let_go = new.kd.min() <= 0.0
@@ -62,12 +62,18 @@ def examine_command(
     after = SenderMemory(new, held, limp, reversals)
     if wrong is not None and limp >= limits.samples:
         i = int(np.argmax(wrong))
-        return after, Fault(
-            Reason.COMMAND_GAINS, f"{JOINT_NAMES[i]} with kp {new.kp[i]:g} and kd {new.kd[i]:g}"
+        return (
+            after,
+            False,
+            Fault(Reason.COMMAND_GAINS, f"{JOINT_NAMES[i]} with kp {new.kp[i]:g} and kd {new.kd[i]:g}"),
         )
     if reversals >= limits.reversals and last is not None:
         i = int(np.argmin((new.tau * last.tau) / limits.flip))
-        return after, Fault(
-            Reason.COMMAND_REVERSALS, f"{JOINT_NAMES[i]} from {last.tau[i]:.0f} to {new.tau[i]:.0f} N m"
+        return (
+            after,
+            False,
+            Fault(
+                Reason.COMMAND_REVERSALS, f"{JOINT_NAMES[i]} from {last.tau[i]:.0f} to {new.tau[i]:.0f} N m"
+            ),
         )
-    return after, None
+    return after, limp == 0, None
