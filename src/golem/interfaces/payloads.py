@@ -304,12 +304,12 @@ class Fault(NamedTuple):
     Attributes:
         reason: why.
         detail: one line; may be empty.
-        arms: whether state and legs are sound in spite of it, because it is about the upper body alone.
+        stands: whether state and legs are sound in spite of it, because it is about the upper body alone.
     """
 
     reason: Reason
     detail: str = ""
-    arms: bool = False
+    stands: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ from golem.runtime.executor import FOREVER, Executor, in_order
 from golem.runtime.node_groups import RobotNodes, SafetyNodes, StackNodes, hears_lidar
 from golem.runtime.perception_nodes import LATENCY, detection_requested
 from golem.runtime.skill_table import SkillTable
+from golem.runtime.standing_legs import StandingLegs
 from golem.skills.base import Routine, SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
@@ -68,7 +69,8 @@ class LockstepRunner:
         self._robot = RobotNodes(self.bus, stack, robot, seen, lambda: lidar)
         limits = limits or SafetyLimits.from_profile(stack.limits)
         lives = isinstance(robot, HasLivingSensors) and robot.living
-        self._safety = SafetyNodes(self.bus, limits if lives else limits.still(), self.estop)
+        standing = StandingLegs if stack.on_ground else None
+        self._safety = SafetyNodes(self.bus, limits if lives else limits.still(), self.estop, standing)
         self._stack = StackNodes(self.bus, stack, robot.calibration, gantry, LATENCY)
         placed = self._robot.nodes + self._safety.nodes + self._stack.nodes
         self.executor = Executor(self.bus, in_order(placed))

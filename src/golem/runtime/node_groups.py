@@ -33,6 +33,7 @@ from golem.runtime.navigator_node import NavigatorNode
 from golem.runtime.odometry_node import LidarNode, OdometryNode
 from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode, stack_loco_api
 from golem.runtime.skill_table import SkillTable
+from golem.runtime.standing_legs import StandingLegs
 from golem.skills.base import Routine
 from golem.skills.context import Context, Modules
 from golem.skills.pursuit import pursue
@@ -134,9 +135,15 @@ class SafetyNodes:
         gate: the one of them that runs the gate.
     """
 
-    def __init__(self, bus: Bus, limits: SafetyLimits, estop: EmergencyStop | None) -> None:
-        """Enforce `limits`, under `estop`; without one the gate stays shut."""
-        self.gate = nodes.SafetyNode(bus, limits)
+    def __init__(
+        self,
+        bus: Bus,
+        limits: SafetyLimits,
+        estop: EmergencyStop | None,
+        standing: Callable[[], StandingLegs] | None = None,
+    ) -> None:
+        """Enforce `limits`, under `estop`; without one the gate stays shut. `standing`: see `StandingGate`."""
+        self.gate = nodes.SafetyNode(bus, limits, standing)
         self.nodes: list[Placed] = [(Phase.PROTECT, self.gate)]
         if estop is not None:
             self.nodes.insert(0, (Phase.PROTECT, nodes.EstopNode(bus, estop)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from golem.capabilities.arms.base import UpperBody
@@ -24,6 +26,7 @@ from golem.middleware.bus import Bus, News
 from golem.robots.base import Robot
 from golem.runtime.arm_limits import ArmLimits
 from golem.runtime.contract_check import ContractCheck
+from golem.runtime.standing_legs import StandingGate, StandingLegs
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import LACKS, SkillRun
@@ -302,9 +305,11 @@ class SafetyNode:
 
     period = TICK
 
-    def __init__(self, bus: Bus, limits: SafetyLimits) -> None:
-        """Enforce `limits`."""
-        self._bus, self._gate = bus, Gate(limits)
+    def __init__(
+        self, bus: Bus, limits: SafetyLimits, standing: Callable[[], StandingLegs] | None = None
+    ) -> None:
+        """Enforce `limits`; what `standing` makes gets the legs where a stop leaves them sound."""
+        self._bus, self._gate = bus, StandingGate(Gate(limits), standing)
         self._faults = News(bus, topics.TRANSPORT_FAULT)
         self.request = OperatorRequest.NONE
 

@@ -115,6 +115,6 @@ def _gate() -> Iterator[Injection]:
             f"gate held up for {1e3 * seconds:g} ms", (Reason.STALLED,), seconds + 0.004, gate=held(seconds)
         )
     for seconds in (-1.0, -0.01):
-        yield _stop(f"gate's clock {seconds:+g} s", (Reason.CLOCK,), gate=shifted(seconds), stands=True)
+        yield _stop(f"gate's clock {seconds:+g} s", (Reason.CLOCK,), gate=shifted(seconds))
     for seconds in (0.2, 10.0):
         yield _stop(f"gate's clock {seconds:+g} s", (Reason.STALLED,), gate=shifted(seconds))

@@ -28,6 +28,7 @@ from golem.runtime.executor import Executor, Phase, in_order
 from golem.runtime.live.safety_process import SafetyProcess
 from golem.runtime.lockstep import build_robot
 from golem.runtime.node_groups import RobotNodes, StackNodes
+from golem.runtime.standing_legs import StandingLegs
 from golem.stack import Stack
 from golem.types import TICK, LowCommand, Twist
 
@@ -94,7 +95,12 @@ class FaultRig:
         if not robot.living:
             limits = limits.still()
         self.gate = SafetyProcess(
-            safety, DdsNode(safety, "safety"), limits, self.estop, clock=lambda: 1000.0 + self.t + self.clock
+            safety,
+            DdsNode(safety, "safety"),
+            limits,
+            self.estop,
+            clock=lambda: 1000.0 + self.t + self.clock,
+            standing=StandingLegs if stack.on_ground else None,
         )
         self.states, self.commands = (self.writer(name) for name in ("/lowstate", "/safety/lowcmd_in"))
         row = public.topic("/lowcmd")

@@ -205,7 +205,8 @@ class GateInputs:
         transport: what is wrong with the way the frames came: a checksum, or a second writer of the motors' command;
             None when nothing is, or when there is no transport.
         tick: the robot's own time of `state` [s]; None where its stamp is that.
-        standing: what a standing controller tells the motors; None where there is none, or where it cannot stand.
+        stands: whether a standing controller can take the legs.
+        standing: what it tells the motors; None before it has them, or when it fails.
     """
 
     t: float
@@ -216,6 +217,7 @@ class GateInputs:
     base: BaseEstimate | None = None
     transport: Fault | None = None
     tick: float | None = None
+    stands: bool = False
     standing: LowCommand | None = None
 
 

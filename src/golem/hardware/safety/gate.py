@@ -2,12 +2,16 @@
 
     INIT   something is missing; limp           -> ARMED  once state and e-stop are sound
     ARMED  sound; damps                         -> ACTIVE on request, INIT when no longer sound
-    ACTIVE commands pass, limited               -> STOP1  on any fault
+    ACTIVE commands pass, limited               -> STOP2  on a fault that leaves state and legs sound
+                                                -> STOP1  on any other
+    STOP2  a controller of the gate stands      -> STOP1  when it cannot, or a stop is asked for; ACTIVE: see below
     STOP1  damps                                -> STOP0  after 3 s, ARMED on reset
     STOP0  limp                                 -> ARMED  on reset
 
 A stop is latched with its reason. Reset needs everything sound, the button released, and an explicit request; it leads
-to ARMED, never back to motion. A command that is not finite stops the robot; one beyond a limit is limited.
+to ARMED, never back to motion. A robot that stands in STOP2 would fall in ARMED: there a reset only takes the reason
+away, and a robot without a reason can be activated again. A command that is not finite stops the robot; one beyond a
+limit is limited.
 """
 
 from __future__ import annotations
@@ -25,6 +29,22 @@ from golem.hardware.safety.sender import SenderMemory, examine_command
 from golem.hardware.safety.senses import SensesMemory, sense
 from golem.interfaces.payloads import EstopMessage, Fault, GateState, Reason
 from golem.types import NUM_JOINTS, Array, BaseEstimate, LowCommand, LowState
+
+STANDING_AGE = 0.010
+"""Time in which a standing controller has to have the legs once a stop has given them to it [s]."""
+STAND = frozenset(
+    {
+        Reason.COMMAND_DAMAGED,
+        Reason.COMMAND_MISSING,
+        Reason.COMMAND_STALE,
+        Reason.COMMAND_TIME,
+        Reason.COMMAND_INVALID,
+        Reason.COMMAND_UNSTAMPED,
+        Reason.COMMAND_GAINS,
+        Reason.COMMAND_REVERSALS,
+    }
+)
+"""Reasons that say nothing against state and legs."""
 
 
 def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateResult:
@@ -46,16 +66,32 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     command, sender, command_fault = _command(inputs.command, memory, t, limits)
     grounded, base_fault = _base(inputs.base, memory, t, limits)
     clock_fault = None if running else Fault(Reason.CLOCK)
-    fault = clock_fault or _pause(memory, t, limits) or inputs.transport or estop_fault or state_fault
+    faults = [clock_fault, _pause(memory, t, limits), inputs.transport, estop_fault, state_fault]
+    fault = _first(faults)
     edge = inputs.request if inputs.request is not memory.request else OperatorRequest.NONE
 
     mode, reason, detail, since = memory.mode, memory.reason, memory.detail, memory.since
     outgoing = memory.outgoing
     if mode is GateState.ACTIVE:
         requested = Fault(Reason.REQUESTED) if inputs.request is OperatorRequest.STOP else None
-        fault = fault or command_fault or base_fault or requested
+        faults += [command_fault, base_fault, requested]
+        fault = _first(faults)
         if fault is not None:
-            mode, reason, detail, since, outgoing = GateState.STOP1, fault.reason, fault.detail, t, None
+            carried = grounded is not None and t - grounded <= limits.base_age
+            stands = inputs.stands and carried and all(map(_stands, faults))
+            mode = GateState.STOP2 if stands else GateState.STOP1
+            reason, detail, since = fault.reason, fault.detail, t
+    elif mode is GateState.STOP2:
+        asked = Fault(Reason.REQUESTED) if inputs.request is OperatorRequest.STOP else None
+        hard = next((f for f in (asked, *faults) if not _stands(f)), None)
+        failed = inputs.standing is None and t > since + STANDING_AGE
+        if hard is not None or failed:
+            mode, since = GateState.STOP1, t
+            reason, detail = (hard.reason, hard.detail) if hard is not None else (reason, detail)
+        elif edge is OperatorRequest.RESET and fault is None and command_fault is None:
+            reason, detail = None, ""
+        elif edge is OperatorRequest.ACTIVATE and reason is None and fault is None and command_fault is None:
+            mode, since = GateState.ACTIVE, t
     elif mode.stopped:
         if edge is OperatorRequest.RESET and fault is None:
             mode, reason, detail, since = GateState.ARMED, None, "", t
@@ -73,11 +109,14 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
         if new is not mode:
             mode, since = new, t
 
-    if mode is GateState.ACTIVE and state is not None and command is not None and outgoing is not None:
+    wanted = {GateState.ACTIVE: command, GateState.STOP2: inputs.standing}.get(mode)
+    if state is not None and wanted is not None and outgoing is not None:
         dt = min(t - memory.t, limits.longest_tick)
-        sent, outgoing = limit_command(t, state, command, limits, outgoing, dt, strained(counters))
+        sent, outgoing = limit_command(t, state, wanted, limits, outgoing, dt, strained(counters))
     else:
-        damps = mode in (GateState.ARMED, GateState.STOP1)
+        if mode is not GateState.STOP2:
+            outgoing = None
+        damps = mode in (GateState.ARMED, GateState.STOP1, GateState.STOP2)
         sent = passive(t, state, limits.damping if damps else np.zeros(NUM_JOINTS))
     return GateResult(
         command=sent,
@@ -129,6 +168,15 @@ class Gate:
         result = check(inputs, self.limits, self.memory)
         self.memory = result.memory
         return result
+
+
+def _first(faults: list[Fault | None]) -> Fault | None:
+    return next((fault for fault in faults if fault is not None), None)
+
+
+def _stands(fault: Fault | None) -> bool:
+    """Return whether a robot can stand in spite of `fault`."""
+    return fault is None or fault.stands or fault.reason in STAND
 
 
 def _stamped(t_frame: float, t: float, limits: SafetyLimits) -> bool:

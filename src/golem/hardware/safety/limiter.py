@@ -14,6 +14,8 @@ from golem.types import NUM_JOINTS, Array, LowCommand, LowState
 
 # Arrays instead of numbers: numpy then skips a conversion, a third of such an operation's time.
 _ZERO = np.zeros(NUM_JOINTS)
+BRAKE = 0.2
+"""Share of the torque bound that brakes a joint which is too fast or too close to the end of its range [own]."""
 _MIN_STIFFNESS = np.full(NUM_JOINTS, 1e-9)
 
 
@@ -46,8 +48,8 @@ def limit_command(
         limits: the limits.
         last: what the previous call returned.
         dt: time since then [s].
-        strained: whether a joint is too fast, or too close to the end of its range for its speed. Torque that drives
-            it on is then taken away, so that less is left for a stop to do.
+        strained: whether a joint is too fast, or too close to the end of its range for its speed. It is then braked
+            whatever the command says, so that less is left for a stop to do.
     """
     minimum, maximum = np.minimum, np.maximum
     bound = limits.torque_command
@@ -84,9 +86,10 @@ def limit_command(
 
 
 def _spared(state: LowState, limits: SafetyLimits) -> tuple[Array, Array]:
-    """Return the (27,) highest and lowest torque that drives no joint on that moves too fast or too far [N m]."""
+    """Return the (27,) highest and lowest torque that brakes every joint that moves too fast or too far [N m]."""
     q, dq, bound = state.q, state.dq, limits.torque_command
     rest = at_rest(q, dq, limits.deceleration)
     up = (dq > limits.velocity) | (rest > limits.state_upper)
     down = (dq < -limits.velocity) | (rest < limits.state_lower)
-    return np.where(up, 0.0, bound), np.where(down, 0.0, -bound)
+    brake = BRAKE * bound
+    return np.where(up, -brake, bound), np.where(down, brake, -bound)

@@ -103,20 +103,20 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
     ratio = speed / limits.velocity
     n, legs = limits.samples, limits.leg_samples
     # What the legs have no part in leaves them able to stand.
-    arms = not (
+    stands = not (
         new.leg_position or new.leg_velocity or new.leg_braking or new.tilt or _legs_strain(load, limits)
     )
     if new.position >= n or new.leg_position >= legs or outside.max() > limits.gross:
-        return new, Fault(Reason.POSITION, _worst(outside, lambda i: f"at {q[i]:.3f} rad"), arms)
+        return new, Fault(Reason.POSITION, _worst(outside, lambda i: f"at {q[i]:.3f} rad"), stands)
     if fast and (new.velocity >= n or new.leg_velocity >= legs or ratio.max() > limits.gross):
-        return new, Fault(Reason.VELOCITY, _worst(ratio, lambda i: f"at {dq[i]:.2f} rad/s"), arms)
+        return new, Fault(Reason.VELOCITY, _worst(ratio, lambda i: f"at {dq[i]:.2f} rad/s"), stands)
     if new.braking >= n or new.leg_braking >= legs:
         return new, Fault(
-            Reason.BRAKING, _worst(beyond, lambda i: f"at {q[i]:.3f} rad with {dq[i]:.2f} rad/s"), arms
+            Reason.BRAKING, _worst(beyond, lambda i: f"at {q[i]:.3f} rad with {dq[i]:.2f} rad/s"), stands
         )
     if new.torque >= limits.torque_samples:
         return new, Fault(
-            Reason.TORQUE, _worst(load / limits.torque, lambda i: f"at {state.tau[i]:.1f} N m"), arms
+            Reason.TORQUE, _worst(load / limits.torque, lambda i: f"at {state.tau[i]:.1f} N m"), stands
         )
     if new.tilt >= n:
         return new, Fault(Reason.TILT, f"torso at {math.degrees(angle):.0f} degrees")

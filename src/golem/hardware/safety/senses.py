@@ -148,7 +148,7 @@ def _jumped(
     return (
         memory,
         False,
-        Fault(Reason.STATE_IMPLAUSIBLE, f"{JOINT_NAMES[i]} jumped by {moved[i]:.2f} rad", arms=not legs),
+        Fault(Reason.STATE_IMPLAUSIBLE, f"{JOINT_NAMES[i]} jumped by {moved[i]:.2f} rad", stands=not legs),
     )
 
 
@@ -207,8 +207,8 @@ def _frozen(m: SensesMemory, limits: SafetyLimits) -> Fault | None:
     if still < limits.frozen - EVERY * TICK - 1e-6:
         return None
     names = [g for g, s in zip(GROUPS, m.since, strict=True) if s == min(m.since)]
-    arms = not any(name.endswith("leg") or name == "IMU" for name in names)
-    return Fault(Reason.STATE_FROZEN, f"{', '.join(names)} for {still * 1e3:.0f} ms", arms)
+    stands = not any(name.endswith("leg") or name == "IMU" for name in names)
+    return Fault(Reason.STATE_FROZEN, f"{', '.join(names)} for {still * 1e3:.0f} ms", stands)
 
 
 def _drifts(m: SensesMemory, speed: Array, limits: SafetyLimits) -> Fault | None:
@@ -216,9 +216,11 @@ def _drifts(m: SensesMemory, speed: Array, limits: SafetyLimits) -> Fault | None
     i = int(beyond.argmax())
     if beyond[i] <= limits.drift:
         return None
-    arms = i >= LEGS.stop and bool(beyond[LEGS].max() <= limits.drift)
+    stands = i >= LEGS.stop and bool(beyond[LEGS].max() <= limits.drift)
     return Fault(
-        Reason.STATE_IMPLAUSIBLE, f"{JOINT_NAMES[i]} is {m.drift[i]:.2f} rad from its speed's integral", arms
+        Reason.STATE_IMPLAUSIBLE,
+        f"{JOINT_NAMES[i]} is {m.drift[i]:.2f} rad from its speed's integral",
+        stands,
     )
 
 
@@ -244,7 +246,7 @@ def _dead(m: SensesMemory, limits: SafetyLimits) -> Fault | None:
     if m.dead[i] < limits.dead_time:
         return None
     legs = bool(m.dead[LEGS].max() >= limits.dead_time)
-    return Fault(Reason.MOTOR_DEAD, f"{JOINT_NAMES[i]} has no torque", arms=not legs)
+    return Fault(Reason.MOTOR_DEAD, f"{JOINT_NAMES[i]} has no torque", stands=not legs)
 
 
 def _turned(

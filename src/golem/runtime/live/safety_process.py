@@ -23,6 +23,7 @@ from golem.runtime.live.motion_switcher_client import MotionSwitcherClient
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.safety_arrivals import Arrivals
 from golem.runtime.live.safety_status import StatusReports, describe_status
+from golem.runtime.standing_legs import StandingGate, StandingLegs
 from golem.types import BaseEstimate, LowCommand
 
 LOOK = 0.05
@@ -52,6 +53,7 @@ class SafetyProcess:
         who: Callable[[bytes], str] = bytes.hex,
         patient: bool = False,
         real: bool = False,
+        standing: Callable[[], StandingLegs] | None = None,
     ) -> None:
         """Guard the robot on the domain.
 
@@ -65,6 +67,7 @@ class SafetyProcess:
             patient: whether the robot's time may stand still for a stack that is behind; see `live.pace`.
             real: whether the robot's own controllers must have let go of the motors first; a twin's move none. Its
                 motors must hear us then, and its time must run as ours does; that of a twin stands still at times.
+            standing: makes what the legs are given to where a stop leaves them and the state sound; None damps.
         """
         if patient:
             limits = sim_sync.relaxed_limits(limits)
@@ -78,7 +81,8 @@ class SafetyProcess:
         # Best effort, as the robot's own reader may be: a reliable one does not see writers that are.
         self._all_commands = endpoints.reader("/lowcmd", Qos(reliable=False, depth=1))
         self._switcher, self._real = MotionSwitcherClient.on(endpoints, clock), real
-        self._gate, self._estop = Gate(limits), estop
+        self._gate, self._estop = StandingGate(Gate(limits), standing), estop
+        self._gate.prepare()
         self._frame: EstopMessage | None = None
         self._base: BaseEstimate | None = None
         self._base_stamp = -math.inf
@@ -121,7 +125,7 @@ class SafetyProcess:
         """Ask for a stop, and return whether the gate has done damping, if it had anything to damp."""
         self._ending = True
         self.step()
-        return self.status.state not in (GateState.ACTIVE, GateState.STOP1)
+        return self.status.state not in (GateState.ACTIVE, GateState.STOP2, GateState.STOP1)
 
     def damp(self) -> None:
         """Tell the motors to damp, whatever may have failed."""
@@ -160,7 +164,10 @@ class SafetyProcess:
     def _fault(self, moving: bool) -> Fault | None:
         """Return what is wrong with the transport: what holds now, or else what came since the gate last ran."""
         fault = self._arrivals.take_fault()
-        doubts = [(self._estop_reason(), self._estop_fault()), (Reason.WRITERS, self._crowded)]
+        if self._crowded:
+            # Of two stacks, or two writers of commands, neither touches what the robot measures.
+            fault = Fault(Reason.WRITERS, self._crowded, not self._crowded.startswith("/lowstate"))
+        doubts = [(self._estop_reason(), self._estop_fault())]
         if self._real:
             # A robot that moves is not dropped for its clock: the unit was right, and what arrives may be late.
             clock = "" if moving or self._arrivals.mode_machine is None else self._arrivals.rate.doubt()
