@@ -16,6 +16,7 @@ from golem.capabilities.legs.base import Envelope
 from golem.errors import GolemError
 from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
+from golem.hardware.safety.standing_gate import Standing
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
@@ -33,7 +34,6 @@ from golem.runtime.navigator_node import NavigatorNode
 from golem.runtime.odometry_node import LidarNode, OdometryNode
 from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode, stack_loco_api
 from golem.runtime.skill_table import SkillTable
-from golem.runtime.standing_legs import StandingLegs
 from golem.skills.base import Routine
 from golem.skills.context import Context, Modules
 from golem.skills.pursuit import pursue
@@ -140,7 +140,7 @@ class SafetyNodes:
         bus: Bus,
         limits: SafetyLimits,
         estop: EmergencyStop | None,
-        standing: Callable[[], StandingLegs] | None = None,
+        standing: Callable[[], Standing] | None = None,
     ) -> None:
         """Enforce `limits`, under `estop`; without one the gate stays shut. `standing`: see `StandingGate`."""
         self.gate = nodes.SafetyNode(bus, limits, standing)

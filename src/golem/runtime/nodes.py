@@ -13,6 +13,7 @@ from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.hands.base import HandController
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
+from golem.hardware.safety.standing_gate import Standing, StandingGate
 from golem.hardware.servo.base import MotorServo
 from golem.interfaces import topics
 from golem.interfaces.payloads import (
@@ -26,7 +27,6 @@ from golem.middleware.bus import Bus, News
 from golem.robots.base import Robot
 from golem.runtime.arm_limits import ArmLimits
 from golem.runtime.contract_check import ContractCheck
-from golem.runtime.standing_legs import StandingGate, StandingLegs
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import LACKS, SkillRun
@@ -306,7 +306,7 @@ class SafetyNode:
     period = TICK
 
     def __init__(
-        self, bus: Bus, limits: SafetyLimits, standing: Callable[[], StandingLegs] | None = None
+        self, bus: Bus, limits: SafetyLimits, standing: Callable[[], Standing] | None = None
     ) -> None:
         """Enforce `limits`; what `standing` makes gets the legs where a stop leaves them sound."""
         self._bus, self._gate = bus, StandingGate(Gate(limits), standing)

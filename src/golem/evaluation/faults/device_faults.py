@@ -73,7 +73,8 @@ def _writers() -> Iterator[Injection]:
     for topic in ("/safety/lowcmd_in", "/lowcmd", "/lowstate"):
 
         def second(m: Moment, rig: Any, topic: str = topic) -> None:
-            m.kept.setdefault("writer", None) or m.kept.update(writer=rig.writer(topic))
+            if "writer" not in m.kept:
+                m.kept["writer"] = rig.writer(topic)
 
         stands = topic != "/lowstate"
         yield _stop(f"second writer of {topic}", (Reason.WRITERS,), 0.052, gate=second, stands=stands)

@@ -23,6 +23,7 @@ from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.ros.node import DdsNode
 from golem.middleware.wire import convert
 from golem.middleware.wire.struct_layout import WireError
+from golem.robots.base import HasGantry
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.executor import Executor, Phase, in_order
 from golem.runtime.live.safety_process import SafetyProcess
@@ -111,7 +112,8 @@ class FaultRig:
         self._base = node.publisher(base.name, base.type, base.qos)
         self._activate = node.client("/safety/activate", public.TRIGGER)
         nodes = RobotNodes(self.bus, stack, robot, None, lambda: False)
-        modules = StackNodes(self.bus, stack, robot.calibration, robot, 0.0)
+        gantry = robot if isinstance(robot, HasGantry) else None
+        modules = StackNodes(self.bus, stack, robot.calibration, gantry, 0.0)
         placed = nodes.nodes + [(Phase.MEASURE, FaultyRobot(self)), (Phase.PROTECT, self)] + modules.nodes
         self.executor = Executor(self.bus, in_order(placed))
 

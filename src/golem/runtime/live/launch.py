@@ -75,6 +75,7 @@ def commands(config: LaunchConfig) -> dict[Part, list[str]]:
             "--limits",
             stack.limits,
             *(["--strict"] if config.strict else []),
+            *(["--stand"] if stack.on_ground else []),
             *([] if load_profile(stack.profile).lives else ["--still"]),
             *estop,
             *dds,

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import signal
 import time
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
+from typing import TYPE_CHECKING
 
 from tyro.conf import OmitArgPrefixes
 
@@ -20,6 +22,9 @@ from golem.runtime.live.node_setup import AsyncLogger, member, settle
 from golem.runtime.live.safety_process import SafetyProcess
 from golem.runtime.live.safety_status import report
 from golem.types import TICK
+
+if TYPE_CHECKING:
+    from golem.runtime.standing_legs import StandingLegs
 
 ROBOT_LIMITS = "urdf"
 """Limit profile of the real robot: the smaller torques."""
@@ -39,6 +44,8 @@ class SafetyConfig:
     """Stop a simulated robot as early as the real one for what is late: a busy machine then stops it."""
     still: bool = False
     """The sensors of the simulated robot have no noise (profile ideal): do not stop it where they stand still."""
+    stand: bool = False
+    """The robot stands on its feet: where a stop leaves state and legs sound, shipped legs go on standing."""
     estop: EstopConfig = field(default_factory=EstopConfig)
     """The emergency stop. A real robot has none until its board is named."""
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
@@ -59,6 +66,12 @@ def run_safety(config: SafetyConfig) -> None:
         if config.dds.robot:
             raise ConfigError("A real robot's sensors never stand still: leave out --still.")
         limits = limits.still()
+    standing: Callable[[], StandingLegs] | None = None
+    if config.stand:
+        # Imported here: without it this process has no module of a stack in it.
+        from golem.runtime.standing_legs import StandingLegs
+
+        standing = StandingLegs
     patient = not (config.strict or config.dds.robot)
     virtual = config.estop.use == "virtual"
     estop = None if virtual and config.dds.robot else config.estop.create()
@@ -71,7 +84,14 @@ def run_safety(config: SafetyConfig) -> None:
         refuse_second(participant, config.dds, "/lowcmd")
         who = partial(owner, participant)
         gate = SafetyProcess(
-            participant, node, limits, estop, who=who, patient=patient, real=config.dds.robot
+            participant,
+            node,
+            limits,
+            estop,
+            who=who,
+            patient=patient,
+            real=config.dds.robot,
+            standing=standing,
         )
         tell(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
         if config.still:

@@ -10,6 +10,7 @@ from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate, passive
+from golem.hardware.safety.standing_gate import Standing, StandingGate
 from golem.interfaces.payloads import EstopMessage, Fault, GateState, GateStatus, Reason
 from golem.interfaces.ros_convert import diagnostic, diagnostics
 from golem.middleware.dds.base import Participant, Qos
@@ -23,7 +24,6 @@ from golem.runtime.live.motion_switcher_client import MotionSwitcherClient
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.safety_arrivals import Arrivals
 from golem.runtime.live.safety_status import StatusReports, describe_status
-from golem.runtime.standing_legs import StandingGate, StandingLegs
 from golem.types import BaseEstimate, LowCommand
 
 LOOK = 0.05
@@ -53,7 +53,7 @@ class SafetyProcess:
         who: Callable[[bytes], str] = bytes.hex,
         patient: bool = False,
         real: bool = False,
-        standing: Callable[[], StandingLegs] | None = None,
+        standing: Callable[[], Standing] | None = None,
     ) -> None:
         """Guard the robot on the domain.
 
