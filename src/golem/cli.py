@@ -72,6 +72,11 @@ def _ladder(words: list[str]) -> int:
     return 0
 
 
+def _faults(words: list[str]) -> int:
+    """Try every fault against the safety layer: the rung `faults` of the ladder, with its options."""
+    return _ladder(["--rung", "faults", *words])
+
+
 def _compare(words: list[str]) -> int:
     """Compare two ladder runs on the same seeds, e.g. tether with stand."""
     from golem.evaluation.metrics.compare import CompareConfig, run_compare
@@ -304,6 +309,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "run": _run,
     "options": _options,
     "ladder": _ladder,
+    "faults": _faults,
     "compare": _compare,
     "results": _results,
     "model": _model,

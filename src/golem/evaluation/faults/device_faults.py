@@ -79,15 +79,21 @@ def _writers() -> Iterator[Injection]:
         stands = topic != "/lowstate"
         yield _stop(f"second writer of {topic}", (Reason.WRITERS,), 0.052, gate=second, stands=stands)
 
-    def writes(m: Moment, rig: Any) -> None:
-        if "writer" not in m.kept:
-            m.kept["writer"] = rig.writer("/safety/lowcmd_in")
-        q = np.full(NUM_JOINTS, 0.3)
-        zeros, ones = np.zeros(NUM_JOINTS), np.ones(NUM_JOINTS)
-        command = LowCommand(rig.t, q, zeros, zeros, 200.0 * ones, 2.0 * ones)
-        m.kept["writer"].write(encode_low_command(command, 0, answers=rig.t))
+    def writes(topic: str) -> Callable[[Moment, Any], None]:
+        def write(m: Moment, rig: Any) -> None:
+            if "writer" not in m.kept:
+                m.kept["writer"] = rig.writer(topic)
+            q = np.full(NUM_JOINTS, 0.3)
+            zeros, ones = np.zeros(NUM_JOINTS), np.ones(NUM_JOINTS)
+            command = LowCommand(rig.t, q, zeros, zeros, 200.0 * ones, 2.0 * ones)
+            m.kept["writer"].write(encode_low_command(command, 0, answers=rig.t))
 
-    yield _stop("a second stack that commands", (Reason.WRITERS,), 0.052, gate=writes, stands=True)
+        return write
+
+    both = (Reason.WRITERS, Reason.NOT_IN_CONTROL)
+    yield _stop("a second stack that commands", both, 0.052, gate=writes("/safety/lowcmd_in"), stands=True)
+    # Its commands are overtaken by the gate's within the tick; that they come is said all the same.
+    yield _stop("a second gate that commands", (Reason.NOT_IN_CONTROL,), 0.052, gate=writes("/lowcmd"))
 
 
 def _gate() -> Iterator[Injection]:

@@ -13,7 +13,7 @@ from golem.hardware.safety.gate import Gate, passive
 from golem.hardware.safety.standing_gate import Standing, StandingGate
 from golem.interfaces.payloads import EstopMessage, Fault, GateState, GateStatus, Reason
 from golem.interfaces.ros_convert import diagnostic, diagnostics
-from golem.middleware.dds.base import Participant, Qos
+from golem.middleware.dds.base import Participant, Qos, Sample
 from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.msgs.diagnostic_msgs import DiagnosticStatus
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response, Trigger_Response
@@ -30,6 +30,8 @@ LOOK = 0.05
 """Time between two looks for other writers of the motors' command [s]."""
 WARY = 1.0
 """Time after a pause of the gate in which it is asked for nothing but a stop [s]."""
+FOREIGN = 0.1
+"""Time for which a command of another writer counts as reaching the motors [s]: their drives go limp without one."""
 DIAGNOSE = 1.0
 """Time between two diagnostics [s]."""
 
@@ -79,7 +81,7 @@ class SafetyProcess:
         self.commands = self._arrivals.commands
         self._out = endpoints.writer("/lowcmd")
         # Best effort, as the robot's own reader may be: a reliable one does not see writers that are.
-        self._all_commands = endpoints.reader("/lowcmd", Qos(reliable=False, depth=1))
+        self._all_commands = endpoints.reader("/lowcmd", Qos(reliable=False, depth=8))
         self._switcher, self._real = MotionSwitcherClient.on(endpoints, clock), real
         self._gate, self._estop = StandingGate(Gate(limits), standing), estop
         self._gate.prepare()
@@ -88,6 +90,7 @@ class SafetyProcess:
         self._base_stamp = -math.inf
         self._crowded, self._unheard = "", ""
         self._listeners: set[bytes] | None = None
+        self._foreign = -math.inf
         self._looks, self._diagnoses, self._reports = Every(LOOK), Every(DIAGNOSE), StatusReports(endpoints)
         self._steps = 0
         self._ending, self._halts = False, False
@@ -117,6 +120,8 @@ class SafetyProcess:
             if self._real:
                 self._listen()
         self._switcher.poll()
+        if self._crowded and any(self._is_foreign(sample) for sample in self._all_commands.take(8)):
+            self._foreign = now
         self._judge(OperatorRequest.STOP if self._ending else OperatorRequest.NONE)
         if self._diagnoses.due(now):
             self._diagnose(now)
@@ -154,6 +159,10 @@ class SafetyProcess:
         self._steps += 1
         self.command = result.command
         self.status = status = GateStatus(now, result.state, result.reason, result.detail)
+        if status.stopped and now - self._foreign < FOREIGN:
+            # To say "stopped" would be to lie: the motors follow whoever wrote last.
+            detail = f"ALARM, the motors get another's commands; stopped for {status.why}"
+            self.status = status = GateStatus(now, result.state, Reason.NOT_IN_CONTROL, detail)
         self._halts = moving and status.state is not GateState.ACTIVE
         waited_for = self._patient and status.state is GateState.ACTIVE
         self._tell(result.command, self._arrivals.answered if waited_for else 0.0)
@@ -198,6 +207,9 @@ class SafetyProcess:
         machine = self._arrivals.mode_machine
         if machine is not None and self.status.state is not GateState.INIT and not theirs:
             self._out.write(convert.encode_low_command(command, machine, answers))
+
+    def _is_foreign(self, sample: Sample) -> bool:
+        return sample.alive and self._all_commands.writers().get(sample.writer) != self._out.guid
 
     def _crowd(self) -> str:
         """Return who else writes what one process alone may write; empty if nobody does."""
