@@ -68,9 +68,12 @@ class LockstepRunner:
         seen = partial(detection_requested, self.bus)
         self._robot = RobotNodes(self.bus, stack, robot, seen, lambda: lidar)
         limits = limits or SafetyLimits.from_profile(stack.limits)
-        lives = isinstance(robot, HasLivingSensors) and robot.living
+        if not isinstance(robot, HasLivingSensors):
+            limits = limits.believing()
+        elif not robot.living:
+            limits = limits.still()
         standing = StandingLegs if stack.on_ground else None
-        self._safety = SafetyNodes(self.bus, limits if lives else limits.still(), self.estop, standing)
+        self._safety = SafetyNodes(self.bus, limits, self.estop, standing)
         self._stack = StackNodes(self.bus, stack, robot.calibration, gantry, LATENCY)
         placed = self._robot.nodes + self._safety.nodes + self._stack.nodes
         self.executor = Executor(self.bus, in_order(placed))

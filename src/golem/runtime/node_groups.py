@@ -16,7 +16,7 @@ from golem.capabilities.legs.base import Envelope
 from golem.errors import GolemError
 from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
-from golem.hardware.safety.standing_gate import Standing
+from golem.hardware.safety.standing_gate import StandingController
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
@@ -140,7 +140,7 @@ class SafetyNodes:
         bus: Bus,
         limits: SafetyLimits,
         estop: EmergencyStop | None,
-        standing: Callable[[], Standing] | None = None,
+        standing: Callable[[], StandingController] | None = None,
     ) -> None:
         """Enforce `limits`, under `estop`; without one the gate stays shut. `standing`: see `StandingGate`."""
         self.gate = nodes.SafetyNode(bus, limits, standing)

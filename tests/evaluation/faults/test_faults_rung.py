@@ -7,14 +7,14 @@ import pytest
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.faults.catalogue import FAULTS
-from golem.evaluation.faults.injection import Expect, Injection, Source
-from golem.evaluation.faults.judge import Finding, verdict
+from golem.evaluation.faults.injection import Expect, FaultSource, Injection
+from golem.evaluation.faults.judge import FaultFinding, verdict
 from golem.evaluation.rungs.faults import FaultOptions, FaultsRung
 from golem.interfaces.payloads import GateState, Reason
 
-STOP = Injection("x", Source.COMMAND, Expect.STOP, (Reason.COMMAND_STALE,), 0.1, stands=True)
-BEAR = Injection("x", Source.DATA, Expect.BEAR)
-STOPPED = Finding(0.1, Reason.COMMAND_STALE, "", GateState.STOP2)
+STOP = Injection("x", FaultSource.COMMAND, Expect.STOP, (Reason.COMMAND_STALE,), 0.1, stands=True)
+BEAR = Injection("x", FaultSource.DATA, Expect.BEAR)
+STOPPED = FaultFinding(0.1, Reason.COMMAND_STALE, "", GateState.STOP2)
 
 
 def test_there_are_more_than_200_faults_and_names_tell_them_apart() -> None:
@@ -25,19 +25,19 @@ def test_there_are_more_than_200_faults_and_names_tell_them_apart() -> None:
     ("fault", "finding", "stage"),
     [
         (STOP, STOPPED, "done"),
-        (STOP, Finding(ended=GateState.ACTIVE), "missed"),
-        (STOP, Finding(0.2, Reason.COMMAND_STALE), "late"),
-        (STOP, Finding(0.1, Reason.TILT), "reason"),
-        (STOP, Finding(0.1, Reason.COMMAND_STALE, speed=1.2), "speed"),
-        (STOP, Finding(0.1, Reason.COMMAND_STALE, beyond=0.2), "range"),
-        (STOP, Finding(0.1, Reason.COMMAND_STALE, fell=True), "fell"),
-        (STOP, Finding(0.1, Reason.COMMAND_STALE, unsafe="not finite"), "unsafe"),
-        (BEAR, Finding(ended=GateState.ACTIVE), "done"),
-        (BEAR, Finding(0.1, Reason.STATE_STALE), "false stop"),
-        (BEAR, Finding(ended=GateState.ACTIVE, fell=True), "fell"),
+        (STOP, FaultFinding(ended=GateState.ACTIVE), "missed"),
+        (STOP, FaultFinding(0.2, Reason.COMMAND_STALE), "late"),
+        (STOP, FaultFinding(0.1, Reason.TILT), "reason"),
+        (STOP, FaultFinding(0.1, Reason.COMMAND_STALE, speed=1.2), "speed"),
+        (STOP, FaultFinding(0.1, Reason.COMMAND_STALE, beyond=0.2), "range"),
+        (STOP, FaultFinding(0.1, Reason.COMMAND_STALE, fell=True), "fell"),
+        (STOP, FaultFinding(0.1, Reason.COMMAND_STALE, unsafe="not finite"), "unsafe"),
+        (BEAR, FaultFinding(ended=GateState.ACTIVE), "done"),
+        (BEAR, FaultFinding(0.1, Reason.STATE_STALE), "false stop"),
+        (BEAR, FaultFinding(ended=GateState.ACTIVE, fell=True), "fell"),
     ],
 )
-def test_the_judge_names_what_went_wrong(fault: Injection, finding: Finding, stage: str) -> None:
+def test_the_judge_names_what_went_wrong(fault: Injection, finding: FaultFinding, stage: str) -> None:
     assert verdict(fault, finding, "standing")[0] == stage
 
 

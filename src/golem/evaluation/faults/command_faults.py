@@ -9,10 +9,10 @@ import numpy as np
 
 from golem.evaluation.faults.injection import (
     Expect,
+    FaultMoment,
+    FaultSource,
     Frames,
     Injection,
-    Moment,
-    Source,
     edited_command,
 )
 from golem.interfaces.payloads import Reason
@@ -47,7 +47,7 @@ LIMITS = (
 """Reasons of a robot that was moved beyond what it may do."""
 SENDER = (Reason.COMMAND_GAINS, Reason.COMMAND_REVERSALS)
 
-Edit = Callable[[Moment, Any], None]
+Edit = Callable[[FaultMoment, Any], None]
 
 
 def command_faults() -> Iterator[Injection]:
@@ -58,27 +58,29 @@ def command_faults() -> Iterator[Injection]:
     yield from _times()
 
 
-def _edit(edit: Edit) -> Callable[[Moment, bytes], Frames]:
+def _edit(edit: Edit) -> Callable[[FaultMoment, bytes], Frames]:
     return lambda m, payload: [edited_command(payload, lambda image: edit(m, image))]
 
 
-def _set(field: str, part: slice, value: Callable[[Moment], Any]) -> Callable[[Moment, bytes], Frames]:
-    def edit(m: Moment, image: Any) -> None:
+def _set(
+    field: str, part: slice, value: Callable[[FaultMoment], Any]
+) -> Callable[[FaultMoment, bytes], Frames]:
+    def edit(m: FaultMoment, image: Any) -> None:
         image["motor"][field][part] = value(m)
 
     return _edit(edit)
 
 
 def _stop(name: str, reasons: tuple[Reason, ...], within: float = 0.006, **more: Any) -> Injection:
-    return Injection(name, Source.COMMAND, Expect.STOP, reasons, within, stands=True, **more)
+    return Injection(name, FaultSource.COMMAND, Expect.STOP, reasons, within, stands=True, **more)
 
 
 def _bear(name: str, **more: Any) -> Injection:
-    return Injection(name, Source.COMMAND, Expect.BEAR, stands=True, **more)
+    return Injection(name, FaultSource.COMMAND, Expect.BEAR, stands=True, **more)
 
 
 def _safe(name: str, **more: Any) -> Injection:
-    return Injection(name, Source.COMMAND, Expect.SAFE, (*LIMITS, *SENDER), **more)
+    return Injection(name, FaultSource.COMMAND, Expect.SAFE, (*LIMITS, *SENDER), **more)
 
 
 def _damaged() -> Iterator[Injection]:
@@ -91,7 +93,7 @@ def _damaged() -> Iterator[Injection]:
         spoil = _set("q", slice(i, i + 1), lambda m: 1e7)
         yield _stop(f"q 1e7 {joint}", INVALID, command=spoil)
 
-    def flipped(m: Moment, payload: bytes) -> bytes:
+    def flipped(m: FaultMoment, payload: bytes) -> bytes:
         wrong = bytearray(payload)
         wrong[100] ^= 1
         return bytes(wrong)
@@ -112,7 +114,7 @@ def _damaged() -> Iterator[Injection]:
     )
     for word, value in (("mode_pr", 1), ("mode_machine", 7)):
 
-        def edit(m: Moment, image: Any, word: str = word, value: int = value) -> None:
+        def edit(m: FaultMoment, image: Any, word: str = word, value: int = value) -> None:
             image[word] = value
 
         yield _stop(f"{word} {value}", DAMAGED, command=_edit(edit))
@@ -123,12 +125,12 @@ def _gains() -> Iterator[Injection]:
     limp = (Reason.COMMAND_GAINS,)
     for part, where in PARTS.items():
 
-        def off(m: Moment, image: Any, where: slice = where) -> None:
+        def off(m: FaultMoment, image: Any, where: slice = where) -> None:
             image["motor"]["mode"][where] = 0
             if where.start == 0:
                 image["first_mode"] = 0
 
-        def zero(m: Moment, image: Any, where: slice = where) -> None:
+        def zero(m: FaultMoment, image: Any, where: slice = where) -> None:
             for field in ("kp", "kd", "tau"):
                 image["motor"][field][where] = 0.0
 
@@ -168,7 +170,7 @@ def _motion() -> Iterator[Injection]:
         for size, period in ((0.5, 1), (0.02, 1), (0.5, 50)):
 
             def shake(
-                m: Moment, image: Any, where: slice = where, size: float = size, n: int = period
+                m: FaultMoment, image: Any, where: slice = where, size: float = size, n: int = period
             ) -> None:
                 image["motor"]["q"][where] += size * (-1) ** (m.k // n)
 
@@ -192,7 +194,7 @@ def _times() -> Iterator[Injection]:
         "answers a state long past", stale, 0.104, command=_answering(lambda tick: max(1, tick - 1000))
     )
     for late in (10, 30, 90):
-        yield Injection(f"{late} ms late", Source.COMMAND, Expect.SAFE, stale, command=_late(late // 2))
+        yield Injection(f"{late} ms late", FaultSource.COMMAND, Expect.SAFE, stale, command=_late(late // 2))
     yield _stop("150 ms late", stale, 0.106, command=_late(75))
     yield _bear("half lost", command=lambda m, p: [p] if m.k % 2 else [])
     yield _stop("all but 1 of 70 lost", stale, 0.15, command=lambda m, p: [p] if m.k % 70 == 69 else [])
@@ -201,12 +203,12 @@ def _times() -> Iterator[Injection]:
     yield _bear("in pairs the wrong way round", command=_reordered)
 
 
-def _first(m: Moment, payload: bytes) -> Frames:
+def _first(m: FaultMoment, payload: bytes) -> Frames:
     return [m.kept.setdefault("first", payload)]
 
 
-def _answering(stamp: Callable[[int], int]) -> Callable[[Moment, bytes], Frames]:
-    def spoil(m: Moment, payload: bytes) -> Frames:
+def _answering(stamp: Callable[[int], int]) -> Callable[[FaultMoment, bytes], Frames]:
+    def spoil(m: FaultMoment, payload: bytes) -> Frames:
         def edit(image: Any) -> None:
             image["reserve"][0] = stamp(int(image["reserve"][0]))
 
@@ -215,8 +217,8 @@ def _answering(stamp: Callable[[int], int]) -> Callable[[Moment, bytes], Frames]
     return spoil
 
 
-def _late(ticks: int) -> Callable[[Moment, bytes], Frames]:
-    def spoil(m: Moment, payload: bytes) -> Frames:
+def _late(ticks: int) -> Callable[[FaultMoment, bytes], Frames]:
+    def spoil(m: FaultMoment, payload: bytes) -> Frames:
         queue = m.kept.setdefault("queue", [])
         queue.append(payload)
         return [queue.pop(0)] if len(queue) > ticks else []
@@ -224,7 +226,7 @@ def _late(ticks: int) -> Callable[[Moment, bytes], Frames]:
     return spoil
 
 
-def _reordered(m: Moment, payload: bytes) -> Frames:
+def _reordered(m: FaultMoment, payload: bytes) -> Frames:
     held = m.kept.pop("held", None)
     if held is None:
         m.kept["held"] = payload

@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 
 from golem.evaluation.faults.command_faults import JOINTS, LIMITS
-from golem.evaluation.faults.injection import Expect, Frames, Injection, Moment, Source, edited_state
+from golem.evaluation.faults.injection import (
+    Expect,
+    FaultMoment,
+    FaultSource,
+    Frames,
+    Injection,
+    edited_state,
+)
 from golem.interfaces.payloads import Reason
 from golem.robots.model.table import JOINT_INDEX
 from golem.types import Array, Imu, LowState
@@ -32,18 +39,18 @@ def data_faults() -> Iterator[Injection]:
 
 
 def _stop(name: str, reasons: tuple[Reason, ...], within: float = 0.006, **more: Any) -> Injection:
-    return Injection(f"state: {name}", Source.DATA, Expect.STOP, reasons, within, **more)
+    return Injection(f"state: {name}", FaultSource.DATA, Expect.STOP, reasons, within, **more)
 
 
 def _bear(name: str, **more: Any) -> Injection:
-    return Injection(f"state: {name}", Source.DATA, Expect.BEAR, stands=True, **more)
+    return Injection(f"state: {name}", FaultSource.DATA, Expect.BEAR, stands=True, **more)
 
 
 def _safe(name: str, reasons: tuple[Reason, ...], **more: Any) -> Injection:
-    return Injection(f"state: {name}", Source.DATA, Expect.SAFE, (*reasons, *LIMITS), **more)
+    return Injection(f"state: {name}", FaultSource.DATA, Expect.SAFE, (*reasons, *LIMITS), **more)
 
 
-def _edit(edit: Callable[[Moment, Any], None]) -> Callable[[Moment, bytes], Frames]:
+def _edit(edit: Callable[[FaultMoment, Any], None]) -> Callable[[FaultMoment, bytes], Frames]:
     return lambda m, payload: [edited_state(payload, lambda image: edit(m, image))]
 
 
@@ -70,18 +77,18 @@ def _frames() -> Iterator[Injection]:
             for value in (np.nan, np.inf):
 
                 def edit(
-                    m: Moment, image: Any, f: str = field, i: int = JOINT_INDEX[joint], v: float = value
+                    m: FaultMoment, image: Any, f: str = field, i: int = JOINT_INDEX[joint], v: float = value
                 ) -> None:
                     image["motor"][f][i] = v
 
                 yield _stop(f"{field} {value} {joint}", DAMAGED, state=_edit(edit))
 
-    def pr(m: Moment, image: Any) -> None:
+    def pr(m: FaultMoment, image: Any) -> None:
         image["mode_pr"] = 1
 
     yield _stop("mode_pr 1", DAMAGED, state=_edit(pr))
 
-    def zero(m: Moment, image: Any) -> None:
+    def zero(m: FaultMoment, image: Any) -> None:
         image["imu"]["quaternion"] = 0.0
 
     yield _stop("quaternion zero", DAMAGED, state=_edit(zero))
@@ -90,30 +97,30 @@ def _frames() -> Iterator[Injection]:
 def _clock() -> Iterator[Injection]:
     for seconds in (-1.0, -10.0, 0.5, 10.0):
 
-        def jump(m: Moment, image: Any, by: int = round(1e3 * seconds)) -> None:
+        def jump(m: FaultMoment, image: Any, by: int = round(1e3 * seconds)) -> None:
             image["tick"] = max(1, int(image["tick"]) + by)
 
         yield _stop(f"tick jumps by {seconds:+g} s", JUMPED, 0.002, state=_edit(jump))
 
-    def slow(m: Moment, image: Any) -> None:
+    def slow(m: FaultMoment, image: Any) -> None:
         start = m.kept.setdefault("start", int(image["tick"]))
         image["tick"] = start + (int(image["tick"]) - start) // 2
 
     yield _safe("tick at half rate", (Reason.STATE_CLOCK, Reason.COMMAND_STALE), state=_edit(slow))
 
-    def stands(m: Moment, image: Any) -> None:
+    def stands(m: FaultMoment, image: Any) -> None:
         image["tick"] = m.kept.setdefault("tick", int(image["tick"]))
 
     yield _stop("tick stands", STALE, 0.054, state=_edit(stands))
 
 
 def _frozen() -> Iterator[Injection]:
-    def keep(m: Moment, state: LowState) -> LowState:
+    def keep(m: FaultMoment, state: LowState) -> LowState:
         return m.kept.setdefault("state", state)
 
     for limb, part in LIMBS.items():
 
-        def freeze(m: Moment, state: LowState, part: slice = part) -> LowState:
+        def freeze(m: FaultMoment, state: LowState, part: slice = part) -> LowState:
             old = keep(m, state)
             arrays = {name: getattr(state, name).copy() for name in ("q", "dq", "tau")}
             for name, array in arrays.items():
@@ -130,7 +137,7 @@ def _frozen() -> Iterator[Injection]:
     )
     yield _stop("IMU frozen", (*FROZEN, *IMU), LOST, senses=lambda m, s: replace(s, imu=keep(m, s).imu))
 
-    def speeds(m: Moment, state: LowState) -> LowState:
+    def speeds(m: FaultMoment, state: LowState) -> LowState:
         return replace(state, dq=np.zeros(27))
 
     yield _safe("dq zero", ODD, senses=speeds)
@@ -140,12 +147,12 @@ def _frozen() -> Iterator[Injection]:
 
 def _joints() -> Iterator[Injection]:
     for joint in JOINTS:
-        i, leg = JOINT_INDEX[joint], JOINT_INDEX[joint] < 12
+        i, leg = JOINT_INDEX[joint], JOINT_INDEX[joint] < 13
 
         def add(
-            size: Callable[[Moment], float], field: str = "q", i: int = i
-        ) -> Callable[[Moment, LowState], LowState]:
-            def spoil(m: Moment, state: LowState) -> LowState:
+            size: Callable[[FaultMoment], float], field: str = "q", i: int = i
+        ) -> Callable[[FaultMoment, LowState], LowState]:
+            def spoil(m: FaultMoment, state: LowState) -> LowState:
                 array = getattr(state, field).copy()
                 array[i] += size(m)
                 return replace(state, **{field: array})
@@ -175,14 +182,14 @@ def _joints() -> Iterator[Injection]:
             stands=not leg,
         )
 
-    def swapped(m: Moment, state: LowState) -> LowState:
+    def swapped(m: FaultMoment, state: LowState) -> LowState:
         order = np.arange(27)
         order[[3, 9]] = order[[9, 3]]
         return replace(state, q=state.q[order], dq=state.dq[order], tau=state.tau[order])
 
     yield _safe("knees swapped", ODD, senses=swapped)
 
-    def arms(m: Moment, state: LowState) -> LowState:
+    def arms(m: FaultMoment, state: LowState) -> LowState:
         order = np.concatenate((np.arange(13), np.arange(20, 27), np.arange(13, 20)))
         return replace(state, q=state.q[order], dq=state.dq[order], tau=state.tau[order])
 
@@ -190,7 +197,7 @@ def _joints() -> Iterator[Injection]:
 
 
 def _imu() -> Iterator[Injection]:
-    def imu(change: Callable[[Moment, Imu], Imu]) -> Callable[[Moment, LowState], LowState]:
+    def imu(change: Callable[[FaultMoment, Imu], Imu]) -> Callable[[FaultMoment, LowState], LowState]:
         return lambda m, state: replace(state, imu=change(m, state.imu))
 
     def rolled(angle: float, quat: Array) -> Array:
@@ -242,8 +249,8 @@ def _imu() -> Iterator[Injection]:
 
 
 def _motors() -> Iterator[Injection]:
-    def motor(field: str, value: Any, where: Any) -> Callable[[Moment, bytes], Frames]:
-        def edit(m: Moment, image: Any) -> None:
+    def motor(field: str, value: Any, where: Any) -> Callable[[FaultMoment, bytes], Frames]:
+        def edit(m: FaultMoment, image: Any) -> None:
             image["motor"][field][where] = value
 
         return _edit(edit)
@@ -264,7 +271,7 @@ def _motors() -> Iterator[Injection]:
                 f"{joint} at {volts:g} V", (Reason.MOTOR_VOLTAGE,), 0.062, state=motor("vol", volts, i)
             )
 
-    def brief(m: Moment, image: Any) -> None:
+    def brief(m: FaultMoment, image: Any) -> None:
         image["motor"]["motorstate"][3] = 1 if m.k < 10 else 0
 
     yield _bear("a knee reports an error for 20 ms", state=_edit(brief))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from golem.evaluation.faults.command_faults import JOINTS, LIMITS
-from golem.evaluation.faults.injection import Expect, Injection, Moment, Source
+from golem.evaluation.faults.injection import Expect, FaultMoment, FaultSource, Injection
 from golem.interfaces.payloads import Reason
 from golem.middleware.wire.convert import encode_low_command
 from golem.robots.model.table import JOINT_INDEX
@@ -25,14 +25,14 @@ def device_faults() -> Iterator[Injection]:
 
 
 def _stop(name: str, reasons: tuple[Reason, ...], within: float = 0.006, **more: Any) -> Injection:
-    return Injection(name, Source.DEVICE, Expect.STOP, reasons, within, **more)
+    return Injection(name, FaultSource.DEVICE, Expect.STOP, reasons, within, **more)
 
 
 def _motors() -> Iterator[Injection]:
     for joint in JOINTS:
         i = JOINT_INDEX[joint]
 
-        def dead(m: Moment, command: LowCommand, i: int = i) -> LowCommand:
+        def dead(m: FaultMoment, command: LowCommand, i: int = i) -> LowCommand:
             arrays = {name: getattr(command, name).copy() for name in ("tau", "kp", "kd")}
             for array in arrays.values():
                 array[i] = 0.0
@@ -40,28 +40,28 @@ def _motors() -> Iterator[Injection]:
 
         yield Injection(
             f"{joint} without torque",
-            Source.DEVICE,
+            FaultSource.DEVICE,
             Expect.SAFE,
             (Reason.MOTOR_DEAD, *LIMITS),
             motors=dead,
-            stands=i >= 12,
+            stands=i >= 13,
         )
 
-    def changed(m: Moment, rig: Any) -> None:
+    def changed(m: FaultMoment, rig: Any) -> None:
         rig.machine = 7
 
     yield _stop("mode_machine changes", (Reason.MOTOR_MODE,), 0.004, gate=changed)
 
 
 def _estop() -> Iterator[Injection]:
-    def press(m: Moment, rig: Any) -> None:
+    def press(m: FaultMoment, rig: Any) -> None:
         rig.estop.pressed = True
 
-    def silent(m: Moment, rig: Any) -> None:
+    def silent(m: FaultMoment, rig: Any) -> None:
         rig.estop.period = 1e9
         rig.estop._due = 1e12
 
-    def repeats(m: Moment, rig: Any) -> None:
+    def repeats(m: FaultMoment, rig: Any) -> None:
         rig.estop._sequence = m.kept.setdefault("sequence", rig.estop._sequence)
 
     yield _stop("e-stop pressed", (Reason.ESTOP_PRESSED,), 0.012, gate=press)
@@ -72,15 +72,15 @@ def _estop() -> Iterator[Injection]:
 def _writers() -> Iterator[Injection]:
     for topic in ("/safety/lowcmd_in", "/lowcmd", "/lowstate"):
 
-        def second(m: Moment, rig: Any, topic: str = topic) -> None:
+        def second(m: FaultMoment, rig: Any, topic: str = topic) -> None:
             if "writer" not in m.kept:
                 m.kept["writer"] = rig.writer(topic)
 
         stands = topic != "/lowstate"
         yield _stop(f"second writer of {topic}", (Reason.WRITERS,), 0.052, gate=second, stands=stands)
 
-    def writes(topic: str) -> Callable[[Moment, Any], None]:
-        def write(m: Moment, rig: Any) -> None:
+    def writes(topic: str) -> Callable[[FaultMoment, Any], None]:
+        def write(m: FaultMoment, rig: Any) -> None:
             if "writer" not in m.kept:
                 m.kept["writer"] = rig.writer(topic)
             q = np.full(NUM_JOINTS, 0.3)
@@ -97,14 +97,14 @@ def _writers() -> Iterator[Injection]:
 
 
 def _gate() -> Iterator[Injection]:
-    def held(seconds: float) -> Callable[[Moment, Any], None]:
-        def hold(m: Moment, rig: Any) -> None:
+    def held(seconds: float) -> Callable[[FaultMoment, Any], None]:
+        def hold(m: FaultMoment, rig: Any) -> None:
             rig.held = m.t < seconds
 
         return hold
 
-    def shifted(seconds: float) -> Callable[[Moment, Any], None]:
-        def shift(m: Moment, rig: Any) -> None:
+    def shifted(seconds: float) -> Callable[[FaultMoment, Any], None]:
+        def shift(m: FaultMoment, rig: Any) -> None:
             rig.clock = seconds
 
         return shift
@@ -112,7 +112,7 @@ def _gate() -> Iterator[Injection]:
     for seconds in (0.02, 0.06):
         yield Injection(
             f"gate held up for {1e3 * seconds:g} ms",
-            Source.DEVICE,
+            FaultSource.DEVICE,
             Expect.BEAR,
             gate=held(seconds),
             stands=True,

@@ -25,7 +25,7 @@ class Expect(StrEnum):
     """Stop or go on: what the robot does is judged, and no limit may be left."""
 
 
-class Source(StrEnum):
+class FaultSource(StrEnum):
     """Where a fault comes from."""
 
     COMMAND = "command"
@@ -35,7 +35,7 @@ class Source(StrEnum):
 
 
 @dataclass
-class Moment:
+class FaultMoment:
     """How far a fault has come.
 
     Attributes:
@@ -73,17 +73,17 @@ class Injection:
     """
 
     name: str
-    source: Source
+    source: FaultSource
     expect: Expect
     reasons: tuple[Reason, ...] = ()
     within: float = 0.002
     lasting: float = 1.5
     stands: bool = False
-    state: Callable[[Moment, bytes], Frames] | None = None
-    command: Callable[[Moment, bytes], Frames] | None = None
-    senses: Callable[[Moment, LowState], LowState] | None = None
-    motors: Callable[[Moment, LowCommand], LowCommand] | None = None
-    gate: Callable[[Moment, Any], None] | None = None
+    state: Callable[[FaultMoment, bytes], Frames] | None = None
+    command: Callable[[FaultMoment, bytes], Frames] | None = None
+    senses: Callable[[FaultMoment, LowState], LowState] | None = None
+    motors: Callable[[FaultMoment, LowCommand], LowCommand] | None = None
+    gate: Callable[[FaultMoment, Any], None] | None = None
 
 
 def edited_state(payload: bytes, edit: Callable[[Any], None]) -> bytes:

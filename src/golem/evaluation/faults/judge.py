@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.evaluation.faults.injection import Expect, Injection, Source
+from golem.evaluation.faults.injection import Expect, FaultSource, Injection
 from golem.evaluation.faults.rig import FaultRig
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, Reason
@@ -30,7 +30,7 @@ KP_MAX, KD_MAX = 500.0, 30.0
 
 
 @dataclass
-class Finding:
+class FaultFinding:
     """What was seen of one fault.
 
     Attributes:
@@ -68,7 +68,7 @@ class Judge:
 
     def __init__(self, rig: FaultRig) -> None:
         """Watch `rig`, whose fault begins now."""
-        self._rig, self.finding = rig, Finding()
+        self._rig, self.finding = rig, FaultFinding()
         limits = load_limits("urdf")
         self._velocity, self._torque = limits.velocity, limits.torque
         self._lower, self._upper = limits.lower, limits.upper
@@ -123,7 +123,7 @@ class Judge:
         return ""
 
 
-def verdict(fault: Injection, found: Finding, posture: str) -> tuple[str, str]:
+def verdict(fault: Injection, found: FaultFinding, posture: str) -> tuple[str, str]:
     """Return the stage at which the gate failed under a fault, `"done"` if it did not, and one sentence."""
     what = f"{found.ended}" + (f", {found.reason}: {found.detail}" if found.reason else "")
     if found.unsafe:
@@ -137,9 +137,9 @@ def verdict(fault: Injection, found: Finding, posture: str) -> tuple[str, str]:
             return "reason", f"It stopped for another reason ({what})."
         if fault.expect is Expect.STOP and found.stopped_at > fault.within + 1e-9:
             return "late", f"It stopped after {1e3 * found.stopped_at:.0f} ms ({what})."
-    if fault.source is Source.COMMAND and found.speed > MARGIN:
+    if fault.source is FaultSource.COMMAND and found.speed > MARGIN:
         return "speed", f"A joint reached {100 * found.speed:.0f} % of its speed ({what})."
-    if fault.source is Source.COMMAND and found.beyond > BEYOND:
+    if fault.source is FaultSource.COMMAND and found.beyond > BEYOND:
         return "range", f"A joint was {found.beyond:.2f} rad beyond its range ({what})."
     if fault.expect is Expect.BEAR and posture == "hanging" and found.moved > ASTRAY:
         return "moved", f"A joint moved {found.moved:.2f} rad ({what})."

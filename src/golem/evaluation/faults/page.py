@@ -10,7 +10,7 @@ from pathlib import Path
 import tyro
 
 from golem.evaluation.faults.catalogue import FAULTS
-from golem.evaluation.faults.injection import Source
+from golem.evaluation.faults.injection import FaultSource
 from golem.evaluation.harness.records import TrialRecord, read_records
 from golem.evaluation.metrics.text_table import TextTable
 
@@ -42,7 +42,7 @@ def page(records: Sequence[TrialRecord]) -> str:
         "accept.\n",
         _summary(records, postures).markdown() + "\n",
     ]
-    for source in Source:
+    for source in FaultSource:
         rows = tuple(
             (name, *(_cell(by_fault[name].get(posture)) for posture in postures))
             for name in by_fault
@@ -55,15 +55,15 @@ def page(records: Sequence[TrialRecord]) -> str:
 
 
 HEADS = {
-    Source.COMMAND: "Of commands",
-    Source.DATA: "Of what the robot says",
-    Source.DEVICE: "Of devices and processes",
+    FaultSource.COMMAND: "Of commands",
+    FaultSource.DATA: "Of what the robot says",
+    FaultSource.DEVICE: "Of devices and processes",
 }
 
 
 def _summary(records: Sequence[TrialRecord], postures: Sequence[str]) -> TextTable:
     rows = list[tuple[str, ...]]()
-    for source in Source:
+    for source in FaultSource:
         for posture in postures:
             mine = [
                 r

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from golem.evaluation.faults.injection import Injection, Moment, edited_state
+from golem.evaluation.faults.injection import FaultMoment, Injection, edited_state
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces import public, topics
@@ -23,7 +23,6 @@ from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.ros.node import DdsNode
 from golem.middleware.wire import convert
 from golem.middleware.wire.struct_layout import WireError
-from golem.robots.base import HasGantry
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.executor import Executor, Phase, in_order
 from golem.runtime.live.safety_process import SafetyProcess
@@ -86,7 +85,7 @@ class FaultRig:
         self.bus, self.estop = Bus(), VirtualEstop()
         self.clock, self.held, self.machine = 0.0, False, 0
         self.fault: Injection | None = None
-        self.moment = Moment()
+        self.moment = FaultMoment()
         self.told: LowCommand | None = None
         self.twist: Twist | None = None
         self.t = 0.0
@@ -112,7 +111,7 @@ class FaultRig:
         self._base = node.publisher(base.name, base.type, base.qos)
         self._activate = node.client("/safety/activate", public.TRIGGER)
         nodes = RobotNodes(self.bus, stack, robot, None, lambda: False)
-        gantry = robot if isinstance(robot, HasGantry) else None
+        gantry: Any = robot
         modules = StackNodes(self.bus, stack, robot.calibration, gantry, 0.0)
         placed = nodes.nodes + [(Phase.MEASURE, FaultyRobot(self)), (Phase.PROTECT, self)] + modules.nodes
         self.executor = Executor(self.bus, in_order(placed))
@@ -128,7 +127,7 @@ class FaultRig:
 
     def begin(self, fault: Injection) -> None:
         """Let `fault` begin at the next tick."""
-        self.fault, self.moment = fault, Moment()
+        self.fault, self.moment = fault, FaultMoment()
 
     @property
     def status(self) -> GateStatus:

@@ -14,12 +14,16 @@ import numpy as np
 from golem.interfaces.payloads import EstopMessage, Fault
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
-from golem.types import LEGS, NUM_JOINTS, Array, BaseEstimate, LowCommand, LowState
+from golem.types import LEGS, NUM_JOINTS, UPPER, Array, BaseEstimate, LowCommand, LowState
 
 LIMIT_RATIO = 0.9
 """Share of the vendor's maxima that is used [paper]."""
 REVERSAL = 0.25
 """Share of the torque limit on either side of zero that makes a change of sign a reversal [own]."""
+
+
+STANDING = slice(0, UPPER.start + 1)
+"""Joints that standing needs: the legs, and the torso, which tells how the pelvis leans under the IMU."""
 
 
 class OperatorRequest(StrEnum):
@@ -148,6 +152,10 @@ class SafetyLimits:
     def still(self) -> SafetyLimits:
         """Return these limits for sensors without noise, which may repeat their numbers while the robot rests."""
         return replace(self, frozen=0.0)
+
+    def believing(self) -> SafetyLimits:
+        """Return these limits for a robot that says nothing of its sensors: they may stand still and feel no torque."""
+        return replace(self, frozen=0.0, dead_time=np.inf)
 
     @classmethod
     def from_profile(cls, profile: str = "urdf", ratio: float = LIMIT_RATIO) -> SafetyLimits:

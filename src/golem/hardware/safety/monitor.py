@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from golem.hardware.safety.base import Counters, SafetyLimits
+from golem.hardware.safety.base import STANDING, Counters, SafetyLimits
 from golem.interfaces.payloads import Fault, Reason
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand, LowState
@@ -102,10 +102,9 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
     beyond = np.maximum(rest - limits.state_upper, limits.state_lower - rest)
     ratio = speed / limits.velocity
     n, legs = limits.samples, limits.leg_samples
-    # What the legs have no part in leaves them able to stand.
-    stands = not (
-        new.leg_position or new.leg_velocity or new.leg_braking or new.tilt or _legs_strain(load, limits)
-    )
+    # What legs and torso have no part in leaves them able to stand.
+    bad = quick | beyond_range | (outside > 0.0) | (load > limits.torque)
+    stands = not (tilted or bad[STANDING].any())
     if new.position >= n or new.leg_position >= legs or outside.max() > limits.gross:
         return new, Fault(Reason.POSITION, _worst(outside, lambda i: f"at {q[i]:.3f} rad"), stands)
     if fast and (new.velocity >= n or new.leg_velocity >= legs or ratio.max() > limits.gross):
@@ -121,10 +120,6 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
     if new.tilt >= n:
         return new, Fault(Reason.TILT, f"torso at {math.degrees(angle):.0f} degrees")
     return new, None
-
-
-def _legs_strain(load: Array, limits: SafetyLimits) -> bool:
-    return bool((load[LEGS] > limits.torque[LEGS]).any())
 
 
 def _worst(score: Array, text: Callable[[int], str]) -> str:

@@ -15,10 +15,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from golem.hardware.safety.base import SafetyLimits
+from golem.hardware.safety.base import STANDING, SafetyLimits
 from golem.interfaces.payloads import Fault, Reason
 from golem.robots.model.table import JOINT_NAMES
-from golem.types import LEGS, NUM_JOINTS, TICK, Array, Imu, LowCommand, LowState
+from golem.types import NUM_JOINTS, TICK, Array, Imu, LowCommand, LowState
 
 EVERY = 5
 """Samples from one look at life and plausibility to the next."""
@@ -144,7 +144,7 @@ def _jumped(
     if bad < limits.bad_frames:
         return memory, False, None
     i = int(np.argmax(moved))
-    legs = bool(moved[LEGS].max() > limits.jump)
+    legs = bool(moved[STANDING].max() > limits.jump)
     return (
         memory,
         False,
@@ -207,7 +207,7 @@ def _frozen(m: SensesMemory, limits: SafetyLimits) -> Fault | None:
     if still < limits.frozen - EVERY * TICK - 1e-6:
         return None
     names = [g for g, s in zip(GROUPS, m.since, strict=True) if s == min(m.since)]
-    stands = not any(name.endswith("leg") or name == "IMU" for name in names)
+    stands = all(name.endswith("arm") for name in names)
     return Fault(Reason.STATE_FROZEN, f"{', '.join(names)} for {still * 1e3:.0f} ms", stands)
 
 
@@ -216,7 +216,7 @@ def _drifts(m: SensesMemory, speed: Array, limits: SafetyLimits) -> Fault | None
     i = int(beyond.argmax())
     if beyond[i] <= limits.drift:
         return None
-    stands = i >= LEGS.stop and bool(beyond[LEGS].max() <= limits.drift)
+    stands = i >= STANDING.stop and bool(beyond[STANDING].max() <= limits.drift)
     return Fault(
         Reason.STATE_IMPLAUSIBLE,
         f"{JOINT_NAMES[i]} is {m.drift[i]:.2f} rad from its speed's integral",
@@ -245,7 +245,7 @@ def _dead(m: SensesMemory, limits: SafetyLimits) -> Fault | None:
     i = int(m.dead.argmax())
     if m.dead[i] < limits.dead_time:
         return None
-    legs = bool(m.dead[LEGS].max() >= limits.dead_time)
+    legs = bool(m.dead[STANDING].max() >= limits.dead_time)
     return Fault(Reason.MOTOR_DEAD, f"{JOINT_NAMES[i]} has no torque", stands=not legs)
 
 

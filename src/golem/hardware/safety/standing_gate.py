@@ -14,7 +14,7 @@ from golem.interfaces.payloads import GateState
 from golem.types import Array, LowCommand, LowState
 
 
-class Standing(Protocol):
+class StandingController(Protocol):
     """A controller that stands by the state alone."""
 
     def start(self, state: LowState) -> None:
@@ -37,10 +37,10 @@ class StandingGate:
         gate: the gate.
     """
 
-    def __init__(self, gate: Gate, make: Callable[[], Standing] | None) -> None:
+    def __init__(self, gate: Gate, make: Callable[[], StandingController] | None) -> None:
         """Give the legs to what `make` makes, at the first stop that leaves them sound; None always damps."""
         self.gate, self._make = gate, make
-        self._legs: Standing | None = None
+        self._legs: StandingController | None = None
 
     @property
     def memory(self) -> GateMemory:

@@ -10,7 +10,7 @@ from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate, passive
-from golem.hardware.safety.standing_gate import Standing, StandingGate
+from golem.hardware.safety.standing_gate import StandingController, StandingGate
 from golem.interfaces.payloads import EstopMessage, Fault, GateState, GateStatus, Reason
 from golem.interfaces.ros_convert import diagnostic, diagnostics
 from golem.middleware.dds.base import Participant, Qos, Sample
@@ -55,7 +55,7 @@ class SafetyProcess:
         who: Callable[[bytes], str] = bytes.hex,
         patient: bool = False,
         real: bool = False,
-        standing: Callable[[], Standing] | None = None,
+        standing: Callable[[], StandingController] | None = None,
     ) -> None:
         """Guard the robot on the domain.
 
