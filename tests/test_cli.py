@@ -17,7 +17,7 @@ BROKEN = {
     "command": (["ladr"], "Did you mean 'ladder'?"),
     "rung": (
         ["ladder", "--rung", "teter"],
-        "valid: base-estimation, faults, gate-limits, mpc-rate, navigate-line, odometry, push, push-limit, push-ramp, stand, ",
+        "valid: base-estimation, faults, gate-limits, mpc-rate, navigate-line, odometry, push, push-limit, push-ramp, ",
     ),
     "method": (["ladder", "--method", "centriod"], "Did you mean 'centroid'?"),
     "method file": (["ladder", "--method", "x.py:Mine"], "does not exist"),

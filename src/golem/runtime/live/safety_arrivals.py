@@ -64,8 +64,15 @@ class Arrivals:
         sole: what reads each of the topics that one process alone may write.
     """
 
-    def __init__(self, endpoints: RoleEndpoints, clock: Callable[[], float], limits: SafetyLimits) -> None:
-        """Stamp by `clock` [s], and compare with `limits`."""
+    def __init__(
+        self,
+        endpoints: RoleEndpoints,
+        clock: Callable[[], float],
+        limits: SafetyLimits,
+        observe: Callable[[str, Payload, float], None] | None = None,
+    ) -> None:
+        """Stamp by `clock` [s], compare with `limits`, and show every frame to `observe`, sound or not."""
+        self._observe = observe
         self._clock = clock
         self.tick = 0.0
         self.damaged = {name: DamagedFrames(limits) for name in ("/lowstate", "/safety/lowcmd_in")}
@@ -97,6 +104,8 @@ class Arrivals:
 
     def _state(self, sample: Sample) -> None:
         now = self._clock()
+        if self._observe is not None:
+            self._observe("/lowstate", sample.payload, now)
         try:
             state = convert.decode_low_state(sample.payload)
         except WireError as error:
@@ -129,6 +138,8 @@ class Arrivals:
 
     def _command(self, sample: Sample) -> None:
         now = self._clock()
+        if self._observe is not None:
+            self._observe("/safety/lowcmd_in", sample.payload, now)
         try:
             command = convert.decode_low_command(sample.payload, now, self.mode_machine or 0)
             answered = convert.answered(sample.payload)

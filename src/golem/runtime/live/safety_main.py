@@ -8,11 +8,12 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tyro.conf import OmitArgPrefixes
 
-from golem.errors import ConfigError
+from golem.errors import ConfigError, MissingExtra
 from golem.hardware.estop.estop_config import EstopConfig
 from golem.hardware.safety.base import SafetyLimits
 from golem.middleware.dds.domain import DdsConfig
@@ -24,6 +25,7 @@ from golem.runtime.live.safety_status import report
 from golem.types import TICK
 
 if TYPE_CHECKING:
+    from golem.runtime.live.black_box import BlackBox
     from golem.runtime.standing_legs import StandingLegs
 
 ROBOT_LIMITS = "urdf"
@@ -46,6 +48,8 @@ class SafetyConfig:
     """The sensors of the simulated robot have no noise (profile ideal): do not stop it where they stand still."""
     stand: bool = False
     """The robot stands on its feet: where a stop leaves state and legs sound, shipped legs go on standing."""
+    black_box: Path | None = Path("runs/stops")
+    """Folder for bags of what was heard and said from 5 s before each stop to 2 s after it; 'None' keeps nothing."""
     estop: EstopConfig = field(default_factory=EstopConfig)
     """The emergency stop. A real robot has none until its board is named."""
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
@@ -92,6 +96,7 @@ def run_safety(config: SafetyConfig) -> None:
             patient=patient,
             real=config.dds.robot,
             standing=standing,
+            black_box=_black_box(config, tell),
         )
         tell(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
         if config.still:
@@ -118,3 +123,14 @@ def run_safety(config: SafetyConfig) -> None:
                 time.sleep(TICK)
             raise
         report(said, gate.status, tell)
+
+
+def _black_box(config: SafetyConfig, tell: Callable[[str], None]) -> BlackBox | None:
+    if config.black_box is None:
+        return None
+    try:
+        from golem.runtime.live.black_box import BlackBox
+    except MissingExtra as error:
+        tell(f"There is no black box: {error}")
+        return None
+    return BlackBox(config.black_box, tell)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.estop.virtual import VirtualEstop
@@ -25,6 +26,9 @@ from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.safety_arrivals import Arrivals
 from golem.runtime.live.safety_status import StatusReports, describe_status
 from golem.types import BaseEstimate, LowCommand
+
+if TYPE_CHECKING:  # it needs the extra 'record', the gate does not
+    from golem.runtime.live.black_box import BlackBox
 
 LOOK = 0.05
 """Time between two looks for other writers of the motors' command [s]."""
@@ -56,6 +60,7 @@ class SafetyProcess:
         patient: bool = False,
         real: bool = False,
         standing: Callable[[], StandingController] | None = None,
+        black_box: BlackBox | None = None,
     ) -> None:
         """Guard the robot on the domain.
 
@@ -70,6 +75,7 @@ class SafetyProcess:
             real: whether the robot's own controllers must have let go of the motors first; a twin's move none. Its
                 motors must hear us then, and its time must run as ours does; that of a twin stands still at times.
             standing: makes what the legs are given to where a stop leaves them and the state sound; None damps.
+            black_box: keeps what happened around each stop; None keeps nothing.
         """
         if patient:
             limits = sim_sync.relaxed_limits(limits)
@@ -77,7 +83,8 @@ class SafetyProcess:
         self._estop_age, self._frozen = limits.estop_age, limits.frozen > 0.0
         self._node, self._clock, self._who = node, clock, who
         self._endpoints = endpoints = RoleEndpoints("safety", participant, node)
-        self._arrivals = Arrivals(endpoints, clock, limits)
+        self._arrivals = Arrivals(endpoints, clock, limits, None if black_box is None else black_box.add)
+        self._black_box = black_box
         self.commands = self._arrivals.commands
         self._out = endpoints.writer("/lowcmd")
         # Best effort, as the robot's own reader may be: a reliable one does not see writers that are.
@@ -130,7 +137,10 @@ class SafetyProcess:
         """Ask for a stop, and return whether the gate has done damping, if it had anything to damp."""
         self._ending = True
         self.step()
-        return self.status.state not in (GateState.ACTIVE, GateState.STOP2, GateState.STOP1)
+        over = self.status.state not in (GateState.ACTIVE, GateState.STOP2, GateState.STOP1)
+        if over and self._black_box is not None:
+            self._black_box.flush()
+        return over
 
     def damp(self) -> None:
         """Tell the motors to damp, whatever may have failed."""
@@ -163,6 +173,8 @@ class SafetyProcess:
             # To say "stopped" would be to lie: the motors follow whoever wrote last.
             detail = f"ALARM, the motors get another's commands; stopped for {status.why}"
             self.status = status = GateStatus(now, result.state, Reason.NOT_IN_CONTROL, detail)
+        if self._black_box is not None:
+            self._black_box.judge(before, status)
         self._halts = moving and status.state is not GateState.ACTIVE
         waited_for = self._patient and status.state is GateState.ACTIVE
         self._tell(result.command, self._arrivals.answered if waited_for else 0.0)
@@ -206,7 +218,10 @@ class SafetyProcess:
         theirs = self._real and bool(switcher.owner or (limp and not switcher.free)) and not self._halts
         machine = self._arrivals.mode_machine
         if machine is not None and self.status.state is not GateState.INIT and not theirs:
-            self._out.write(convert.encode_low_command(command, machine, answers))
+            payload = convert.encode_low_command(command, machine, answers)
+            self._out.write(payload)
+            if self._black_box is not None:
+                self._black_box.add("/lowcmd", payload, self._clock())
 
     def _is_foreign(self, sample: Sample) -> bool:
         return sample.alive and self._all_commands.writers().get(sample.writer) != self._out.guid
