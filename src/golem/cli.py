@@ -179,9 +179,14 @@ def _twin(words: list[str]) -> int:
 
 
 def _safety(words: list[str]) -> int:
-    """Run the safety gate of a robot on a domain; `safety activate|stop|reset|press|release|status|take` asks it."""
+    """Run a robot's safety gate; `safety activate|stop|reset|press|release|status|take` asks it, `console` is quick."""
     from golem.runtime.live import operator
 
+    if words[:1] == ["console"]:
+        from golem.runtime.live.operator_console import run_console
+
+        run_console(_parse(operator.RequestConfig, "safety console", words[1:]))
+        return 0
     if words[:1] == ["take"]:
         return 0 if operator.run_take(_parse(operator.TakeConfig, "safety take", words[1:])) else FAILED
     if words and words[0] in operator.REQUESTS:
