@@ -17,7 +17,7 @@ BROKEN = {
     "command": (["ladr"], "Did you mean 'ladder'?"),
     "rung": (
         ["ladder", "--rung", "teter"],
-        "valid: base-estimation, gate-limits, mpc-rate, navigate, navigate-line, odometry, push, push-limit, ",
+        "valid: base-estimation, faults, gate-limits, memory, mpc-rate, navigate, navigate-line, odometry, push, ",
     ),
     "method": (["ladder", "--method", "centriod"], "Did you mean 'centroid'?"),
     "method file": (["ladder", "--method", "x.py:Mine"], "does not exist"),

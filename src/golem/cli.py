@@ -81,6 +81,11 @@ def _ladder(words: list[str]) -> int:
     return 0
 
 
+def _faults(words: list[str]) -> int:
+    """Try every fault against the safety layer: the rung `faults` of the ladder, with its options."""
+    return _ladder(["--rung", "faults", *words])
+
+
 def _compare(words: list[str]) -> int:
     """Compare two ladder runs on the same seeds, e.g. tether with stand."""
     from golem.evaluation.metrics.compare import CompareConfig, run_compare
@@ -191,9 +196,14 @@ def _twin(words: list[str]) -> int:
 
 
 def _safety(words: list[str]) -> int:
-    """Run the safety gate of a robot on a domain; `safety activate|stop|reset|press|release|status|take` asks it."""
+    """Run a robot's safety gate; `safety activate|stop|reset|press|release|status|take` asks it, `console` is quick."""
     from golem.runtime.live import operator
 
+    if words[:1] == ["console"]:
+        from golem.runtime.live.operator_console import run_console
+
+        run_console(_parse(operator.RequestConfig, "safety console", words[1:]))
+        return 0
     if words[:1] == ["take"]:
         return 0 if operator.run_take(_parse(operator.TakeConfig, "safety take", words[1:])) else FAILED
     if words and words[0] in operator.REQUESTS:
@@ -321,6 +331,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "run": _run,
     "options": _options,
     "ladder": _ladder,
+    "faults": _faults,
     "compare": _compare,
     "results": _results,
     "model": _model,

@@ -16,7 +16,7 @@ DT = 0.002
 
 def test_an_estimate_that_stays_stale_stops_the_motors() -> None:
     bus = Bus()
-    node = SafetyNode(bus, SafetyLimits.from_profile())
+    node = SafetyNode(bus, SafetyLimits.from_profile().still())
     node.request = OperatorRequest.ACTIVATE
     zero = np.zeros(NUM_JOINTS)
     imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))

@@ -57,6 +57,7 @@ SAFETY_COLOURS = {
     GateState.ACTIVE: (63, 160, 110),
     GateState.ARMED: (224, 160, 50),
     GateState.INIT: (130, 138, 150),
+    GateState.STOP2: (216, 74, 56),
     GateState.STOP1: (216, 74, 56),
     GateState.STOP0: (216, 74, 56),
 }

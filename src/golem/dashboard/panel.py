@@ -22,6 +22,7 @@ SAFETY_COLOURS = {
     GateState.ACTIVE: "#2e9e63",
     GateState.ARMED: "#d99a22",
     GateState.INIT: "#7c8594",
+    GateState.STOP2: "#d0432f",
     GateState.STOP1: "#d0432f",
     GateState.STOP0: "#d0432f",
 }

@@ -32,6 +32,7 @@ RUNGS: dict[str, str] = {
     "push-ramp": "golem.evaluation.rungs.push_ramp:PushRampRung",
     "push-limit": "golem.evaluation.rungs.push_limit:PushLimit",
     "gate-limits": "golem.evaluation.rungs.gate_limits:GateLimits",
+    "faults": "golem.evaluation.rungs.faults:FaultsRung",
     "stand-quiet": "golem.evaluation.rungs.stand_minute:StandQuiet",
     "stand-arms": "golem.evaluation.rungs.stand_minute:StandArms",
     "walk-twist": "golem.evaluation.rungs.walk_twist:WalkTwist",

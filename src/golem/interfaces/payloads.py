@@ -248,11 +248,13 @@ class GateState(StrEnum):
     """Stopped and latched: the motors damp (kp = 0, kd > 0)."""
     STOP0 = "stop0"
     """Stopped and latched: the motors are limp (kp = kd = 0)."""
+    STOP2 = "stop2"
+    """Stopped and latched: the gate's own controller stands on the legs, the arms damp."""
 
     @property
     def stopped(self) -> bool:
         """Whether the robot was stopped, and stays so until the gate is reset."""
-        return self in (GateState.STOP1, GateState.STOP0)
+        return self in (GateState.STOP2, GateState.STOP1, GateState.STOP0)
 
 
 class Reason(StrEnum):
@@ -270,6 +272,10 @@ class Reason(StrEnum):
     STATE_TIME = "state_time_invalid"
     STATE_INVALID = "state_not_finite"
     STATE_CLOCK = "state_clock"
+    STATE_JUMPED = "state_clock_jumped"
+    STATE_FROZEN = "state_frozen"
+    STATE_IMPLAUSIBLE = "state_implausible"
+    IMU_IMPLAUSIBLE = "imu_implausible"
     POSITION = "joint_position"
     VELOCITY = "joint_velocity"
     TORQUE = "joint_torque"
@@ -279,20 +285,35 @@ class Reason(StrEnum):
     WRITERS = "two_writers"
     HELD = "motors_held"
     UNHEARD = "motors_unheard"
+    NOT_IN_CONTROL = "not_in_control"
     STATE_DAMAGED = "state_damaged"
     MOTOR = "motor_error"
+    MOTOR_DEAD = "motor_does_not_follow"
+    MOTOR_MODE = "motor_mode"
+    MOTOR_HOT = "motor_temperature"
+    MOTOR_VOLTAGE = "motor_voltage"
     COMMAND_DAMAGED = "command_damaged"
     COMMAND_MISSING = "command_never_seen"
     COMMAND_STALE = "command_stale"
     COMMAND_TIME = "command_time_invalid"
     COMMAND_INVALID = "command_not_finite"
+    COMMAND_UNSTAMPED = "command_unstamped"
+    COMMAND_GAINS = "command_gains"
+    COMMAND_REVERSALS = "command_torque_reversals"
 
 
 class Fault(NamedTuple):
-    """A reason, and one line that names the joint, the sender or the figures."""
+    """A reason, and one line that names the joint, the sender or the figures.
+
+    Attributes:
+        reason: why.
+        detail: one line; may be empty.
+        stands: whether state and legs are sound in spite of it, because it is about the upper body alone.
+    """
 
     reason: Reason
     detail: str = ""
+    stands: bool = False
 
 
 @dataclass(frozen=True, slots=True)

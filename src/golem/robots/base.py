@@ -91,6 +91,17 @@ class HasGantry(Protocol):
 
 
 @runtime_checkable
+class HasLivingSensors(Protocol):
+    """A robot that says whether its sensors live; of one that does not the gate believes sensors that stand still.
+
+    Attributes:
+        living: whether the last digits of every limb and of the IMU always move, as those of real sensors do.
+    """
+
+    living: bool
+
+
+@runtime_checkable
 class HasLidar(Protocol):
     """A robot with a LiDAR on its torso."""
 

@@ -18,13 +18,14 @@ from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
 from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
-from golem.robots.base import HasGantry, Robot
+from golem.robots.base import HasGantry, HasLivingSensors, Robot
 from golem.robots.sensors.profiles import load_profile
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import FOREVER, Executor, in_order
 from golem.runtime.node_groups import RobotNodes, SafetyNodes, StackNodes, hears_lidar
 from golem.runtime.perception_nodes import LATENCY, detection_requested
 from golem.runtime.skill_table import SkillTable
+from golem.runtime.standing_legs import StandingLegs
 from golem.skills.base import Routine, SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
@@ -66,7 +67,13 @@ class LockstepRunner:
         lidar = hears_lidar(stack)
         seen = partial(detection_requested, self.bus)
         self._robot = RobotNodes(self.bus, stack, robot, seen, lambda: lidar)
-        self._safety = SafetyNodes(self.bus, limits or SafetyLimits.from_profile(stack.limits), self.estop)
+        limits = limits or SafetyLimits.from_profile(stack.limits)
+        if not isinstance(robot, HasLivingSensors):
+            limits = limits.believing()
+        elif not robot.living:
+            limits = limits.still()
+        standing = StandingLegs if stack.on_ground else None
+        self._safety = SafetyNodes(self.bus, limits, self.estop, standing)
         self._stack = StackNodes(self.bus, stack, robot.calibration, gantry, LATENCY)
         placed = self._robot.nodes + self._safety.nodes + self._stack.nodes
         self.executor = Executor(self.bus, in_order(placed))

@@ -17,6 +17,7 @@ from golem.capabilities.legs.base import Envelope
 from golem.errors import GolemError
 from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
+from golem.hardware.safety.standing_gate import StandingController
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
@@ -140,9 +141,15 @@ class SafetyNodes:
         gate: the one of them that runs the gate.
     """
 
-    def __init__(self, bus: Bus, limits: SafetyLimits, estop: EmergencyStop | None) -> None:
-        """Enforce `limits`, under `estop`; without one the gate stays shut."""
-        self.gate = nodes.SafetyNode(bus, limits)
+    def __init__(
+        self,
+        bus: Bus,
+        limits: SafetyLimits,
+        estop: EmergencyStop | None,
+        standing: Callable[[], StandingController] | None = None,
+    ) -> None:
+        """Enforce `limits`, under `estop`; without one the gate stays shut. `standing`: see `StandingGate`."""
+        self.gate = nodes.SafetyNode(bus, limits, standing)
         self.nodes: list[Placed] = [(Phase.PROTECT, self.gate)]
         if estop is not None:
             self.nodes.insert(0, (Phase.PROTECT, nodes.EstopNode(bus, estop)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from golem.capabilities.arms.base import UpperBody
@@ -11,6 +13,7 @@ from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.hands.base import HandController
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
+from golem.hardware.safety.standing_gate import StandingController, StandingGate
 from golem.hardware.servo.base import MotorServo
 from golem.interfaces import topics
 from golem.interfaces.payloads import (
@@ -302,9 +305,11 @@ class SafetyNode:
 
     period = TICK
 
-    def __init__(self, bus: Bus, limits: SafetyLimits) -> None:
-        """Enforce `limits`."""
-        self._bus, self._gate = bus, Gate(limits)
+    def __init__(
+        self, bus: Bus, limits: SafetyLimits, standing: Callable[[], StandingController] | None = None
+    ) -> None:
+        """Enforce `limits`; what `standing` makes gets the legs where a stop leaves them sound."""
+        self._bus, self._gate = bus, StandingGate(Gate(limits), standing)
         self._faults = News(bus, topics.TRANSPORT_FAULT)
         self.request = OperatorRequest.NONE
 

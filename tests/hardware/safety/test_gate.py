@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.hardware.safety.base import GateInputs, GateMemory, OperatorRequest, SafetyLimits
+from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import check
+from golem.hardware.safety.memory import GateMemory
 from golem.interfaces.payloads import EstopMessage, GateState, Reason
 from golem.types import LowCommand, LowState
 
@@ -74,7 +75,6 @@ FAULTS: dict[Reason, Callable[[Any, Make, Make], dict[str, object]]] = {
     Reason.ESTOP_TIME: lambda b, s, c: {"estop": EstopMessage(b.t + 1.0, 999, False)},
     Reason.STATE_TIME: lambda b, s, c: {"state": s(b.t + 1.0)},
     Reason.STATE_INVALID: lambda b, s, c: {"state": s(b.t + 0.002, np.full(27, np.nan))},
-    Reason.POSITION: lambda b, s, c: {"state": s(b.t + 0.002, np.full(27, 9.0))},
     Reason.VELOCITY: lambda b, s, c: {"state": s(b.t + 0.002, dq=np.full(27, 500.0))},
     Reason.COMMAND_TIME: lambda b, s, c: {"command": c(b.t + 1.0)},
     Reason.COMMAND_INVALID: lambda b, s, c: {"command": c(b.t + 0.002, np.full(27, np.nan))},

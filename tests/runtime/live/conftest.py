@@ -60,7 +60,7 @@ class Live:
         self, patient: bool = False, real: bool = False, estop: EmergencyStop | None = None
     ) -> None:
         """Put a new gate on the domain, with a virtual e-stop if none is given."""
-        limits = SafetyLimits.from_profile(self.stack.limits)
+        limits = SafetyLimits.from_profile(self.stack.limits).still()
         estop = estop or VirtualEstop()
         self.gate = SafetyProcess(
             *self.member("safety"), limits, estop, clock=lambda: self.clock, patient=patient, real=real

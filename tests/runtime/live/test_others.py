@@ -78,12 +78,15 @@ def test_a_second_stack_and_a_second_robot_stop_the_first(
 
 def test_a_motor_that_reports_an_error_is_named_once_it_persists(live: Live) -> None:
     live.activate()
+    assert live.twin is not None
+    start = live.twin.executor.t
+    q, dq, tau = live.robot.joints()
     live.leave("twin")
     robot, _ = live.member("robot")
     writer = robot.writer("rt/lowstate", hg.LOW_STATE.type_name, public.topic("/lowstate").qos)
     seen = []
     for k in range(40):
-        payload = bytearray(encode_low_state(at_rest(100.0 + 0.002 * k)))
+        payload = bytearray(encode_low_state(LowState(start + 0.002 * k, q, dq, tau, STILL)))
         hg.LOW_STATE.read(payload)["motor"]["motorstate"][9] = 0x20
         hg.STATE_CHECKSUM.seal(payload)
         writer.write(bytes(payload))

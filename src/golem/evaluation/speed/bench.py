@@ -20,8 +20,9 @@ from golem.capabilities.arms.base import UpperBody
 from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.postures import posture
 from golem.errors import ConfigError, MissingExtra
-from golem.hardware.safety.base import GateInputs, GateMemory, OperatorRequest, SafetyLimits
+from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import check
+from golem.hardware.safety.memory import GateMemory
 from golem.hardware.servo.servo import Servo
 from golem.interfaces.payloads import EstopMessage
 from golem.robots.mujoco.config import MujocoConfig, World

@@ -52,12 +52,14 @@ def gate_ticks(n: int) -> Array:
     estimates = node.publisher(base.name, base.type, base.qos)
     activate = node.client("/safety/activate", public.TRIGGER)
     q, zeros = start_posture(), np.zeros(NUM_JOINTS)
-    imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), zeros[:3], np.array([0.0, 0.0, 9.81]))
+    up, noise = np.array([1.0, 0.0, 0.0, 0.0]), np.random.default_rng(0)
     command = LowCommand(0.0, q, zeros, zeros, np.full(NUM_JOINTS, 50.0), np.full(NUM_JOINTS, 2.0))
     times: list[float] = []
     for i in count(1):
         clock = i * TICK
-        states.write(encode_low_state(LowState(clock, q, zeros, zeros, imu)))
+        dq, shake = 1e-3 * noise.standard_normal((2, NUM_JOINTS))
+        imu = Imu(up, shake[:3], np.array([0.0, 0.0, 9.81]) + shake[3:6])
+        states.write(encode_low_state(LowState(clock, q, dq, zeros, imu)))
         commands.write(encode_low_command(command, 0, answers=clock))
         estimates.publish(base_estimate(BaseEstimate(clock, np.eye(4))))
         start = time.thread_time_ns()

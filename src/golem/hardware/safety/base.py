@@ -6,18 +6,24 @@ leaves open is chosen here; `SafetyLimits` names the source of each number.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
-from golem.interfaces.payloads import EstopMessage, Fault, GateState, Reason
+from golem.interfaces.payloads import EstopMessage, Fault
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
-from golem.types import LEGS, NUM_JOINTS, Array, BaseEstimate, LowCommand, LowState
+from golem.types import LEGS, NUM_JOINTS, UPPER, Array, BaseEstimate, LowCommand, LowState
 
 LIMIT_RATIO = 0.9
 """Share of the vendor's maxima that is used [paper]."""
+REVERSAL = 0.25
+"""Share of the torque limit on either side of zero that makes a change of sign a reversal [own]."""
+
+
+STANDING = slice(0, UPPER.start + 1)
+"""Joints that standing needs: the legs, and the torso, which tells how the pelvis leans under the IMU."""
 
 
 class OperatorRequest(StrEnum):
@@ -44,6 +50,10 @@ class SafetyLimits:
         torque: measured joint torque that stops the robot [N m]: 90 % [profile, paper].
         torque_command: bound of the predicted PD torque [N m]: 95 % of `torque` [own: a command at its bound plus
             the noise of the torque estimate must not stop the robot].
+        torque_rate: bound of the feed-forward torque's rate [N m/s]: the whole range in 0.1 s for torso and arms, whose
+            weight changes slowly, in 0.02 s for the legs, which feel the ground [own].
+        flip: product of two feed-forward torques below whose negative they are a reversal [N^2 m^2]: the square of
+            `REVERSAL` of `torque` [own: gravity changes its sign through zero].
         slew: bound of the commanded position's rate [rad/s]: `velocity` for the legs, whose policies use distant
             targets as torques; 3 rad/s for torso and arms, three times what the controllers ask for [own].
         deceleration: what each joint can surely be braked with [rad/s^2]: torso and arms 20 [own: torque left after
@@ -74,6 +84,24 @@ class SafetyLimits:
         longest_tick: time step up to which slewing accumulates [s] [own].
         stall: time between two ticks that stops the robot [s]: meanwhile nobody looked, it may lie on the floor, and
             what comes first after a pause looks fresh [own: as old as a command may be].
+        frozen: time for which the sensors of a limb, or the IMU, may report the very same numbers [s]; 0 where they
+            stand still, as those of a simulation without noise do [own: as long as a state may be old].
+        jump: how far a joint may be from where its speed has taken it since the last sample [rad]; a sample beyond is
+            dropped [own: 50 rad/s for one tick, twice the fastest joint].
+        drift: how far the positions of a joint may leave its integrated speed, beyond `drift_lag` [rad] [own: see the
+            margins in docs/reference/safety.md; so for the other numbers of plausibility].
+        drift_lag: delay between a joint's position and its speed that is no fault [s].
+        imu_drift: how far the IMU's orientation may leave its integrated rate [rad].
+        gravity: bounds of the mean specific force over half a second [m/s^2].
+        gravity_angle: angle between mean specific force and the orientation's up for a robot that hardly moves [rad].
+        dead_share, dead_load: a motor whose torque is below this share of the one asked for, where that is above this
+            share of `torque`, for `dead_time` [s] does not follow.
+        temperature: range of the motors' temperature [degrees].
+        voltage: range of their voltage [V], once they have reported one.
+        bad_frames: level at which damaged frames stop the robot: each counts one, each sound one takes `frame_leak`
+            off. So three in a row stop it, or more than one in fifty for long [own].
+        frame_leak: see `bad_frames`.
+        reversals: level of reversals that stops the robot, as `bad_frames` [own].
     """
 
     lower: Array
@@ -83,6 +111,8 @@ class SafetyLimits:
     velocity: Array
     torque: Array
     torque_command: Array
+    torque_rate: Array
+    flip: Array
     slew: Array
     deceleration: Array
     damping: Array
@@ -103,6 +133,29 @@ class SafetyLimits:
     damping_time: float = 3.0
     longest_tick: float = 0.010
     stall: float = 0.100
+    frozen: float = 0.050
+    jump: float = 0.100
+    drift: float = 0.060
+    drift_lag: float = 0.010
+    imu_drift: float = 0.120
+    gravity: tuple[float, float] = (4.0, 20.0)
+    gravity_angle: float = 0.35
+    dead_share: float = 0.1
+    dead_load: float = 0.10
+    dead_time: float = 0.150
+    temperature: tuple[float, float] = (-30.0, 100.0)
+    voltage: tuple[float, float] = (30.0, 75.0)
+    bad_frames: float = 3.0
+    frame_leak: float = 0.02
+    reversals: float = 5.0
+
+    def still(self) -> SafetyLimits:
+        """Return these limits for sensors without noise, which may repeat their numbers while the robot rests."""
+        return replace(self, frozen=0.0)
+
+    def believing(self) -> SafetyLimits:
+        """Return these limits for a robot that says nothing of its sensors: they may stand still and feel no torque."""
+        return replace(self, frozen=0.0, dead_time=np.inf)
 
     @classmethod
     def from_profile(cls, profile: str = "urdf", ratio: float = LIMIT_RATIO) -> SafetyLimits:
@@ -123,6 +176,8 @@ class SafetyLimits:
         for part, maximum in (("hip_yaw", 200.0), ("knee", 200.0), ("ankle", 150.0)):
             deceleration[[k for k, name in enumerate(JOINT_NAMES) if part in name]] = maximum
         torque_command = 0.95 * torque
+        torque_rate = 2.0 * torque / 0.1
+        torque_rate[LEGS] = 2.0 * torque[LEGS] / 0.02
         new = cls(
             lower=middle - ratio * half,
             upper=middle + ratio * half,
@@ -131,6 +186,8 @@ class SafetyLimits:
             velocity=velocity,
             torque=torque,
             torque_command=torque_command,
+            torque_rate=torque_rate,
+            flip=(REVERSAL * torque) ** 2,
             slew=slew,
             deceleration=deceleration,
             damping=np.minimum(5.0, torque_command / velocity),
@@ -155,6 +212,9 @@ class GateInputs:
         base: newest estimate of the base that arrived, or None.
         transport: what is wrong with the way the frames came: a checksum, or a second writer of the motors' command;
             None when nothing is, or when there is no transport.
+        tick: the robot's own time of `state` [s]; None where its stamp is that.
+        stands: whether a standing controller can take the legs.
+        standing: what it tells the motors; None before it has them, or when it fails.
     """
 
     t: float
@@ -164,6 +224,9 @@ class GateInputs:
     request: OperatorRequest = OperatorRequest.NONE
     base: BaseEstimate | None = None
     transport: Fault | None = None
+    tick: float | None = None
+    stands: bool = False
+    standing: LowCommand | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,58 +249,10 @@ class Outgoing:
 
     Attributes:
         q, kp, kd: (27,) each, before any scaling for torque.
+        tau: (27,) feed-forward torque; None before the first command, which may carry the arms' weight at once.
     """
 
     q: Array
     kp: Array
     kd: Array
-
-
-@dataclass(frozen=True, slots=True)
-class GateMemory:
-    """All that the gate remembers from one tick to the next; the default is a gate that has seen nothing.
-
-    Attributes:
-        t: time of the previous tick [s].
-        mode: state of the gate.
-        since: when it entered that state [s].
-        reason, detail: why, for a state that has a reason.
-        state, command, estop: newest frame accepted of each.
-        counters: consecutive bad samples.
-        outgoing: last command, while active.
-        request: request of the previous tick.
-        grounded: stamp of the newest base estimate that was not stale [s]; None before the first one since the
-            activation. A robot that hangs in a band with its feet in the air has none, and is not stopped for it.
-    """
-
-    t: float = -np.inf
-    mode: GateState = GateState.INIT
-    since: float = -np.inf
-    reason: Reason | None = None
-    detail: str = ""
-    state: LowState | None = None
-    command: LowCommand | None = None
-    estop: EstopMessage | None = None
-    counters: Counters = field(default_factory=Counters)
-    outgoing: Outgoing | None = None
-    request: OperatorRequest = OperatorRequest.NONE
-    grounded: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class GateResult:
-    """What the gate decided at one tick.
-
-    Attributes:
-        command: what the motors are to be told.
-        state: state of the gate.
-        reason: why it is not armed, not activated or stopped; None when all is well.
-        detail: one line that names the joint and the figures behind `reason`; may be empty.
-        memory: to be passed to the next tick.
-    """
-
-    command: LowCommand
-    state: GateState
-    reason: Reason | None
-    detail: str
-    memory: GateMemory
+    tau: Array | None = None

@@ -2,33 +2,49 @@
 
     INIT   something is missing; limp           -> ARMED  once state and e-stop are sound
     ARMED  sound; damps                         -> ACTIVE on request, INIT when no longer sound
-    ACTIVE commands pass, limited               -> STOP1  on any fault
+    ACTIVE commands pass, limited               -> STOP2  on a fault that leaves state and legs sound
+                                                -> STOP1  on any other
+    STOP2  a controller of the gate stands      -> STOP1  when it cannot, or a stop is asked for; ACTIVE: see below
     STOP1  damps                                -> STOP0  after 3 s, ARMED on reset
     STOP0  limp                                 -> ARMED  on reset
 
 A stop is latched with its reason. Reset needs everything sound, the button released, and an explicit request; it leads
-to ARMED, never back to motion. A command that is not finite stops the robot; one beyond a limit is limited.
+to ARMED, never back to motion. A robot that stands in STOP2 would fall in ARMED: there a reset only takes the reason
+away, and a robot without a reason can be activated again. A command that is not finite stops the robot; one beyond a
+limit is limited.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
-from golem.hardware.safety.base import (
-    Counters,
-    GateInputs,
-    GateMemory,
-    GateResult,
-    OperatorRequest,
-    Outgoing,
-    SafetyLimits,
-)
+from golem.hardware.safety.base import Counters, GateInputs, OperatorRequest, Outgoing, SafetyLimits
 from golem.hardware.safety.limiter import limit_command
-from golem.hardware.safety.monitor import examine, whole, whole_command
+from golem.hardware.safety.memory import GateMemory, GateResult
+from golem.hardware.safety.monitor import examine, strained, whole, whole_command
+from golem.hardware.safety.sender import SenderMemory, examine_command
+from golem.hardware.safety.senses import SensesMemory, sense
 from golem.interfaces.payloads import EstopMessage, Fault, GateState, Reason
 from golem.types import NUM_JOINTS, Array, BaseEstimate, LowCommand, LowState
+
+STANDING_AGE = 0.010
+"""Time in which a standing controller has to have the legs once a stop has given them to it [s]."""
+STAND = frozenset(
+    {
+        Reason.COMMAND_DAMAGED,
+        Reason.COMMAND_MISSING,
+        Reason.COMMAND_STALE,
+        Reason.COMMAND_TIME,
+        Reason.COMMAND_INVALID,
+        Reason.COMMAND_UNSTAMPED,
+        Reason.COMMAND_GAINS,
+        Reason.COMMAND_REVERSALS,
+    }
+)
+"""Reasons that say nothing against state and legs."""
 
 
 def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateResult:
@@ -46,42 +62,61 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     running = math.isfinite(inputs.t) and inputs.t >= memory.t
     t = inputs.t if running else memory.t if math.isfinite(memory.t) else 0.0
     estop, estop_fault = _estop(inputs.estop, memory.estop, t, limits)
-    state, counters, state_fault = _state(inputs.state, memory, t, limits)
-    command, command_fault = _command(inputs.command, memory.command, t, limits)
+    state, counters, senses, state_fault = _state(inputs, memory, t, limits)
+    command, sender, command_fault = _command(inputs.command, memory, t, limits)
     grounded, base_fault = _base(inputs.base, memory, t, limits)
     clock_fault = None if running else Fault(Reason.CLOCK)
-    fault = clock_fault or _pause(memory, t, limits) or inputs.transport or estop_fault or state_fault
+    faults = [clock_fault, _pause(memory, t, limits), inputs.transport, estop_fault, state_fault]
+    fault = _first(faults)
     edge = inputs.request if inputs.request is not memory.request else OperatorRequest.NONE
 
     mode, reason, detail, since = memory.mode, memory.reason, memory.detail, memory.since
     outgoing = memory.outgoing
     if mode is GateState.ACTIVE:
         requested = Fault(Reason.REQUESTED) if inputs.request is OperatorRequest.STOP else None
-        fault = fault or command_fault or base_fault or requested
+        faults += [command_fault, base_fault, requested]
+        fault = _first(faults)
         if fault is not None:
-            mode, (reason, detail), since, outgoing = GateState.STOP1, fault, t, None
+            carried = grounded is not None and t - grounded <= limits.base_age
+            stands = inputs.stands and carried and all(map(_stands, faults))
+            mode = GateState.STOP2 if stands else GateState.STOP1
+            reason, detail, since = fault.reason, fault.detail, t
+    elif mode is GateState.STOP2:
+        asked = Fault(Reason.REQUESTED) if inputs.request is OperatorRequest.STOP else None
+        hard = next((f for f in (asked, *faults) if not _stands(f)), None)
+        failed = inputs.standing is None and t > since + STANDING_AGE
+        if hard is not None or failed:
+            mode, since = GateState.STOP1, t
+            reason, detail = (hard.reason, hard.detail) if hard is not None else (reason, detail)
+        elif edge is OperatorRequest.RESET and fault is None and command_fault is None:
+            reason, detail = None, ""
+        elif edge is OperatorRequest.ACTIVATE and reason is None and fault is None and command_fault is None:
+            mode, since = GateState.ACTIVE, t
     elif mode.stopped:
         if edge is OperatorRequest.RESET and fault is None:
             mode, reason, detail, since = GateState.ARMED, None, "", t
         elif mode is GateState.STOP1 and t - since >= limits.damping_time:
             mode, since = GateState.STOP0, t
     else:
-        reason, detail = fault or (None, "")
+        reason, detail = (None, "") if fault is None else (fault.reason, fault.detail)
         new = GateState.ARMED if fault is None else GateState.INIT
         if new is GateState.ARMED and edge is OperatorRequest.ACTIVATE:
             if command_fault is not None:
-                reason, detail = command_fault
+                reason, detail = command_fault.reason, command_fault.detail
             elif state is not None:
                 new = GateState.ACTIVE
                 outgoing = Outgoing(state.q.astype(np.float64), np.zeros(NUM_JOINTS), limits.damping)
         if new is not mode:
             mode, since = new, t
 
-    if mode is GateState.ACTIVE and state is not None and command is not None and outgoing is not None:
+    wanted = {GateState.ACTIVE: command, GateState.STOP2: inputs.standing}.get(mode)
+    if state is not None and wanted is not None and outgoing is not None:
         dt = min(t - memory.t, limits.longest_tick)
-        sent, outgoing = limit_command(t, state, command, limits, outgoing, dt)
+        sent, outgoing = limit_command(t, state, wanted, limits, outgoing, dt, strained(counters))
     else:
-        damps = mode in (GateState.ARMED, GateState.STOP1)
+        if mode is not GateState.STOP2:
+            outgoing = None
+        damps = mode in (GateState.ARMED, GateState.STOP1, GateState.STOP2)
         sent = passive(t, state, limits.damping if damps else np.zeros(NUM_JOINTS))
     return GateResult(
         command=sent,
@@ -101,6 +136,9 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
             outgoing=outgoing,
             request=inputs.request,
             grounded=grounded,
+            senses=senses,
+            sender=sender,
+            sent=sent,
         ),
     )
 
@@ -130,6 +168,15 @@ class Gate:
         result = check(inputs, self.limits, self.memory)
         self.memory = result.memory
         return result
+
+
+def _first(faults: list[Fault | None]) -> Fault | None:
+    return next((fault for fault in faults if fault is not None), None)
+
+
+def _stands(fault: Fault | None) -> bool:
+    """Return whether a robot can stand in spite of `fault`."""
+    return fault is None or fault.stands or fault.reason in STAND
 
 
 def _stamped(t_frame: float, t: float, limits: SafetyLimits) -> bool:
@@ -163,24 +210,30 @@ def _estop(
 
 
 def _state(
-    new: LowState | None, memory: GateMemory, t: float, limits: SafetyLimits
-) -> tuple[LowState | None, Counters, Fault | None]:
-    old, counters = memory.state, memory.counters
+    inputs: GateInputs, memory: GateMemory, t: float, limits: SafetyLimits
+) -> tuple[LowState | None, Counters, SensesMemory, Fault | None]:
+    new, old, counters, senses = inputs.state, memory.state, memory.counters, memory.senses
     if new is not None:
         if not _stamped(new.t, t, limits):
-            return old, counters, Fault(Reason.STATE_TIME, f"stamp {new.t} at {t}")
+            return old, counters, senses, Fault(Reason.STATE_TIME, f"stamp {new.t} at {t}")
         if not whole(new):
-            return old, counters, Fault(Reason.STATE_INVALID)
+            return old, counters, senses, Fault(Reason.STATE_INVALID)
         if old is None or new.t > old.t:
-            counters, fault = examine(new, limits, counters)
-            if fault is not None:
-                return new, counters, fault
-            old = new
+            tick = new.t if inputs.tick is None else inputs.tick
+            sent = memory.sent if memory.mode is GateState.ACTIVE else None
+            senses, believed, odd = sense(new, tick, senses, limits, sent)
+            if believed:
+                counters, fault = examine(new, limits, counters)
+                if fault is not None:
+                    return new, counters, senses, fault
+                old = new
+            if odd is not None:
+                return old, counters, senses, odd
     if old is None:
-        return None, counters, Fault(Reason.STATE_MISSING)
+        return None, counters, senses, Fault(Reason.STATE_MISSING)
     if t - old.t > limits.state_age:
-        return old, counters, Fault(Reason.STATE_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
-    return old, counters, None
+        return old, counters, senses, Fault(Reason.STATE_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
+    return old, counters, senses, None
 
 
 def _base(
@@ -197,17 +250,22 @@ def _base(
 
 
 def _command(
-    new: LowCommand | None, old: LowCommand | None, t: float, limits: SafetyLimits
-) -> tuple[LowCommand | None, Fault | None]:
+    new: LowCommand | None, memory: GateMemory, t: float, limits: SafetyLimits
+) -> tuple[LowCommand | None, SenderMemory, Fault | None]:
+    old = memory.command
+    sender = memory.sender if memory.mode is GateState.ACTIVE else SenderMemory()
     if new is not None:
         if not _stamped(new.t, t, limits):
-            return old, Fault(Reason.COMMAND_TIME, f"stamp {new.t} at {t}")
+            return old, sender, Fault(Reason.COMMAND_TIME, f"stamp {new.t} at {t}")
         if not whole_command(new):
-            return old, Fault(Reason.COMMAND_INVALID)
+            return old, sender, Fault(Reason.COMMAND_INVALID)
         if old is None or new.t > old.t:
-            old = new
+            sender, followed, fault = examine_command(new, sender, limits)
+            if fault is not None:
+                return new, sender, fault
+            old = new if followed or old is None else replace(old, t=new.t)
     if old is None:
-        return None, Fault(Reason.COMMAND_MISSING)
+        return None, sender, Fault(Reason.COMMAND_MISSING)
     if t - old.t > limits.command_age:
-        return old, Fault(Reason.COMMAND_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
-    return old, None
+        return old, sender, Fault(Reason.COMMAND_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
+    return old, sender, None

@@ -9,15 +9,24 @@ from __future__ import annotations
 import numpy as np
 
 from golem.hardware.safety.base import Outgoing, SafetyLimits
-from golem.types import NUM_JOINTS, LowCommand, LowState
+from golem.hardware.safety.monitor import at_rest
+from golem.types import NUM_JOINTS, Array, LowCommand, LowState
 
 # Arrays instead of numbers: numpy then skips a conversion, a third of such an operation's time.
 _ZERO = np.zeros(NUM_JOINTS)
+BRAKE = 0.2
+"""Share of the torque bound that brakes a joint which is too fast or too close to the end of its range [own]."""
 _MIN_STIFFNESS = np.full(NUM_JOINTS, 1e-9)
 
 
 def limit_command(
-    t: float, state: LowState, command: LowCommand, limits: SafetyLimits, last: Outgoing, dt: float
+    t: float,
+    state: LowState,
+    command: LowCommand,
+    limits: SafetyLimits,
+    last: Outgoing,
+    dt: float,
+    strained: bool = False,
 ) -> tuple[LowCommand, Outgoing]:
     """Return the limited command and what the next tick's slew limits refer to.
 
@@ -26,7 +35,8 @@ def limit_command(
     1. Gains: 0 <= k <= k_max, rising by at most `k_rate * dt`.
     2. Position: into the commanded range, then at most `slew * dt` away from the last one. Towards a range's end
        the rate is at most sqrt(2 a d), d the distance left, so that the joint can follow to a halt.
-    3. Torque, |kp (q_cmd - q) + kd (dq_cmd - dq) + tau| <= L: the damping term alone is kept within L by scaling
+    3. Feed-forward: at most `torque_rate * dt` away from the last one.
+    4. Torque, |kp (q_cmd - q) + kd (dq_cmd - dq) + tau| <= L: the damping term alone is kept within L by scaling
        kd, then `tau` gives way, then the position is pulled towards the measured one. Only this pull may exceed the
        slew limit, and it can only lower the torque. A position far away is thus never stored as a spring, and the
        gravity torque survives as long as possible.
@@ -38,10 +48,13 @@ def limit_command(
         limits: the limits.
         last: what the previous call returned.
         dt: time since then [s].
+        strained: whether a joint is too fast, or too close to the end of its range for its speed. It is then braked
+            whatever the command says, so that less is left for a stop to do.
     """
     minimum, maximum = np.minimum, np.maximum
     bound = limits.torque_command
     negative = -bound
+    highest, lowest = _spared(state, limits) if strained else (bound, negative)
 
     kp = minimum(maximum(command.kp, _ZERO), limits.kp_max)
     kp = minimum(kp, last.kp + limits.kp_rate * dt)
@@ -59,12 +72,24 @@ def limit_command(
     share = bound / maximum(np.abs(damp), bound)
     damp *= share
     tau = minimum(maximum(command.tau, negative), bound)
-    rest = minimum(maximum(tau + damp, negative), bound)
+    if last.tau is not None:
+        step = limits.torque_rate * dt
+        tau = minimum(maximum(tau, last.tau - step), last.tau + step)
+    rest = minimum(maximum(tau + damp, lowest), highest)
     soft = maximum(kp, _MIN_STIFFNESS)
-    reach = bound / soft
     center = state.q - rest / soft
-    q = minimum(maximum(q, center - reach), center + reach)
+    q = minimum(maximum(q, center + lowest / soft), center + highest / soft)
 
     # Copies: whoever receives the command must not be able to reach into the memory.
     limited = LowCommand(t=t, q=q.copy(), dq=dq, tau=rest - damp, kp=kp.copy(), kd=kd * share)
-    return limited, Outgoing(q=q, kp=kp, kd=kd)
+    return limited, Outgoing(q, kp, kd, tau)
+
+
+def _spared(state: LowState, limits: SafetyLimits) -> tuple[Array, Array]:
+    """Return the (27,) highest and lowest torque that brakes every joint that moves too fast or too far [N m]."""
+    q, dq, bound = state.q, state.dq, limits.torque_command
+    rest = at_rest(q, dq, limits.deceleration)
+    up = (dq > limits.velocity) | (rest > limits.state_upper)
+    down = (dq < -limits.velocity) | (rest < limits.state_lower)
+    brake = BRAKE * bound
+    return np.where(up, -brake, bound), np.where(down, brake, -bound)

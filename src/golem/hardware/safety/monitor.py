@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from golem.hardware.safety.base import Counters, SafetyLimits
+from golem.hardware.safety.base import STANDING, Counters, SafetyLimits
 from golem.interfaces.payloads import Fault, Reason
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand, LowState
@@ -54,6 +54,12 @@ def at_rest(q: Array, dq: Array, deceleration: Array) -> Array:
     return q + dq * np.abs(dq) / (deceleration + deceleration)
 
 
+def strained(counters: Counters) -> bool:
+    """Return whether the newest sample was too fast, or would not come to rest within its range."""
+    c = counters
+    return c is not _SOUND and bool(c.velocity or c.leg_velocity or c.braking or c.leg_braking)
+
+
 def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[Counters, Fault | None]:
     """Compare one new sample with the limits.
 
@@ -96,16 +102,21 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
     beyond = np.maximum(rest - limits.state_upper, limits.state_lower - rest)
     ratio = speed / limits.velocity
     n, legs = limits.samples, limits.leg_samples
+    # What legs and torso have no part in leaves them able to stand.
+    bad = quick | beyond_range | (outside > 0.0) | (load > limits.torque)
+    stands = not (tilted or bad[STANDING].any())
     if new.position >= n or new.leg_position >= legs or outside.max() > limits.gross:
-        return new, Fault(Reason.POSITION, _worst(outside, lambda i: f"at {q[i]:.3f} rad"))
+        return new, Fault(Reason.POSITION, _worst(outside, lambda i: f"at {q[i]:.3f} rad"), stands)
     if fast and (new.velocity >= n or new.leg_velocity >= legs or ratio.max() > limits.gross):
-        return new, Fault(Reason.VELOCITY, _worst(ratio, lambda i: f"at {dq[i]:.2f} rad/s"))
+        return new, Fault(Reason.VELOCITY, _worst(ratio, lambda i: f"at {dq[i]:.2f} rad/s"), stands)
     if new.braking >= n or new.leg_braking >= legs:
         return new, Fault(
-            Reason.BRAKING, _worst(beyond, lambda i: f"at {q[i]:.3f} rad with {dq[i]:.2f} rad/s")
+            Reason.BRAKING, _worst(beyond, lambda i: f"at {q[i]:.3f} rad with {dq[i]:.2f} rad/s"), stands
         )
     if new.torque >= limits.torque_samples:
-        return new, Fault(Reason.TORQUE, _worst(load / limits.torque, lambda i: f"at {state.tau[i]:.1f} N m"))
+        return new, Fault(
+            Reason.TORQUE, _worst(load / limits.torque, lambda i: f"at {state.tau[i]:.1f} N m"), stands
+        )
     if new.tilt >= n:
         return new, Fault(Reason.TILT, f"torso at {math.degrees(angle):.0f} degrees")
     return new, None

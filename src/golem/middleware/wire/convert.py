@@ -79,8 +79,8 @@ def mode_machine(payload: Payload) -> int:
     return int(hg.LOW_STATE.read(payload)["mode_machine"])
 
 
-def motor_errors(payload: Payload) -> dict[int, int]:
-    """Return the error word of every motor in a `LowState_` that has one, by index.
+def motor_columns(payload: Payload) -> tuple[Array, Array, Array, Array]:
+    """Return modes (27,), error words (27,), temperatures (27, 2) [degrees] and voltages (27,) [V] of a `LowState_`.
 
     The vendor's low-level examples report a `motorstate` other than zero as an error with that code; what the codes
     mean is not published.
@@ -88,8 +88,11 @@ def motor_errors(payload: Payload) -> dict[int, int]:
     Raises:
         WireError: encapsulation or length is wrong.
     """
-    words = hg.LOW_STATE.read(payload)["motor"]["motorstate"][:NUM_JOINTS]
-    return {int(i): int(words[i]) for i in np.flatnonzero(words)}
+    image = hg.LOW_STATE.read(payload)
+    motors = image["motor"][:NUM_JOINTS]
+    mode = motors["mode"].copy()
+    mode[0] = image["first_mode"]
+    return mode, motors["motorstate"], motors["temperature"], motors["vol"]
 
 
 def encode_low_command(command: LowCommand, mode_machine: int, answers: float = 0.0) -> bytes:

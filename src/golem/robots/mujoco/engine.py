@@ -130,6 +130,11 @@ class MujocoRobot:
         return options.get("support") == "ground"
 
     @property
+    def living(self) -> bool:
+        """Whether the sensors have noise; see `HasLivingSensors`."""
+        return self.profile.lives
+
+    @property
     def on_gantry(self) -> bool:
         """Whether the robot stands in a band that is to be let go; see `HasGantry`."""
         return self.config.support == "ground" and not self._hoist.released

@@ -70,6 +70,11 @@ class RealismProfile:
     hoist_sway: float = 0.0
     screws: ScrewRanges = field(default_factory=ScrewRanges)
 
+    @property
+    def lives(self) -> bool:
+        """Whether the last digits of its sensors move while the robot rests: the IMU's noise sees to all of them."""
+        return self.imu.gyro_noise > 0.0
+
 
 NOMINAL_SCREWS = ScrewRanges(
     friction=(0.35, 0.35), clearance=(0.0003, 0.0003), protrusion=(0.008, 0.008), tilt=(0.0, 0.0)

@@ -77,6 +77,16 @@ class RobotClock:
         self._writer: int | None = None
         self._heard = -math.inf
 
+    @property
+    def known(self) -> bool:
+        """Whether a robot has been heard."""
+        return self._writer is not None
+
+    @property
+    def heard(self) -> float:
+        """When its newest state came [s]; -inf before the first."""
+        return self._heard
+
     def advances(self, t: float, writer: int) -> bool:
         """Return whether a state with stamp `t` [s] from `writer` is new, and remember it if so.
 

@@ -24,6 +24,7 @@ from golem.middleware.interrupt import LIFELINE, interrupted
 from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
+from golem.robots.sensors.profiles import load_profile
 from golem.runtime.live.exclusive_writers import LAUNCH, refuse_second_launch
 from golem.runtime.live.node_setup import log_line, member, until
 from golem.runtime.live.process import TwinConfig
@@ -74,6 +75,8 @@ def commands(config: LaunchConfig) -> dict[Part, list[str]]:
             "--limits",
             stack.limits,
             *(["--strict"] if config.strict else []),
+            *(["--stand"] if stack.on_ground else []),
+            *([] if load_profile(stack.profile).lives else ["--still"]),
             *estop,
             *dds,
         ],

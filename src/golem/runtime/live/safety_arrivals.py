@@ -1,7 +1,7 @@
 """What arrives at the safety process, stamped by its own clock.
 
 Nobody else's clock can thereby make something old look new. The robot's time serves only to tell a new state from a
-repeated one, and which state a command answers.
+repeated one, how far apart two states are, and which state a command answers.
 """
 
 from __future__ import annotations
@@ -11,20 +11,43 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import replace
 
+from golem.hardware.safety.base import SafetyLimits
+from golem.hardware.safety.motor_reports import EVERY, MotorReports, MotorWatch
 from golem.interfaces.payloads import Fault, Reason
-from golem.middleware.dds.base import Sample
+from golem.middleware.dds.base import Payload, Sample
 from golem.middleware.ros.waitset import WaitSet
-from golem.middleware.wire import convert
+from golem.middleware.wire import convert, hg
 from golem.middleware.wire.struct_layout import WireError
-from golem.robots.model.table import JOINT_NAMES
-from golem.runtime.live.clock import Rate, RobotClock
+from golem.runtime.live.clock import BACK, Rate, RobotClock
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.types import LowCommand, LowState
 
 REMEMBERED = 256
 """States whose time of arrival is remembered: half a second."""
-PERSISTENT = 25
-"""States in a row with a motor's error that are a fault [own: as many as stop the legs for a speed]."""
+
+
+class DamagedFrames:
+    """Counts damaged frames of one stream: one is dropped, a run of them is a fault.
+
+    Attributes:
+        dropped: how many there were.
+    """
+
+    def __init__(self, limits: SafetyLimits) -> None:
+        """Bear as many as `limits` say."""
+        self._most, self._leak, self._level = limits.bad_frames, limits.frame_leak, 0.0
+        self.dropped = 0
+
+    def bad(self) -> bool:
+        """Count one; return whether there are too many."""
+        self.dropped += 1
+        self._level = min(self._level + 1.0, self._most)
+        return self._level >= self._most
+
+    def good(self) -> None:
+        """Take note of a sound one."""
+        if self._level:
+            self._level = max(0.0, self._level - self._leak)
 
 
 class Arrivals:
@@ -36,12 +59,24 @@ class Arrivals:
         mode_machine: machine type that the robot reports; None before its first state.
         answered: robot time of the state that the newest command answers [s]; 0 where its sender does not say.
         rate: of the robot's time.
+        tick: the robot's own time of `state` [s].
+        damaged: damaged frames, by topic.
         sole: what reads each of the topics that one process alone may write.
     """
 
-    def __init__(self, endpoints: RoleEndpoints, clock: Callable[[], float]) -> None:
-        """Stamp by `clock` [s]."""
+    def __init__(
+        self,
+        endpoints: RoleEndpoints,
+        clock: Callable[[], float],
+        limits: SafetyLimits,
+        observe: Callable[[str, Payload, float], None] | None = None,
+    ) -> None:
+        """Stamp by `clock` [s], compare with `limits`, and show every frame to `observe`, sound or not."""
+        self._observe = observe
         self._clock = clock
+        self.tick = 0.0
+        self.damaged = {name: DamagedFrames(limits) for name in ("/lowstate", "/safety/lowcmd_in")}
+        self._motors, self._count = MotorWatch(limits), 0
         self.state: LowState | None = None
         self.command: LowCommand | None = None
         self._fault: Fault | None = None
@@ -50,7 +85,6 @@ class Arrivals:
         self.mode_machine: int | None = None
         self.answered = 0.0
         self.rate = Rate()
-        self._faulty = 0
         # Of each there is one: commands of two stacks would take turns, and states of two robots.
         self.sole = {
             "/lowstate": endpoints.receive("/lowstate", self._states, self._state),
@@ -70,37 +104,60 @@ class Arrivals:
 
     def _state(self, sample: Sample) -> None:
         now = self._clock()
+        if self._observe is not None:
+            self._observe("/lowstate", sample.payload, now)
         try:
             state = convert.decode_low_state(sample.payload)
         except WireError as error:
-            self._fault = Fault(Reason.STATE_DAMAGED, str(error))
+            if self.damaged["/lowstate"].bad():
+                self._fault = Fault(Reason.STATE_DAMAGED, str(error))
             return
+        self.damaged["/lowstate"].good()
+        known, before, heard = self._robot.known, self._robot.t, self._robot.heard
         if not self._robot.advances(state.t, sample.writer):
             return
-        self.mode_machine = convert.mode_machine(sample.payload)
+        ahead = (state.t - before) - (now - heard)
+        if known and (self._robot.restarted or ahead > BACK):
+            self._fault = Fault(Reason.STATE_JUMPED, f"by {state.t - before:+.3f} s in {now - heard:.3f} s")
         if self._robot.restarted:
             self._arrived.clear()
+        machine = convert.mode_machine(sample.payload)
+        if self.mode_machine not in (None, machine):
+            self._fault = Fault(
+                Reason.MOTOR_MODE, f"mode_machine changed from {self.mode_machine} to {machine}"
+            )
+        self.mode_machine = machine
         self._arrived[state.t] = now
         self.rate.add(state.t, now)
         if len(self._arrived) > REMEMBERED:
             self._arrived.popitem(last=False)
-        self.state = replace(state, t=now)
-        errors = convert.motor_errors(sample.payload)
-        self._faulty = self._faulty + 1 if errors else 0
-        if self._faulty >= PERSISTENT:
-            said = ", ".join(f"{JOINT_NAMES[i]} reports error {code:#x}" for i, code in errors.items())
-            self._fault = Fault(Reason.MOTOR, said)
+        self.state, self.tick = replace(state, t=now), state.t
+        self._count += 1
+        if self._count % EVERY == 0:
+            self._fault = self._motors.add(_reports(sample.payload)) or self._fault
 
     def _command(self, sample: Sample) -> None:
         now = self._clock()
+        if self._observe is not None:
+            self._observe("/safety/lowcmd_in", sample.payload, now)
         try:
             command = convert.decode_low_command(sample.payload, now, self.mode_machine or 0)
             answered = convert.answered(sample.payload)
         except WireError as error:
-            self._fault = Fault(Reason.COMMAND_DAMAGED, str(error))
+            if self.damaged["/safety/lowcmd_in"].bad():
+                self._fault = Fault(Reason.COMMAND_DAMAGED, str(error))
             return
-        if answered:
-            # As old as the state it answers; one that answers a state nobody remembers is too old for anything.
-            command = replace(command, t=self._arrived.get(answered, -math.inf))
+        self.damaged["/safety/lowcmd_in"].good()
+        if not answered:
+            self._fault = Fault(
+                Reason.COMMAND_UNSTAMPED, "reserve[0] is 0: copy the tick of the state it answers"
+            )
+            return
+        # As old as the state it answers; one that answers a state nobody remembers is too old for anything.
         self.answered = answered
-        self.command = command
+        self.command = replace(command, t=self._arrived.get(answered, -math.inf))
+
+
+def _reports(payload: Payload) -> MotorReports:
+    mode, error, temperature, voltage = convert.motor_columns(payload)
+    return MotorReports(mode == hg.ENABLE, error, temperature, voltage)

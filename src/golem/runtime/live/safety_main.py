@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import signal
 import time
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tyro.conf import OmitArgPrefixes
 
-from golem.errors import ConfigError
+from golem.errors import ConfigError, MissingExtra
 from golem.hardware.estop.estop_config import EstopConfig
 from golem.hardware.safety.base import SafetyLimits
 from golem.middleware.dds.domain import DdsConfig
@@ -20,6 +23,10 @@ from golem.runtime.live.node_setup import AsyncLogger, member, settle
 from golem.runtime.live.safety_process import SafetyProcess
 from golem.runtime.live.safety_status import report
 from golem.types import TICK
+
+if TYPE_CHECKING:
+    from golem.runtime.live.black_box import BlackBox
+    from golem.runtime.standing_legs import StandingLegs
 
 ROBOT_LIMITS = "urdf"
 """Limit profile of the real robot: the smaller torques."""
@@ -37,6 +44,12 @@ class SafetyConfig:
     """Limit profile to enforce: urdf or paper. The stack file's is not read here: the gate trusts no stack."""
     strict: bool = False
     """Stop a simulated robot as early as the real one for what is late: a busy machine then stops it."""
+    still: bool = False
+    """The sensors of the simulated robot have no noise (profile ideal): do not stop it where they stand still."""
+    stand: bool = False
+    """The robot stands on its feet: where a stop leaves state and legs sound, shipped legs go on standing."""
+    black_box: Path | None = Path("runs/stops")
+    """Folder for bags of what was heard and said from 5 s before each stop to 2 s after it; 'None' keeps nothing."""
     estop: EstopConfig = field(default_factory=EstopConfig)
     """The emergency stop. A real robot has none until its board is named."""
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
@@ -53,6 +66,16 @@ def run_safety(config: SafetyConfig) -> None:
     limits = SafetyLimits.from_profile(config.limits)
     if config.dds.robot and config.limits != ROBOT_LIMITS:
         raise ConfigError(f"The real robot is guarded with --limits {ROBOT_LIMITS}, not '{config.limits}'.")
+    if config.still:
+        if config.dds.robot:
+            raise ConfigError("A real robot's sensors never stand still: leave out --still.")
+        limits = limits.still()
+    standing: Callable[[], StandingLegs] | None = None
+    if config.stand:
+        # Imported here: without it this process has no module of a stack in it.
+        from golem.runtime.standing_legs import StandingLegs
+
+        standing = StandingLegs
     patient = not (config.strict or config.dds.robot)
     virtual = config.estop.use == "virtual"
     estop = None if virtual and config.dds.robot else config.estop.create()
@@ -65,9 +88,19 @@ def run_safety(config: SafetyConfig) -> None:
         refuse_second(participant, config.dds, "/lowcmd")
         who = partial(owner, participant)
         gate = SafetyProcess(
-            participant, node, limits, estop, who=who, patient=patient, real=config.dds.robot
+            participant,
+            node,
+            limits,
+            estop,
+            who=who,
+            patient=patient,
+            real=config.dds.robot,
+            standing=standing,
+            black_box=_black_box(config, tell),
         )
         tell(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
+        if config.still:
+            tell("Sensors that stand still do not stop the robot: --still.")
         if estop is None:
             tell(
                 "No emergency stop is here, so the gate stays shut; "
@@ -90,3 +123,14 @@ def run_safety(config: SafetyConfig) -> None:
                 time.sleep(TICK)
             raise
         report(said, gate.status, tell)
+
+
+def _black_box(config: SafetyConfig, tell: Callable[[str], None]) -> BlackBox | None:
+    if config.black_box is None:
+        return None
+    try:
+        from golem.runtime.live.black_box import BlackBox
+    except MissingExtra as error:
+        tell(f"There is no black box: {error}")
+        return None
+    return BlackBox(config.black_box, tell)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate, passive
+from golem.hardware.safety.standing_gate import StandingController, StandingGate
 from golem.interfaces.payloads import EstopMessage, Fault, GateState, GateStatus, Reason
 from golem.interfaces.ros_convert import diagnostic, diagnostics
-from golem.middleware.dds.base import Participant, Qos
+from golem.middleware.dds.base import Participant, Qos, Sample
 from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.msgs.diagnostic_msgs import DiagnosticStatus
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response, Trigger_Response
@@ -25,10 +27,15 @@ from golem.runtime.live.safety_arrivals import Arrivals
 from golem.runtime.live.safety_status import StatusReports, describe_status
 from golem.types import BaseEstimate, LowCommand
 
+if TYPE_CHECKING:  # it needs the extra 'record', the gate does not
+    from golem.runtime.live.black_box import BlackBox
+
 LOOK = 0.05
 """Time between two looks for other writers of the motors' command [s]."""
 WARY = 1.0
 """Time after a pause of the gate in which it is asked for nothing but a stop [s]."""
+FOREIGN = 0.1
+"""Time for which a command of another writer counts as reaching the motors [s]: their drives go limp without one."""
 DIAGNOSE = 1.0
 """Time between two diagnostics [s]."""
 
@@ -52,6 +59,8 @@ class SafetyProcess:
         who: Callable[[bytes], str] = bytes.hex,
         patient: bool = False,
         real: bool = False,
+        standing: Callable[[], StandingController] | None = None,
+        black_box: BlackBox | None = None,
     ) -> None:
         """Guard the robot on the domain.
 
@@ -65,25 +74,30 @@ class SafetyProcess:
             patient: whether the robot's time may stand still for a stack that is behind; see `live.pace`.
             real: whether the robot's own controllers must have let go of the motors first; a twin's move none. Its
                 motors must hear us then, and its time must run as ours does; that of a twin stands still at times.
+            standing: makes what the legs are given to where a stop leaves them and the state sound; None damps.
+            black_box: keeps what happened around each stop; None keeps nothing.
         """
         if patient:
             limits = sim_sync.relaxed_limits(limits)
         self._patient, self._damping, self._stall = patient, limits.damping, limits.stall
-        self._estop_age = limits.estop_age
+        self._estop_age, self._frozen = limits.estop_age, limits.frozen > 0.0
         self._node, self._clock, self._who = node, clock, who
         self._endpoints = endpoints = RoleEndpoints("safety", participant, node)
-        self._arrivals = Arrivals(endpoints, clock)
+        self._arrivals = Arrivals(endpoints, clock, limits, None if black_box is None else black_box.add)
+        self._black_box = black_box
         self.commands = self._arrivals.commands
         self._out = endpoints.writer("/lowcmd")
         # Best effort, as the robot's own reader may be: a reliable one does not see writers that are.
-        self._all_commands = endpoints.reader("/lowcmd", Qos(reliable=False, depth=1))
+        self._all_commands = endpoints.reader("/lowcmd", Qos(reliable=False, depth=8))
         self._switcher, self._real = MotionSwitcherClient.on(endpoints, clock), real
-        self._gate, self._estop = Gate(limits), estop
+        self._gate, self._estop = StandingGate(Gate(limits), standing), estop
+        self._gate.prepare()
         self._frame: EstopMessage | None = None
         self._base: BaseEstimate | None = None
         self._base_stamp = -math.inf
         self._crowded, self._unheard = "", ""
         self._listeners: set[bytes] | None = None
+        self._foreign = -math.inf
         self._looks, self._diagnoses, self._reports = Every(LOOK), Every(DIAGNOSE), StatusReports(endpoints)
         self._steps = 0
         self._ending, self._halts = False, False
@@ -113,6 +127,8 @@ class SafetyProcess:
             if self._real:
                 self._listen()
         self._switcher.poll()
+        if self._crowded and any(self._is_foreign(sample) for sample in self._all_commands.take(8)):
+            self._foreign = now
         self._judge(OperatorRequest.STOP if self._ending else OperatorRequest.NONE)
         if self._diagnoses.due(now):
             self._diagnose(now)
@@ -121,7 +137,10 @@ class SafetyProcess:
         """Ask for a stop, and return whether the gate has done damping, if it had anything to damp."""
         self._ending = True
         self.step()
-        return self.status.state not in (GateState.ACTIVE, GateState.STOP1)
+        over = self.status.state not in (GateState.ACTIVE, GateState.STOP2, GateState.STOP1)
+        if over and self._black_box is not None:
+            self._black_box.flush()
+        return over
 
     def damp(self) -> None:
         """Tell the motors to damp, whatever may have failed."""
@@ -144,11 +163,18 @@ class SafetyProcess:
                 OperatorRequest.NONE if early else request,
                 self._base,
                 self._fault(moving),
+                self._arrivals.tick,
             )
         )
         self._steps += 1
         self.command = result.command
         self.status = status = GateStatus(now, result.state, result.reason, result.detail)
+        if status.stopped and now - self._foreign < FOREIGN:
+            # To say "stopped" would be to lie: the motors follow whoever wrote last.
+            detail = f"ALARM, the motors get another's commands; stopped for {status.why}"
+            self.status = status = GateStatus(now, result.state, Reason.NOT_IN_CONTROL, detail)
+        if self._black_box is not None:
+            self._black_box.judge(before, status)
         self._halts = moving and status.state is not GateState.ACTIVE
         waited_for = self._patient and status.state is GateState.ACTIVE
         self._tell(result.command, self._arrivals.answered if waited_for else 0.0)
@@ -159,7 +185,10 @@ class SafetyProcess:
     def _fault(self, moving: bool) -> Fault | None:
         """Return what is wrong with the transport: what holds now, or else what came since the gate last ran."""
         fault = self._arrivals.take_fault()
-        doubts = [(self._estop_reason(), self._estop_fault()), (Reason.WRITERS, self._crowded)]
+        if self._crowded:
+            # Of two stacks, or two writers of commands, neither touches what the robot measures.
+            fault = Fault(Reason.WRITERS, self._crowded, not self._crowded.startswith("/lowstate"))
+        doubts = [(self._estop_reason(), self._estop_fault())]
         if self._real:
             # A robot that moves is not dropped for its clock: the unit was right, and what arrives may be late.
             clock = "" if moving or self._arrivals.mode_machine is None else self._arrivals.rate.doubt()
@@ -189,7 +218,13 @@ class SafetyProcess:
         theirs = self._real and bool(switcher.owner or (limp and not switcher.free)) and not self._halts
         machine = self._arrivals.mode_machine
         if machine is not None and self.status.state is not GateState.INIT and not theirs:
-            self._out.write(convert.encode_low_command(command, machine, answers))
+            payload = convert.encode_low_command(command, machine, answers)
+            self._out.write(payload)
+            if self._black_box is not None:
+                self._black_box.add("/lowcmd", payload, self._clock())
+
+    def _is_foreign(self, sample: Sample) -> bool:
+        return sample.alive and self._all_commands.writers().get(sample.writer) != self._out.guid
 
     def _crowd(self) -> str:
         """Return who else writes what one process alone may write; empty if nobody does."""
@@ -252,6 +287,9 @@ class SafetyProcess:
         }
         for name, frame in newest.items():
             values[f"age of {name} [ms]"] = "never seen" if frame is None else f"{(now - frame.t) * 1e3:.0f}"
+        for name, frames in self._arrivals.damaged.items():
+            values[f"damaged frames of {name}"] = frames.dropped
+        values["check of sensors that stand still"] = "on" if self._frozen else "off: declared still"
         values["on-board controller"] = self._switcher.owner or "none"
         level = DiagnosticStatus.ERROR if self.status.stopped else DiagnosticStatus.OK
         if self.status.state in (GateState.INIT, GateState.ARMED):

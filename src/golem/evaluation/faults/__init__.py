@@ -1,0 +1,1 @@
+"""Faults against the safety layer, and who judges what came of them."""

@@ -1,0 +1,104 @@
+"""The page of the faults that were tried, from a run of `golem faults`: `python -m golem.evaluation.faults.page`."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from golem.evaluation.faults.catalogue import FAULTS
+from golem.evaluation.faults.injection import FaultSource
+from golem.evaluation.harness.records import TrialRecord, read_records
+from golem.evaluation.metrics.text_table import TextTable
+
+
+@dataclass(frozen=True)
+class PageConfig:
+    """Write the page of the faults that were tried."""
+
+    run: Path = Path("runs/faults")
+    """Folder that `golem faults` wrote."""
+    out: Path = Path("docs/reference/faults.md")
+    """The page."""
+
+
+def page(records: Sequence[TrialRecord]) -> str:
+    """Return the page of the trials of one run, in Markdown."""
+    by_fault: dict[str, dict[str, TrialRecord]] = defaultdict(dict)
+    for record in records:
+        by_fault[str(record.case["fault"])][str(record.case["posture"])] = record
+    postures = sorted({str(record.case["posture"]) for record in records})
+    first = records[0]
+    parts = [
+        "# Safety: faults tried\n",
+        f"`golem faults --profile {first.profile} --seed {first.seed}` tries {len(by_fault)} faults on a robot that "
+        f"is {', '.join(postures)};\n`python -m golem.evaluation.faults.page` writes this page from its records. "
+        "One trial each. A judge that shares nothing\nwith the gate looks at every command that reached the motors, "
+        "and at what the robot really did. A cell says where the\nrobot was in the end (active, or the kind of "
+        "stop), after how many milliseconds of robot time the gate stopped it, and\nin bold what the judge did not "
+        "accept.\n",
+        _summary(records, postures).markdown() + "\n",
+    ]
+    for source in FaultSource:
+        rows = tuple(
+            (name, *(_cell(by_fault[name].get(posture)) for posture in postures))
+            for name in by_fault
+            if FAULTS[name].source is source
+        )
+        if rows:
+            parts.append(f"## {HEADS[source]}\n")
+            parts.append(TextTable("", ("fault", *postures), rows).markdown() + "\n")
+    return "\n".join(parts)
+
+
+HEADS = {
+    FaultSource.COMMAND: "Of commands",
+    FaultSource.DATA: "Of what the robot says",
+    FaultSource.DEVICE: "Of devices and processes",
+}
+
+
+def _summary(records: Sequence[TrialRecord], postures: Sequence[str]) -> TextTable:
+    rows = list[tuple[str, ...]]()
+    for source in FaultSource:
+        for posture in postures:
+            mine = [
+                r
+                for r in records
+                if r.case["posture"] == posture and FAULTS[str(r.case["fault"])].source is source
+            ]
+            if not mine:
+                continue
+            lost: dict[str, int] = defaultdict(int)
+            for record in mine:
+                if not record.success:
+                    lost[record.stage] += 1
+            others = ", ".join(f"{stage} {n}" for stage, n in sorted(lost.items())) or "none"
+            rows.append((source, posture, f"{sum(r.success for r in mine)} of {len(mine)}", others))
+    return TextTable("", ("source", "robot", "accepted", "others"), tuple(rows))
+
+
+def _cell(record: TrialRecord | None) -> str:
+    if record is None:
+        return "not tried"
+    state = "stop" if "reaction" in record.timings else "active"
+    for word in ("stop2", "stop1", "stop0"):
+        if word in record.detail:
+            state = word
+            break
+    reason = record.detail.partition(f"{state}, ")[2].partition(":")[0]
+    after = f" {reason}, {1e3 * record.timings['reaction']:.0f} ms" if "reaction" in record.timings else ""
+    return f"{state}{after}" if record.success else f"{state}{after} **{record.stage}**"
+
+
+def main() -> None:
+    """Write it."""
+    config = tyro.cli(PageConfig)
+    config.out.write_text(page(read_records(config.run / "trials.jsonl")), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

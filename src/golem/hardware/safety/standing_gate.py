@@ -1,0 +1,69 @@
+"""The gate with a controller behind it that can stand; the controller itself is whoever's runs the gate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Protocol
+
+from golem.errors import GolemError
+from golem.hardware.safety.base import GateInputs
+from golem.hardware.safety.gate import Gate
+from golem.hardware.safety.memory import GateMemory, GateResult
+from golem.interfaces.payloads import GateState
+from golem.types import Array, LowCommand, LowState
+
+
+class StandingController(Protocol):
+    """A controller that stands by the state alone."""
+
+    def start(self, state: LowState) -> None:
+        """Take the legs of the robot in `state`."""
+        ...
+
+    def step(self, state: LowState, damping: Array) -> LowCommand:
+        """Return what the motors are told in `state`: legs that stand, and `damping` (27,) for all others.
+
+        Raises:
+            GolemError: it failed.
+        """
+        ...
+
+
+class StandingGate:
+    """The gate, with a controller behind it that can stand.
+
+    Attributes:
+        gate: the gate.
+    """
+
+    def __init__(self, gate: Gate, make: Callable[[], StandingController] | None) -> None:
+        """Give the legs to what `make` makes, at the first stop that leaves them sound; None always damps."""
+        self.gate, self._make = gate, make
+        self._legs: StandingController | None = None
+
+    @property
+    def memory(self) -> GateMemory:
+        """What the gate remembers."""
+        return self.gate.memory
+
+    def prepare(self) -> None:
+        """Make the controller now: where the wall clock counts, it must not take its time at the stop."""
+        if self._make is not None and self._legs is None:
+            self._legs = self._make()
+
+    def step(self, inputs: GateInputs) -> GateResult:
+        """Run the gate, and the legs if they are the controller's."""
+        before = self.gate.memory
+        standing = None
+        if before.mode is GateState.STOP2 and self._legs is not None and inputs.state is not None:
+            try:
+                standing = self._legs.step(inputs.state, self.gate.limits.damping)
+            except GolemError:
+                standing = None  # the gate then damps
+        result = self.gate.step(replace(inputs, stands=self._make is not None, standing=standing))
+        if result.state is GateState.STOP2 and before.mode is not GateState.STOP2:
+            self.prepare()
+            assert self._legs is not None and result.memory.state is not None
+            self._legs.start(result.memory.state)
+        return result

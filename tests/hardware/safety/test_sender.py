@@ -1,0 +1,48 @@
+"""A sender that lets motors go, or shakes them, is found out; one that is merely strong is not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from golem.hardware.safety.base import SafetyLimits
+from golem.hardware.safety.sender import SenderMemory, examine_command
+from golem.interfaces.payloads import Fault, Reason
+from golem.types import LowCommand
+
+LIMITS = SafetyLimits.from_profile()
+
+
+def command(k: int, kp: float = 100.0, kd: float = 3.0, tau: float = 0.0) -> LowCommand:
+    zeros, ones = np.zeros(27), np.ones(27)
+    return LowCommand(0.002 * k, zeros, zeros, tau * ones, kp * ones, kd * ones)
+
+
+def run(*commands: LowCommand) -> tuple[list[bool], Fault | None]:
+    memory, followed, fault = SenderMemory(), list[bool](), None
+    for each in commands:
+        memory, follow, fault = examine_command(each, memory, LIMITS)
+        followed.append(follow)
+    return followed, fault
+
+
+def test_a_motor_that_was_held_is_not_let_go() -> None:
+    limp = command(1, 0.0, 0.0)
+    assert run(command(0), limp) == ([True, False], None)
+    _, fault = run(command(0), limp, limp, limp)
+    assert fault is not None and fault.reason is Reason.COMMAND_GAINS
+
+
+def test_motors_that_were_never_held_may_be_limp() -> None:
+    limp = command(0, 0.0, 0.0)
+    assert run(*[limp] * 10)[1] is None
+
+
+def test_negative_gains_are_a_fault_of_the_sender() -> None:
+    _, fault = run(*[command(0, kp=-1.0)] * 3)
+    assert fault is not None and fault.reason is Reason.COMMAND_GAINS
+
+
+def test_torques_that_go_to_and_fro_are_a_fault_and_one_reversal_is_none() -> None:
+    assert run(command(0, tau=200.0), *[command(1, tau=-200.0)] * 20)[1] is None
+    _, fault = run(*[command(k, tau=300.0 * (-1) ** k) for k in range(8)])
+    assert fault is not None and fault.reason is Reason.COMMAND_REVERSALS

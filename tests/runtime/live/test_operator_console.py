@@ -1,0 +1,34 @@
+"""Enter presses the emergency stop of a gate that was found before; other words ask for what they say."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tests.runtime.live.conftest import Live
+
+from golem.interfaces.payloads import GateState
+from golem.runtime.live.operator_console import Console
+from golem.types import TICK
+
+
+def test_enter_presses_and_words_are_asked_for(live: Live) -> None:
+    live.activate()
+    said: list[str] = []
+    states: list[GateState] = []
+    _, node = live.member("console")
+
+    def wait(answer: Any) -> Any:
+        for _ in range(50):
+            live.run(TICK)
+            node.poll()
+            if answer.done:
+                break
+        live.run(0.02)
+        states.append(live.state)
+        return answer.result()
+
+    console = Console(node, wait, said.append)
+    console.connect("start it")
+    console.run(["\n", "release\n", "reste\n", "reset\n", "activate\n"])
+    assert states == [GateState.STOP1, GateState.STOP1, GateState.ARMED, GateState.ACTIVE]
+    assert said[0] == "pressed" and "Did you mean 'reset'?" in said[2] and said[-1] == "active"
