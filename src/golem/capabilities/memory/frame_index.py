@@ -1,0 +1,116 @@
+"""A memory of frames: each is one vector with a place and a time, and the nearest ones to the words answer.
+
+After ReMEmbR (Anwar et al., 2025) without its language model: what was true once answers as well as what is true now.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.capabilities.memory.base import Observation, Place, When, check_observation, check_query
+from golem.capabilities.memory.frame_encoder import BagOfLabels
+from golem.errors import ConfigError
+from golem.types import Array
+
+WINDOW = 0.25
+"""Share of the image's width and height, about its middle, whose median depth tells where a frame looks."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameIndexConfig:
+    """How frames are remembered.
+
+    Attributes:
+        spread: places closer to a better one than this are left out of an answer [m].
+        least: least similarity of an answer, 0 to 1.
+        most: most frames; the oldest are forgotten first.
+    """
+
+    spread: float = 0.5
+    least: float = 0.05
+    most: int = 100_000
+
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning.
+
+        Raises:
+            ConfigError: an option is out of range.
+        """
+        if not (self.spread >= 0.0 and 0.0 <= self.least <= 1.0 and self.most > 0):
+            raise ConfigError(
+                "Of frame_index, spread is at least 0, least is from 0 to 1, and most is above 0."
+            )
+
+
+class FrameIndex:
+    """Frames by what they look like."""
+
+    def __init__(self, config: FrameIndexConfig | None = None) -> None:
+        """Remember nothing yet."""
+        self._config = config or FrameIndexConfig()
+        self._encoder = BagOfLabels()
+        self._vectors: list[Array] = []
+        self._places: list[Array] = []
+        self._times: list[float] = []
+
+    def observe(self, observation: Observation) -> None:
+        """See `Memory.observe`."""
+        check_observation(observation, self._times[-1] if self._times else -math.inf)
+        self._vectors.append(self._encoder.frame(observation))
+        self._places.append(_looked_at(observation))
+        self._times.append(observation.frame.t)
+        over = len(self._times) - self._config.most
+        if over > 0:
+            del self._vectors[:over], self._places[:over], self._times[:over]
+
+    def query(self, text: str, when: When = "now", at: float | None = None, limit: int = 5) -> list[Place]:
+        """See `Memory.query`; `when` counts for nothing but `at`, before which the frames have to be."""
+        check_query(text, when, at, limit)
+        wanted = self._encoder.text(text)
+        if not self._times or not wanted.any():
+            return []
+        similar = np.array(self._vectors) @ wanted
+        if when == "at" and at is not None:
+            similar[np.array(self._times) > at] = 0.0
+        return self._apart(text, similar, np.argsort(-similar, kind="stable"), limit)
+
+    def _apart(self, text: str, similar: Array, order: NDArray[np.intp], limit: int) -> list[Place]:
+        out: list[Place] = []
+        for k in order:
+            if similar[k] < self._config.least or len(out) == limit:
+                break
+            place, t = self._places[k], self._times[k]
+            if all(np.linalg.norm(place - other.position) > self._config.spread for other in out):
+                out.append(Place(text, place, float(min(similar[k], 1.0)), t, t, "similar"))
+        return out
+
+    def forget(self, text: str) -> int:
+        """See `Memory.forget`: frames that are most similar to the words go."""
+        check_query(text, "anywhere", None, 1)
+        wanted = self._encoder.text(text)
+        kept = [k for k, vector in enumerate(self._vectors) if vector @ wanted < self._config.least]
+        count = len(self._vectors) - len(kept)
+        self._vectors = [self._vectors[k] for k in kept]
+        self._places = [self._places[k] for k in kept]
+        self._times = [self._times[k] for k in kept]
+        return count
+
+    def close(self) -> None:
+        """See `Memory.close`."""
+
+
+def _looked_at(observation: Observation) -> Array:
+    """Return the (3,) point at which the middle of a frame looks; the eye itself where there is no depth."""
+    frame = observation.frame
+    height, width = frame.depth.shape
+    rows, columns = (
+        slice(round(n * (0.5 - WINDOW / 2)), round(n * (0.5 + WINDOW / 2))) for n in (height, width)
+    )
+    window = frame.depth[rows, columns]
+    valid = window[window > 0.0]
+    depth = float(np.median(valid)) if len(valid) else 0.0
+    return frame.T_odom_optical[:3, :3] @ (0.0, 0.0, depth) + frame.T_odom_optical[:3, 3]

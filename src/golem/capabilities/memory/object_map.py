@@ -1,0 +1,268 @@
+"""A memory of objects: looks are put to objects by their places, and a look through a place takes its object away."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from golem.capabilities.memory.base import (
+    Evidence,
+    Observation,
+    Place,
+    When,
+    check_observation,
+    check_query,
+)
+from golem.capabilities.memory.look import Look, look_at
+from golem.capabilities.memory.memory_file import MemoryFile
+from golem.capabilities.memory.object_records import (
+    BELIEF,
+    COLUMNS,
+    FIRST,
+    GONE,
+    LAST,
+    LOOKS,
+    SIZE,
+    VARIANCE,
+    ObjectRecords,
+)
+from golem.capabilities.memory.words import label_scores
+from golem.errors import ConfigError
+from golem.types import Array, LocalizedObject
+
+PLACE = slice(0, 3)
+FORBIDDEN = 1e9
+"""Cost of a pair outside the gate."""
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectMapConfig:
+    """How objects are remembered.
+
+    Attributes:
+        file: where they are kept; None keeps them in this process alone.
+        gate: distance at which a look can no longer be of an object, in standard deviations of both.
+        depth_noise: standard deviation of a position at 1 m, growing with the square of the distance [m].
+        found: log odds of one detection of score 1.
+        missed: the same of a look at a place whose object was not detected though nothing hides it.
+        through: the same of a look through the place.
+        ceiling: highest log odds; below `-through`, so that one look through a place is enough.
+        most: most objects that are kept; the longest gone are forgotten first, then the longest unseen.
+    """
+
+    file: str | None = None
+    gate: float = 3.0
+    depth_noise: float = 0.01
+    found: float = 1.5
+    missed: float = -0.5
+    through: float = -3.0
+    ceiling: float = 2.5
+    most: int = 10_000
+
+    def __post_init__(self) -> None:
+        """Refuse what has no meaning.
+
+        Raises:
+            ConfigError: an option is out of range.
+        """
+        if not (
+            self.gate > 0 and self.depth_noise > 0 and self.found > 0 and self.ceiling > 0 and self.most > 0
+        ):
+            raise ConfigError(
+                "The options gate, depth_noise, found, ceiling and most of object_map are above 0."
+            )
+        if not (self.missed <= 0 and self.through < 0):
+            raise ConfigError("The options missed and through of object_map are log odds below 0.")
+
+
+class ObjectMap:
+    """The objects that were seen, where they are, and where they were."""
+
+    def __init__(self, config: ObjectMapConfig | None = None) -> None:
+        """Open the memory.
+
+        Raises:
+            MemoryFault: the file cannot be used.
+        """
+        self._config = config or ObjectMapConfig()
+        self._records = ObjectRecords()
+        self._last = -math.inf
+        self._file = None if self._config.file is None else MemoryFile(Path(self._config.file))
+        if self._file is not None:
+            self._read(self._file)
+
+    def _read(self, file: MemoryFile) -> None:
+        self._records = ObjectRecords()
+        rows, self._last = file.read()
+        for row in rows:
+            self._records.add(row.label, row.values, row.number)
+
+    def __len__(self) -> int:
+        """Return how many objects are remembered, gone ones included."""
+        return len(self._records)
+
+    def observe(self, observation: Observation) -> None:
+        """See `Memory.observe`."""
+        check_observation(observation, self._last)
+        changed = self._match(observation) | self._miss(observation)
+        removed = self._bound()
+        self._last = observation.frame.t
+        self._keep(changed - removed, removed)
+
+    def _keep(self, changed: set[int], removed: set[int]) -> None:
+        if self._file is None:
+            return
+        try:
+            self._file.write([self._records.row(number) for number in sorted(changed)], removed, self._last)
+        except BaseException:
+            self._read(self._file)
+            raise
+
+    def _match(self, observation: Observation) -> set[int]:
+        """Put each detection to an object that may be there, or make a new one; return their numbers."""
+        config, records, frame = self._config, self._records, observation.frame
+        eye = frame.T_odom_optical[:3, 3]
+        changed: set[int] = set()
+        for label in dict.fromkeys(found.label for found in observation.objects):
+            seen = [found for found in observation.objects if found.label == label]
+            places = np.array([found.position for found in seen])
+            far = np.linalg.norm(places - eye, axis=1)
+            variances = observation.pose_sigma**2 + (config.depth_noise * far**2) ** 2
+            rows = records.rows(label)
+            rows = rows[np.isinf(records.values[rows, GONE])]
+            known = records.values[rows]
+            distance = np.linalg.norm(places[:, None] - known[None, :, PLACE], axis=2)
+            reach = known[:, SIZE] + config.gate * np.sqrt(variances[:, None] + known[None, :, VARIANCE])
+            pairs = np.full(
+                (len(seen), len(seen)), FORBIDDEN / 2
+            )  # to each detection a new object of its own
+            cost = np.hstack([np.where(distance <= reach, distance, FORBIDDEN), pairs])
+            for k, column in zip(*linear_sum_assignment(cost), strict=True):
+                gain = config.found * seen[k].detection.score
+                if column < len(rows):
+                    row = rows[column]
+                    _update(records.values[row], places[k], variances[k], gain, config.ceiling, frame.t)
+                    changed.add(int(records.numbers[row]))
+                else:
+                    values = np.array(
+                        [*places[k], variances[k], _size(seen[k]), gain, frame.t, frame.t, math.inf, 1.0]
+                    )
+                    changed.add(records.add(label, values))
+        return changed
+
+    def _miss(self, observation: Observation) -> set[int]:
+        """Doubt the objects that should have been seen; return the numbers of those that are doubted more."""
+        config, records, frame = self._config, self._records, observation.frame
+        asked = [records.rows(label) for label in dict.fromkeys(observation.labels)]
+        rows = np.concatenate(asked) if asked else np.empty(0, np.intp)
+        values = records.values
+        rows = rows[np.isinf(values[rows, GONE]) & (values[rows, LAST] < frame.t)]
+        sigmas = np.sqrt(values[rows, VARIANCE] + observation.pose_sigma**2)
+        changed: set[int] = set()
+        for row, look in zip(
+            rows, look_at(frame, values[rows, PLACE], values[rows, SIZE], sigmas), strict=True
+        ):
+            if look in (Look.THROUGH, Look.EMPTY):
+                values[row, BELIEF] += config.through if look is Look.THROUGH else config.missed
+                if values[row, BELIEF] < 0.0:
+                    values[row, GONE] = frame.t
+                changed.add(int(records.numbers[row]))
+        return changed
+
+    def _bound(self) -> set[int]:
+        """Forget what is too much; return the numbers."""
+        over = len(self._records) - self._config.most
+        if over <= 0:
+            return set()
+        values = self._records.values
+        worth = np.where(np.isinf(values[:, GONE]), values[:, LAST] + 1e12, values[:, GONE])
+        removed = {int(n) for n in self._records.numbers[np.argsort(worth, kind="stable")[:over]]}
+        for number in removed:
+            self._records.remove(number)
+        return removed
+
+    def query(self, text: str, when: When = "now", at: float | None = None, limit: int = 5) -> list[Place]:
+        """See `Memory.query`.
+
+        Now, the object that was seen last comes first; objects that are gone are only named, as moved, where none of
+        their kind is left. In history, where it was last comes first.
+        """
+        check_query(text, when, at, limit)
+        places = [
+            place
+            for label, score in label_scores(text, self._records.labels).items()
+            for place in self._places(label, score, when, at)
+        ]
+        return sorted(places, key=lambda p: (-p.score, -p.last_seen))[:limit]
+
+    def _places(self, label: str, score: float, when: When, at: float | None) -> list[Place]:
+        records = self._records
+        rows = records.rows(label)
+        values = records.values[rows]
+        there = np.isinf(values[:, GONE])
+        absent: Evidence = "moved" if when == "now" else "gone"
+        if when == "now":
+            chosen = there if there.any() else ~there
+        elif when == "history":
+            chosen = ~there
+        elif when == "at":
+            assert at is not None
+            chosen = (values[:, FIRST] <= at) & (at < values[:, GONE])
+        else:
+            chosen = np.ones(len(rows), bool)
+        return [
+            Place(
+                label, value[PLACE].copy(), score, float(value[FIRST]), float(value[LAST]),
+                "seen" if math.isinf(value[GONE]) else absent,
+                {"belief": float(value[BELIEF]), "looks": float(value[LOOKS]),
+                 "sigma": float(np.sqrt(value[VARIANCE]))},
+            )
+            for value in values[chosen]
+        ]  # fmt: skip
+
+    def forget(self, text: str) -> int:
+        """See `Memory.forget`."""
+        check_query(text, "anywhere", None, 1)
+        numbers = {
+            int(self._records.numbers[row])
+            for label in label_scores(text, self._records.labels)
+            for row in self._records.rows(label)
+        }
+        for number in numbers:
+            self._records.remove(number)
+        self._keep(set(), numbers)
+        return len(numbers)
+
+    def close(self) -> None:
+        """See `Memory.close`."""
+        if self._file is not None:
+            self._file.close()
+
+
+def _update(row: Array, place: Array, variance: float, gain: float, ceiling: float, t: float) -> None:
+    """Put a look at `place` to an object, whose row is changed.
+
+    The variance does not fall below a quarter of the look's: the errors of poses are those of a drift, and do not
+    average out.
+    """
+    fused = 1.0 / (1.0 / row[VARIANCE] + 1.0 / variance)
+    row[PLACE] += fused / variance * (place - row[PLACE])
+    row[VARIANCE] = max(fused, variance / 4.0)
+    row[BELIEF] = min(row[BELIEF] + gain, ceiling)
+    row[LAST] = t
+    row[LOOKS] += 1.0
+
+
+def _size(found: LocalizedObject) -> float:
+    """Return the radius of an object [m], by the spread of its points."""
+    if len(found.points) < 4:
+        return 0.03
+    spread = np.median(np.linalg.norm(found.points - np.median(found.points, axis=0), axis=1))
+    return float(np.clip(1.5 * spread, 0.02, 0.3))
+
+
+assert len(COLUMNS) == LOOKS + 1

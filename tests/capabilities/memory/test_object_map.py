@@ -1,0 +1,247 @@
+"""What the memory of objects says after looks that showed, missed, hid or looked through things."""
+
+from __future__ import annotations
+
+import math
+import sqlite3
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.capabilities.memory.room import T_LOOK, look
+
+from golem.capabilities.memory.base import Memory, MemoryFault
+from golem.capabilities.memory.object_map import ObjectMap, ObjectMapConfig
+from golem.errors import ConfigError, GolemError
+
+HERE, THERE = (1.4, 0.3, 1.1), (1.6, -0.35, 1.2)
+
+
+def test_it_is_a_memory() -> None:
+    assert isinstance(ObjectMap(), Memory)
+
+
+def test_what_was_seen_is_where_it_was_seen() -> None:
+    memory = ObjectMap()
+    memory.observe(look(1.0, {"mug": HERE, "can": THERE}))
+    memory.observe(look(2.0, {"mug": HERE, "can": THERE}))
+    (place,) = memory.query("the red cup")
+    np.testing.assert_allclose(place.position, HERE, atol=1e-6)
+    assert (place.label, place.evidence, place.first_seen, place.last_seen) == ("mug", "seen", 1.0, 2.0)
+    assert place.facts["looks"] == 2.0
+    assert memory.query("bowl") == [] and memory.query("xylophone") == []
+
+
+def test_what_was_moved_is_where_it_was_seen_last_and_its_old_place_is_history() -> None:
+    memory = ObjectMap()
+    for t in (1.0, 2.0):
+        memory.observe(look(t, {"mug": HERE}))
+    memory.observe(look(10.0, {"mug": THERE}))
+    now, past = memory.query("mug"), memory.query("mug", "history")
+    assert [p.position.round(2).tolist() for p in now] == [list(THERE)]
+    assert [p.position.round(2).tolist() for p in past] == [list(HERE)] and past[0].evidence == "gone"
+    assert [p.position.round(2).tolist() for p in memory.query("mug", "at", at=1.5)] == [list(HERE)]
+    assert memory.query("mug", "at", at=0.5) == []
+    assert len(memory.query("mug", "anywhere")) == 2
+
+
+def test_what_is_gone_is_answered_as_moved() -> None:
+    memory = ObjectMap()
+    memory.observe(look(1.0, {"mug": HERE}))
+    memory.observe(look(5.0, {}))
+    (place,) = memory.query("mug")
+    assert place.evidence == "moved" and place.last_seen == 1.0
+
+
+def test_what_is_hidden_stays() -> None:
+    memory = ObjectMap()
+    memory.observe(look(1.0, {"mug": HERE}))
+    for t in range(2, 30):
+        memory.observe(look(float(t), {}, hiding=(0.8, 0.17, 1.15)))
+    assert memory.query("mug")[0].evidence == "seen"
+
+
+def test_one_missed_detection_does_not_take_an_object_away_but_many_do() -> None:
+    memory = ObjectMap()
+    memory.observe(look(1.0, {"mug": HERE}))
+    memory.observe(look(2.0, {"mug": HERE}, seen=()))
+    assert memory.query("mug")[0].evidence == "seen"
+    for t in range(3, 9):
+        memory.observe(look(float(t), {"mug": HERE}, seen=()))
+    assert memory.query("mug")[0].evidence == "moved"
+
+
+def test_what_was_not_asked_for_is_not_missed() -> None:
+    memory = ObjectMap()
+    memory.observe(look(1.0, {"mug": HERE}))
+    memory.observe(look(2.0, {}, labels=("can",)))
+    assert memory.query("mug")[0].evidence == "seen"
+
+
+def test_two_equal_objects_are_two() -> None:
+    memory = ObjectMap()
+    beside = (1.4, 0.15, 1.1)
+    for t in (1.0, 2.0, 3.0):
+        memory.observe(look(t, {"mug1": HERE, "mug2": beside}))
+    assert len(memory) == 2
+    memory.observe(look(4.0, {"mug2": beside}))
+    assert [p.position.round(2).tolist() for p in memory.query("mug")] == [list(beside)]
+
+
+def test_a_drifting_pose_makes_one_object_of_one() -> None:
+    memory = ObjectMap()
+    rng = np.random.default_rng(1)
+    for t in range(20):
+        believed = T_LOOK.copy()
+        believed[:3, 3] += rng.normal(0.0, 0.05, 3)
+        memory.observe(look(float(t), {"mug": HERE}, believed=believed, pose_sigma=0.05))
+    assert len(memory) == 1
+    assert np.linalg.norm(memory.query("mug")[0].position - HERE) < 0.06
+
+
+def test_what_is_forgotten_is_not_remembered() -> None:
+    memory = ObjectMap()
+    memory.observe(look(1.0, {"mug": HERE, "can": THERE}))
+    assert memory.forget("cup") == 1
+    assert memory.query("mug", "anywhere") == [] and len(memory.query("can")) == 1
+
+
+def test_the_longest_gone_are_forgotten_first() -> None:
+    memory = ObjectMap(ObjectMapConfig(most=2))
+    memory.observe(look(1.0, {"mug": HERE}))
+    memory.observe(look(2.0, {"can": THERE}))
+    memory.observe(look(3.0, {"can": THERE, "bowl": (1.5, 0.0, 0.9)}))
+    assert memory.query("mug", "anywhere") == []
+    assert [len(memory.query(label)) for label in ("can", "bowl")] == [1, 1]
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"t": math.nan}, "time of an observation is not finite"),
+        ({"t": 0.5}, "older than the last one"),
+        ({"T_odom_optical": np.full((4, 4), np.nan)}, "pose of an observation is not finite"),
+    ],
+)
+def test_a_look_that_cannot_be_is_refused_and_changes_nothing(change: dict[str, object], why: str) -> None:
+    memory = ObjectMap()
+    memory.observe(look(1.0, {"mug": HERE}))
+    bad = look(2.0, {"can": THERE})
+    with pytest.raises(MemoryFault, match=why):
+        memory.observe(replace(bad, frame=replace(bad.frame, **change)))  # pyright: ignore[reportArgumentType]
+    assert len(memory) == 1 and memory.query("mug")[0].last_seen == 1.0
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ({"text": " "}, "query is empty"),
+        ({"text": "x" * 10_000_000}, "10000000 characters"),
+        ({"text": "mug", "when": "yesterday"}, "yesterday"),
+        ({"text": "mug", "when": "at"}, "needs a finite time"),
+        ({"text": "mug", "limit": 0}, "at least one place"),
+    ],
+)
+def test_a_question_that_cannot_be_is_refused(words: dict[str, object], why: str) -> None:
+    with pytest.raises(GolemError, match=why):
+        ObjectMap().query(**words)  # pyright: ignore[reportArgumentType]
+
+
+def test_options_without_a_meaning_are_refused() -> None:
+    with pytest.raises(ConfigError, match="above 0"):
+        ObjectMapConfig(gate=0.0)
+    with pytest.raises(ConfigError, match="below 0"):
+        ObjectMapConfig(through=1.0)
+
+
+def test_a_file_is_read_again(tmp_path: Path) -> None:
+    config = ObjectMapConfig(str(tmp_path / "deep" / "memory.db"))
+    memory = ObjectMap(config)
+    memory.observe(look(1.0, {"mug": HERE, "can": THERE}))
+    memory.observe(look(2.0, {"can": THERE}))
+    memory.forget("bowl")
+    before = [memory.query(word, "anywhere") for word in ("mug", "can")]
+    memory.close()
+    again = ObjectMap(config)
+    for old, new in zip(before, [again.query(word, "anywhere") for word in ("mug", "can")], strict=True):
+        for a, b in zip(old, new, strict=True):
+            np.testing.assert_array_equal(a.position, b.position)
+            assert replace(a, position=b.position) == b
+    with pytest.raises(MemoryFault, match="older"):
+        again.observe(look(1.5, {}))
+    again.close()
+
+
+def test_a_file_belongs_to_one_process(tmp_path: Path) -> None:
+    config = ObjectMapConfig(str(tmp_path / "memory.db"))
+    first = ObjectMap(config)
+    with pytest.raises(MemoryFault, match="another process has it open"):
+        ObjectMap(config)
+    first.close()
+    ObjectMap(config).close()
+
+
+def test_a_broken_or_foreign_file_is_refused(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.db"
+    broken.write_bytes(b"no database" * 400)
+    with pytest.raises(MemoryFault, match=r"broken\.db cannot be used"):
+        ObjectMap(ObjectMapConfig(str(broken)))
+    foreign = sqlite3.connect(tmp_path / "foreign.db")
+    foreign.execute("CREATE TABLE cats (name TEXT)")
+    foreign.commit()
+    foreign.close()
+    with pytest.raises(MemoryFault, match="no memory of this version"):
+        ObjectMap(ObjectMapConfig(str(tmp_path / "foreign.db")))
+
+
+def test_a_full_disk_is_said_and_the_memory_is_as_it_was(tmp_path: Path) -> None:
+    memory = ObjectMap(ObjectMapConfig(str(tmp_path / "memory.db")))
+    memory.observe(look(1.0, {"mug": HERE}))
+    assert memory._file is not None
+    memory._file._base.execute("PRAGMA max_page_count=1")
+    one = look(2.0, {"can": THERE}, labels=())
+    (can,) = one.objects
+    shifts = np.linspace(0.0, 60.0, 200)[:, None] * (0.0, 1.0, 0.0)
+    cans = [replace(can, position=can.position + shift) for shift in shifts]
+    with pytest.raises(MemoryFault, match="full"):
+        memory.observe(replace(one, objects=cans))
+    assert len(memory) == 1
+    assert memory.query("mug")[0].last_seen == 1.0
+
+
+WRITER = """
+import sys
+from dataclasses import replace
+from tests.capabilities.memory.room import look
+from golem.capabilities.memory.object_map import ObjectMap, ObjectMapConfig
+memory = ObjectMap(ObjectMapConfig(sys.argv[1]))
+t = memory._last if len(memory) else 0.0
+one = look(t, {"mug": (1.4, 0.3, 1.1)})
+while True:
+    t += 1.0
+    memory.observe(replace(one, frame=replace(one.frame, t=t)))
+    print(t, flush=True)
+"""
+
+
+@pytest.mark.slow
+def test_what_was_acknowledged_survives_a_kill(tmp_path: Path) -> None:
+    path = tmp_path / "memory.db"
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        writer = subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, text=True
+        )
+        assert writer.stdout is not None
+        first = writer.stdout.readline()
+        time.sleep(float(rng.uniform(0.0, 0.1)))
+        writer.kill()
+        said = [first, *writer.stdout.readlines()]
+        writer.wait()
+        memory = ObjectMap(ObjectMapConfig(str(path)))
+        assert memory.query("mug")[0].last_seen >= float([line for line in said if line.endswith("\n")][-1])
+        memory.close()
