@@ -144,7 +144,7 @@ class Pick:
                 await self._extract(context, attempt)
                 return
             except StageFailed as failure:
-                if law is None or count == self._config.attempts:
+                if law is None or count == self._config.attempts or outcome_of(failure) is PickOutcome.TIGHT:
                     raise
                 context.say(failure.stage, f"{failure} Trying again.")
                 context.hands[attempt.side].open(grasp.gap)
@@ -190,6 +190,9 @@ class Pick:
                     elif step.status is ServoStatus.LOST:
                         text = f"The palm camera lost the {attempt.label}."
                         raise PickFailed(PickOutcome.NOTHING_THERE, "servo", "localizer", text)
+                    elif step.status is ServoStatus.TIGHT:
+                        text = f"The {attempt.label} stands no higher than a tight one."
+                        raise PickFailed(PickOutcome.TIGHT, "servo", "grasp_method", text)
                     elif step.status is ServoStatus.STALLED:
                         text = "The hand makes no progress towards the target."
                         raise PickFailed(PickOutcome.OUT_OF_REACH, "servo", "upper_body", text)

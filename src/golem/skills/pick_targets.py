@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.capabilities.arms.reach_map import load_map
+from golem.capabilities.grasping.ground import height_above_ground
 from golem.interfaces.payloads import Detections
 from golem.skills.context import Context
 from golem.skills.pick_config import PickConfig, PickGoal
@@ -38,7 +39,10 @@ class TargetChoice:
         self._config = config
 
     async def look(self, context: Context, goal: PickGoal) -> tuple[list[Attempt], LocalizedObject]:
-        """Look once with the head camera: the reachable objects, the most comfortable first, and the container."""
+        """Look once with the head camera: the reachable objects and the container.
+
+        Those that stand proud come first, and of them the most comfortable ones.
+        """
         context.say("detect", f"Looking for a {goal.label} and a {goal.container}.")
         sides: tuple[Side, ...] = SIDES if goal.side == "either" else (goal.side,)
         with context.watch("head", goal.label, goal.container) as eye:
@@ -64,7 +68,7 @@ class TargetChoice:
                 outcome = PickOutcome.TRAY_MISSING if container is None and seen else outcome
         if goal.side == "either":
             attempts = [a for a in attempts if self._serves(context, a.side, container)] or attempts
-        attempts.sort(key=lambda a: self._discomfort(context, a.side, a.target))
+        attempts.sort(key=lambda a: (self._stands_low(a.target), self._discomfort(context, a.side, a.target)))
         chosen = attempts[: self._config.candidates]
         text = f"{len(attempts)} {goal.label}s in reach."
         context.say("detect", text, target=chosen[0].target.position.tolist())
@@ -98,6 +102,11 @@ class TargetChoice:
     def _serves(self, context: Context, side: Side, container: LocalizedObject) -> bool:
         """Return whether a hand need not reach across the body to the container."""
         return bool(_in_base(context, side, container.position)[1] <= self._config.workspace[3])
+
+    def _stands_low(self, o: LocalizedObject) -> bool:
+        """Return whether an object looks as if it were screwed down; the head camera is not sure of it."""
+        height = height_above_ground(o)
+        return height is not None and height < self._config.proud
 
     def _discomfort(self, context: Context, side: Side, o: LocalizedObject) -> float:
         x, y, _ = _in_base(context, side, o.position)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from golem.capabilities.grasping.ground import MIN_POINTS, ground_normal
+from golem.capabilities.grasping.ground import MIN_POINTS, ground_plane, height_above_ground
 from golem.types import Array, Detection, LocalizedObject
 
 TOP = np.array([0.43, -0.14, -0.03])
@@ -32,35 +34,42 @@ def normal_of(slope: tuple[float, float]) -> Array:
 
 
 @pytest.mark.parametrize("slope", [(0.0, 0.0), (0.1, 0.0), (0.0, -0.1), (0.08, 0.05)])
-def test_the_normal_of_a_plane_is_found(slope: tuple[float, float]) -> None:
-    normal = ground_normal(sighting(slope))
-    assert normal is not None
-    np.testing.assert_allclose(normal, normal_of(slope), atol=1e-9)
+def test_the_plane_and_the_height_above_it_are_found(slope: tuple[float, float]) -> None:
+    plane = ground_plane(sighting(slope))
+    assert plane is not None
+    np.testing.assert_allclose(plane[0], normal_of(slope), atol=1e-9)
+    np.testing.assert_allclose(plane[1], 0.010 * normal_of(slope)[2], atol=1e-9)
 
 
 def test_noise_of_a_millimetre_turns_it_by_less_than_a_degree() -> None:
-    normal = ground_normal(sighting((0.05, 0.0), noise=0.001))
-    assert normal is not None
-    assert np.degrees(np.arccos(normal @ normal_of((0.05, 0.0)))) < 1.0
+    plane = ground_plane(sighting((0.05, 0.0), noise=0.001))
+    assert plane is not None
+    assert np.degrees(np.arccos(plane[0] @ normal_of((0.05, 0.0)))) < 1.0
 
 
 def test_a_step_in_the_ground_is_left_out() -> None:
     step = TOP + np.array([[0.02, y, -0.030] for y in np.linspace(-0.02, 0.02, 15)])
-    normal = ground_normal(sighting((0.0, 0.0), extra=step))
-    assert normal is not None
-    assert np.degrees(np.arccos(normal[2])) < 2.0
+    plane = ground_plane(sighting((0.0, 0.0), extra=step))
+    assert plane is not None
+    assert np.degrees(np.arccos(plane[0][2])) < 2.0
 
 
-def test_too_few_points_give_no_normal() -> None:
-    assert ground_normal(sighting((0.0, 0.0), n=7)) is None
+def test_too_few_points_give_no_plane() -> None:
+    assert ground_plane(sighting((0.0, 0.0), n=7)) is None
     assert 7 * 7 < MIN_POINTS
 
 
 def test_a_wall_is_no_ground() -> None:
-    assert ground_normal(sighting((0.39, 0.0))) is None
+    assert ground_plane(sighting((0.39, 0.0))) is None
 
 
-def test_points_in_one_line_give_no_normal() -> None:
+def test_points_in_one_line_give_no_plane() -> None:
     thing = sighting((0.0, 0.0))
     thing.points[:, 1] = TOP[1]
-    assert ground_normal(thing) is None
+    assert ground_plane(thing) is None
+
+
+def test_the_height_needs_no_plane() -> None:
+    thing = sighting((0.0, 0.0))
+    np.testing.assert_allclose(height_above_ground(thing), 0.010)
+    assert height_above_ground(replace(thing, points=thing.points[:0])) is None

@@ -261,3 +261,22 @@ def test_the_ground_under_a_low_head_lifts_the_grasp() -> None:
     assert chase.run(10.0).status is ServoStatus.CONVERGED
     depth = SCREW[2] - chase.gripper[2]
     assert depth < VisualServoConfig().centroid.depth / 3.0 + ServoLawConfig().height_tolerance
+
+
+@pytest.mark.parametrize(
+    ("height", "label", "status"),
+    [
+        (0.006, "screw", ServoStatus.TIGHT),
+        (0.0105, "screw", ServoStatus.CONVERGED),
+        (0.006, "nut", ServoStatus.CONVERGED),
+    ],
+)
+def test_a_screw_that_stands_as_low_as_a_tight_one_is_left(
+    height: float, label: str, status: ServoStatus
+) -> None:
+    side = np.linspace(-0.02, 0.02, 15)
+    x, y = (a.ravel() for a in np.meshgrid(side, side))
+    ground = SCREW + np.stack([x, y, np.full_like(x, -height)], axis=1)
+    chase = Chase(lambda t: [thing(SCREW, label, ground)])
+    chase.law.label = label
+    assert chase.run(8.0).status is status

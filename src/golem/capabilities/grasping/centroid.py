@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.capabilities.grasping.base import Grasp, Gripper, OpenLoop
+from golem.capabilities.grasping.ground import height_above_ground
 from golem.finite import check_finite
 from golem.types import Array, LocalizedObject
 
@@ -57,11 +58,8 @@ def grasp_depth(target: LocalizedObject, depth: float, clearance: float) -> floa
     That is `depth`, or less where the ground around the object (the lowest tenth of its cloud) is so near that less
     than `clearance` would be left [m]; never less than a third of `depth`.
     """
-    if len(target.points) == 0:
-        return depth
-    ground = float(np.quantile(target.points[:, 2], 0.1))
-    height = float(target.position[2]) - ground
-    return float(np.clip(height - clearance, depth / 3.0, depth))
+    height = height_above_ground(target)
+    return depth if height is None else float(np.clip(height - clearance, depth / 3.0, depth))
 
 
 class Centroid(OpenLoop):

@@ -8,13 +8,14 @@ faces the plate squarely: tilt that the encoders do not know of shows in the pla
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from golem.capabilities.grasping.base import Grasp, Gripper, ServoLaw, ServoStatus, ServoStep
 from golem.capabilities.grasping.centroid import UP, Centroid, CentroidConfig, grasp_depth, grasp_pose
-from golem.capabilities.grasping.ground import ground_normal
+from golem.capabilities.grasping.ground import ground_plane
 from golem.types import Array, LocalizedObject
 
 
@@ -38,6 +39,9 @@ class ServoLawConfig:
         lost_after: time without a sighting until the hand backs off [s].
         retreat: how far it backs off to see more [m].
         retreats: how often it may do so.
+        loose_height: by label, height of the top above the ground from which on an object is loose [m]; the heads of
+            this pack's screws are 5 to 7 mm high, and a loosened one shows 5 mm of its shank or more.
+        looks: frames in which the ground was seen before an object is called tight.
         stall_after: time without progress until it gives up [s].
         progress: what counts as progress [m].
     """
@@ -57,6 +61,8 @@ class ServoLawConfig:
     lost_after: float = 1.0
     retreat: float = 0.05
     retreats: int = 2
+    loose_height: Mapping[str, float] = field(default_factory=lambda: {"screw": 0.0085})
+    looks: int = 8
     stall_after: float = 4.0
     progress: float = 0.001
 
@@ -83,6 +89,7 @@ class CentroidServo:
         self._variance: Array = np.full(3, config.first_radius**2)
         self._depth = centroid.depth
         self._normal: Array = UP
+        self._heights: list[float] = []
         self._yaw = yaw
         self._t = t
         self._seen_at = t
@@ -121,10 +128,12 @@ class CentroidServo:
                 self._inside += 1
             if self._inside >= c.dwell:
                 status = ServoStatus.CONVERGED
+            if self._is_tight():
+                status = ServoStatus.TIGHT
             error = lateral + abs(height)
             if error < self._best - c.progress:
                 self._best, self._best_at = error, t
-            elif t - self._best_at > c.stall_after and status is not ServoStatus.CONVERGED:
+            elif t - self._best_at > c.stall_after and status is ServoStatus.TRACKING:
                 status = ServoStatus.STALLED
         else:
             self._best, self._best_at = np.inf, t
@@ -167,10 +176,18 @@ class CentroidServo:
 
     def _turn(self, sighting: LocalizedObject) -> None:
         """Turn the approach towards the ground's normal: a hand that comes in askew jams the screw it pulls."""
-        normal = ground_normal(sighting)
-        if normal is not None:
+        plane = ground_plane(sighting)
+        if plane is not None:
+            normal, height = plane
+            self._heights.append(height)
             mixed = self._normal + self._config.normal_gain * (normal - self._normal)
             self._normal = mixed / np.linalg.norm(mixed)
+
+    def _is_tight(self) -> bool:
+        """Return whether the object stands as low as one that is screwed down, by the last looks at the ground."""
+        loose = self._config.loose_height.get(self.label)
+        recent = self._heights[-self._config.looks :]
+        return loose is not None and len(recent) == self._config.looks and float(np.median(recent)) < loose
 
     def _wanted_depth(self, sighting: LocalizedObject) -> float:
         return grasp_depth(sighting, self._centroid.depth, self._centroid.clearance)
