@@ -126,6 +126,7 @@ SLOTS: dict[str, Slot] = {
     "skill": Slot(
         "golem.skills.base:Skill",
         {
+            "explore": "golem.skills.explore:Explore",
             "navigate": "golem.skills.navigate:Navigate",
             "pick": "golem.skills.pick:Pick",
             "stand": "golem.skills.walk:Stand",
