@@ -126,6 +126,7 @@ SLOTS: dict[str, Slot] = {
     "skill": Slot(
         "golem.skills.base:Skill",
         {
+            "dock": "golem.skills.dock:Dock",
             "explore": "golem.skills.explore:Explore",
             "navigate": "golem.skills.navigate:Navigate",
             "pick": "golem.skills.pick:Pick",
