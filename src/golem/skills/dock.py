@@ -26,7 +26,7 @@ LOOK = 1.2
 """Time over which scans are put together while the robot stands [s]."""
 SETTLE = 1.0
 """Time that the body gets to come to rest before [s]."""
-FARTHEST = 1.5
+FARTHEST = 1.8
 """Longest way to the stance [m]: more is a way for `navigate`."""
 STEP = 30.0
 """Time that one approach may take [s]."""

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from golem.types import Array, PlanarPose
 
@@ -79,10 +80,10 @@ def _rim(local: Array) -> Array:
     return np.array(found).reshape(-1, 2)
 
 
-def _line(rim: Array) -> tuple[float, float, Array] | None:
+def _line(rim: Array) -> tuple[float, float, NDArray[np.bool_]] | None:
     """Return slope and offset of x = slope y + offset, and which points are on it; None where too few are."""
     rng = np.random.default_rng(0)
-    best = np.zeros(len(rim), np.bool_)
+    best: NDArray[np.bool_] = np.zeros(len(rim), np.bool_)
     for _ in range(TRIES):
         i, j = rng.choice(len(rim), 2, replace=False)
         if abs(rim[j, 1] - rim[i, 1]) < 2.0 * SLICE:
