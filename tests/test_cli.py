@@ -34,7 +34,10 @@ BROKEN = {
     "run seed": (["run", "--seed", "-1"], "The seed is -1; it must be 0 or more"),
     "bench seed": (["bench", "--seed", "-1"], "--seed is -1; it must be 0 or more"),
     "run profile": (["run", "--profile", "feild"], "Did you mean 'field'?"),
-    "skill": (["run", "--skill", "pik"], "valid: navigate, pick, stand, walk. Did you mean 'pick'?"),
+    "skill": (
+        ["run", "--skill", "pik"],
+        "valid: dock, explore, navigate, pick, stand, walk. Did you mean 'pick'?",
+    ),
     "skill goal": (["run", "--skill", "walk", "--x", "nan"], "'x' is a finite number"),
     "skill and by hand": (["run", "--skill", "pick", "--operate"], "give it or --skill, not both"),
     "skill of a domain": (["skill"], "Say which skill"),

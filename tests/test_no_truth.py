@@ -40,6 +40,7 @@ INSIDERS = (
     "cli.py",
     "run.py",
     "demo.py",
+    "demo_walk.py",
     "doctor.py",
 )
 # The twin's robot is built from the same table as the model that the modules use.

@@ -258,7 +258,16 @@ def test_a_stack_file_lists_skills_and_their_options() -> None:
         "gentle": Choice("pick", {"force": 4}),
         "mine": Choice("my.py:Mine"),
     }
-    assert list(stack.all_skills) == ["navigate", "pick", "stand", "walk", "gentle", "mine"]
+    assert list(stack.all_skills) == [
+        "dock",
+        "explore",
+        "navigate",
+        "pick",
+        "stand",
+        "walk",
+        "gentle",
+        "mine",
+    ]
     assert Stack().all_skills["pick"] == Choice("pick")
 
 
@@ -268,7 +277,7 @@ def test_a_stack_file_lists_skills_and_their_options() -> None:
         ("skills: pick", "'skills' wants '{NAME: {option: value, ...}, ...}'"),
         (
             "skills: {pik: {force: 8}}",
-            "Unknown skill in x.yaml 'pik'; valid: navigate, pick, stand, walk. Did you mean 'pick'",
+            "Unknown skill in x.yaml 'pik'; valid: dock, explore, navigate, pick, stand, walk. Did you mean 'pick'",
         ),
         ("skills: {Mine: {use: my.py:Mine}}", "a skill's name is a word of a-z, 0-9 and _"),
         ("skills: {mine: {use: 3}}", "'skills: mine' wants '{use: NAME"),

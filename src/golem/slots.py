@@ -142,6 +142,8 @@ SLOTS: dict[str, Slot] = {
     "skill": Slot(
         "golem.skills.base:Skill",
         {
+            "dock": "golem.skills.dock:Dock",
+            "explore": "golem.skills.explore:Explore",
             "navigate": "golem.skills.navigate:Navigate",
             "pick": "golem.skills.pick:Pick",
             "stand": "golem.skills.walk:Stand",

@@ -86,6 +86,19 @@ class Scan:
 
 
 @dataclass(frozen=True, slots=True)
+class MapFile:
+    """Where a map is to be kept, or was.
+
+    Attributes:
+        path: of the map, without ending.
+        problem: one sentence why it could not be written; empty where it was, or is to be.
+    """
+
+    path: str
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class NavGoal:
     """Where a skill wants the robot to be.
 

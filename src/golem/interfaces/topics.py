@@ -6,6 +6,7 @@ from functools import cache
 
 from golem.interfaces.lidar import ExternalOdometry, LidarImu, LidarScan
 from golem.interfaces.nav_payloads import (
+    MapFile,
     MapPlace,
     Nav2Goal,
     Nav2Reply,
@@ -87,6 +88,10 @@ MAP = Topic("map", OccupancyGrid)
 """From whatever maps; a stack without it never sends any."""
 MAP_POSE = Topic("map/pose", MapPlace)
 """From whatever maps, with every scan, while the place in the map is known."""
+MAP_SAVE = Topic("map/save", MapFile)
+"""From a skill that wants the map to be kept."""
+MAP_SAVED = Topic("map/saved", MapFile)
+"""The answer, from whatever maps."""
 SCAN = Topic("scan", Scan)
 """From a LiDAR that an odometry locates; a robot without one never sends any."""
 NAV_GOAL = Topic("navigation/goal", NavGoal)

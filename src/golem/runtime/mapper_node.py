@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from golem.capabilities.mapping.base import Mapper
+from golem.capabilities.mapping.map_file import StoredMap, save_map
+from golem.errors import OutputError
 from golem.interfaces import topics
-from golem.interfaces.nav_payloads import HERE, MapPlace, OccupancyGrid
+from golem.interfaces.nav_payloads import HERE, MapFile, MapPlace, OccupancyGrid
 from golem.middleware.bus import Bus, News
 from golem.runtime.contract_check import ContractCheck
 from golem.types import TICK, PlanarPose
@@ -22,10 +26,14 @@ class MapperNode:
         self._bus, self._mapper, self._contract = bus, mapper, contract
         self._every = 1.0 / contract.number("rate", mapper.rate, minimum=0.1)
         self._scans = News(bus, topics.SCAN)
+        self._wanted = News(bus, topics.MAP_SAVE)
         self._due = 0.0
 
     def step(self, t: float) -> None:
-        """Pass a new scan on, and publish the map if it is due."""
+        """Pass a new scan on, publish the map if it is due, and keep it if a skill wants that."""
+        wanted = self._wanted.read()
+        if wanted is not None:
+            self._bus.publish(topics.MAP_SAVED, self._kept(wanted.path), t)
         scan = self._scans.read()
         if scan is None:
             return
@@ -48,6 +56,18 @@ class MapperNode:
                 raise self._contract.fault(f"cells are {cells.dtype}, the contract asks for int8")
             self._contract.number("resolution", grid.resolution, minimum=1e-3)
             self._bus.publish(topics.MAP, grid, t)
+
+    def _kept(self, path: str) -> MapFile:
+        """Write the map, and say how that went."""
+        stored = self._contract.call(self._mapper.stored)
+        if stored is None:
+            return MapFile(path, "There is no map yet.")
+        self._contract.kind("what it stores", stored, StoredMap)
+        try:
+            save_map(Path(path), stored)
+        except OutputError as problem:
+            return MapFile(path, str(problem))
+        return MapFile(path)
 
     def _estimate_in_map(self, T_odom_map: PlanarPose) -> PlanarPose:
         """Return where odom of the base estimate is in the map: /tf has base_link in that odom."""

@@ -205,6 +205,7 @@ class StackNodes:
         navigator, navigator_contract = make("navigator", nav2=BusNav2(bus))
         estimator, estimator_contract = make("estimator")
         odometry, odometry_contract = make("odometry")
+        mapper, mapper_contract = make("mapper")
         localizer, contract = make("localizer")
         legs, reserve = (
             CheckedLowerBody(*make(key, onboard=None if real else BusOnboard(bus)), stack.on_ground)
@@ -247,7 +248,7 @@ class StackNodes:
             self.nodes.append((Phase.PERCEIVE, OdometryNode(bus, odometry, odometry_contract)))
         if hears_lidar(stack):
             self.nodes.append((Phase.PERCEIVE, ScanNode(bus)))
-            self.nodes.append((Phase.PERCEIVE, MapperNode(bus, *make("mapper"))))
+            self.nodes.append((Phase.PERCEIVE, MapperNode(bus, mapper, mapper_contract)))
         for side in SIDES:
             hand, hand_contract = make("hand", side=side)
             self.nodes.append((Phase.CONTROL, nodes.HandNode(bus, hand, side, hand_contract)))

@@ -79,7 +79,7 @@ def test_points_that_are_none_and_scans_of_other_clocks_are_left_out() -> None:
 
 
 def test_a_map_from_before_is_found_from_a_rough_guess(tmp_path: Path) -> None:
-    stored = mapped(scans(8)).stored_map()
+    stored = mapped(scans(8)).stored()
     assert stored is not None
     save_map(tmp_path / "room", stored)
     true = PlanarPose(1.2, -0.6, 0.3)
@@ -96,7 +96,7 @@ def test_a_map_from_before_is_found_from_a_rough_guess(tmp_path: Path) -> None:
 
 
 def test_a_map_of_somewhere_else_is_not_believed(tmp_path: Path) -> None:
-    stored = mapped(scans(8)).stored_map()
+    stored = mapped(scans(8)).stored()
     assert stored is not None
     rng = np.random.default_rng(0)
     save_map(tmp_path / "else", replace(stored, walls=rng.uniform(-4.0, 9.0, (40, 2))))

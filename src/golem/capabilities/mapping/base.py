@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol, runtime_checkable
 
+from golem.capabilities.mapping.map_file import StoredMap
 from golem.interfaces.nav_payloads import OccupancyGrid, Scan
 from golem.types import PlanarPose
 
@@ -35,6 +36,10 @@ class Mapper(Protocol):
 
     def grid(self) -> OccupancyGrid | None:
         """Return the map of the floor as it is now, its origin in odom; None while there is none."""
+        ...
+
+    def stored(self) -> StoredMap | None:
+        """Return what there is, to be kept in a file; None before anything was seen."""
         ...
 
     def locate(self, guess: PlanarPose) -> str:

@@ -88,7 +88,7 @@ class VoxelGridMapper:
     Attributes:
         config: its options.
         rate: grids per second [Hz].
-        stored: the map from before; None where the options name none.
+        before: the map from before; None where the options name none.
     """
 
     rate = 2.0
@@ -100,16 +100,16 @@ class VoxelGridMapper:
             ConfigError: it cannot be read.
         """
         self.config = config or GridConfig()
-        self.stored = load_map(Path(self.config.file)) if self.config.file else None
+        self.before = load_map(Path(self.config.file)) if self.config.file else None
         self._marks: Landmarks | None = None
-        if self.stored is not None:
-            self._marks = Landmarks(_landmarks(self.stored))
+        if self.before is not None:
+            self._marks = Landmarks(_landmarks(self.before))
         self.reset()
 
     @property
     def T_odom_map(self) -> PlanarPose | None:
         """Where the map's frame is in odom; see `Mapper`."""
-        return self._T_odom_map if self._located or self.stored is None else None
+        return self._T_odom_map if self._located or self.before is None else None
 
     def reset(self) -> None:
         """Forget what was seen; see `Mapper`."""
@@ -136,7 +136,7 @@ class VoxelGridMapper:
         self.voxels.add(points, np.asarray(scan.origin, np.float64), plane, self.config.rays)
         height = points[:, 2] - points[:, :2] @ plane[:2] - plane[2]
         upright = points[(height > UPRIGHT[0]) & (height < UPRIGHT[1]), :2]
-        if self.stored is None and scan.t >= self._summed + EVERY:
+        if self.before is None and scan.t >= self._summed + EVERY:
             self._summed = scan.t
             self.walls.add(upright)
         self._newest = upright[:: max(1, len(upright) // 800)]
@@ -147,8 +147,8 @@ class VoxelGridMapper:
         if self.voxels.empty or self.floor is None or self.T_odom_map is None:
             return None
         cells = self.voxels.flatten(self.floor)
-        if self.stored is not None:
-            return self._overlaid(self.stored)
+        if self.before is not None:
+            return self._overlaid(self.before)
         corner = PlanarPose(float(self.voxels.corner[0]), float(self.voxels.corner[1]), 0.0)
         return OccupancyGrid(self._t, corner, self.config.resolution, cells.copy())
 
@@ -168,13 +168,17 @@ class VoxelGridMapper:
         self._place(match, 1.0)
         return ""
 
-    def stored_map(self) -> StoredMap | None:
-        """Return what was seen so far, to be saved, in odom; None before anything was."""
+    def stored(self) -> StoredMap | None:
+        """Return what there is, in the map's own frame; see `Mapper`."""
         grid = self.grid()
-        if grid is None or self.floor is None:
+        if grid is None:
             return None
-        places = self.walls.places() if self.stored is None else self.stored.walls
-        return StoredMap(grid.origin, grid.resolution, grid.cells, self.voxels.occupied(), places)
+        places = self.walls.places() if self.before is None else self.before.walls
+        own = grid.in_map
+        voxels = self.voxels.occupied()
+        back = self._T_odom_map.to(PlanarPose(0.0, 0.0, 0.0)).matrix()
+        cloud = voxels @ back[:3, :3].T + back[:3, 3]
+        return StoredMap(own.origin, own.resolution, own.cells, cloud, places)
 
     def _follow(self) -> None:
         """Find the place in the map from before at first, and correct it from time to time."""

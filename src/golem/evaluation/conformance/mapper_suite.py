@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from golem.capabilities.mapping.base import Mapper
+from golem.capabilities.mapping.map_file import StoredMap
 from golem.evaluation.conformance.base import Candidate, check
 from golem.evaluation.conformance.room import HEIGHT, ROOM, MadeWalk
 from golem.evaluation.conformance.samples import with_nan
@@ -114,6 +115,19 @@ class MapperSuite(Suite):
         for x, y in ((ROOM[0, 0], 0.5), (0.5, ROOM[1, 0]), (0.5, ROOM[1, 1])):
             if _near(answer.grid, float(x), float(y), OFF) < FULL:
                 raise candidate.fault(f"the wall at ({x:g}, {y:g}) is not on its map")
+
+    @check
+    def can_be_kept(self, candidate: Candidate) -> None:
+        """What it stores is a map with the cells of its grid, in its own frame, and finite points."""
+        module, contract = candidate.make(), candidate.contract
+        self.run(candidate, self.inputs(), module)
+        stored = contract.kind("what it stores", contract.call(module.stored), StoredMap)
+        grid = contract.kind("the grid", contract.call(module.grid), OccupancyGrid).in_map
+        contract.array("cloud", stored.cloud, None, 3)
+        contract.array("walls", stored.walls, None, 2)
+        off = stored.origin.to(grid.origin)
+        if stored.cells.shape != grid.cells.shape or (stored.cells != grid.cells).any() or abs(off.x) > 1e-6:
+            raise candidate.fault("what it stores is another map than the one it shows")
 
     @check
     def says_why_it_does_not_locate(self, candidate: Candidate) -> None:

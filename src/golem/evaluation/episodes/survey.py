@@ -63,6 +63,6 @@ def survey(robot: MujocoRobot, seed: int, path: Path) -> None:
                 points = points[~filter.own(in_base, joints)] @ T[:3, :3].T + T[:3, 3]
                 mapper.add_scan(Scan(scan.t, points, T[:3, 3], floor.update(points, T[:3, 3])))
         t += 1.0
-    stored = mapper.stored_map()
+    stored = mapper.stored()
     assert stored is not None
     save_map(path, stored)

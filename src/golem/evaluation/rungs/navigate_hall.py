@@ -207,12 +207,12 @@ def judge(
     # With a map the mapper answers for the place, which corrects the odometry by it.
     lost = modules["mapper" if spec.case["map"] == "survey" else "odometry"]
     module = navigator = f"{SLOT}: {spec.method}"
-    if loss is not None:
-        module = modules["lower_body"]
-    elif contacts.touched:
+    if contacts.touched:  # a robot that was hit may fall, or be stopped, for that
         pair, t = next(iter(contacts.touched.items()))
         loss = Loss("contact", f"{pair} at {t:.1f} s, {drift:.2f} m beside where it believed to be.")
         module = lost if drift > 0.15 else navigator
+    elif loss is not None:
+        module = modules["lower_body"]
     elif result is None:
         loss = Loss("timeout", f"It is {radial:.2f} m from the goal after {TIMEOUT:g} s.")
     elif not result.success:

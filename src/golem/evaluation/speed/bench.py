@@ -20,6 +20,7 @@ from golem.capabilities.arms.base import UpperBody
 from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.postures import posture
 from golem.errors import ConfigError, MissingExtra
+from golem.evaluation.speed.navigation_bench import navigation_times
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import check
 from golem.hardware.safety.memory import GateMemory
@@ -72,7 +73,13 @@ def run_bench(config: BenchConfig) -> list[Figure]:
     """
     if config.seed < 0:
         raise ConfigError(f"--seed is {config.seed}; it must be 0 or more.")
-    figures = [*_control(config), *_physics(config), *_perception(config), *_robot(config)]
+    figures = [
+        *_control(config),
+        *_physics(config),
+        *_perception(config),
+        *_navigation(config),
+        *_robot(config),
+    ]
     table = Table("figure", "median", "p99", "unit", "reference", title="GOLEM, CPU time of one thread")
     for f in figures:
         table.add_row(f.name, f"{f.median:.3g}", f"{f.p99:.3g}", f.unit, f.reference)
@@ -191,6 +198,12 @@ def _perception(config: BenchConfig) -> list[Figure]:
     finally:
         robot.close()
     return figures
+
+
+def _navigation(config: BenchConfig) -> list[Figure]:
+    """Return what mapping and navigation cost."""
+    rows = navigation_times(timed, 10 if config.quick else 60)
+    return [figure(name, times, 1e3, "ms", reference) for name, times, reference in rows]
 
 
 def _robot(config: BenchConfig) -> list[Figure]:

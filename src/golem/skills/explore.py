@@ -1,0 +1,138 @@
+"""Mapping a hall: from frontier to frontier until there is nothing more to see, then home."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from golem.capabilities.navigation.frontiers import frontiers
+from golem.errors import ConfigError
+from golem.interfaces import topics
+from golem.interfaces.nav_payloads import MapFile
+from golem.middleware.bus import News
+from golem.options import require
+from golem.skills.base import SkillResult, StageFailed
+from golem.skills.context import Context
+from golem.skills.navigate import FIRST_MAP
+from golem.skills.pose_goal import FIRST_REPORT, MARGIN, MAX_TIMEOUT, go_to
+from golem.types import PlanarPose, Twist
+
+RADIUS = 0.55
+"""Distance that the robot keeps from obstacles where it looks at a frontier [m]: half its width and some more."""
+LOOK = 1.5
+"""Time that it looks at a frontier [s]."""
+SAVING = 5.0
+"""Time that the map gets to be written [s]."""
+LEG = 60.0
+"""Time for the way to one frontier [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExploreGoal:
+    """How far to go.
+
+    Attributes:
+        most: frontiers that are visited at most.
+        save: file for the map, without ending; empty for none.
+        timeout: time after which the robot goes home [s].
+    """
+
+    most: int = 20
+    save: str = ""
+    timeout: float = 600.0
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ConfigError: one of them cannot be meant.
+        """
+        require(
+            "goal of exploring: ",
+            ("most", self.most, self.most >= 0, "not negative"),
+            ("timeout", self.timeout, 0.0 < self.timeout <= MAX_TIMEOUT, "a time of at most an hour"),
+        )
+
+
+class Explore:
+    """Map the hall by walking to where the map ends, come home, and keep the map if asked to.
+
+    Stages: `locate`, `explore`, `home`, `save`, `done`. A frontier that cannot be reached is left out.
+    """
+
+    Goal = ExploreGoal
+
+    def timeout(self, goal: ExploreGoal) -> float:
+        """Return the time it may take [s]; see `Skill`."""
+        return goal.timeout + 2.0 * LEG + FIRST_MAP + SAVING + MARGIN
+
+    async def run(self, context: Context, goal: ExploreGoal) -> SkillResult:
+        """Explore; see `Skill`."""
+        try:
+            return await self._explore(context, goal)
+        except StageFailed as failure:
+            context.legs.drive(Twist())
+            context.say(failure.stage, str(failure), failed=True)
+            return SkillResult(False, failure.stage, failure.slot, str(failure))
+
+    async def _explore(self, context: Context, goal: ExploreGoal) -> SkillResult:
+        start = context.t
+        await context.until(lambda: context.legs.reporting, FIRST_REPORT)
+        if context.legs.status.speed == 0.0:
+            raise ConfigError(
+                f"The legs, '{context.legs.status.controller}', do not walk; choose others, such as almi."
+            )
+        if not await context.until(lambda: context.mapped, FIRST_MAP):
+            raise StageFailed("locate", "mapper", f"There is no map after {FIRST_MAP:g} s.")
+        home, given_up, visited = self._here(context), list[PlanarPose](), 0
+        while visited < goal.most and context.t - start < goal.timeout:
+            target = self._next(context, given_up)
+            if target is None:
+                break
+            context.say("explore", f"Frontier {visited + 1}: ({target.x:.1f}, {target.y:.1f}).")
+            try:
+                await go_to(context, target, "map", LEG, "explore")
+            except StageFailed as failure:
+                if failure.slot != "navigator":
+                    raise
+            visited += 1
+            given_up.append(target)  # one look is enough: what it did not show, another will not
+            await context.sleep(LOOK)
+        context.say("home", f"{visited} frontiers seen; going home.")
+        result = await go_to(context, home, "map", 2.0 * LEG, "home")
+        saved = await self._save(context, goal.save) if goal.save else ""
+        text = f"{visited} frontiers seen in {context.t - start:.0f} s. {result.reason}{saved}"
+        context.say("done", text)
+        return SkillResult(True, "done", None, text, {"explore": context.t - start})
+
+    def _here(self, context: Context) -> PlanarPose:
+        """Return where the robot is on the map."""
+        return context.T_odom_map.to(PlanarPose.of(context.legs.pose))
+
+    def _next(self, context: Context, given_up: list[PlanarPose]) -> PlanarPose | None:
+        """Return from where to look at the frontier that is worth most; None where none is left."""
+        grid = context.bus.latest(topics.MAP)
+        if grid is None:
+            return None
+        for frontier in frontiers(grid.in_map, RADIUS, self._here(context)):
+            near = (math.hypot(frontier.pose.x - p.x, frontier.pose.y - p.y) < RADIUS for p in given_up)
+            if not any(near):
+                return frontier.pose
+        return None
+
+    async def _save(self, context: Context, path: str) -> str:
+        """Keep the map, and return a sentence about it."""
+        news = News(context.bus, topics.MAP_SAVED)
+        context.publish(topics.MAP_SAVE, MapFile(path))
+        found: list[MapFile] = []
+
+        def answered() -> bool:
+            answer = news.read()
+            found.extend([] if answer is None else [answer])
+            return bool(found)
+
+        if not await context.until(answered, SAVING):
+            raise StageFailed("save", "mapper", f"The map was not written within {SAVING:g} s.")
+        if found[0].problem:
+            raise StageFailed("save", "mapper", found[0].problem)
+        return f" The map is in {path}.yaml."

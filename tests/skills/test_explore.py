@@ -1,0 +1,70 @@
+"""Exploring: a robot that follows every twist exactly, in a room that it sees 2.5 m far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from tests.capabilities.navigation.rooms import room
+from tests.skills.test_walk import Ground, outcome
+
+from golem.interfaces import topics
+from golem.interfaces.nav_payloads import MapFile, MapPlace, OccupancyGrid
+from golem.middleware.bus import News
+from golem.skills.explore import Explore, ExploreGoal
+from golem.types import PlanarPose
+
+ORIGIN = PlanarPose(0.0, 0.0, 0.0)
+
+
+@dataclass
+class Explorer(Ground):
+    """Maps what is within 2.5 m of it."""
+
+    problem: str = ""
+    grid: OccupancyGrid = field(default_factory=lambda: room(size=(-2.0, 6.0, -2.0, 2.0)))
+
+    def __post_init__(self) -> None:
+        self.seen = np.full(self.grid.cells.shape, -1, np.int8)
+        rows, columns = np.indices(self.seen.shape)
+        o, h = self.grid.origin, self.grid.resolution
+        self.places = np.stack([o.x + (columns + 0.5) * h, o.y + (rows + 0.5) * h])
+        super().__post_init__()
+        self.saves = News(self.bus, topics.MAP_SAVE)
+
+    def _advance(self) -> None:
+        super()._advance()
+        t = self.context.t
+        asked = self.saves.read() if hasattr(self, "saves") else None
+        if asked is not None:
+            self.bus.publish(topics.MAP_SAVED, MapFile(asked.path, self.problem), t)
+        if round(t * 100) % 20 == 0 or self.bus.latest(topics.MAP) is None:
+            near = np.hypot(self.places[0] - self.pose.x, self.places[1] - self.pose.y) < 2.5
+            self.seen[near] = self.grid.cells[near]
+            self.bus.publish(topics.MAP, replace(self.grid, t=t, cells=self.seen.copy()), t)
+            self.bus.publish(topics.MAP_POSE, MapPlace(t, ORIGIN, ORIGIN), t)
+
+
+def test_it_sees_the_whole_room_and_comes_home(tmp_path: Path) -> None:
+    robot = Explorer()
+    goal = ExploreGoal(save=str(tmp_path / "hall"))
+    result = outcome(robot.run(Explore().run(robot.context, goal), 120.0))
+    assert result.success and "hall.yaml" in result.reason
+    inside = robot.seen[1:-1, 1:-1]
+    assert (inside >= 0).mean() > 0.95
+    assert abs(robot.pose.x) < 0.05 and abs(robot.pose.y) < 0.05
+    assert robot.stages[0] == "explore" and robot.stages[-1] == "done" and "home" in robot.stages
+
+
+def test_a_map_that_cannot_be_kept_is_said() -> None:
+    robot = Explorer(problem="The map 'x' cannot be written: no room.")
+    result = outcome(robot.run(Explore().run(robot.context, ExploreGoal(most=0, save="x")), 60.0))
+    assert (result.success, result.stage, result.slot) == (False, "save", "mapper")
+    assert "cannot be written" in result.reason
+
+
+def test_without_a_map_it_does_not_begin() -> None:
+    ground = Ground(offset=0.0)
+    result = outcome(ground.run(Explore().run(ground.context, ExploreGoal()), 30.0))
+    assert (result.success, result.stage) == (False, "locate") and ground.pose == ORIGIN
