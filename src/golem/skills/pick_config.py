@@ -72,7 +72,7 @@ class PickConfig:
     comfort: tuple[float, float] = (0.45, -0.12)
     attempts: int = 2
     candidates: int = 3
-    travel: Literal["lines", "planned"] = "lines"
+    travel: Literal["lines", "planned"] = "planned"
     clearance: float = 0.15
     travel_height: float = 0.08
     travel_speed: float = 0.25
