@@ -171,7 +171,7 @@ def test_a_skill_that_asks_for_the_impossible_is_told_so_and_moves_nothing() -> 
         run: Any = running.start(Asks(), 0.0)
         running.executor.run(0.2)
         assert run.result.stage == "fault"
-        assert "torso_joint is sent to 9 rad; possible: -2.35 to 2.35 rad." in run.result.reason
+        assert "torso_joint is sent to 9 rad; possible: -2.12 to 2.12 rad." in run.result.reason
         assert running.bus.latest(topics.ARM_TRAJECTORY) is None
     finally:
         robot.close()

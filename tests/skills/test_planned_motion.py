@@ -21,7 +21,7 @@ from golem.middleware.bus import Bus
 from golem.robots.model.kinematics import Kinematics
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import UpperBodyNode
-from golem.skills.base import SkillResult
+from golem.skills.base import REFUSED, SkillResult
 from golem.skills.context import Context, Modules
 from golem.skills.planned_motion import PlannedMotion, Then
 from golem.skills.runner import SkillRun
@@ -142,6 +142,17 @@ def test_what_cannot_be_is_refused_and_nothing_moves(
     assert refusals[0].refusal is refusal
     assert re.search(words, str(refusals[0]))
     np.testing.assert_array_equal(rig.q, before)
+
+
+def test_a_refusal_that_a_skill_lets_through_is_its_result(rig: Rig) -> None:
+    async def far(context: Context) -> SkillResult:
+        T = OVER.copy()
+        T[0, 3] = 1.5
+        await PlannedMotion(context).to({"right": T}, 0.25)
+        return DONE
+
+    result = rig.run(far(rig.context)).result
+    assert result is not None and result.stage == REFUSED and "gets no nearer" in result.reason
 
 
 def test_cancelled_at_every_stage_the_arms_stay_where_they_are(planner: RrtConnect) -> None:

@@ -104,7 +104,7 @@ class Routine(Protocol, Generic[C, G]):
         that is safe to stay in.
 
         Raises:
-            ConfigError: this robot cannot pursue this goal; nothing has moved. The result is then `REFUSED`.
+            ConfigError, PlanRefused: this robot cannot pursue this goal, or not now. The result is then `REFUSED`.
             StageFailed: the result is then of that stage.
         """
         ...

@@ -75,7 +75,7 @@ class PickConfig:
     attempts: int = 2
     candidates: int = 3
     proud: float = 0.0115
-    travel: Literal["lines", "planned"] = "lines"
+    travel: Literal["lines", "planned"] = "planned"
     clearance: float = 0.15
     travel_height: float = 0.08
     travel_speed: float = 0.25

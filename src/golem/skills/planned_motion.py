@@ -22,8 +22,17 @@ from golem.types import SIDES, Array, Side
 
 SCREW: Array = np.array([[0.0, 0.0, z, 0.010] for z in (-0.005, 0.005, 0.015, 0.025)])
 """Balls that hold a screw of 30 mm between the fingertips, in the grasp frame [m]."""
+NATURAL_SPEED = 0.4
+"""Speed of a hand whose way only finds a posture [m/s]."""
+FARTHEST = 2.0
+"""How far a joint may turn on a planned way [rad]: beyond, the arm turns over, and later motions of the hand end at
+other limits than those that the work area was chosen for."""
 TOUCHING = 0.015
 """What the cloud shows this near to the robot, where it stands already, is not in its way [m]."""
+
+
+STRAIGHT = (0.001, np.deg2rad(0.5))
+"""How far a hand may leave a line, and its approach axis turn away from it [m, rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +43,13 @@ class Then:
         side: which hand.
         T_odom_gripper: (4, 4) where the line ends, in odom.
         speed: how fast [m/s].
+        tolerance: how far the hand may leave it, distance [m] and angle [rad].
     """
 
     side: Side
     T_odom_gripper: Array
     speed: float
+    tolerance: tuple[float, float] = STRAIGHT
 
 
 class PlannedMotion:
@@ -77,6 +88,7 @@ class PlannedMotion:
         then: Sequence[Then] = (),
         rules: Sequence[Rule] = (),
         held: Sequence[Held] = (),
+        near: float = POSITION,
     ) -> Plan:
         """Bring hands to poses, around what is in the way; return the way that was gone.
 
@@ -86,6 +98,7 @@ class PlannedMotion:
             then: lines that shall be possible from there.
             rules: what the way has to keep.
             held: what the hands hold.
+            near: distance of a hand from its pose that will do [m].
 
         Raises:
             PlanRefused: there is no such way; nothing has moved.
@@ -95,10 +108,10 @@ class PlannedMotion:
         q, world = self._start(held)
         T = np.linalg.inv(context.T_odom_base)
         in_base: dict[Side, Array] = {side: T @ pose for side, pose in targets.items()}
-        lines = [Then(one.side, T @ one.T_odom_gripper, one.speed) for one in then]
+        lines = [replace(one, T_odom_gripper=T @ one.T_odom_gripper) for one in then]
 
         def think() -> PlanRequest:
-            goals = self._goal_postures(q, world, in_base, lines, rules, held)
+            goals = self._goal_postures(q, world, in_base, lines, rules, held, near)
             return PlanRequest(q, goals, world, rules, held, hand_speed=hand_speed)
 
         plan = await self._planned(think)
@@ -151,6 +164,7 @@ class PlannedMotion:
         T_goal: Array,
         v_max: float,
         stop: Callable[[], bool] = lambda: False,
+        tolerance: tuple[float, float] = STRAIGHT,
         avoid: bool = False,
     ) -> None:
         """Go straight to `T_goal` (4, 4) in odom, if the hand can keep to the line; see `Arm.move`.
@@ -160,6 +174,7 @@ class PlannedMotion:
             T_goal: where to.
             v_max: speed [m/s].
             stop: asked every tick.
+            tolerance: how far the hand may leave the line, distance [m] and angle [rad].
             avoid: whether the world counts, not the robot itself alone.
 
         Raises:
@@ -168,7 +183,8 @@ class PlannedMotion:
         context = self._context
         q = context.commanded_joints
         space = JointSpace(self._robot, q, self.world if avoid else None)
-        self._lines.check(side, np.linalg.inv(context.T_odom_base) @ T_goal, q, v_max, space=space)
+        T = np.linalg.inv(context.T_odom_base) @ T_goal
+        self._lines.check(side, T, q, v_max, 1.5, *tolerance, space)
         await context.arms[side].move(T_goal, v_max, stop=stop)
 
     def _goal_postures(
@@ -179,8 +195,12 @@ class PlannedMotion:
         lines: Sequence[Then],
         rules: Sequence[Rule],
         held: Sequence[Held],
+        near: float,
     ) -> Array:
         """Return (k, 15) postures to plan to, from which the lines can be gone.
+
+        The first choice is the posture in which the arm's own controller would arrive: it is the one that later
+        motions along palm targets need not leave.
 
         Raises:
             PlanRefused: there is none.
@@ -190,18 +210,28 @@ class PlannedMotion:
         found: list[str] = []
 
         def free(goal: Array) -> bool:
+            if np.abs(goal - q).max() > FARTHEST:
+                found.append("its arm would have to turn over")
+                return False
             verdict = space.verdict(goal)
             if verdict:
                 found.append(space.reason(verdict, goal))
                 return False
             try:
                 for line in lines:
-                    self._lines.check(line.side, line.T_odom_gripper, goal, line.speed, space=itself)
+                    self._lines.check(
+                        line.side, line.T_odom_gripper, goal, line.speed, 1.5, *line.tolerance, itself
+                    )
             except PlanRefused as error:
                 found.append(str(error))
                 return False
             return True
 
+        if len(targets) == 1:
+            ((side, T),) = targets.items()
+            natural = self._lines.check(side, T, q, NATURAL_SPEED, deviation=np.inf, tilt=np.inf)
+            if natural.left < near and free(natural.q[-1]):
+                return natural.q[-1:]
         left, right = (targets.get(side) for side in SIDES)
         goals = self._goals.find(left, right, q, free)
         if len(goals):
@@ -213,5 +243,5 @@ class PlannedMotion:
                 f"The {which} hand gets no nearer than {self._goals.nearest * 1e3:.0f} mm to where it is to go.",
             )
         raise PlanRefused(
-            Refusal.GOAL, f"The {which} hand cannot be where it is to go: {found[-1]}.".replace("..", ".")
+            Refusal.GOAL, f"The {which} hand cannot be where it is to go: {found[0]}.".replace("..", ".")
         )

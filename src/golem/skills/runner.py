@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 
+from golem.capabilities.planning.base import PlanRefused
 from golem.errors import ConfigError, MissingExtra, MissingSystemLibrary, ModuleFault
 from golem.skills.base import CANCELLED, FAULT, REFUSED, SkillCancelled, SkillResult, StageFailed
 
@@ -72,7 +73,7 @@ class SkillRun:
             self.result = SkillResult(False, CANCELLED, None, "The skill was cancelled.")
         except StageFailed as failure:
             self.result = SkillResult(False, failure.stage, failure.slot, str(failure))
-        except ConfigError as refusal:
+        except (ConfigError, PlanRefused) as refusal:
             self.result = SkillResult(False, REFUSED, None, str(refusal))
         except ModuleFault as fault:
             self.result = _failed(fault)

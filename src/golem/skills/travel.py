@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+import numpy as np
+
 from golem.capabilities.planning.base import Held, PlanRefused, Refusal
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
@@ -13,6 +15,13 @@ from golem.types import SIDES, Array, Side
 
 SPARED = 0.06
 """Radius around an object that the hand goes to within which nothing is in its way [m]."""
+APPROACH = (0.010, np.deg2rad(3.0))
+"""How far a hand on its way down may leave the line that the head camera suggests, and turn [m, rad]: the palm camera
+corrects it."""
+OVER = 0.015
+"""How far from its place above an object a hand may arrive [m]: it looks from there, and does not grasp."""
+PULL = (0.003, np.deg2rad(1.5))
+"""The same of a hand that pulls; sway and encoders off by 0.03 rad do as much."""
 ARM_BLAMED = (Refusal.UNREACHABLE, Refusal.OFF_LINE)
 
 
@@ -125,10 +134,23 @@ class PlannedTravel:
         self._motion.look([(target, SPARED) for target in targets])
 
     async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
-        """Go there in a posture from which the way down and up again is straight; see `Travel`."""
+        """Go there in a posture from which the way down is straight, or half of it, or at last in any; see `Travel`.
+
+        The head camera may be off by half of the way, so what it says of the far end is no reason not to go and look.
+        """
         from golem.skills.planned_motion import Then
 
-        await self._to("approach", side, T_above, speed, then=[Then(side, T_object, speed)])
+        half = T_object.copy()
+        half[:3, 3] = 0.5 * (T_above[:3, 3] + T_object[:3, 3])
+        for end in (T_object, half):
+            try:
+                then = [Then(side, end, speed, APPROACH)]
+                return await self._to("approach", side, T_above, speed, then=then, near=OVER)
+            except StageFailed as failure:
+                cause = failure.__cause__
+                if not (isinstance(cause, PlanRefused) and cause.refusal is Refusal.GOAL):
+                    raise
+        await self._to("approach", side, T_above, speed, near=OVER)
 
     async def carry(self, side: Side, T_goal: Array, speed: float) -> None:
         """Go around what is in the way of the hand and of the screw; see `Travel`."""
@@ -141,7 +163,7 @@ class PlannedTravel:
     ) -> None:
         """Go if the hand can keep to the line; see `Travel`."""
         try:
-            await self._motion.line(side, T_goal, speed, stop)
+            await self._motion.line(side, T_goal, speed, stop, PULL)
         except PlanRefused as refusal:
             raise failed(stage, refusal) from refusal
 

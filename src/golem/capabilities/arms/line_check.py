@@ -29,11 +29,13 @@ class LineCheck:
     Attributes:
         deviation: largest distance of the hand from where the line has it [m].
         tilt: largest angle of its approach axis from where the line has it [rad].
+        left: distance of the hand from the end of the line at last [m].
         q: (n, 15) joints on the way, one row per tick [rad].
     """
 
     deviation: float
     tilt: float
+    left: float
     q: Array
 
 
@@ -79,7 +81,7 @@ class LineChecker:
         full[UPPER] = q
         self.ik.reset(check_joints("The joints that a line starts from", full))
         line = Line(self.ik.kinematics.pose(side, self.ik.q), T_goal, v_max, w_max)
-        rows, worst, turned, late = [self.ik.q.copy()], 0.0, 0.0, 0.0
+        rows, worst, turned, late, away = [self.ik.q.copy()], 0.0, 0.0, 0.0, 0.0
         for i in range(1, int(np.ceil((line.duration + SETTLE) / DT)) + 1):
             wanted = line.pose(i * DT)
             targets = (wanted, None) if side == "left" else (None, wanted)
@@ -107,7 +109,7 @@ class LineChecker:
                     f"{100 * line.fraction((k + 1) * DT):.0f} % of it, "
                     f"{space.reason(int(verdicts[k]), path[k + 1])}.",
                 )
-        return LineCheck(worst, turned, path)
+        return LineCheck(worst, turned, away, path)
 
     def _stopped(self) -> str:
         """Return which joints are at their limits now."""

@@ -319,6 +319,6 @@ def _norm(v: Array) -> float:
 def _spheres() -> CollisionModel:
     # Numba takes a second to import, and arms without collision rows do without it.
     from golem.capabilities.collision.collision_model import CollisionModel
-    from golem.capabilities.collision.sphere_robot import load_spheres
+    from golem.capabilities.collision.sphere_robot import shipped_spheres
 
-    return CollisionModel(load_spheres(), JOINT_NAMES[UPPER])
+    return CollisionModel(shipped_spheres(), JOINT_NAMES[UPPER])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -110,6 +111,12 @@ def load_spheres(file: Path = H12_SPHERES) -> SphereRobot:
             f"Cannot read '{file}' as a file of spheres ({error}); `golem model spheres` writes one."
         ) from error
     return SphereRobot(data["robot"], data["kind"], tuple(links), tuple(packings), pairs, allowed, ignored)
+
+
+@functools.cache
+def shipped_spheres() -> SphereRobot:
+    """Return those of the H1-2 with MAGPIE hands, read once; nobody writes to them."""
+    return load_spheres()
 
 
 def holding(robot: SphereRobot, hand: str, held: Packing, name: str = "held") -> SphereRobot:

@@ -12,7 +12,7 @@ from golem.capabilities.collision import sphere_kernel
 from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.obstacles import World
 from golem.capabilities.collision.sphere_packer import Packing
-from golem.capabilities.collision.sphere_robot import SphereRobot, holding, load_spheres
+from golem.capabilities.collision.sphere_robot import SphereRobot, holding, shipped_spheres
 from golem.capabilities.planning import plan_kernel
 from golem.capabilities.planning.base import Held
 from golem.capabilities.planning.plan_kernel import FREE, ITSELF, RANGE, RULE, WORLD, Space
@@ -42,7 +42,7 @@ class PlanningRobot:
         Args:
             robot: the spheres; by default those of the H1-2 with MAGPIE hands.
         """
-        self._robot = robot or load_spheres()
+        self._robot = robot or shipped_spheres()
         self._models: dict[tuple[tuple[Side, bytes], ...], CollisionModel] = {}
         gate = SafetyLimits.from_profile()
         self.lower: Array = gate.lower[UPPER] + LIMIT_MARGIN

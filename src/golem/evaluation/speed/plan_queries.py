@@ -16,31 +16,28 @@ from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.rules import HandUpright, Rule
 from golem.robots.worlds.conditions import arranged, draw_conditions
 from golem.robots.worlds.layout import PackLayout
+from golem.skills.planned_motion import SCREW
 from golem.types import Array, Side
 
 PELVIS = 1.10
 """Height of base_link above the floor in the hoist [m]."""
 YAW: dict[Side, float] = {"left": 0.5 * np.pi, "right": -0.5 * np.pi}
 """Heading of the gripper's x axis that suits an arm [rad]."""
-SCREW: Array = np.array([[0.0, 0.0, z, 0.010] for z in (-0.005, 0.005, 0.015, 0.025)])
-"""Balls that hold a screw of 30 mm between the fingertips, in the grasp frame [m]."""
 UPRIGHT = np.deg2rad(45.0)
 """How far a hand that carries a screw may lean in a third of the queries [rad]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """A request, and whether it may be served along a straight line of the joints is not known.
+    """What a planner is asked.
 
     Attributes:
-        request: what is asked.
+        request: the request.
         kind: from where to where.
-        layout: the pack and tray.
     """
 
     request: PlanRequest
     kind: str
-    layout: PackLayout
 
 
 def queries(robot: PlanningRobot, n: int, seed: int) -> Iterator[Query]:
@@ -76,7 +73,7 @@ def queries(robot: PlanningRobot, n: int, seed: int) -> Iterator[Query]:
             ends.append(found[:1] if name == one else found)
         if len(ends) == 2:
             count += 1
-            yield Query(PlanRequest(ends[0][0], ends[1], world, rules, held, seed=count), kind, layout)
+            yield Query(PlanRequest(ends[0][0], ends[1], world, rules, held, seed=count), kind)
 
 
 def pack_world(layout: PackLayout, rng: np.random.Generator) -> World:
