@@ -82,9 +82,11 @@ class Judge:
 
     def over(self) -> bool:
         """Return whether nothing more can be learnt: a stop that does not stand is long past."""
-        found = self.finding
+        found, fault = self.finding, self._rig.fault
         return (
             found.stopped_at is not None
+            and fault is not None
+            and not fault.stands
             and found.ended is not GateState.STOP2
             and self._rig.moment.t - found.stopped_at > SEEN
         )
