@@ -216,6 +216,7 @@ def test_the_fault_generator_does_reach_motion() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_a_million_random_states_and_commands_let_no_dangerous_command_out() -> None:
     rng, n, block = np.random.default_rng(1), 0, 1000
     active = 0
