@@ -159,7 +159,7 @@ TOPICS: tuple[TopicRow, ...] = (
     *(row for service, robots in (("loco", "an H1"), ("sport", "a G1 or an H2")) for row in _loco(service, robots)),
     TopicRow("/safety/lowcmd_in", "unitree_hg/msg/LowCmd", "stack", ("safety",), LOW, 500, "",
           "Motor commands of the stack, for the gate to judge. The field reserve[0] repeats the tick of the state "
-          "it answers, 0 where unknown; the gate takes a command to be as old as that state.",
+          "it answers; the gate takes a command to be as old as that state, and refuses one with 0.",
           topics.LOW_CMD_REQUEST),
     TopicRow("/safety/status", "golem_interfaces/msg/SafetyStatus", "safety", ("stack",), LATCHED, 20, "",
           "State of the gate, and why; at every change, and regularly.",

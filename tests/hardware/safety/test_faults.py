@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
+from golem.hardware.safety.base import GateInputs, OperatorRequest, Outgoing, SafetyLimits
 from golem.hardware.safety.gate import check
 from golem.hardware.safety.memory import GateMemory, GateResult
 from golem.interfaces.payloads import EstopMessage, GateState
@@ -212,3 +213,35 @@ def test_the_fault_generator_does_reach_motion() -> None:
     assert states[0] is GateState.ARMED
     assert set(states[1:202]) == {GateState.ACTIVE}
     assert states[202:] == [GateState.STOP1, GateState.STOP1]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_million_random_states_and_commands_let_no_dangerous_command_out() -> None:
+    rng, n, block = np.random.default_rng(1), 0, 1000
+    active = 0
+    limits = replace(LIMITS, jump=np.inf)
+    while n < 1_000_000:
+        # Anything from a robot at work to noise far beyond every limit, and commands that are finite or not.
+        reach = 10.0 ** rng.uniform(-3.0, 1.0)
+        states = reach * rng.standard_normal((block, 3, 27)) * [[[0.3], [3.0], [30.0]]]
+        commands = rng.standard_normal((block, 5, 27)) * 10.0 ** rng.uniform(-2.0, 3.0, (block, 5, 1))
+        commands[:, 3:] = np.abs(commands[:, 3:]) + 1e-3
+        commands[rng.random((block, 5, 27)) < 1e-5] = np.nan
+        world, memory = World(), GateMemory()
+        for kind in ("sound", "activate"):
+            memory = check(world.tick(kind, rng), limits, memory).memory
+        for (q, dq, tau), command in zip(states, commands, strict=True):
+            inputs = world.tick("sound", rng)
+            assert inputs.state is not None and inputs.command is not None
+            state = replace(inputs.state, q=q, dq=dq, tau=tau)
+            result = check(
+                replace(inputs, state=state, command=LowCommand(world.t, *command)), limits, memory
+            )
+            assert_safe(result, memory)
+            active += result.state is GateState.ACTIVE
+            memory, n = result.memory, n + 1
+            if result.state is not GateState.ACTIVE:
+                fresh = Outgoing(state.q, np.zeros(27), LIMITS.damping)
+                memory = replace(memory, mode=GateState.ACTIVE, reason=None, detail="", outgoing=fresh)
+    assert active > 1000

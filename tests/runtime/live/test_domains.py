@@ -122,7 +122,7 @@ def test_every_process_is_told_what_concerns_it() -> None:
         "rubble",
         *where,
     ]
-    assert words["safety"] == ["safety", "--limits", "urdf", *where]
+    assert words["safety"] == ["safety", "--limits", "urdf", "--stand", "--still", *where]
     assert words["up"] == ["up", "stand", "--profile", "ideal", *where]
     strict = commands(LaunchConfig(strict=True, dds=dds))
     assert strict["safety"] == ["safety", "--limits", "urdf", "--strict", *where]

@@ -25,6 +25,8 @@ BEYOND = 0.05
 """How far a joint may be beyond its range [rad]: what a joint that leans on its stop gives."""
 ASTRAY = 0.1
 """How far a robot that hangs may be moved by a fault the gate bears [rad]."""
+SEEN = 0.3
+"""Time after a stop that does not stand from which on nothing more can be learnt [s]."""
 KP_MAX, KD_MAX = 500.0, 30.0
 """Bounds of the gains of the authors' firmware."""
 
@@ -77,6 +79,17 @@ class Judge:
         self._v = np.array([model.joint(name).dofadr[0] for name in JOINT_NAMES])
         self._start = rig.robot.data.qpos[self._q].copy()
         self._height = float(rig.robot.data.qpos[2])
+
+    def over(self) -> bool:
+        """Return whether nothing more can be learnt: a stop that does not stand is long past."""
+        found, fault = self.finding, self._rig.fault
+        return (
+            found.stopped_at is not None
+            and fault is not None
+            and not fault.stands
+            and found.ended is not GateState.STOP2
+            and self._rig.moment.t - found.stopped_at > SEEN
+        )
 
     def step(self, t: float) -> None:
         """Look at one tick."""

@@ -35,18 +35,16 @@ def page(records: Sequence[TrialRecord]) -> str:
     parts = [
         "# Safety: faults tried\n",
         f"`golem faults --profile {first.profile} --seed {first.seed}` tries {len(by_fault)} faults on a robot that "
-        f"is {', '.join(postures)};\n`python -m golem.evaluation.faults.page` writes this page from its records. "
-        "One trial each. A judge that shares nothing\nwith the gate looks at every command that reached the motors, "
-        "and at what the robot really did. A cell says where the\nrobot was in the end (active, or the kind of "
-        "stop), after how many milliseconds of robot time the gate stopped it, and\nin bold what the judge did not "
-        "accept.\n",
+        f"is {', '.join(postures)}, one trial each.\n"
+        "`python -m golem.evaluation.faults.page` writes this page from its records.\n",
+        CRITERIA,
         _summary(records, postures).markdown() + "\n",
     ]
     for source in FaultSource:
         rows = tuple(
             (name, *(_cell(by_fault[name].get(posture)) for posture in postures))
-            for name in by_fault
-            if FAULTS[name].source is source
+            for name in FAULTS
+            if name in by_fault and FAULTS[name].source is source
         )
         if rows:
             parts.append(f"## {HEADS[source]}\n")
@@ -54,6 +52,20 @@ def page(records: Sequence[TrialRecord]) -> str:
     return "\n".join(parts)
 
 
+CRITERIA = """\
+A judge that shares nothing with the gate looks at every command that reached the motors, and at what the robot really
+did. This is what it wants:
+
+- The right reason, in time. One wrong frame has 2 ms of robot time, what is a fault from the third frame on has 6 ms.
+  Lost or frozen data has 52 ms.
+- No command beyond the motors.
+- After a fault of commands no joint is 5 % above its speed, or 0.05 rad beyond its range.
+- A fault that leaves legs and state sound leaves a robot standing that stood.
+- A fault that is to be borne stops nothing.
+
+A cell says where the robot was in the end: active, or the kind of stop. Then follow the reason, and the robot time from
+the begin of the fault to the stop. In bold is what the judge did not accept.
+"""
 HEADS = {
     FaultSource.COMMAND: "Of commands",
     FaultSource.DATA: "Of what the robot says",

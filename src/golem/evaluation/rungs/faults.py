@@ -32,6 +32,8 @@ SETTLED = {"hanging": 2.5, "standing": 3.5, "walking": 5.5}
 """Time at which the fault begins [s]."""
 WALKS = Twist(0.3)
 """What a robot that walks is told, from `SETTLED["standing"]` on."""
+BATCH = 20
+"""Faults that are tried from one past: as many as a worker gets through within the ladder's limit."""
 GATE = "gate"
 """The method: there is one safety layer."""
 
@@ -92,7 +94,8 @@ class FaultsRung(Rung[FaultOptions]):
 
     def together(self, spec: TrialSpec) -> Hashable:
         """Return what trials share that have one past."""
-        return spec.method, spec.index, spec.case["posture"]
+        chunk = self.faults.index(str(spec.case["fault"])) // BATCH
+        return spec.method, spec.index, spec.case["posture"], chunk
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
@@ -152,7 +155,7 @@ def _try(rig: FaultRig, spec: TrialSpec) -> TrialOutcome:
     rig.executor.add(judge)
     rig.begin(fault)
     try:
-        rig.executor.run(rig.executor.t + fault.lasting)
+        rig.executor.run(rig.executor.t + fault.lasting, judge.over)
     except Exception as error:  # whatever a fault makes raise would have ended a process
         return TrialOutcome(
             False, "crash", "safety: gate", f"{type(error).__name__}: {error}", trace=traceback.format_exc()

@@ -52,7 +52,7 @@ class SafetyLimits:
             the noise of the torque estimate must not stop the robot].
         torque_rate: bound of the feed-forward torque's rate [N m/s]: the whole range in 0.1 s for torso and arms, whose
             weight changes slowly, in 0.02 s for the legs, which feel the ground [own].
-        flip: product of two feed-forward torques below whose negative they are a reversal [N^2 m^2]: the square of
+        flip: product of two feed-forward torques below which they are a reversal [N^2 m^2]: minus the square of
             `REVERSAL` of `torque` [own: gravity changes its sign through zero].
         slew: bound of the commanded position's rate [rad/s]: `velocity` for the legs, whose policies use distant
             targets as torques; 3 rad/s for torso and arms, three times what the controllers ask for [own].
@@ -187,7 +187,7 @@ class SafetyLimits:
             torque=torque,
             torque_command=torque_command,
             torque_rate=torque_rate,
-            flip=(REVERSAL * torque) ** 2,
+            flip=-((REVERSAL * torque) ** 2),
             slew=slew,
             deceleration=deceleration,
             damping=np.minimum(5.0, torque_command / velocity),

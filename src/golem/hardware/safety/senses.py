@@ -101,7 +101,7 @@ def sense(
     apart, q = tick - memory.tick, memory.q
     if q is not None and 0.0 < apart < LOST:
         moved = np.abs(state.q - q)
-        if moved.max() > limits.jump * max(1.0, apart / TICK):
+        if np.count_nonzero(moved > limits.jump * max(1.0, apart / TICK)):
             return _jumped(state, tick, memory, limits, moved, sent is not None)
     count = memory.count + 1
     bad = max(0.0, memory.bad - limits.frame_leak)
@@ -156,7 +156,7 @@ def _look(
     state: LowState, tick: float, m: SensesMemory, limits: SafetyLimits, sent: LowCommand | None
 ) -> tuple[SensesMemory, Fault | None]:
     """Judge life and plausibility of `state` against the sample looked at before."""
-    raw = _raw(state)
+    raw = _raw(state) if limits.frozen else m.raw
     before, dt = m.looked, tick - m.looked_at
     if before is None or not 0.0 < dt < LOST:
         calm = replace(m, looked=state, looked_at=tick, raw=raw, since=(tick,) * len(GROUPS))

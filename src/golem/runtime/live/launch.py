@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from golem.errors import ConfigError
+from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces import public
 from golem.interfaces.payloads import GateState, GateStatus
 from golem.interfaces.ros_safety import to_gate_status
@@ -25,6 +26,7 @@ from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
 from golem.robots.sensors.profiles import load_profile
+from golem.runtime.live.damper import Damper
 from golem.runtime.live.exclusive_writers import LAUNCH, refuse_second_launch
 from golem.runtime.live.node_setup import log_line, member, until
 from golem.runtime.live.process import TwinConfig
@@ -37,8 +39,8 @@ PARTS: tuple[Part, ...] = ("twin", "safety", "up")
 """In the order they are started; they end in the opposite one, so that the gate outlives what it guards against."""
 GRACE = 15.0
 """Time a process gets to end by itself [s]: the gate damps for three, on a busy machine longer."""
-PERIOD = 0.1
-"""Time between two looks at the processes [s]."""
+PERIOD = 0.05
+"""Time between two looks at the processes [s]: half of that after which drives that hear nothing go limp."""
 
 
 @dataclass(frozen=True)
@@ -147,8 +149,16 @@ class Launcher:
         gate: newest verdict of the safety gate; None before the first.
     """
 
-    def __init__(self, words: dict[Part, list[str]], node: RosNode, activate: bool) -> None:
-        """Start the processes, `words` being their command lines; watch the gate through `node`."""
+    def __init__(self, words: dict[Part, list[str]], node: RosNode, activate: bool, damper: Damper) -> None:
+        """Start the processes, `words` being their command lines; watch the gate through `node`.
+
+        Args:
+            words: command line of each.
+            node: a node of the domain.
+            activate: whether to open the gate once it is armed.
+            damper: has the motors when the gate has died.
+        """
+        self._damper = damper
         self._words, self._node, self._activate = words, node, activate
         self._activation: Future[Any] | None = None
         self._client = node.client("/safety/activate", public.TRIGGER)
@@ -166,6 +176,8 @@ class Launcher:
         for name, process in self.processes.items():
             if process.code is not None and name not in self._dead:
                 self._dead.add(name)
+                if name == "safety":
+                    self._damper.start()
                 log_line(f"{name} has died (exit code {process.code}). {self._consequence(name)}")
                 log_line(f"Restart it with: golem restart {name}")
         if self._activate and self.gate is not None and self.gate.state is GateState.ARMED:
@@ -176,6 +188,8 @@ class Launcher:
     def restart(self, name: Part) -> None:
         """End one process, if it still runs, and start it again; the others go on."""
         self.processes[name].end()
+        if name == "safety":
+            self._damper.stop()
         self._dead.discard(name)
         self.processes[name] = Process(name, self._words[name])
         log_line(f"{name} was restarted (process {self.processes[name].pid}).")
@@ -184,11 +198,12 @@ class Launcher:
         """End all processes: what commands, then the gate, which damps, then the robot."""
         for name in reversed(PARTS):
             self.processes[name].end()
+        self._damper.stop()
 
     def _consequence(self, name: str) -> str:
         """Return what becomes of the robot once a process has died, as far as it is seen here."""
         if name == "safety":
-            return "The drives go limp within 0.1 s."
+            return "The motors are damped from here, and then go limp."
         until(
             self._node,
             lambda: self.gate is not None and self.gate.state is not GateState.ACTIVE,
@@ -228,7 +243,7 @@ def run_launch(config: LaunchConfig) -> bool:
     words = commands(config)
     with interrupted() as stop, member(LAUNCH, config.dds) as (participant, node):
         refuse_second_launch(participant, config.dds)
-        launcher = Launcher(words, node, config.activate)
+        launcher = Launcher(words, node, config.activate, Damper(participant, SafetyLimits.from_profile()))
         try:
             while not stop.is_set():
                 launcher.step(PERIOD)

@@ -19,7 +19,10 @@ from golem.runtime.live.operator import REQUESTS, RequestConfig
 
 WORDS = tuple(word for word, (service, _) in REQUESTS.items() if service)
 """What can be typed; an empty line is the first that helps in an emergency: press."""
-HELP = f"Enter presses the emergency stop; or type {', '.join(WORDS)}. Ctrl-D ends this."
+HELP = (
+    "Enter presses the virtual emergency stop, or asks for a stop where there is a board; "
+    f"or type {', '.join(WORDS)}. Ctrl-D ends this."
+)
 
 
 def run_console(config: RequestConfig) -> None:
@@ -64,7 +67,15 @@ class Console:
             try:
                 if word not in WORDS:
                     raise unknown_name("request", word, WORDS)
-                service, request = REQUESTS[word]
-                self._tell(self._wait(self._clients[service].call(request)).message)
+                if not self._ask(word) and word == "press":
+                    self._ask(
+                        "stop"
+                    )  # a robot with a button of its own has none that can be pressed from here
             except GolemError as error:
                 self._tell(str(error))
+
+    def _ask(self, word: str) -> bool:
+        service, request = REQUESTS[word]
+        answer = self._wait(self._clients[service].call(request))
+        self._tell(answer.message)
+        return bool(answer.success)

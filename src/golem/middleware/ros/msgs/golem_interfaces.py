@@ -399,6 +399,7 @@ class SafetyStatus(Message):
     INIT: ClassVar[str] = "init"
     ARMED: ClassVar[str] = "armed"
     ACTIVE: ClassVar[str] = "active"
+    STOP2: ClassVar[str] = "stop2"
     STOP1: ClassVar[str] = "stop1"
     STOP0: ClassVar[str] = "stop0"
 
