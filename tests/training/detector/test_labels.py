@@ -31,7 +31,7 @@ def test_labelled_centres_lie_on_the_geoms_of_their_part() -> None:
                 seen.add(CLASSES[int(kind)])
                 total += 1
                 right += owner[segmentation[round(y), round(x)]] == kind
-    assert seen == {"screw", "tight_screw", "nut", "bus_bar", "tray"} and total > 60
+    assert seen == {"screw", "nut", "bus_bar", "tray"} and total > 60
     assert right / total > 0.93  # the rest is hidden behind a finger or a cable
 
 

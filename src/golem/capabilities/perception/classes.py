@@ -2,5 +2,5 @@
 
 from __future__ import annotations
 
-CLASSES: tuple[str, ...] = ("screw", "screw_hole", "nut", "bus_bar", "tray", "tight_screw")
+CLASSES: tuple[str, ...] = ("screw", "screw_hole", "nut", "bus_bar", "tray")
 """Class names, in the order of the network's heatmaps."""

@@ -351,5 +351,5 @@ def _add_fasteners(
             parts.visual_mesh(body, head, (x, y, 0.0), material="zinc", name=names[1])
             parts.collider(body, _CYLINDER, (0.006, height / 2), (x, y, height / 2))
             size = np.array([0.0144, 0.0144, height])
-            found.append(PackPart("tight_screw", "pack", names, at + [0, 0, height], size))
+            found.append(PackPart("screw", "pack", names, at + [0, 0, height], size))
     return found

@@ -15,9 +15,7 @@ from golem.types import Array, Detection
 MATCH_FLOOR = 4.0
 """A centre matches within half the shorter side of the true box, or within this [px], whichever is more."""
 THRESHOLD = 0.05
-BY_CONDITION = [(camera, label) for label in ("screw", "tight_screw") for camera in ("head", "palm")] + [
-    ("head", "tray")
-]
+BY_CONDITION = (("head", "screw"), ("palm", "screw"), ("head", "tray"))
 """Camera and class of the figures that are told for each condition."""
 
 Detector = Callable[[NDArray[np.uint8]], list[Detection]]

@@ -18,7 +18,7 @@ def load_onnx(model: PartNet, path: Path) -> None:
     """Give `model` the weights of an ONNX file that `export_onnx` wrote.
 
     The normalisation is folded into the convolutions there: here it begins with mean 0 and variance 1. Classes that
-    the file does not know keep their random weights.
+    the file does not know keep their random weights; its classes that the network lacks are left out.
 
     Raises:
         ValueError: the file is no such detector.
@@ -34,8 +34,10 @@ def load_onnx(model: PartNet, path: Path) -> None:
     with torch.no_grad():
         for layer, (weight, bias) in zip(layers, folded, strict=True):
             if layer is model.heat:
-                rows = [CLASSES.index(label) for label in known]
-                layer.weight[rows], model.heat.bias[rows] = weight, bias
+                for row, label in enumerate(known):
+                    if label in CLASSES:
+                        layer.weight[CLASSES.index(label)] = weight[row]
+                        model.heat.bias[CLASSES.index(label)] = bias[row]
                 continue
             layer.weight.copy_(weight)
             norm = norms.get(id(layer))

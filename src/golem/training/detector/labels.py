@@ -57,7 +57,7 @@ def _solid(
     pixels = project(info, optical)
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     centre_world, faces = part.position, True
-    if part.label == "screw":
+    if part.label == "screw" and part.body != "pack":
         body = model.body(part.body).id
         axis = data.xmat[body].reshape(3, 3)[:, 2]
         draw = next(d for d in world.draws if screw_name(d.slot) == part.body)
