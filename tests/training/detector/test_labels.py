@@ -63,8 +63,10 @@ def test_a_pulled_screw_leaves_a_hole_label() -> None:
 def test_a_world_depends_on_its_seed_alone() -> None:
     pairs = [list(dataset.render(3, 0, "train", 1)) for _ in range(2)]
     assert len(pairs[0]) == 2
-    for (image, labels, camera), (image_2, labels_2, camera_2) in zip(*pairs, strict=True):
-        assert camera == camera_2 and (image == image_2).all() and (labels == labels_2).all()
+    for (image, labels, camera, place), (image_2, labels_2, camera_2, place_2) in zip(*pairs, strict=True):
+        assert (
+            (camera, place) == (camera_2, place_2) and (image == image_2).all() and (labels == labels_2).all()
+        )
         assert labels.shape[1] == len(COLUMNS)
     held_out = next(iter(dataset.render(3, 0, "held_out", 1)))
     assert (held_out[0] != pairs[0][0][0]).any()

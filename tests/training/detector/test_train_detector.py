@@ -16,6 +16,7 @@ torch = pytest.importorskip("torch", reason="training needs the extra 'train'")
 from golem.capabilities.perception.classes import CLASSES  # noqa: E402
 from golem.capabilities.perception.onnx_detector import OnnxDetector, OnnxDetectorConfig  # noqa: E402
 from golem.training.detector.export_detector import export_onnx  # noqa: E402
+from golem.training.detector.import_detector import load_onnx  # noqa: E402
 from golem.training.detector.part_net import PartNet  # noqa: E402
 from golem.training.detector.train_detector import TrainDetectorConfig, train  # noqa: E402
 
@@ -34,6 +35,7 @@ def splits(tmp_path_factory: pytest.TempPathFactory) -> Path:
             camera = ("head", "palm")[k % 2]
             arrays[f"image_{camera}_{k:04d}"] = np.asarray(cv2.imencode(".png", image)[1])
             arrays[f"label_{camera}_{k:04d}"] = np.array([[2, 74.5, 54.5, 70, 50, 79, 59, 0]], np.float32)
+            arrays[f"conditions_{camera}_{k:04d}"] = np.array(["zinc", "grey", "teal", "nominal"])
         np.savez(folder / split / "world_000.npz", **arrays)
     return folder
 
@@ -75,6 +77,20 @@ def test_the_exported_network_computes_what_the_trained_one_does(tmp_path: Path)
             expected = model(image).numpy()
         np.testing.assert_allclose(
             np.asarray(session.run(["maps"], {"image": image.numpy()})[0]), expected, atol=1e-4
+        )
+
+
+def test_training_goes_on_from_an_exported_network(tmp_path: Path) -> None:
+    torch.manual_seed(1)
+    torch.save({"average": PartNet().state_dict(), "step": 7}, tmp_path / "x.pt")
+    path = export_onnx(tmp_path / "x.pt", tmp_path / "x.onnx")
+    model = PartNet().eval()
+    load_onnx(model, path)
+    image = torch.randn(1, 3, 64, 96)
+    session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
+    with torch.inference_mode():
+        np.testing.assert_allclose(
+            model(image).numpy(), np.asarray(session.run(["maps"], {"image": image.numpy()})[0]), atol=1e-3
         )
 
 

@@ -7,9 +7,11 @@ import numpy as np
 
 from golem.robots.model.spatial import rotation_rpy
 from golem.robots.worlds.conditions import COATS, TRAYS, Conditions, Finish
+from golem.robots.worlds.hall import MATERIALS
 
-SURFACES: dict[Finish, tuple[tuple[float, float, float], float, float]] = {
-    # colour, specular, shininess
+Surface = tuple[tuple[float, float, float], float, float]
+"""Colour (r, g, b), specular, shininess."""
+SURFACES: dict[Finish, Surface] = {
     "zinc": ((0.80, 0.81, 0.83), 0.9, 0.7),
     "black_oxide": ((0.09, 0.09, 0.10), 0.5, 0.5),
     "brass": ((0.72, 0.56, 0.24), 0.9, 0.6),
@@ -21,17 +23,31 @@ BEAD = 0.04
 """How much lighter the pressed beads are than the cover."""
 
 
+def surfaces(conditions: Conditions) -> dict[str, Surface]:
+    """Return the materials that differ from work place to work place, by name."""
+    screws = SURFACES[conditions.finish]
+    coat = COATS[conditions.cover]
+    looks = {
+        "zinc": screws,
+        "cover_coat": (coat, *MATERIALS["cover_coat"][1:3]),
+        "cover_bead": (_lighter(coat), *MATERIALS["cover_bead"][1:3]),
+        "tray_teal": (TRAYS[conditions.tray], *MATERIALS["tray_teal"][1:3]),
+    }
+    if conditions.finish == "rust":
+        looks["steel"] = (screws[0], *MATERIALS["steel"][1:3])
+    return looks
+
+
+def _lighter(coat: tuple[float, float, float]) -> tuple[float, float, float]:
+    red, green, blue = (min(value + BEAD, 1.0) for value in coat)
+    return red, green, blue
+
+
 def dress(spec: mujoco.MjSpec, conditions: Conditions) -> None:
     """Give the materials and lamps of a work place with a pack their looks."""
-    colour, specular, shininess = SURFACES[conditions.finish]
-    screws = spec.material("zinc")
-    screws.rgba, screws.specular, screws.shininess = [*colour, 1.0], specular, shininess
-    if conditions.finish == "rust":
-        spec.material("steel").rgba = [*colour, 1.0]
-    coat = COATS[conditions.cover]
-    spec.material("cover_coat").rgba = [*coat, 1.0]
-    spec.material("cover_bead").rgba = [*(min(value + BEAD, 1.0) for value in coat), 1.0]
-    spec.material("tray_teal").rgba = [*TRAYS[conditions.tray], 1.0]
+    for name, (colour, specular, shininess) in surfaces(conditions).items():
+        material = spec.material(name)
+        material.rgba, material.specular, material.shininess = [*colour, 1.0], specular, shininess
     turn = rotation_rpy(0.0, 0.0, conditions.light_azimuth)
     for light in spec.lights:
         light.pos = (turn @ light.pos).tolist()

@@ -35,7 +35,13 @@ def render(
     dataset.generate(folder, seed, "train", worlds, per_camera)
 
 
-def train(data: Path = RUNS / "data", out: Path = RUNS / "run", seed: int = 0, steps: int = 12000) -> None:
+def train(
+    data: Path = RUNS / "data",
+    out: Path = RUNS / "run",
+    seed: int = 0,
+    steps: int = 12000,
+    start: Path | None = None,
+) -> None:
     """Train on the rendered splits, or resume.
 
     Args:
@@ -43,8 +49,9 @@ def train(data: Path = RUNS / "data", out: Path = RUNS / "run", seed: int = 0, s
         out: folder of checkpoints and curve.
         seed: of weights and crops.
         steps: gradient steps of 8 crops.
+        start: ONNX file of an earlier detector to begin with.
     """
-    print(run_training(TrainDetectorConfig(data=data, out=out, seed=seed, steps=steps)))
+    print(run_training(TrainDetectorConfig(data=data, out=out, seed=seed, steps=steps, start=start)))
 
 
 def export(checkpoint: Path = RUNS / "run" / "best.pt", out: Path = RUNS / "detector.onnx") -> None:
@@ -79,11 +86,13 @@ def evaluate(data: Path = RUNS / "data", weights: Path | None = None) -> None:
         weights: ONNX file; the shipped one if absent.
     """
     from golem.capabilities.perception.onnx_detector import OnnxDetector, OnnxDetectorConfig
-    from golem.training.detector.evaluate import THRESHOLD, evaluate, table
+    from golem.training.detector.evaluate import THRESHOLD, condition_table, evaluate, table
 
     detector = OnnxDetector(OnnxDetectorConfig(None if weights is None else str(weights), THRESHOLD))
     held = dataset.load(data, "held_out")
     print(table(evaluate(held, detector.detect)))
+    print()
+    print(condition_table(held, detector.detect))
     for camera in ("head", "palm"):
         times = []
         for image, name in zip(held.images, held.cameras, strict=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,12 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from golem.robots.sensors.auto_exposure import AutoExposure
 from golem.robots.sensors.streams import stream
+from golem.robots.worlds.conditions import Conditions
 from golem.training.detector import random_scene
 from golem.training.detector.labels import COLUMNS, label_image
 from golem.types import Array
 
 JPEG_QUALITY = 96
+CONDITIONS = ("finish", "cover", "tray", "light")
+"""What is kept of an image's conditions; the light as the name of its range."""
+LIGHTS = {"dim": 0.3, "low": 0.7, "nominal": 1.4, "bright": np.inf}
+"""Upper ends of the ranges of the light's level, 1 is nominal."""
 FANCY_SHARE = 0.25
 """Share of the images with shadows and smooth edges."""
 
@@ -29,17 +35,29 @@ class Dataset:
         images: (height, width, 3) RGB each, decoded: 3 GB for the default training split.
         labels: per image (n, 8), columns as in `labels.COLUMNS`.
         cameras: per image `"head"` or `"palm"`.
+        conditions: per image the values of `CONDITIONS`.
     """
 
     images: list[NDArray[np.uint8]]
     labels: list[Array]
     cameras: list[str]
+    conditions: list[dict[str, str]]
+
+    def only(self, chosen: Iterable[int]) -> Dataset:
+        """Return the images with these numbers."""
+        some = Dataset([], [], [], [])
+        for k in chosen:
+            some.images.append(self.images[k])
+            some.labels.append(self.labels[k])
+            some.cameras.append(self.cameras[k])
+            some.conditions.append(self.conditions[k])
+        return some
 
 
 def render(
     seed: int, world_index: int, split: str, per_camera: int
-) -> Iterator[tuple[NDArray[np.uint8], Array, str]]:
-    """Yield (image RGB, labels, camera) of one world; depends on the arguments only.
+) -> Iterator[tuple[NDArray[np.uint8], Array, str, Conditions]]:
+    """Yield (image RGB, labels, camera, conditions) of one world; depends on the arguments only.
 
     Args:
         seed: of the dataset.
@@ -52,13 +70,20 @@ def render(
     plain, fancy = random_scene.make_rigs(world)
     with plain, fancy:
         for k in range(2 * per_camera):
-            random_scene.randomise_looks(world, rng)
+            conditions = random_scene.randomise_looks(world, rng)
             random_scene.randomise_objects(world, rng)
             info = (random_scene.place_head if k % 2 == 0 else random_scene.place_palm)(world, rng)
             rig = fancy if rng.random() < FANCY_SHARE else plain
             rgb, _ = rig.render(world.data, info.name)
             labels = label_image(world, info, plain.segment(world.data, info.name))
-            yield rgb, labels, "head" if info.name == "head" else "palm"
+            exposed = AutoExposure(conditions.light, rng).expose(rgb)
+            yield exposed, labels, "head" if info.name == "head" else "palm", conditions
+
+
+def named(conditions: Conditions) -> list[str]:
+    """Return the values of `CONDITIONS` as words."""
+    light = next(name for name, end in LIGHTS.items() if conditions.light <= end)
+    return [conditions.finish, conditions.cover, conditions.tray, light]
 
 
 def generate(folder: Path, seed: int, split: str, worlds: int, per_camera: int) -> None:
@@ -77,8 +102,8 @@ def generate(folder: Path, seed: int, split: str, worlds: int, per_camera: int) 
         path = target / f"world_{index:03d}.npz"
         if path.exists():
             continue
-        arrays: dict[str, NDArray[np.float32] | NDArray[np.uint8]] = {}
-        for k, (rgb, labels, camera) in enumerate(render(seed, index, split, per_camera)):
+        arrays: dict[str, NDArray[np.float32] | NDArray[np.uint8] | NDArray[np.str_]] = {}
+        for k, (rgb, labels, camera, conditions) in enumerate(render(seed, index, split, per_camera)):
             ok, code = cv2.imencode(
                 ".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
             )
@@ -86,6 +111,7 @@ def generate(folder: Path, seed: int, split: str, worlds: int, per_camera: int) 
                 raise RuntimeError("JPEG encoding failed")
             arrays[f"image_{camera}_{k:04d}"] = np.asarray(code, np.uint8)
             arrays[f"label_{camera}_{k:04d}"] = labels.astype(np.float32)
+            arrays[f"conditions_{camera}_{k:04d}"] = np.array(named(conditions))
         part = path.with_suffix(".part")
         with part.open("wb") as file:
             np.savez(file, allow_pickle=False, **arrays)
@@ -101,7 +127,7 @@ def load(folder: Path, split: str) -> Dataset:
     paths = sorted((folder / split).glob("world_*.npz"))
     if not paths:
         raise FileNotFoundError(f"no rendered worlds in {folder / split}")
-    data = Dataset([], [], [])
+    data = Dataset([], [], [], [])
     for path in paths:
         with np.load(path) as file:
             for key in sorted(k for k in file.files if k.startswith("image_")):
@@ -113,4 +139,6 @@ def load(folder: Path, split: str) -> Dataset:
                     file[key.replace("image_", "label_")].reshape(-1, len(COLUMNS)).astype(float)
                 )
                 data.cameras.append(key.split("_")[1])
+                words = file[key.replace("image_", "conditions_")].tolist()
+                data.conditions.append(dict(zip(CONDITIONS, words, strict=True)))
     return data

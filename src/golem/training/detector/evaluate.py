@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.capabilities.perception.classes import CLASSES
-from golem.training.detector.dataset import Dataset
+from golem.training.detector.dataset import CONDITIONS, Dataset
 from golem.types import Array, Detection
 
 MATCH_FLOOR = 4.0
 """A centre matches within half the shorter side of the true box, or within this [px], whichever is more."""
 THRESHOLD = 0.05
+BY_CONDITION = (("head", "screw"), ("palm", "screw"), ("head", "tray"))
+"""Camera and class of the figures that are told for each condition."""
 
 Detector = Callable[[NDArray[np.uint8]], list[Detection]]
 
@@ -96,6 +98,21 @@ def _score(hits: list[tuple[float, bool, float]], count: int, working_score: flo
         error=float(np.median(right)) if right else float("nan"),
         error_p95=float(np.percentile(right, 95)) if right else float("nan"),
     )
+
+
+def condition_table(data: Dataset, detect: Detector) -> str:
+    """Return the mean AP of classes and cameras, and that of `BY_CONDITION`, for each value of each condition."""
+    columns = " | ".join(f"{label}, {camera}" for camera, label in BY_CONDITION)
+    lines = [f"| condition | value | images | mean AP | {columns} |", "|---" * (4 + len(BY_CONDITION)) + "|"]
+    for name in CONDITIONS:
+        for value in sorted({conditions[name] for conditions in data.conditions}):
+            chosen = [k for k, conditions in enumerate(data.conditions) if conditions[name] == value]
+            scores = evaluate(data.only(chosen), detect)
+            found = {key: s.ap for key, s in scores.items() if s.count}
+            mean = f"{np.mean(list(found.values())):.3f}"
+            single = " | ".join(f"{found[key]:.3f}" if key in found else "none" for key in BY_CONDITION)
+            lines.append(f"| {name} | {value} | {len(chosen)} | {mean} | {single} |")
+    return "\n".join(lines)
 
 
 def table(scores: dict[tuple[str, str], Score]) -> str:

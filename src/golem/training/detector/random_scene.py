@@ -17,16 +17,21 @@ from golem.robots.model import magpie_model, mjcf
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.sensors.cameras import CAMERAS, T_MUJOCO_OPTICAL
 from golem.robots.worlds import hall
+from golem.robots.worlds.clutter import add_clutter
+from golem.robots.worlds.conditions import Conditions, draw_conditions
+from golem.robots.worlds.dressing import surfaces
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
 from golem.robots.worlds.screws import ScrewDraw, ScrewRanges, draw_screws, screw_name
 from golem.types import SIDES, Array, CameraInfo, Side
 
 DISTRACTORS = 14
-WIDE = ScrewRanges(protrusion=(0.0, 0.013))
-"""Screws of the training images: those of the worlds, some of them screwed down."""
+WIDE = ScrewRanges(protrusion=(0.004, 0.013))
+"""Loosened screws of the training images: those of the worlds, and some that stand less proud."""
 TINTED = (0.25, 0.35)
 """Spread of brightness and of colour of the randomised materials (log scale)."""
+CLUTTER = 6
+"""Most things that lie on the cover beside the distractors."""
 AWAY = np.array([0.0, 0.0, -5.0])
 """Where unused distractors are [m]: under the floor."""
 
@@ -83,6 +88,7 @@ def build_world(rng: np.random.Generator) -> RandomScene:
     free = [i for i in range(68) if i not in layout.empty_holes]
     draws = draw_screws(rng, WIDE, [int(i) for i in rng.choice(free, size=14, replace=False)])
     names = add_pack(spec, layout, draws)
+    add_clutter(spec, layout, int(rng.integers(CLUTTER + 1)), rng)
     for k in range(DISTRACTORS):
         _add_distractor(spec, k, rng)
     model = spec.compile()
@@ -122,13 +128,19 @@ def _add_distractor(spec: mujoco.MjSpec, index: int, rng: np.random.Generator) -
             body.add_geom(type=kinds.mjGEOM_SPHERE, size=[u(0.006, 0.02), 0, 0], **look)
 
 
-def randomise_looks(world: RandomScene, rng: np.random.Generator) -> None:
-    """Draw colours of materials, robot and distractors, the lights, and who casts shadows."""
+def randomise_looks(world: RandomScene, rng: np.random.Generator) -> Conditions:
+    """Draw finishes, colours of materials, robot and distractors, the lights, and who casts shadows.
+
+    Returns:
+        The conditions that were drawn: of them finish, cover, tray and light hold for the image.
+    """
     model = world.model
-    wild = rng.random() < 0.6  # the others keep the colours of the hall, up to light and small tints
-    for name, (rgba, specular, shininess, _) in hall.MATERIALS.items():
+    wild = rng.random() < 0.6  # the others keep the colours of a work place, up to light and small tints
+    conditions = draw_conditions("varied", {}, rng)
+    looks = {name: (rgba[:3], *shine[:2]) for name, (rgba, *shine) in hall.MATERIALS.items()}
+    for name, (colour, specular, shininess) in (looks | surfaces(conditions)).items():
         mat = model.material(name).id
-        base = np.array(rgba[:3])
+        base = np.array(colour)
         if (
             wild
             and name in ("cover_coat", "cover_bead", "wall_paint", "wall_band", "stand_blue")
@@ -170,6 +182,7 @@ def randomise_looks(world: RandomScene, rng: np.random.Generator) -> None:
         model.light_diffuse[light] = level * np.exp(0.08 * rng.standard_normal(3))
         model.light_specular[light] = level * rng.uniform(0.2, 1.0)
         model.light_castshadow[light] = light == 0 or rng.random() < 0.3
+    return conditions
 
 
 def _random_colour(rng: np.random.Generator) -> Array:

@@ -22,6 +22,7 @@ from golem.robots.sensors.streams import stream
 from golem.training.detector import augment, dataset
 from golem.training.detector.augment import MEAN, STD
 from golem.training.detector.evaluate import THRESHOLD, Detector, evaluate
+from golem.training.detector.import_detector import load_onnx
 from golem.training.detector.part_net import MULTIPLE, PartNet
 
 
@@ -39,6 +40,7 @@ class TrainDetectorConfig:
         check_every: steps between evaluations on part of the held-out split.
         check_images: how many of its images.
         workers: processes that cut crops.
+        start: ONNX file of an earlier detector to begin with; random weights if absent.
         bfloat16: compute the convolutions in this type: 1.7 times faster where the processor has it.
     """
 
@@ -51,6 +53,7 @@ class TrainDetectorConfig:
     check_every: int = 500
     check_images: int = 80
     workers: int = 1
+    start: Path | None = None
     bfloat16: bool = True
 
 
@@ -132,8 +135,10 @@ def train(config: TrainDetectorConfig, stop: int | None = None) -> Path:
     data = dataset.load(config.data, "train")
     held = dataset.load(config.data, "held_out")
     pick = np.linspace(0, len(held.images) - 1, min(config.check_images, len(held.images))).astype(int)
-    held = dataset.Dataset(*([items[i] for i in pick] for items in (held.images, held.labels, held.cameras)))
+    held = held.only(pick.tolist())
     model = PartNet().to(memory_format=torch.channels_last)
+    if config.start is not None:
+        load_onnx(model, config.start)
     average = copy.deepcopy(model).eval()
     optimiser = torch.optim.AdamW(model.parameters(), lr=config.rate, weight_decay=1e-3)
     step, best = 0, -1.0
