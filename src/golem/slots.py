@@ -130,15 +130,6 @@ SLOTS: dict[str, Slot] = {
         },
         ("nav2",),
     ),
-    "memory": Slot(
-        "golem.capabilities.memory.base:Memory",
-        {
-            "frame_index": "golem.capabilities.memory.frame_index:FrameIndex",
-            "object_map": "golem.capabilities.memory.object_map:ObjectMap",
-            "reranked": "golem.capabilities.memory.reranked:Reranked",
-            "top_down_map": "golem.capabilities.memory.top_down_map:TopDownMap",
-        },
-    ),
     "skill": Slot(
         "golem.skills.base:Skill",
         {
@@ -167,7 +158,6 @@ KEYS: dict[str, StackKey] = {
     # Runs where the stack listens to the LiDAR.
     "mapper": StackKey("mapper", "grid"),
     "navigator": StackKey("navigator", "goto"),
-    "memory": StackKey("memory", "object_map"),
     # Takes the legs when `lower_body` fails.
     "fallback": StackKey("lower_body", "hold", standing="almi"),
     # Run by the twin's on-board computer for a lower body that speaks to it.

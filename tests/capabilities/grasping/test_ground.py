@@ -71,5 +71,5 @@ def test_points_in_one_line_give_no_plane() -> None:
 
 def test_the_height_needs_no_plane() -> None:
     thing = sighting((0.0, 0.0))
-    np.testing.assert_allclose(height_above_ground(thing), 0.010)
+    assert height_above_ground(thing) == pytest.approx(0.010)
     assert height_above_ground(replace(thing, points=thing.points[:0])) is None

@@ -26,13 +26,13 @@ class RerankedConfig:
     Attributes:
         proposer: the memory whose answers these are: frame_index or top_down_map.
         candidates: how many of its places are looked at.
-        near: distance up to which an object is at a place [m].
+        near: distance up to which an object is at a place [m]; a frame knows only where its middle looks.
         objects: the memory that knows what is there.
     """
 
     proposer: Proposer = "frame_index"
     candidates: int = 20
-    near: float = 0.6
+    near: float = 1.2
     objects: ObjectMapConfig = field(default_factory=ObjectMapConfig)
 
     def __post_init__(self) -> None:
