@@ -9,7 +9,7 @@ import importlib
 import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -102,39 +102,16 @@ def _results(words: list[str]) -> int:
     return 0
 
 
-@dataclass(frozen=True)
-class ExportConfig:
-    """Write the robot model to a file."""
-
-    out: Path
-    """The file to write."""
-    format: str = "mjcf"
-    """urdf or mjcf."""
-    hands: bool = True
-    """With the MAGPIE hands."""
-
-
 def _model(words: list[str]) -> int:
     """Export the robot model as URDF or MJCF, or cover a robot with spheres: `model export`, `model spheres`."""
-    if not words or words[0] in ("-h", "--help"):
-        print(f"usage: golem model {{{','.join(MODEL_COMMANDS)}}} [options]")
-        return 0 if words else BAD_INPUT
-    if words[0] not in MODEL_COMMANDS:
-        raise unknown_name("model command", words[0], MODEL_COMMANDS)
-    if words[0] == "spheres":
-        from golem.capabilities.collision.pack_robot import SpheresConfig, run_spheres
-
-        run_spheres(_parse(SpheresConfig, "model spheres", words[1:]))
-        return 0
-    config = _parse(ExportConfig, "model export", words[1:])
-    from golem.robots.model.export import export
-
-    export(config.format, config.hands, config.out)
-    print(f"Wrote {config.out}")
-    return 0
+    return _one_of(words, "model", "model command", MODEL_COMMANDS)
 
 
-MODEL_COMMANDS = ("export", "spheres")
+MODEL_COMMANDS = {
+    "export": ("golem.robots.model.export", "ExportConfig", "run_export"),
+    "spheres": ("golem.capabilities.collision.pack_robot", "SpheresConfig", "run_spheres"),
+}
+"""What is done with a model: its module, its options, and what runs it; so it is for devices."""
 
 
 def _bench(words: list[str]) -> int:
@@ -165,12 +142,9 @@ def _reach(words: list[str]) -> int:
 
 def _train(words: list[str]) -> int:
     """Train a module from scratch: detector or legs."""
-    what = words[0] if words else ""
-    if what in ("-h", "--help"):
-        print(f"usage: golem train {{{','.join(TRAINERS)}}} [options]")
+    what = _named(words, "train", "thing to train", TRAINERS)
+    if what is None:
         return 0
-    if what not in TRAINERS:
-        raise unknown_name("thing to train", what, TRAINERS)
     _prepare_graphics()
     from golem.errors import MissingExtra
 
@@ -217,16 +191,7 @@ def _safety(words: list[str]) -> int:
 
 def _drivers(words: list[str]) -> int:
     """Put a device on a domain: `drivers camera`, `hands` and `lidar`; `drivers estop PORT` tries the e-stop board."""
-    what = words[0] if words else ""
-    if what in ("-h", "--help"):
-        print(f"usage: golem drivers {{{','.join(DEVICES)}}}")
-        return 0
-    if what not in DEVICES:
-        raise unknown_name("device", what, DEVICES)
-    module, config, run = DEVICES[what]
-    driver = importlib.import_module(module)
-    done = getattr(driver, run)(_parse(getattr(driver, config), f"drivers {what}", words[1:]))
-    return FAILED if done is False else 0
+    return _one_of(words, "drivers", "device", DEVICES)
 
 
 DEVICES = {
@@ -235,7 +200,7 @@ DEVICES = {
     "hands": ("golem.runtime.live.hand_process", "HandsConfig", "run_hands"),
     "lidar": ("golem.runtime.live.lidar_process", "LidarConfig", "run_lidar"),
 }
-"""What has a driver: its module, its options, and what runs it."""
+"""What has a driver."""
 
 
 def _up(words: list[str]) -> int:
@@ -398,6 +363,28 @@ def _dispatch(words: list[str]) -> int:
     if words[0] not in COMMANDS:
         raise unknown_name("command", words[0], COMMANDS)
     return COMMANDS[words[0]](words[1:])
+
+
+def _named(words: list[str], command: str, what: str, names: Collection[str]) -> str | None:
+    """Return which of `names` the first of `words` is; None where help was asked for, which is printed."""
+    word = words[0] if words else ""
+    if word in ("-h", "--help"):
+        print(f"usage: golem {command} {{{','.join(names)}}} [options]")
+        return None
+    if word not in names:
+        raise unknown_name(what, word, names)
+    return word
+
+
+def _one_of(words: list[str], command: str, what: str, table: Mapping[str, tuple[str, str, str]]) -> int:
+    """Run what the first of `words` names in `table` with the options that follow."""
+    name = _named(words, command, what, table)
+    if name is None:
+        return 0
+    module, config, run = table[name]
+    owner = importlib.import_module(module)
+    done = getattr(owner, run)(_parse(getattr(owner, config), f"{command} {name}", words[1:]))
+    return FAILED if done is False else 0
 
 
 def _parse(kind: type[T], name: str, words: list[str]) -> T:

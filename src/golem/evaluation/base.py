@@ -44,7 +44,7 @@ RUNGS: dict[str, str] = {
     "navigate": "golem.evaluation.rungs.navigate_hall:NavigateRung",
     "base-estimation": "golem.evaluation.rungs.base_estimation:BaseEstimation",
     "odometry": "golem.evaluation.rungs.odometry:OdometryRung",
-    "memory": "golem.evaluation.rungs.memory:MemoryRung",
+    "memory": "golem.evaluation.rungs.spatial_memory:MemoryRung",
     "mpc-rate": "golem.evaluation.rungs.mpc_rate:MpcRate",
 }
 """Rung name -> `module:Class`; the module is imported when the rung is used."""

@@ -71,11 +71,14 @@ SOUND: dict[str, Any] = {
     "/skill/run": RunSkill_Goal("stand", '{"seconds": 0.02}'),
     "/skill/pick": Pick_Goal("screw", "tray", "right"),
     "/skill/walk": Walk_Goal(PoseStamped(convert.header(0.0, "base_link")), convert.duration(1.0)),
+    "/skill/navigate": Walk_Goal(PoseStamped(convert.header(0.0, "base_link")), convert.duration(1.0)),
     "/skill/stand": Stand_Goal(convert.duration(0.02)),
     "/left/gripper/set_position": SetGap_Request(0.03),
     "/left/gripper/set_force": SetForce_Request(5.0),
 }
 """Goals and requests that make sense; the others' defaults do."""
+WALKS = ("/skill/walk", "/skill/navigate")
+"""Actions of legs."""
 STOPS = ("/safety/stop", "/estop/press")
 """Services after which it takes a while until the robot may move again."""
 KNOWN = codec.codec()
@@ -209,11 +212,19 @@ def test_every_field_of_every_goal_at_its_edges(crowd: Crowd, action: str) -> No
         for goal in variants(base)
     ]
     assert len(stages) > 15 and "refused" in stages
-    assert {"done", "cancelled", "detect"} & set(stages) or action == "/skill/walk"  # whose legs do not
+    assert {"done", "cancelled", "detect"} & set(stages) or action in WALKS  # whose legs do not
 
 
 def test_every_field_of_every_goal_in_json_at_its_edges(crowd: Crowd) -> None:
-    sound = {"pick": {}, "walk": {"x": 1.0}, "stand": {"seconds": 0.02}}
+    walk = {"x": 1.0}
+    sound = {
+        "pick": {},
+        "walk": walk,
+        "navigate": walk,
+        "explore": {},
+        "dock": {},
+        "stand": {"seconds": 0.02},
+    }
     for spec in SPECS.values():
         for field in spec.goal["properties"]:
             others = json.dumps({k: v for k, v in sound[spec.name].items() if k != field})[1:-1]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from golem.capabilities.memory.base import MemoryFault
-from golem.capabilities.memory.object_records import COLUMNS, Row
+from golem.capabilities.memory.object_records import COLUMNS, ObjectRow
 
 VERSION = 1
 """Layout of the file."""
@@ -64,7 +64,7 @@ class MemoryFile:
         except (sqlite3.DatabaseError, OSError) as error:
             raise MemoryFault(f"The memory {self.path} cannot be used: {error}.") from None
 
-    def read(self) -> tuple[list[Row], float]:
+    def read(self) -> tuple[list[ObjectRow], float]:
         """Return every object, and the time of the last look [s], -inf where there was none.
 
         Raises:
@@ -73,10 +73,12 @@ class MemoryFile:
         with self._faults():
             rows = self._base.execute("SELECT * FROM objects ORDER BY number").fetchall()
             last = self._base.execute("SELECT last FROM clock").fetchone()
-        objects = [Row(int(number), str(label), np.array(values, float)) for number, label, *values in rows]
+        objects = [
+            ObjectRow(int(number), str(label), np.array(values, float)) for number, label, *values in rows
+        ]
         return objects, -np.inf if last is None else float(last[0])
 
-    def write(self, changed: Iterable[Row], removed: Iterable[int], last: float) -> None:
+    def write(self, changed: Iterable[ObjectRow], removed: Iterable[int], last: float) -> None:
         """Keep what changed: all of it or, when this raises, nothing.
 
         Raises:

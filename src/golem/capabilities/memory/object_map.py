@@ -51,6 +51,7 @@ class ObjectMapConfig:
         missed: the same of a look at a place whose object was not detected though nothing hides it.
         through: the same of a look through the place.
         ceiling: highest log odds; below `-through`, so that one look through a place is enough.
+        sure: log odds from which on an object is answered; one look with a score of 0.67 gives as much.
         most: most objects that are kept; the longest gone are forgotten first, then the longest unseen.
     """
 
@@ -61,6 +62,7 @@ class ObjectMapConfig:
     missed: float = -0.5
     through: float = -3.0
     ceiling: float = 2.5
+    sure: float = 1.0
     most: int = 10_000
 
     def __post_init__(self) -> None:
@@ -202,6 +204,8 @@ class ObjectMap:
     def _places(self, label: str, score: float, when: When, at: float | None) -> list[Place]:
         records = self._records
         rows = records.rows(label)
+        sure = (records.values[rows, BELIEF] >= self._config.sure) | (records.values[rows, LOOKS] > 1.0)
+        rows = rows[sure]
         values = records.values[rows]
         there = np.isinf(values[:, GONE])
         absent: Evidence = "moved" if when == "now" else "gone"

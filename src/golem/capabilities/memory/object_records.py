@@ -18,7 +18,7 @@ X, VARIANCE, SIZE, BELIEF, FIRST, LAST, GONE, LOOKS = 0, 3, 4, 5, 6, 7, 8, 9
 
 
 @dataclass(slots=True)
-class Row:
+class ObjectRow:
     """One object: its number, its label and its values of `COLUMNS`."""
 
     number: int
@@ -89,7 +89,7 @@ class ObjectRecords:
             self._row[int(self._numbers[row])] = row
         self._labels.pop()
 
-    def row(self, number: int) -> Row:
+    def row(self, number: int) -> ObjectRow:
         """Return a copy of an object."""
         at = self._row[number]
-        return Row(number, self._labels[at], self._values[at].copy())
+        return ObjectRow(number, self._labels[at], self._values[at].copy())

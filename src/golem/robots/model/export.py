@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -17,6 +18,28 @@ from golem.robots.model.contact_shapes import Shape
 from golem.robots.model.spatial import Inertial, rpy_of, transform
 from golem.robots.model.table import FRAMES, JOINTS, LINKS, T_TORSO_HEAD_OPTICAL
 from golem.types import SIDES, Array
+
+
+@dataclass(frozen=True)
+class ExportConfig:
+    """Write the robot model to a file."""
+
+    out: Path
+    """The file to write."""
+    format: str = "mjcf"
+    """urdf or mjcf."""
+    hands: bool = True
+    """With the MAGPIE hands."""
+
+
+def run_export(config: ExportConfig) -> None:
+    """Write the file, and say so.
+
+    Raises:
+        ConfigError, OutputError: see `export`.
+    """
+    export(config.format, config.hands, config.out)
+    print(f"Wrote {config.out}")
 
 
 def export(format: str, hands: bool, out: Path) -> None:

@@ -28,8 +28,8 @@ MEMORIES: dict[str, Callable[[], Memory]] = {
     "top_down_map": TopDownMap,
 }
 """The methods of this rung."""
-HIT = 0.5
-"""Distance up to which an answer is right [m]; counters are farther from each other."""
+HIT = 1.0
+"""Distance up to which an answer is right [m]: the same counter, the next ones being 2.4 m away [own]."""
 ERRORS = Rates(missed=0.1, invented=0.03, confused=0.05, jitter=0.02)
 
 
@@ -111,9 +111,8 @@ def ask(method: str, episode: Relocation) -> TrialOutcome:
         past = times.ask(memory, contract, episode.target, "anywhere", limit=3)
     absent = [times.ask(memory, contract, kind) for kind in episode.absent]
     memory.close()
-    ranks = [
-        _rank(answer, thing.position) for answer, thing in zip(static, _kinds(episode.before), strict=True)
-    ]
+    kinds = _kinds(episode.before)
+    ranks = [_rank(answer, thing.kind, episode.before) for answer, thing in zip(static, kinds, strict=True)]
     twin = [thing for thing in episode.after[1:] if thing.kind == episode.target]
     present = [episode.after[0], *twin]
     current = bool(now) and now[0].evidence != "moved" and any(_hits(now[0], thing) for thing in present)
@@ -166,7 +165,8 @@ def _hits(place: Place, thing: Thing) -> bool:
     return bool(np.linalg.norm(place.position[:2] - thing.position[:2]) <= HIT)
 
 
-def _rank(answer: Sequence[Place], position: np.ndarray) -> int | None:
-    """Return the rank of the first place at `position`, from 1."""
-    near = (np.linalg.norm(place.position[:2] - position[:2]) <= HIT for place in answer)
-    return next((rank for rank, hit in enumerate(near, 1) if hit), None)
+def _rank(answer: Sequence[Place], kind: str, things: Sequence[Thing]) -> int | None:
+    """Return the rank of the first place where there is one of that kind, from 1."""
+    alike = [thing for thing in things if thing.kind == kind]
+    right = (any(_hits(place, thing) for thing in alike) for place in answer)
+    return next((rank for rank, hit in enumerate(right, 1) if hit), None)

@@ -9,7 +9,7 @@ import pytest
 
 from golem.evaluation.base import TrialSpec, make_rung
 from golem.evaluation.episodes.relocation import Rates, Relocation, relocation
-from golem.evaluation.rungs.memory import ask
+from golem.evaluation.rungs.spatial_memory import ask
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_a_memory_of_what_was_before_is_out_of_date(episode: Relocation) -> None
 
 @pytest.mark.slow
 def test_a_trial_depends_on_its_spec_alone() -> None:
-    rung = make_rung("golem.evaluation.rungs.memory:MemoryRung")
+    rung = make_rung("golem.evaluation.rungs.spatial_memory:MemoryRung")
     spec = TrialSpec("memory", "object_map", "ideal", 0, 1, case={"condition": "detector"})
     first, again = rung.run(spec, None), rung.run(spec, None)
     assert first.series == again.series and first.stage == again.stage
