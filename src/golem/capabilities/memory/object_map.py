@@ -26,6 +26,7 @@ from golem.capabilities.memory.object_records import (
     GONE,
     LAST,
     LOOKS,
+    PEAK,
     SIZE,
     VARIANCE,
     ObjectRecords,
@@ -51,7 +52,7 @@ class ObjectMapConfig:
         missed: the same of a look at a place whose object was not detected though nothing hides it.
         through: the same of a look through the place.
         ceiling: highest log odds; below `-through`, so that one look through a place is enough.
-        sure: log odds from which on an object is answered; one look with a score of 0.67 gives as much.
+        sure: log odds that an object must have had to be answered; one look with a score of 0.67 gives as much.
         most: most objects that are kept; the longest gone are forgotten first, then the longest unseen.
     """
 
@@ -151,7 +152,17 @@ class ObjectMap:
                     changed.add(int(records.numbers[row]))
                 else:
                     values = np.array(
-                        [*places[k], variances[k], _size(seen[k]), gain, frame.t, frame.t, math.inf, 1.0]
+                        [
+                            *places[k],
+                            variances[k],
+                            _size(seen[k]),
+                            gain,
+                            frame.t,
+                            frame.t,
+                            math.inf,
+                            1.0,
+                            gain,
+                        ]
                     )
                     changed.add(records.add(label, values))
         return changed
@@ -204,8 +215,7 @@ class ObjectMap:
     def _places(self, label: str, score: float, when: When, at: float | None) -> list[Place]:
         records = self._records
         rows = records.rows(label)
-        sure = (records.values[rows, BELIEF] >= self._config.sure) | (records.values[rows, LOOKS] > 1.0)
-        rows = rows[sure]
+        rows = rows[records.values[rows, PEAK] >= self._config.sure]
         values = records.values[rows]
         there = np.isinf(values[:, GONE])
         absent: Evidence = "moved" if when == "now" else "gone"
@@ -257,6 +267,7 @@ def _update(row: Array, place: Array, variance: float, gain: float, ceiling: flo
     row[PLACE] += fused / variance * (place - row[PLACE])
     row[VARIANCE] = max(fused, variance / 4.0)
     row[BELIEF] = min(row[BELIEF] + gain, ceiling)
+    row[PEAK] = max(row[PEAK], row[BELIEF])
     row[LAST] = t
     row[LOOKS] += 1.0
 
@@ -269,4 +280,4 @@ def _size(found: LocalizedObject) -> float:
     return float(np.clip(1.5 * spread, 0.02, 0.3))
 
 
-assert len(COLUMNS) == LOOKS + 1
+assert len(COLUMNS) == PEAK + 1

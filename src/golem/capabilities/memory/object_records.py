@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from golem.types import Array
 
 COLUMNS: tuple[str, ...] = (
-    "x", "y", "z", "variance", "size", "belief", "first_seen", "last_seen", "gone_at", "looks",
+    "x", "y", "z", "variance", "size", "belief", "first_seen", "last_seen", "gone_at", "looks", "peak",
 )  # fmt: skip
 """Position [m], variance of each of its coordinates [m^2], radius [m], log odds that it is there, times [s] with
-`gone_at` infinite while it may be there, and how many looks showed it."""
-X, VARIANCE, SIZE, BELIEF, FIRST, LAST, GONE, LOOKS = 0, 3, 4, 5, 6, 7, 8, 9
+`gone_at` infinite while it may be there, how many looks showed it, and the highest of its log odds."""
+X, VARIANCE, SIZE, BELIEF, FIRST, LAST, GONE, LOOKS, PEAK = 0, 3, 4, 5, 6, 7, 8, 9, 10
 
 
 @dataclass(slots=True)
@@ -49,7 +49,7 @@ class ObjectRecords:
 
     @property
     def values(self) -> Array:
-        """(n, 10) view of all rows, columns as in `COLUMNS`."""
+        """(n, 11) view of all rows, columns as in `COLUMNS`."""
         return self._values[: len(self._labels)]
 
     @property
