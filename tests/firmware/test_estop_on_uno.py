@@ -76,7 +76,7 @@ class Watch:
     """The host and the gate behind a board, in the board's time."""
 
     def __init__(self, uno: Uno) -> None:
-        self._uno, self._bench = uno, Bench(Gate(SafetyLimits.from_profile()))
+        self._uno, self._bench = uno, Bench(Gate(SafetyLimits.from_profile().still()))
         self.estop = SerialEstop(uno.port.name, connect=lambda name, baud: uno.port)
         self._newest: EstopMessage | None = None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from golem.capabilities.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus
+from golem.capabilities.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus, ServoStep
 from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
@@ -184,13 +184,12 @@ class Pick:
                         closing = True
                         end = context.t + self._config.close_timeout
                         self._close(context, attempt)
-                        tried = self._report.tried[-1]
-                        tried.x, tried.y, tried.z = (float(v) for v in step.target)
-                        self._heights.append(tried.z)
+                        self._heights.append(self._saw(step))
                     elif step.status is ServoStatus.LOST:
                         text = f"The palm camera lost the {attempt.label}."
                         raise PickFailed(PickOutcome.NOTHING_THERE, "servo", "localizer", text)
                     elif step.status is ServoStatus.TIGHT:
+                        self._saw(step)
                         text = f"The {attempt.label} stands no higher than a tight one."
                         raise PickFailed(PickOutcome.TIGHT, "servo", "grasp_method", text)
                     elif step.status is ServoStatus.STALLED:
@@ -204,6 +203,12 @@ class Pick:
                 "servo", "grasp_method", f"No convergence within {self._config.servo_timeout:g} s."
             )
         self._check_grip(context, attempt)
+
+    def _saw(self, step: ServoStep) -> float:
+        """Report where the palm camera sees the object; returns its height in odom [m]."""
+        tried = self._report.tried[-1]
+        tried.x, tried.y, tried.z = (float(v) for v in step.target)
+        return tried.z
 
     def _close(self, context: Context, attempt: Attempt) -> None:
         context.say("grasp", f"Closing with {self._config.force:g} N per finger.", side=attempt.side)

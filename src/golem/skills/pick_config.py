@@ -49,6 +49,7 @@ class PickConfig:
         candidates: how many objects it may try.
         proud: height above the ground around it [m] from which on an object comes before lower ones: as the head camera
             sees them, half of the tight screws are lower than 9 mm, and half of the loosened ones higher than 15 mm.
+        turn: how far the torso turns to either side where object or container are not in view [rad]; 0: not at all.
         travel: `planned` goes around what the head camera shows, in postures from which the way down is straight;
             `lines` goes up, across and down, blind to what is in the way.
         clearance: height of the gripper above the object when it arrives and when it leaves [m].
@@ -75,6 +76,7 @@ class PickConfig:
     attempts: int = 2
     candidates: int = 3
     proud: float = 0.0115
+    turn: float = 0.35
     travel: Literal["lines", "planned"] = "planned"
     clearance: float = 0.15
     travel_height: float = 0.08

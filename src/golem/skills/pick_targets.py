@@ -1,18 +1,25 @@
-"""Which objects a pick tries, with which hand, and in which order: one look with the head camera."""
+"""Which objects a pick tries, with which hand, and in which order: looks with the head camera."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.grasping.ground import height_above_ground
+from golem.capabilities.planning.base import PlanRefused
 from golem.interfaces.payloads import Detections
+from golem.skills.base import StageFailed
 from golem.skills.context import Context
 from golem.skills.pick_config import PickConfig, PickGoal
 from golem.skills.pick_report import PickFailed, PickOutcome, Tried
+from golem.skills.planned_motion import PlannedMotion
 from golem.types import SIDES, Array, LocalizedObject, Side
+
+TORSO = 0
+"""Column of the torso's yaw among the joints of torso and arms."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,48 +38,103 @@ class Attempt:
         return Tried(self.side, x, y, z)
 
 
+@dataclass(frozen=True, slots=True)
+class _View:
+    """What is known after a look.
+
+    Attributes:
+        attempts: the reachable objects.
+        container: the container.
+        problem: what is missing, as a failure.
+    """
+
+    attempts: list[Attempt] = field(default_factory=list[Attempt])
+    container: LocalizedObject | None = None
+    problem: PickFailed | None = None
+
+
+def _missing(
+    goal: PickGoal, container: LocalizedObject | None, attempts: list[Attempt], seen: bool
+) -> PickFailed | None:
+    """Return what a look lacks; `seen`: whether it showed such an object at all."""
+    if attempts and container is not None:
+        return None
+    missing = goal.container if attempts else f"reachable {goal.label}"
+    outcome = PickOutcome.OUT_OF_REACH if seen else PickOutcome.NOTHING_THERE
+    outcome = PickOutcome.TRAY_MISSING if container is None and seen else outcome
+    return PickFailed(outcome, "detect", "localizer", f"The head camera shows no {missing}.")
+
+
 class TargetChoice:
-    """Looks once and chooses."""
+    """Looks and chooses."""
 
     def __init__(self, config: PickConfig) -> None:
         """Take workspace and comfort from `config`."""
         self._config = config
 
     async def look(self, context: Context, goal: PickGoal) -> tuple[list[Attempt], LocalizedObject]:
-        """Look once with the head camera: the reachable objects and the container.
+        """Look with the head camera: the reachable objects and the container.
 
-        Those that stand proud come first, and of them the most comfortable ones.
+        Where one of them is not in view, the torso turns to either side for another look. Objects that stand proud
+        come first, and of them the most comfortable ones.
         """
         context.say("detect", f"Looking for a {goal.label} and a {goal.container}.")
-        sides: tuple[Side, ...] = SIDES if goal.side == "either" else (goal.side,)
-        with context.watch("head", goal.label, goal.container) as eye:
-            end = context.t + self._config.look_timeout
-            problem, outcome = "The head camera gave no detections in time.", PickOutcome.FAILED
-            while True:
-                sightings = await eye.look(end - context.t)
-                if sightings is None:
-                    raise PickFailed(outcome, "detect", "localizer", problem)
-                containers = [o for o in sightings.objects if o.label == goal.container]
-                container = max(containers, key=lambda o: o.detection.score, default=None)
-                attempts = [
-                    Attempt(goal.label, goal.container, side, o)
-                    for side in sides
-                    for o in self._reachable(context, goal, side, sightings, container)
-                ]
-                if attempts and container is not None:
-                    break
-                seen = any(o.label == goal.label for o in sightings.objects)
-                missing = goal.container if attempts else f"reachable {goal.label}"
-                problem = f"The head camera shows no {missing}."
-                outcome = PickOutcome.OUT_OF_REACH if seen else PickOutcome.NOTHING_THERE
-                outcome = PickOutcome.TRAY_MISSING if container is None and seen else outcome
+        view = await self._see(context, goal, _View())
+        turning = self._config.turn > 0.0 and view.problem is not None
+        if turning and view.problem.outcome is not PickOutcome.FAILED:
+            view = await self._look_around(context, goal, view)
+        if view.problem is not None or view.container is None:
+            raise view.problem or StageFailed(
+                "detect", "localizer", f"The head camera shows no {goal.container}."
+            )
+        attempts = view.attempts
         if goal.side == "either":
-            attempts = [a for a in attempts if self._serves(context, a.side, container)] or attempts
+            attempts = [a for a in attempts if self._serves(context, a.side, view.container)] or attempts
         attempts.sort(key=lambda a: (self._stands_low(a.target), self._discomfort(context, a.side, a.target)))
         chosen = attempts[: self._config.candidates]
         text = f"{len(attempts)} {goal.label}s in reach."
         context.say("detect", text, target=chosen[0].target.position.tolist())
-        return chosen, container
+        return chosen, view.container
+
+    async def _look_around(self, context: Context, goal: PickGoal, view: _View) -> _View:
+        """Turn the torso to either side until both are seen, and back; the arms come along."""
+        motion, ahead = PlannedMotion(context), context.commanded_joints.copy()
+        context.say("detect", f"{view.problem} Looking around.")
+        for turn in (self._config.turn, -self._config.turn):
+            turned = ahead.copy()
+            turned[TORSO] += turn
+            with suppress(PlanRefused):
+                await motion.to_joints(turned, (), self._config.travel_speed)
+                view = await self._see(context, goal, view)
+            if view.problem is None:
+                break
+        with suppress(PlanRefused):
+            await motion.to_joints(ahead, (), self._config.travel_speed)
+        return view
+
+    async def _see(self, context: Context, goal: PickGoal, before: _View) -> _View:
+        """Look until object and container are known, from this view or from those `before`."""
+        sides: tuple[Side, ...] = SIDES if goal.side == "either" else (goal.side,)
+        container, attempts = before.container, before.attempts
+        problem: PickFailed | None = PickFailed(
+            PickOutcome.FAILED, "detect", "localizer", "The head camera gave no detections in time."
+        )
+        with context.watch("head", goal.label, goal.container) as eye:
+            end = context.t + self._config.look_timeout
+            while problem is not None:
+                sightings = await eye.look(end - context.t)
+                if sightings is None:
+                    break
+                containers = [o for o in sightings.objects if o.label == goal.container]
+                container = max(containers, key=lambda o: o.detection.score, default=before.container)
+                attempts = before.attempts or [
+                    Attempt(goal.label, goal.container, side, o)
+                    for side in sides
+                    for o in self._reachable(context, goal, side, sightings, container)
+                ]
+                seen = bool(before.attempts) or any(o.label == goal.label for o in sightings.objects)
+                problem = _missing(goal, container, attempts, seen)
+        return _View(attempts, container, problem)
 
     def _reachable(
         self,

@@ -125,13 +125,16 @@ def test_the_head_sees_the_tray(detector: OnnxDetector, stage: Stage, head: Rgbd
     assert np.linalg.norm(found.position - tops(stage, "tray")[0]) < 0.03
 
 
-def test_the_palm_sees_its_screw_to_a_quarter_of_the_smallest_head(
-    detector: OnnxDetector, stage: Stage, palm: RgbdImage
-) -> None:
-    found = detector.locate(palm, ["screw"])
-    truth = next(p.position for p in stage.names.parts if p.body == stage.names.screws[1])
-    error = min(np.linalg.norm(o.position - truth) for o in found)
-    assert error < ScrewRanges().head_diameter[0] / 4
+def test_the_palm_sees_screws_to_a_quarter_of_the_smallest_head(detector: OnnxDetector, stage: Stage) -> None:
+    errors: list[float] = []
+    for mouth, body in zip(stage.names.mouths, stage.names.screws, strict=True):
+        truth = next(p.position for p in stage.names.parts if p.body == body)
+        for offset in ((0.0, 0.0), (-0.02, 0.01), (0.02, -0.01)):
+            frame = stage.frame(CAMERAS["right_hand"], mouth + [*offset, 0.20], np.deg2rad(90.0))
+            found = detector.locate(frame, ["screw"])
+            errors.append(min(float(np.linalg.norm(o.position - truth)) for o in found))
+    smallest = ScrewRanges().head_diameter[0]
+    assert np.median(errors) < smallest / 4 and max(errors) < smallest / 2
 
 
 def test_the_same_frame_gives_the_same_objects_bit_for_bit(detector: OnnxDetector, palm: RgbdImage) -> None:
