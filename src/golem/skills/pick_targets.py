@@ -80,8 +80,8 @@ class TargetChoice:
         """
         context.say("detect", f"Looking for a {goal.label} and a {goal.container}.")
         view = await self._see(context, goal, _View())
-        turning = self._config.turn > 0.0 and view.problem is not None
-        if turning and view.problem.outcome is not PickOutcome.FAILED:
+        unseen = view.problem is not None and view.problem.outcome is not PickOutcome.FAILED
+        if unseen and self._config.turn > 0.0:
             view = await self._look_around(context, goal, view)
         if view.problem is not None or view.container is None:
             raise view.problem or StageFailed(
