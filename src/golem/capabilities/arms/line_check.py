@@ -61,7 +61,7 @@ class LineChecker:
         tilt: float = np.deg2rad(0.5),
         space: JointSpace | None = None,
     ) -> LineCheck:
-        """Return what the arm would do on the way to `T_goal`, if it may.
+        """Return what the arm would do on the way to `T_goal`, if it may; what it touches already it may leave.
 
         Args:
             side: which hand.
@@ -100,14 +100,17 @@ class LineChecker:
                 f"and {np.rad2deg(turned):.1f} deg, after {100 * late:.0f} % of it{self._stopped()}.",
             )
         if space is not None:
-            verdicts = space.verdicts(path[1:])
-            if verdicts.any():
-                k = int(np.flatnonzero(verdicts)[0])
+            verdicts = space.verdicts(path)
+            free = np.flatnonzero(verdicts == 0)
+            # An arm that begins in contact may leave it; nothing may be touched afterwards.
+            first = int(free[0]) if len(free) else len(path)
+            blocked = first + np.flatnonzero(verdicts[first:])
+            if len(blocked):
+                k = int(blocked[0])
                 raise PlanRefused(
                     Refusal.NO_PATH,
                     f"The {side} hand cannot go straight for {line.length * 1e3:.0f} mm: after "
-                    f"{100 * line.fraction((k + 1) * DT):.0f} % of it, "
-                    f"{space.reason(int(verdicts[k]), path[k + 1])}.",
+                    f"{100 * line.fraction(k * DT):.0f} % of it, {space.reason(int(verdicts[k]), path[k])}.",
                 )
         return LineCheck(worst, turned, away, path)
 

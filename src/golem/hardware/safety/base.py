@@ -154,8 +154,11 @@ class SafetyLimits:
         return replace(self, frozen=0.0)
 
     def believing(self) -> SafetyLimits:
-        """Return these limits for a robot that says nothing of its sensors: they may stand still and feel no torque."""
-        return replace(self, frozen=0.0, dead_time=np.inf)
+        """Return these limits for a robot that says nothing of its sensors.
+
+        They may stand still and feel no torque, and speeds need not add up to positions.
+        """
+        return replace(self, frozen=0.0, dead_time=np.inf, drift=np.inf)
 
     @classmethod
     def from_profile(cls, profile: str = "urdf", ratio: float = LIMIT_RATIO) -> SafetyLimits:
