@@ -154,7 +154,9 @@ class Vendor:
             self.started = False
             self._fault = fault
             raise
-        return self._onboard.legs() or damp(state)
+        legs = self._onboard.legs()
+        # A controller that lets go commands no damping: limp legs are not passed on while the next call tells why.
+        return legs if legs is not None and bool((legs.kd > 0.0).all()) else damp(state)
 
     def _run(self) -> Wait:
         """Speak to the on-board controller, from the first question to the last velocity."""
