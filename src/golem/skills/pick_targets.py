@@ -11,7 +11,6 @@ from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.grasping.ground import height_above_ground
 from golem.capabilities.planning.base import PlanRefused
 from golem.interfaces.payloads import Detections
-from golem.skills.base import StageFailed
 from golem.skills.context import Context
 from golem.skills.pick_config import PickConfig, PickGoal
 from golem.skills.pick_report import PickFailed, PickOutcome, Tried
@@ -83,10 +82,9 @@ class TargetChoice:
         unseen = view.problem is not None and view.problem.outcome is not PickOutcome.FAILED
         if unseen and self._config.turn > 0.0:
             view = await self._look_around(context, goal, view)
-        if view.problem is not None or view.container is None:
-            raise view.problem or StageFailed(
-                "detect", "localizer", f"The head camera shows no {goal.container}."
-            )
+        if view.problem is not None:
+            raise view.problem
+        assert view.container is not None  # it would be the problem
         attempts = view.attempts
         if goal.side == "either":
             attempts = [a for a in attempts if self._serves(context, a.side, view.container)] or attempts

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, get_args, runtime_checkable
 
@@ -102,6 +102,17 @@ class Memory(Protocol):
     def close(self) -> None:
         """Let go of files; nothing is asked or observed afterwards."""
         ...
+
+
+def apart(places: Iterable[Place], spread: float, limit: int) -> list[Place]:
+    """Return the first `limit` places that are farther than `spread` [m] from those before them."""
+    kept: list[Place] = []
+    for place in places:
+        if len(kept) == limit:
+            break
+        if all(np.linalg.norm(place.position - other.position) > spread for other in kept):
+            kept.append(place)
+    return kept
 
 
 def check_observation(observation: Observation, last: float) -> None:

@@ -9,9 +9,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from golem.capabilities.memory.base import Observation, Place, When, check_observation, check_query
+from golem.capabilities.memory.base import Observation, Place, When, apart, check_observation, check_query
 from golem.capabilities.memory.frame_encoder import BagOfLabels
 from golem.errors import ConfigError
 from golem.types import Array
@@ -54,6 +53,7 @@ class FrameIndex:
         self._config = config or FrameIndexConfig()
         self._encoder = BagOfLabels()
         self._vectors: list[Array] = []
+        self._matrix: Array | None = None  # (n, d) of the vectors; None since the last change
         self._places: list[Array] = []
         self._times: list[float] = []
 
@@ -61,6 +61,7 @@ class FrameIndex:
         """See `Memory.observe`."""
         check_observation(observation, self._times[-1] if self._times else -math.inf)
         self._vectors.append(self._encoder.frame(observation))
+        self._matrix = None
         self._places.append(_looked_at(observation))
         self._times.append(observation.frame.t)
         over = len(self._times) - self._config.most
@@ -73,20 +74,17 @@ class FrameIndex:
         wanted = self._encoder.text(text)
         if not self._times or not wanted.any():
             return []
-        similar = np.array(self._vectors) @ wanted
+        if self._matrix is None:
+            self._matrix = np.array(self._vectors)
+        similar = self._matrix @ wanted
         if when == "at" and at is not None:
             similar[np.array(self._times) > at] = 0.0
-        return self._apart(text, similar, np.argsort(-similar, kind="stable"), limit)
+        order = np.argsort(-similar, kind="stable")
+        best = order[: int(np.count_nonzero(similar >= self._config.least))]
+        return apart((self._place(text, k, float(similar[k])) for k in best), self._config.spread, limit)
 
-    def _apart(self, text: str, similar: Array, order: NDArray[np.intp], limit: int) -> list[Place]:
-        out: list[Place] = []
-        for k in order:
-            if similar[k] < self._config.least or len(out) == limit:
-                break
-            place, t = self._places[k], self._times[k]
-            if all(np.linalg.norm(place - other.position) > self._config.spread for other in out):
-                out.append(Place(text, place, float(min(similar[k], 1.0)), t, t, "similar"))
-        return out
+    def _place(self, text: str, k: int, similar: float) -> Place:
+        return Place(text, self._places[k], min(similar, 1.0), self._times[k], self._times[k], "similar")
 
     def forget(self, text: str) -> int:
         """See `Memory.forget`: frames that are most similar to the words go."""
@@ -94,7 +92,7 @@ class FrameIndex:
         wanted = self._encoder.text(text)
         kept = [k for k, vector in enumerate(self._vectors) if vector @ wanted < self._config.least]
         count = len(self._vectors) - len(kept)
-        self._vectors = [self._vectors[k] for k in kept]
+        self._vectors, self._matrix = [self._vectors[k] for k in kept], None
         self._places = [self._places[k] for k in kept]
         self._times = [self._times[k] for k in kept]
         return count

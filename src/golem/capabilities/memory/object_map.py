@@ -21,12 +21,12 @@ from golem.capabilities.memory.look import Look, look_at
 from golem.capabilities.memory.memory_file import MemoryFile
 from golem.capabilities.memory.object_records import (
     BELIEF,
-    COLUMNS,
     FIRST,
     GONE,
     LAST,
     LOOKS,
     PEAK,
+    PLACE,
     SIZE,
     VARIANCE,
     ObjectRecords,
@@ -35,7 +35,6 @@ from golem.capabilities.memory.words import label_scores
 from golem.errors import ConfigError
 from golem.types import Array, LocalizedObject
 
-PLACE = slice(0, 3)
 FORBIDDEN = 1e9
 """Cost of a pair outside the gate."""
 
@@ -278,6 +277,3 @@ def _size(found: LocalizedObject) -> float:
         return 0.03
     spread = np.median(np.linalg.norm(found.points - np.median(found.points, axis=0), axis=1))
     return float(np.clip(1.5 * spread, 0.02, 0.3))
-
-
-assert len(COLUMNS) == PEAK + 1

@@ -14,7 +14,8 @@ COLUMNS: tuple[str, ...] = (
 )  # fmt: skip
 """Position [m], variance of each of its coordinates [m^2], radius [m], log odds that it is there, times [s] with
 `gone_at` infinite while it may be there, how many looks showed it, and the highest of its log odds."""
-X, VARIANCE, SIZE, BELIEF, FIRST, LAST, GONE, LOOKS, PEAK = 0, 3, 4, 5, 6, 7, 8, 9, 10
+PLACE = slice(0, 3)
+VARIANCE, SIZE, BELIEF, FIRST, LAST, GONE, LOOKS, PEAK = range(3, len(COLUMNS))
 
 
 @dataclass(slots=True)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from golem.capabilities.memory.base import Observation, Place, When, check_observation, check_query
+from golem.capabilities.memory.base import Observation, Place, When, apart, check_observation, check_query
 from golem.capabilities.memory.words import label_scores
 from golem.capabilities.perception.lift import scene_of
 from golem.errors import ConfigError
@@ -105,13 +105,7 @@ class TopDownMap:
                     found.append(
                         Place(label, place, score * min(share, 1.0), cell.first, cell.last, "similar")
                     )
-        out: list[Place] = []
-        for place in sorted(found, key=lambda p: -p.score):
-            if len(out) == limit:
-                break
-            if all(np.linalg.norm(place.position - other.position) > self._config.spread for other in out):
-                out.append(place)
-        return out
+        return apart(sorted(found, key=lambda p: -p.score), self._config.spread, limit)
 
     def forget(self, text: str) -> int:
         """See `Memory.forget`: cells forget what the words name."""

@@ -115,8 +115,9 @@ def ask(method: str, episode: Relocation) -> TrialOutcome:
     ranks = [_rank(answer, thing.kind, episode.before) for answer, thing in zip(static, kinds, strict=True)]
     twin = [thing for thing in episode.after[1:] if thing.kind == episode.target]
     present = [episode.after[0], *twin]
-    current = bool(now) and now[0].evidence != "moved" and any(_hits(now[0], thing) for thing in present)
-    outdated = bool(now) and now[0].evidence != "moved" and _hits(now[0], episode.before[0])
+    first = now[0] if now and now[0].evidence != "moved" else None
+    current = first is not None and any(_hits(first, thing) for thing in present)
+    outdated = first is not None and _hits(first, episode.before[0])
     series = {
         "static_mrr": float(np.mean([0.0 if rank is None else 1.0 / rank for rank in ranks])),
         "current_top1": float(current),
