@@ -36,7 +36,7 @@ BROKEN = {
     "run profile": (["run", "--profile", "feild"], "Did you mean 'field'?"),
     "skill": (
         ["run", "--skill", "pik"],
-        "valid: dock, explore, navigate, pick, stand, walk. Did you mean 'pick'?",
+        "valid: dock, explore, navigate, pick, recall, remember, stand, walk. Did you mean 'pick'?",
     ),
     "skill goal": (["run", "--skill", "walk", "--x", "nan"], "'x' is a finite number"),
     "skill and by hand": (["run", "--skill", "pick", "--operate"], "give it or --skill, not both"),

@@ -263,6 +263,8 @@ def test_a_stack_file_lists_skills_and_their_options() -> None:
         "explore",
         "navigate",
         "pick",
+        "recall",
+        "remember",
         "stand",
         "walk",
         "gentle",
@@ -277,7 +279,7 @@ def test_a_stack_file_lists_skills_and_their_options() -> None:
         ("skills: pick", "'skills' wants '{NAME: {option: value, ...}, ...}'"),
         (
             "skills: {pik: {force: 8}}",
-            "Unknown skill in x.yaml 'pik'; valid: dock, explore, navigate, pick, stand, walk. Did you mean 'pick'",
+            "Unknown skill in x.yaml 'pik'; valid: dock, explore, navigate, pick, recall, remember, stand, walk. Did",
         ),
         ("skills: {Mine: {use: my.py:Mine}}", "a skill's name is a word of a-z, 0-9 and _"),
         ("skills: {mine: {use: 3}}", "'skills: mine' wants '{use: NAME"),

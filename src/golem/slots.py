@@ -121,6 +121,15 @@ SLOTS: dict[str, Slot] = {
         "golem.capabilities.mapping.base:Mapper",
         {"grid": "golem.capabilities.mapping.voxel_grid:VoxelGridMapper"},
     ),
+    "memory": Slot(
+        "golem.capabilities.memory.base:Memory",
+        {
+            "frame_index": "golem.capabilities.memory.frame_index:FrameIndex",
+            "object_map": "golem.capabilities.memory.object_map:ObjectMap",
+            "reranked": "golem.capabilities.memory.reranked:Reranked",
+            "top_down_map": "golem.capabilities.memory.top_down_map:TopDownMap",
+        },
+    ),
     "navigator": Slot(
         "golem.capabilities.navigation.base:Navigator",
         {
@@ -137,6 +146,8 @@ SLOTS: dict[str, Slot] = {
             "explore": "golem.skills.explore:Explore",
             "navigate": "golem.skills.navigate:Navigate",
             "pick": "golem.skills.pick:Pick",
+            "recall": "golem.skills.recall:Recall",
+            "remember": "golem.skills.remember:Remember",
             "stand": "golem.skills.walk:Stand",
             "walk": "golem.skills.walk:Walk",
         },
@@ -157,6 +168,7 @@ KEYS: dict[str, StackKey] = {
     "odometry": StackKey("odometry", "legs"),
     # Runs where the stack listens to the LiDAR.
     "mapper": StackKey("mapper", "grid"),
+    "memory": StackKey("memory", "object_map"),
     "navigator": StackKey("navigator", "goto"),
     # Takes the legs when `lower_body` fails.
     "fallback": StackKey("lower_body", "hold", standing="almi"),

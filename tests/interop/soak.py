@@ -25,6 +25,9 @@ from golem.middleware.ros import codec
 
 EVERY = 300.0
 """Time between two looks at the memory [s]."""
+PATIENCE = 300.0
+"""Time that a pick may take by the clock of the wall [s]."""
+PICKED = "succeeded"
 PICK, ACTION = "golem_interfaces/action/Pick", "/skill/pick"
 
 
@@ -102,12 +105,16 @@ def main() -> None:
                 if not given.get("accepted"):
                     ended[f"not accepted: {given}"] += 1
                     break
-                ros.tell("outcome", name=ACTION, timeout=300.0)
-                result = codec.deserialize(
-                    bytes.fromhex(ros.hear(timeout=330.0)["result"]), codec.action(PICK).Result
-                ).result
-                ended["succeeded" if result.success else f"{result.stage}: {result.reason}"] += 1
-                if not result.success:
+                ros.tell("outcome", name=ACTION, timeout=PATIENCE)
+                answer = ros.hear(timeout=PATIENCE + 30.0)
+                how = f"no outcome came within {PATIENCE:g} s"
+                if answer["done"]:
+                    told = bytes.fromhex(answer["result"])
+                    result = codec.deserialize(told, codec.action(PICK).Result).result
+                    how = PICKED if result.success else f"{result.stage}: {result.reason}"
+                ended[how] += 1
+                print(f"{time.monotonic() - begin:7.1f} s: {how}", file=sys.stderr)
+                if how != PICKED:
                     robot.renew()
                 if time.monotonic() > begin + EVERY * len(memory):
                     memory.append(robot.memory())

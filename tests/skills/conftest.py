@@ -10,6 +10,7 @@ import pytest
 
 from golem.capabilities.grasping.base import GraspMethod
 from golem.capabilities.grasping.visual_servo import VisualServo
+from golem.capabilities.memory.object_map import ObjectMap
 from golem.capabilities.planning.straight import Straight
 from golem.interfaces import topics
 from golem.interfaces.payloads import Detections, GripState, HandStatus
@@ -40,6 +41,7 @@ def modules(**given: Any) -> Modules:
         "grasp_method": VisualServo,
         "skill": SkillTable(Stack()).make,
         "planner": Straight,
+        "memory": ObjectMap(),
     }
     return Modules(**default | given)
 

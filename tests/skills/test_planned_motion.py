@@ -13,6 +13,7 @@ from golem.capabilities.arms.diff_ik import DiffIK
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.arms.solve import downward
 from golem.capabilities.collision.obstacles import Obstacle, World
+from golem.capabilities.memory.object_map import ObjectMap
 from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.capabilities.planning.rrt_connect import RrtConnect
 from golem.interfaces import topics
@@ -39,7 +40,7 @@ class Rig:
     def __init__(self, planner: RrtConnect) -> None:
         self.bus, self.t, self.q = Bus(), 0.0, posture("home")
         self.node = UpperBodyNode(self.bus, DiffIK(), ContractCheck("upper_body", "diff_ik"))
-        modules = Modules(lambda: pytest.fail(), lambda name: pytest.fail(), lambda: planner)
+        modules = Modules(lambda: pytest.fail(), lambda name: pytest.fail(), lambda: planner, ObjectMap())
         self.context = Context(self.bus, Kinematics(), PERIOD, modules)
         self.step()
 

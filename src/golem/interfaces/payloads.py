@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.types import Array, CameraInfo, LocalizedObject, PlanarPose, Twist
+from golem.types import Array, CameraInfo, LocalizedObject, PlanarPose, RgbdImage, Twist
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,11 +213,15 @@ class Detections:
         t: time of the frame [s].
         camera: which camera.
         objects: everything found, in no order.
+        labels: what was looked for: that something else is not among the objects says nothing.
+        frame: the frame itself; None where only what was found in it came here.
     """
 
     t: float
     camera: str
     objects: tuple[LocalizedObject, ...]
+    labels: tuple[str, ...] = ()
+    frame: RgbdImage | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
+from typing import TypeVar, cast
+
 import numpy as np
 
 from golem.capabilities.arms.base import check_pose
 from golem.capabilities.arms.trajectory import check_trajectory
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, ServoLaw, ServoStatus, ServoStep
+from golem.capabilities.memory.base import EVIDENCES, Memory, MemoryFault, Observation, Place, When
 from golem.capabilities.navigation.base import Navigator, NavInputs
 from golem.capabilities.planning.base import NUM_JOINTS, ArmPlanner, Plan, PlanRefused, PlanRequest
 from golem.interfaces.nav_payloads import NavStep
@@ -14,6 +19,8 @@ from golem.interfaces.payloads import JointTrajectory
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import MIN_RATE
 from golem.types import Array, LocalizedObject, PlanarPose, Twist
+
+T = TypeVar("T")
 
 
 class CheckedGraspMethod:
@@ -81,25 +88,92 @@ class CheckedPlanner:
 
     def plan(self, request: PlanRequest) -> Plan:
         """Return the planner's trajectory; see `ArmPlanner`."""
-        refused: list[PlanRefused] = []
-
-        def ask() -> Plan | None:
-            try:
-                return self._planner.plan(request)
-            except PlanRefused as refusal:
-                refused.append(refusal)
-                return None
-
-        plan = self._contract.call(ask)
-        if refused:
-            raise refused[0]
+        plan = passing(self._contract, PlanRefused, lambda: self._planner.plan(request))
         self._contract.kind("the plan", plan, Plan)
-        assert plan is not None
         n = len(self._contract.array("times", plan.times, *np.shape(plan.times)))
         for name in ("q", "dq"):
             self._contract.array(name, getattr(plan, name), n, NUM_JOINTS)
         self._contract.call(check_trajectory, JointTrajectory(0.0, plan.times, plan.q, plan.dq), request.q)
         return plan
+
+
+class CheckedMemory:
+    """A `Memory` whose faults name the module; what it refuses goes further as it is. Threads take turns.
+
+    Attributes:
+        last: see `Memory`.
+    """
+
+    def __init__(self, memory: Memory, contract: ContractCheck) -> None:
+        """Watch `memory`."""
+        self._memory, self._contract, self._turn = memory, contract, threading.Lock()
+
+    @property
+    def last(self) -> float:
+        """Time of the newest look [s]; see `Memory`."""
+        return float(self._contract.kind("last", self._memory.last, float))
+
+    def observe(self, observation: Observation) -> None:
+        """Take a look in; see `Memory`."""
+        self._ask(lambda: self._memory.observe(observation))
+
+    def query(self, text: str, when: When = "now", at: float | None = None, limit: int = 5) -> list[Place]:
+        """Return places; see `Memory`."""
+        places = self._ask(lambda: list(self._memory.query(text, when, at, limit)))
+        for place in places:
+            check_place(self._contract, place)
+        return places
+
+    def forget(self, text: str) -> int:
+        """Forget places; see `Memory`."""
+        return self._contract.kind("the count", self._ask(lambda: self._memory.forget(text)), int)
+
+    def close(self) -> None:
+        """Let go of files; see `Memory`."""
+        self._ask(self._memory.close)
+
+    def _ask(self, call: Callable[[], T]) -> T:
+        with self._turn:
+            return passing(self._contract, MemoryFault, call)
+
+
+def check_place(contract: ContractCheck, place: object) -> None:
+    """Check one answer of a memory.
+
+    Raises:
+        ModuleFault: it is none.
+    """
+    found = contract.kind("a place", place, Place)
+    contract.kind("label", found.label, str)
+    contract.array("position", found.position, 3)
+    if not 0.0 <= contract.number("score", found.score) <= 1.0:
+        raise contract.fault(f"score is {found.score}, the contract asks for 0 to 1")
+    if contract.number("last_seen", found.last_seen) < contract.number("first_seen", found.first_seen):
+        raise contract.fault("a place was seen last before it was seen first")
+    if found.evidence not in EVIDENCES:
+        raise contract.fault(f"evidence is {found.evidence!r}, the contract asks for one of {EVIDENCES}")
+
+
+def passing(contract: ContractCheck, refusal: type[Exception], call: Callable[[], T]) -> T:
+    """Return `call()` of a module that `contract` watches.
+
+    Raises:
+        refusal: it raised that, as its contract allows.
+        ModuleFault: it raised anything else.
+    """
+    refused: list[Exception] = []
+
+    def ask() -> T | None:
+        try:
+            return call()
+        except refusal as reason:
+            refused.append(reason)
+            return None
+
+    answer = contract.call(ask)
+    if refused:
+        raise refused[0]
+    return cast("T", answer)
 
 
 class CheckedNavigator:

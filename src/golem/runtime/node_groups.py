@@ -26,12 +26,13 @@ from golem.robots.model.kinematics import Kinematics
 from golem.robots.unitree import motion_switcher
 from golem.robots.unitree.motion_switcher import MotionSwitcher
 from golem.runtime import nodes, perception_nodes
-from golem.runtime.checked import CheckedGraspMethod, CheckedNavigator, CheckedPlanner
+from golem.runtime.checked import CheckedGraspMethod, CheckedMemory, CheckedNavigator, CheckedPlanner
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Phase, Placed
 from golem.runtime.gantry_release import GantryReleaseNode
 from golem.runtime.lower_body_node import CheckedLowerBody, LowerBodyNode
 from golem.runtime.mapper_node import MapperNode
+from golem.runtime.memory_node import MemoryNode
 from golem.runtime.nav2_link import BusNav2
 from golem.runtime.navigator_node import NavigatorNode
 from golem.runtime.odometry_node import LidarNode, OdometryNode
@@ -49,7 +50,7 @@ from golem.types import SIDES, Array, Side
 
 LEGS_ALONE = ("legs",)
 """What an odometry goes by that knows no more than the base estimate, by which skills go without it."""
-POOLED = ("localizer", "grasp_method", "navigator")
+POOLED = ("localizer", "grasp_method", "navigator", "memory")
 """Slots whose modules may take longer than a tick: live, each thinks on a thread of its own, beside the clock."""
 
 
@@ -170,6 +171,7 @@ class StackNodes:
         context: what its skills work with.
         skills: what skills there are.
         running: the one of its nodes that resumes the skill that runs.
+        memory: what it remembers; closed with `close` before another stack opens its file.
     """
 
     def __init__(
@@ -181,6 +183,7 @@ class StackNodes:
         latency: float,
         pools: Mapping[str, ThreadPoolExecutor] | None = None,
         real: bool = False,
+        epoch: float = 0.0,
     ) -> None:
         """Build the modules of `stack` around `bus`.
 
@@ -192,6 +195,7 @@ class StackNodes:
             latency: what a camera's frame takes on top of its way over the bus [s].
             pools: where the modules of the slots `POOLED` run; None is on the clock, see `LocalizerNode`.
             real: whether the robot is none of ours: no module can then call its on-board controller.
+            epoch: when the robot's clock was at 0, in Unix time [s]: what is remembered outlives that clock.
 
         Raises:
             ConfigError: a name or an option of the stack is wrong, or a module is to call a real robot's controller.
@@ -212,7 +216,9 @@ class StackNodes:
             for key in ("lower_body", "fallback")
         )
         self.legs = LowerBodyNode(bus, legs, reserve, stack.part("locomotion"))
+        self.memory = CheckedMemory(*make("memory"))
         modules = Modules(
+            memory=self.memory,
             grasp_method=lambda: CheckedGraspMethod(*make("grasp_method")),
             skill=self.skills.make,
             planner=functools.cache(lambda: CheckedPlanner(*make("planner"))),
@@ -244,6 +250,12 @@ class StackNodes:
             (Phase.CONTROL, self.legs),
             (Phase.CONTROL, nodes.UpperBodyNode(bus, *make("upper_body"))),
         ]
+        self.nodes.append(
+            (
+                Phase.PERCEIVE,
+                MemoryNode(bus, self.memory, calibration, hears_lidar(stack), epoch, pools.get("memory")),
+            )
+        )
         if tuple(odometry.sources) != LEGS_ALONE or hears_lidar(stack):
             self.nodes.append((Phase.PERCEIVE, OdometryNode(bus, odometry, odometry_contract)))
         if hears_lidar(stack):

@@ -155,7 +155,7 @@ class LocalizerNode:
             self._contract.array("points", o.points, None, 3)
             if o.mask is not None:
                 self._check_mask(self._contract.kind("mask", o.mask, Mask), len(o.points))
-        return Detections(frame.t, self._camera, objects)
+        return Detections(frame.t, self._camera, objects, labels, frame)
 
     def _check_mask(self, mask: Mask, points: int) -> None:
         count = self._contract.call(np.count_nonzero, mask.pixels)

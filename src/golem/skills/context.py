@@ -12,6 +12,7 @@ import numpy as np
 from golem.capabilities.arms.base import check_pose
 from golem.capabilities.arms.line import Line
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper
+from golem.capabilities.memory.base import Memory
 from golem.capabilities.perception.lift import scene_of
 from golem.capabilities.planning.base import ArmPlanner
 from golem.interfaces import topics
@@ -41,12 +42,14 @@ class Modules:
         grasp_method: makes a new one.
         skill: makes a new skill, by its name in the stack.
         planner: the planner, made when it is first asked for.
+        memory: where things are and were.
         worker: where slow modules think; None is on the clock, at the price of the latency that they declare.
     """
 
     grasp_method: Callable[[], GraspMethod]
     skill: Callable[[str], Skill[Context, Any]]
     planner: Callable[[], ArmPlanner]
+    memory: Memory
     worker: Executor | None = None
 
 

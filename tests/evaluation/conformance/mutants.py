@@ -28,6 +28,7 @@ CALLS = {
     "grasp_method": "propose",
     "odometry": "estimate",
     "mapper": "grid",
+    "memory": "query",
     "navigator": "step",
 }
 """The method of each slot that a mutant breaks."""
@@ -55,12 +56,14 @@ class Mutant:
 
 
 def spoil(answer: Any, change: Callable[[np.ndarray], np.ndarray]) -> Any:
-    """Return a copy of `answer` in which `change` was applied to the first array or number inside."""
+    """Return a copy of `answer` in which `change` was applied to the first array or number inside, if there is one."""
     if isinstance(answer, np.ndarray):
         return change(answer.astype(np.float64))
     if isinstance(answer, float):
         return float(change(np.array([answer]))[0])
     if isinstance(answer, list | tuple):
+        if not answer:
+            return answer
         return type(answer)([spoil(answer[0], change), *answer[1:]])
     for field in dataclasses.fields(answer):
         value = getattr(answer, field.name)
@@ -102,8 +105,7 @@ def _nothing(module: Any, method: Callable[..., Any]) -> Callable[..., Any]:
 def _of(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Any, Any], Callable[..., Any]]:
     def around(module: Any, method: Callable[..., Any]) -> Callable[..., Any]:
         def wrong(*given: Any) -> Any:
-            answer = method(*given)
-            return spoil(answer, change) if answer != [] else answer
+            return spoil(method(*given), change)
 
         return wrong
 
@@ -228,14 +230,18 @@ GENERAL: dict[str, Mutant] = {
     "draws from numpy": Mutant("draws_no_shared_randomness", _first(np.random.rand)),
     "draws from the system": Mutant("draws_no_shared_randomness", _first(np.random.default_rng)),
     "writes into its input": Mutant(
-        "leaves_inputs_alone", _writes_input, never=("robot", "navigator", "localizer", "odometry", "mapper")
+        "leaves_inputs_alone",
+        _writes_input,
+        never=("robot", "navigator", "localizer", "odometry", "mapper", "memory"),
     ),
     "returns one buffer": Mutant(
-        "leaves_answers_alone", _one_buffer, never=("hand", "navigator", "localizer", "mapper")
+        "leaves_answers_alone", _one_buffer, never=("hand", "navigator", "localizer", "mapper", "memory")
     ),
     "is slow": Mutant("keeps_its_time", _slow, only=("estimator", "hand")),
     "lets NaN through": Mutant(
-        "stops_nan", _lets_nan_through, never=("robot", "localizer", "grasp_method", "odometry", "mapper")
+        "stops_nan",
+        _lets_nan_through,
+        never=("robot", "localizer", "grasp_method", "odometry", "mapper", "memory"),
     ),
 }
 
@@ -336,6 +342,16 @@ OWN: dict[tuple[str, str], tuple[str, Change]] = {
         changed(origin=lambda o: dataclasses.replace(o, x=o.x + 2.0)),
     ),
     ("mapper", "counts in bytes"): ("answers_soundly", changed(cells=lambda cells: cells.astype(np.uint8))),
+    ("memory", "errs by two metres"): (
+        "answers_with_where_it_was_seen",
+        _each(changed(position=lambda place: place + 2.0)),
+    ),
+    ("memory", "is surer than sure"): ("answers_soundly", _each(changed(score=2.0))),
+    ("memory", "sees last before first"): ("answers_soundly", _each(changed(last_seen=-9.0))),
+    ("memory", "repeats itself in one answer"): (
+        "answers_with_as_many_as_asked_for",
+        lambda places: [*places, *places],
+    ),
     ("navigator", "arrives at once"): ("arrives", changed(arrived=True)),
     ("navigator", "never arrives"): ("arrives", changed(arrived=False)),
     ("navigator", "walks the other way"): (

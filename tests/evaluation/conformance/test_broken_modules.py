@@ -36,6 +36,7 @@ GOOD: dict[str, Candidate] = {
     "grasp_method": candidate("grasp_method", "centroid"),
     "odometry": candidate("odometry", "legs"),
     "mapper": candidate("mapper", "grid"),
+    "memory": candidate("memory", "object_map"),
     "navigator": candidate("navigator", "goto"),
     "skill": Candidate("skill", "counts", Counts),
 }

@@ -17,6 +17,7 @@ WHENS: tuple[When, ...] = get_args(When)
 Evidence = Literal["seen", "moved", "gone", "similar"]
 """seen: nothing speaks against it. moved: it is no longer there, and where it is now is not known. gone: it was there
 once. similar: the method compares looks, and says nothing about the present."""
+EVIDENCES: tuple[Evidence, ...] = get_args(Evidence)
 MAX_WORDS = 500
 """Longest query [characters]."""
 
@@ -71,6 +72,11 @@ class Memory(Protocol):
     A memory is passive: it runs nothing between calls. Its clock is the observations': it must not start again as
     long as the memory lives (live: Unix time).
     """
+
+    @property
+    def last(self) -> float:
+        """Time of the newest look [s]; -inf before the first. A memory with a file goes on from it."""
+        ...
 
     def observe(self, observation: Observation) -> None:
         """Take a look in. What was observed is kept when this returns.

@@ -56,10 +56,12 @@ class FrameIndex:
         self._matrix: Array | None = None  # (n, d) of the vectors; None since the last change
         self._places: list[Array] = []
         self._times: list[float] = []
+        self.last = -math.inf
 
     def observe(self, observation: Observation) -> None:
         """See `Memory.observe`."""
-        check_observation(observation, self._times[-1] if self._times else -math.inf)
+        check_observation(observation, self.last)
+        self.last = observation.frame.t
         self._vectors.append(self._encoder.frame(observation))
         self._matrix = None
         self._places.append(_looked_at(observation))

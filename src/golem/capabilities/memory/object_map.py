@@ -92,14 +92,14 @@ class ObjectMap:
         """
         self._config = config or ObjectMapConfig()
         self._records = ObjectRecords()
-        self._last = -math.inf
+        self.last = -math.inf
         self._file = None if self._config.file is None else MemoryFile(Path(self._config.file))
         if self._file is not None:
             self._read(self._file)
 
     def _read(self, file: MemoryFile) -> None:
         self._records = ObjectRecords()
-        rows, self._last = file.read()
+        rows, self.last = file.read()
         for row in rows:
             self._records.add(row.label, row.values, row.number)
 
@@ -109,17 +109,17 @@ class ObjectMap:
 
     def observe(self, observation: Observation) -> None:
         """See `Memory.observe`."""
-        check_observation(observation, self._last)
+        check_observation(observation, self.last)
         changed = self._match(observation) | self._miss(observation)
         removed = self._bound()
-        self._last = observation.frame.t
+        self.last = observation.frame.t
         self._keep(changed - removed, removed)
 
     def _keep(self, changed: set[int], removed: set[int]) -> None:
         if self._file is None:
             return
         try:
-            self._file.write([self._records.row(number) for number in sorted(changed)], removed, self._last)
+            self._file.write([self._records.row(number) for number in sorted(changed)], removed, self.last)
         except BaseException:
             self._read(self._file)
             raise

@@ -57,11 +57,13 @@ class Reranked:
         self._config = config or RerankedConfig()
         self._proposer = PROPOSERS[self._config.proposer]()
         self._objects = ObjectMap(self._config.objects)
+        self.last = self._objects.last
 
     def observe(self, observation: Observation) -> None:
         """See `Memory.observe`."""
         self._objects.observe(observation)
         self._proposer.observe(observation)
+        self.last = self._objects.last
 
     def query(self, text: str, when: When = "now", at: float | None = None, limit: int = 5) -> list[Place]:
         """See `Memory.query`: places with an object that fits `when` first, and with its place and times."""

@@ -63,12 +63,12 @@ class TopDownMap:
         """Remember nothing yet."""
         self._config = config or TopDownMapConfig()
         self._cells: dict[tuple[int, int], _Cell] = {}
-        self._last = -math.inf
+        self.last = -math.inf
 
     def observe(self, observation: Observation) -> None:
         """See `Memory.observe`."""
-        check_observation(observation, self._last)
-        t = self._last = observation.frame.t
+        check_observation(observation, self.last)
+        t = self.last = observation.frame.t
         for key in self._keys(scene_of(observation.frame)[::STRIDE]):
             cell = self._cells.setdefault(key, _Cell(t))
             cell.last, cell.looks = t, cell.looks + 1.0

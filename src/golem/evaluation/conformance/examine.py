@@ -37,6 +37,7 @@ SUITES: dict[str, str] = {
     "grasp_method": f"{_HERE}.grasp_suite:GraspSuite",
     "odometry": f"{_HERE}.odometry_suite:OdometrySuite",
     "mapper": f"{_HERE}.mapper_suite:MapperSuite",
+    "memory": f"{_HERE}.memory_suite:MemorySuite",
     "navigator": f"{_HERE}.navigator_suite:NavigatorSuite",
     "skill": f"{_HERE}.skill_suite:SkillSuite",
 }

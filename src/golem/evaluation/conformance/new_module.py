@@ -25,6 +25,9 @@ odometry: {{use: lio}}
 mapper: {{use: {name}.py:{cls}}}
 navigator: {{use: costmap_astar}}
 """,
+    "memory": """robot: {{use: mujoco}}
+memory: {{use: {name}.py:{cls}}}
+""",
     "navigator": """robot: {{use: mujoco, support: ground, world: open}}
 lower_body: {{use: almi}}
 navigator: {{use: {name}.py:{cls}}}
@@ -42,6 +45,7 @@ _RUN = {
     "robot": "golem run {name}.yaml --skill stand",
     "lower_body": "golem run {name}.yaml --skill stand",
     "mapper": "golem run {name}.yaml --skill navigate --x 2",
+    "memory": "golem run {name}.yaml --skill remember --labels screw",
     "navigator": "golem run {name}.yaml --skill walk --x 1",
 }
 _COMPARE = {
@@ -50,6 +54,7 @@ _COMPARE = {
     "estimator": "golem ladder --rung base-estimation --method random_walk_kf {name}.py:{cls} --out runs/{name}",
     "odometry": "golem ladder --rung odometry --method legs {name}.py:{cls} -n 1 --out runs/{name}",
     "mapper": "golem ladder --rung navigate --map none --use mapper={name}.py:{cls} -n 10 --out runs/{name}",
+    "memory": "golem ladder --rung memory --method object_map {name}.py:{cls} -n 5 --out runs/{name}",
     "navigator": "golem ladder --rung navigate-line --use navigator={name}.py:{cls} -n 10 --out runs/{name}",
     **{
         slot: f"golem ladder --method visual_servo --use {slot}={{name}}.py:{{cls}} -n 10 --out runs/{{name}}"

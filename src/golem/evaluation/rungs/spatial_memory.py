@@ -10,24 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from golem import registry
 from golem.capabilities.memory.base import Memory, Place, When
-from golem.capabilities.memory.frame_index import FrameIndex
-from golem.capabilities.memory.object_map import ObjectMap
-from golem.capabilities.memory.reranked import Reranked
-from golem.capabilities.memory.top_down_map import TopDownMap
 from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.relocation import Rates, Relocation, Thing, relocation
+from golem.provenance import stack_facts
 from golem.runtime.contract_check import ContractCheck
+from golem.stack import Stack
 
 SLOT = "memory"
-"""Who is to blame for a wrong answer."""
-MEMORIES: dict[str, Callable[[], Memory]] = {
-    "frame_index": FrameIndex,
-    "object_map": ObjectMap,
-    "reranked": Reranked,
-    "top_down_map": TopDownMap,
-}
-"""The methods of this rung."""
+"""What the methods of this rung are."""
 HIT = 1.0
 """Distance up to which an answer is right [m]: the same counter, the next ones being 2.4 m away [own]."""
 ERRORS = Rates(missed=0.1, invented=0.03, confused=0.05, jitter=0.02)
@@ -68,11 +60,12 @@ class MemoryRung(Rung[Any]):
 
     def methods(self) -> tuple[str, ...]:
         """Return the memories."""
-        return tuple(MEMORIES)
+        return registry.names(SLOT)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
-        return {"method": method}
+        _make(method)
+        return stack_facts(Stack().with_choice(SLOT, method))
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return what the looks suffer."""
@@ -93,10 +86,15 @@ class MemoryRung(Rung[Any]):
         return [ask(spec.method, episode) for spec in specs]
 
 
+def _make(method: str) -> Memory:
+    choice = Stack().with_choice(SLOT, method).choice(SLOT)
+    return registry.create(SLOT, choice.use, choice.options)
+
+
 def ask(method: str, episode: Relocation) -> TrialOutcome:
     """Show an episode to a new memory, with questions after either walk, and judge the answers."""
     contract = ContractCheck(SLOT, method)
-    memory = MEMORIES[method]()
+    memory = _make(method)
     looks, times = episode.observations, _Times()
     half = len(looks) // 2
     for look in looks[:half]:

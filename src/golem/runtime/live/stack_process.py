@@ -174,8 +174,11 @@ class StackProcess:
             camera.close()
         if self._gantry is not None:
             self._gantry.renew()
+        if self.side is not None:
+            self.side.memory.close()
+        epoch = time.time() - t
         side = self.side = StackNodes(
-            bus, self._stack, self._calibration, self._gantry, 0.0, self._pools, self._real
+            bus, self._stack, self._calibration, self._gantry, 0.0, self._pools, self._real, epoch
         )
         side.legs.realtime, side.running.live = self._real, True
         self._skills.attach(side)
