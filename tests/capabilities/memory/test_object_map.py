@@ -220,7 +220,7 @@ from dataclasses import replace
 from tests.capabilities.memory.room import look
 from golem.capabilities.memory.object_map import ObjectMap, ObjectMapConfig
 memory = ObjectMap(ObjectMapConfig(sys.argv[1]))
-t = memory._last if len(memory) else 0.0
+t = memory.last if len(memory) else 0.0
 one = look(t, {"mug": (1.4, 0.3, 1.1)})
 while True:
     t += 1.0

@@ -207,11 +207,12 @@ class ObjectMap:
         places = [
             place
             for label, score in label_scores(text, self._records.labels).items()
-            for place in self._places(label, score, when, at)
+            for place in self._places(label, score, when, at, limit)
         ]
         return sorted(places, key=lambda p: (-p.score, -p.last_seen))[:limit]
 
-    def _places(self, label: str, score: float, when: When, at: float | None) -> list[Place]:
+    def _places(self, label: str, score: float, when: When, at: float | None, limit: int) -> list[Place]:
+        """Return those of one label that fit, at most `limit`, the one seen last first."""
         records = self._records
         rows = records.rows(label)
         rows = rows[records.values[rows, PEAK] >= self._config.sure]
@@ -227,6 +228,8 @@ class ObjectMap:
             chosen = (values[:, FIRST] <= at) & (at < values[:, GONE])
         else:
             chosen = np.ones(len(rows), bool)
+        fitting = values[chosen]
+        newest = np.argsort(-fitting[:, LAST], kind="stable")[:limit]
         return [
             Place(
                 label, value[PLACE].copy(), score, float(value[FIRST]), float(value[LAST]),
@@ -234,7 +237,7 @@ class ObjectMap:
                 {"belief": float(value[BELIEF]), "looks": float(value[LOOKS]),
                  "sigma": float(np.sqrt(value[VARIANCE]))},
             )
-            for value in values[chosen]
+            for value in fitting[newest]
         ]  # fmt: skip
 
     def forget(self, text: str) -> int:

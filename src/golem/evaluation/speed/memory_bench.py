@@ -1,0 +1,168 @@
+"""`golem bench memory`: a memory of objects with a file, at scale, and killed in the middle of writing."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from golem.capabilities.memory.base import Observation
+from golem.capabilities.memory.object_map import ObjectMap, ObjectMapConfig
+from golem.capabilities.memory.words import SYNONYMS
+from golem.errors import ConfigError
+from golem.evaluation.speed.bench import Figure, figure, timed
+from golem.robots.sensors.cameras import HEAD
+from golem.types import Array, Detection, LocalizedObject, RgbdImage
+
+LABELS = tuple(SYNONYMS)
+NEAR, VIEW = 6, 0.4
+"""Objects in a look, and height of the camera above their middle [m]."""
+QUESTIONS = 2000
+COUNT = "seen %d"
+
+
+@dataclass(frozen=True)
+class MemoryBenchConfig:
+    """Print figures of a memory of objects at scale, and how often a killed process lost what it had kept."""
+
+    observations: int = 100_000
+    """Looks that are taken in, each written to the file."""
+    objects: int = 10_000
+    """Objects in the room."""
+    kills: int = 100
+    """How often a process that writes is killed."""
+    seed: int = 0
+    """Seed of the room and of the moments."""
+    json: bool = False
+    """Print the figures as a last line of JSON."""
+
+
+class Room:
+    """Objects on a square of the floor, 1 m apart, and looks from above at some of them."""
+
+    def __init__(self, count: int, seed: int) -> None:
+        """Lay `count` objects out."""
+        # A look is at one part of a row: both are multiples of its length.
+        self._side, self._count = NEAR * max(1, round(np.sqrt(count) / NEAR)), count - count % NEAR
+        self._rng = np.random.default_rng(seed)
+        self._depth = np.full((HEAD.height, HEAD.width), 5.0, np.float32)
+        self._rgb = np.zeros((HEAD.height, HEAD.width, 3), np.uint8)
+        self._box = np.array([310.0, 230.0, 330.0, 250.0])
+        self._cloud = self._rng.uniform(-0.03, 0.03, (64, 3))
+
+    def _place(self, number: int) -> Array:
+        return np.array([number % self._side, number // self._side, 0.0], float)
+
+    def look(self, t: float, first: int) -> Observation:
+        """Return a look at `NEAR` objects in a row, the rest being out of view, the first object `first`."""
+        T = np.diag([1.0, -1.0, -1.0, 1.0])
+        T[:3, 3] = self._place(first % self._count) + (0.5 * (NEAR - 1), 0.0, VIEW)
+        found: list[LocalizedObject] = []
+        for i in range(NEAR):
+            number = (first + i) % self._count
+            place = self._place(number) + self._rng.normal(0.0, 0.003, 3)
+            detection = Detection(LABELS[number % len(LABELS)], 0.9, self._box, self._box[:2])
+            found.append(LocalizedObject(detection, t, place, place + self._cloud))
+        return Observation(RgbdImage(t, HEAD, self._rgb, self._depth, T), found, ())
+
+
+def run_memory_bench(config: MemoryBenchConfig) -> list[Figure]:
+    """Measure and print.
+
+    Raises:
+        ConfigError: a number is negative, or there is nothing to see.
+    """
+    if min(config.observations, config.kills, config.seed) < 0 or config.objects < NEAR:
+        raise ConfigError(f"--observations, --kills and --seed are at least 0, --objects at least {NEAR}.")
+    with TemporaryDirectory() as folder:
+        figures = _scale(config, Path(folder) / "memory.sqlite")
+        lost = sum(_killed(Path(folder) / f"{k}.sqlite", config.seed + k) for k in range(config.kills))
+    figures.append(Figure(f"kill -9 while writing, {config.kills} times: lost looks", lost, lost, "", "0"))
+    table = Table("figure", "median", "p99", "unit", "wanted", title="object_map with a file")
+    for f in figures:
+        table.add_row(f.name, f"{f.median:.3g}", f"{f.p99:.3g}", f.unit, f.reference)
+    Console().print(table)
+    if config.json:
+        print(json.dumps([asdict(f) for f in figures]))
+    return figures
+
+
+def _scale(config: MemoryBenchConfig, path: Path) -> list[Figure]:
+    room, options = (
+        Room(config.objects, config.seed),
+        ObjectMapConfig(file=str(path), most=config.objects * 2),
+    )
+    memory = ObjectMap(options)
+    looks = timed(lambda i: memory.observe(room.look(0.1 * i, i * NEAR)), max(config.observations, 1))
+    made = timed(lambda i: room.look(0.1 * i, i * NEAR), min(1000, max(config.observations, 1)))
+    before = _resident()
+    asked = timed(lambda i: memory.query(LABELS[i % len(LABELS)]), QUESTIONS)
+    history = timed(lambda i: memory.query("screw", "anywhere", None, 100), QUESTIONS // 10)
+    count = len(memory)
+    memory.close()
+    started = time.perf_counter()
+    again = ObjectMap(options)
+    loaded = time.perf_counter() - started
+    if len(again) != count:
+        raise AssertionError(f"{count} objects were kept, {len(again)} came back")
+    again.close()
+    of = f"{config.observations} looks, {count} objects"
+    size = path.stat().st_size / 1e6
+    return [
+        figure(
+            f"one look, {of} (making it takes {1e3 * np.median(made):.2g} ms of it)", looks, 1e3, "ms", "5"
+        ),
+        figure("a question for the present", asked, 1e3, "ms", "5 (p99), 1 (median)"),
+        figure("a question for 100 places of any time", history, 1e3, "ms", "5 (p99)"),
+        Figure("the file", size, size, "MB", ""),
+        Figure("reading the file, by the wall clock", loaded, loaded, "s", ""),
+        Figure("resident memory of the process", before, before, "MB", ""),
+    ]
+
+
+def _resident() -> float:
+    """Return the resident memory of this process [MB]; 0 where the system does not tell."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+    except OSError:
+        return 0.0
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def _killed(path: Path, seed: int) -> int:
+    """Return how many looks are lost that a process had acknowledged before it was killed."""
+    words = [sys.executable, "-m", "golem.evaluation.speed.memory_bench", str(path), str(seed)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as writer:
+        assert writer.stdout is not None
+        writer.stdout.readline()
+        time.sleep(np.random.default_rng(seed).uniform(0.0, 0.05))
+        writer.send_signal(signal.SIGKILL)
+        told = [int(line.split()[1]) for line in writer.stdout if line.endswith("\n")]
+    acknowledged = max(told, default=0)
+    memory = ObjectMap(ObjectMapConfig(file=str(path)))
+    kept = memory.last
+    memory.close()
+    return max(0, acknowledged - round(kept))
+
+
+def _write(path: str, seed: int) -> None:
+    """Take looks in for ever, and say after each which it was."""
+    room, memory, i = Room(100, seed), ObjectMap(ObjectMapConfig(file=path)), 0
+    while True:
+        i += 1
+        memory.observe(room.look(float(i), i * NEAR))
+        print(COUNT % i, flush=True)
+
+
+if __name__ == "__main__":
+    _write(sys.argv[1], int(sys.argv[2]))
