@@ -45,6 +45,7 @@ SLOTS: dict[str, Slot] = {
         "golem.robots.base:Robot",
         {
             "mujoco": "golem.robots.mujoco.engine:MujocoRobot",
+            "physx": "golem.robots.physx.engine:PhysxRobot",
             "replay": "golem.robots.replay.robot:ReplayRobot",
         },
         ("profile", "seed", "posture"),

@@ -178,7 +178,11 @@ class MujocoRobot:
             self._hoist.apply(self.data, sway)
             self._pushes.apply(self.data)
             self.scene.move_people(self.data)
-            mujoco.mj_step(self._model, self.data)
+            self._step()
+
+    def _step(self) -> None:
+        """Advance the physics by one step under the torques and wrenches of `data`."""
+        mujoco.mj_step(self._model, self.data)
 
     def joints(self) -> tuple[Array, Array, Array]:
         """Return q, dq, tau as the encoders and drives report them; see `Robot`."""

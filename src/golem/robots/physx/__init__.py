@@ -1,0 +1,1 @@
+"""The robot in PhysX 5 (extra `physx`)."""
