@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Usage: scripts/bootstrap.sh GROUP...     GROUP is the name of a lock in requirements/: cluster, core, dds, dev, docs, hardware, lidar, pink, realsense, record, report, train
+# Usage: scripts/bootstrap.sh GROUP...     GROUP is the name of a lock in requirements/: cluster, core, dds, dev, docs, hardware, lidar, physx, pink, realsense, record, report, train
 #
 # Creates .venv, or $VENV, with the locked packages of every GROUP and this package itself, and sees to it that they find
 # their system libraries. Needs Python 3.11-3.13 and a network to the package index; brings everything else: uv goes to
@@ -90,7 +90,7 @@ if ! "$venv/bin/python" -c 'import sys' 2> /dev/null; then
 fi
 echo "golem: installing the locked packages (${locks[*]}) into $venv" >&2
 for group in "${locks[@]}"; do
-    "$uv" pip install --quiet --python "$venv/bin/python" --require-hashes -r "requirements/$group.txt"
+    "$uv" pip install --quiet --python "$venv/bin/python" --no-deps --require-hashes -r "requirements/$group.txt"
 done
 "$uv" pip install --quiet --python "$venv/bin/python" --no-deps --editable .
 see_to_system

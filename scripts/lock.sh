@@ -7,7 +7,7 @@ cd "$(dirname "$0")/.."
 uv() { if [ -x .uv/bin/uv ]; then .uv/bin/uv "$@"; else command uv "$@"; fi; }
 compile() {
     uv pip compile --quiet --no-config --universal --python-version 3.11 --generate-hashes \
-        --no-annotate --custom-compile-command "make lock" "$@"
+        --override requirements/overrides.in --no-annotate --custom-compile-command "make lock" "$@"
 }
 
 together=$(mktemp)
@@ -24,8 +24,9 @@ compile pyproject.toml --constraints "$together" --extra hardware --output-file 
 compile pyproject.toml --constraints "$together" --extra realsense --output-file requirements/realsense.txt "$@"
 compile pyproject.toml --constraints "$together" --extra cluster --output-file requirements/cluster.txt "$@"
 compile pyproject.toml --constraints "$together" --extra lidar --output-file requirements/lidar.txt "$@"
+compile pyproject.toml --constraints "$together" --extra physx --output-file requirements/physx.txt "$@"
 compile pyproject.toml --constraints "$together" --extra train --output-file requirements/train.txt "$@"
 compile pyproject.toml --constraints "$together" --extra docs --output-file requirements/docs.txt "$@"
 compile pyproject.toml --constraints "$together" --extra dev --extra pink --extra dds --extra record --extra foxglove \
-    --extra report --extra cluster --extra lidar --extra hardware --extra realsense --output-file requirements/dev.txt "$@"
+    --extra report --extra cluster --extra lidar --extra hardware --extra realsense --extra physx --output-file requirements/dev.txt "$@"
 echo "uv>=0.13,<0.14" | compile - --output-file requirements/uv.txt "$@"

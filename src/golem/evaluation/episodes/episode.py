@@ -62,18 +62,20 @@ def legs_stack(
     Args:
         method: see `with_legs`.
         profile: realism profile.
-        overrides: slot -> implementation that replaces the stack's own.
+        overrides: slot -> implementation that replaces the stack's own; another twin keeps the options.
         robot: options of the twin that differ from the stack's own; without any, an open floor.
 
     Raises:
-        ConfigError: `overrides` names the robot or the lower body, which the test itself brings.
+        ConfigError: `overrides` names the lower body, which is the method.
     """
-    for slot in ("robot", SLOT):
-        if slot in (overrides or {}):
-            raise ConfigError(f"The test of a lower body brings its own {slot}; leave out --use {slot}=...")
+    others = dict(overrides or {})
+    if SLOT in others:
+        raise ConfigError(f"The test of a lower body brings its own {SLOT}; leave out --use {SLOT}=...")
     stack = with_legs(load_stack(STACK, profile=profile), method)
     stack = stack.with_options("robot", **{"world": "open", **(robot or {})})
-    for slot, use in (overrides or {}).items():
+    twin = stack.choice("robot")
+    stack = stack.with_choice("robot", Choice(others.pop("robot", twin.use), twin.options))
+    for slot, use in others.items():
         stack = stack.with_choice(slot, use)
     return stack
 
@@ -141,7 +143,8 @@ class Episode:
         self.running, robot = build(stack, seed, limits)
         if not isinstance(robot, MujocoRobot):
             raise ConfigError(
-                f"Balance is judged on the simulator's truth; robot: {stack.choice('robot').use} is not 'mujoco'."
+                f"Balance is judged on a simulator's truth; robot: {stack.choice('robot').use} is neither mujoco nor "
+                "physx."
             )
         self.robot = robot
         if onlooker is not None:

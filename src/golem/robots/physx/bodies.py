@@ -221,4 +221,4 @@ def _to_axis(axis: Array) -> Array:
     other = np.eye(3)[int(np.argmin(np.abs(x)))]
     y = np.cross(x, other)
     y /= np.linalg.norm(y)
-    return quat_of(np.column_stack([x, y, np.cross(x, y)]))
+    return quat_of(np.column_stack([x, y, np.cross(x, y)]).astype(np.float64))
