@@ -45,7 +45,7 @@ SLOTS: dict[str, Slot] = {
         "golem.robots.base:Robot",
         {
             "mujoco": "golem.robots.mujoco.engine:MujocoRobot",
-            "physx": "golem.robots.physx.engine:PhysxRobot",
+            "physx": "golem.robots.physx.physx_robot:PhysxRobot",
             "replay": "golem.robots.replay.robot:ReplayRobot",
         },
         ("profile", "seed", "posture"),

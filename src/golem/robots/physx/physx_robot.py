@@ -12,7 +12,7 @@ from golem.robots.model.magpie_model import FINGERS, finger_names
 from golem.robots.mujoco.config import MujocoConfig, World
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.physx.bodies import PhysxBodies, build_bodies
-from golem.robots.physx.truth import PhysxTruth
+from golem.robots.physx.physx_truth import PhysxTruth
 from golem.types import SIDES, Array
 
 FINGER_DRIVE = 20.0, 0.2

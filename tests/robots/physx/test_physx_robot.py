@@ -17,7 +17,7 @@ from golem.types import NUM_JOINTS, TICK, Array, HandCommand, LowCommand
 
 pytest.importorskip("sapien", reason="PhysX needs the extra 'physx'")
 
-from golem.robots.physx.engine import PhysxConfig, PhysxRobot
+from golem.robots.physx.physx_robot import PhysxConfig, PhysxRobot
 
 ZERO = np.zeros(NUM_JOINTS)
 
