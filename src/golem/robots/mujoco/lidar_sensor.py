@@ -236,13 +236,14 @@ _UPRIGHT: Array = np.array([1.0, 0.0, 0.0, 0.0])
 def visible(model: mujoco.MjModel) -> mujoco.MjModel:
     """Return a copy of `model` in which rays meet what the LiDAR sees: the world's looks, the robot's contact shapes.
 
-    The robot's looks are meshes, which cost many times what its contact shapes do.
+    The robot's looks are meshes, which cost many times what its contact shapes do. The world's meshes are the heads of
+    screws, smaller than the noise of the ranges; rays pass them.
     """
     out = copy.copy(model)
     robot = out.body_rootid[out.geom_bodyid] == out.body(BASE_LINK).id
     shape = robot & (out.geom_group == COLLISION_GROUP)
     shape[out.geom(HOUSING).id] = False
-    looks = ~robot & (out.geom_group < COLLISION_GROUP)
+    looks = ~robot & (out.geom_group < COLLISION_GROUP) & (out.geom_type != mujoco.mjtGeom.mjGEOM_MESH)
     out.geom_group[:] = np.where(shape, _ROBOT, np.where(looks, _SEEN, _HIDDEN))
     out.geom_rgba[shape, 3] = 1.0
     out.geom_matid[shape] = -1
