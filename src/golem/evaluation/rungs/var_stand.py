@@ -23,6 +23,7 @@ from golem.evaluation.rungs.navigate_hall import DISTANCE, GUESS, SPREAD, true_p
 from golem.evaluation.rungs.pick_screw import SETTLE, PickOptions, PickRung, PickWatch, judge_pick
 from golem.interfaces import topics
 from golem.robots.mujoco.balance import BalanceRecorder
+from golem.robots.worlds.conditions import LayoutKind
 from golem.runtime.lockstep import build_robot
 from golem.skills.approach import APPROACH, approach
 from golem.skills.base import SkillResult
@@ -53,6 +54,8 @@ HERE = PlanarPose(0.0, 0.0, 0.0)
 class VarStandOptions(PickOptions):
     """The work place, and how the robot comes to it."""
 
+    layout: LayoutKind = "varied"
+    """nominal or varied; see the rung `stand`."""
     start: tuple[Start, ...] = ("placed", "walked")
     """placed: it begins where the paper's distribution of placement errors puts it. walked: it walks there, 6 m through
     a hall with walls and obstacles, by a map from before."""
@@ -156,21 +159,21 @@ class _Trial:
     def _come(self) -> TrialOutcome | None:
         """Walk to the pack; return how that failed, or None where it did not."""
         stage = self._stance @ PlanarPose(-STAGE, 0.0, 0.0)
-        steps = [("navigate", NavigateGoal(stage.x, stage.y, stage.yaw, "map", WALK))]
-        if not self._docks:
-            steps.append((ByMap(), self._stance))
-        for skill, goal in steps:
-            self._episode.start(skill, goal)
-            self._episode.run(WALK, self._look)
-            result = self._episode.result
-            loss = self._episode.loss
-            if loss is None and (result is None or not result.success):
-                stage_name, reason = (
-                    ("timeout", "Not there in time.") if result is None else (result.stage, result.reason)
-                )
-                return self._failed(Loss(stage_name, reason), (result and result.slot) or "navigator")
-            if loss is not None:
-                return self._failed(loss, "lower_body")
+        came = self._walk("navigate", NavigateGoal(stage.x, stage.y, stage.yaw, "map", WALK))
+        return came or (None if self._docks else self._walk(ByMap(), self._stance))
+
+    def _walk(self, skill: str | ByMap, goal: object) -> TrialOutcome | None:
+        """Pursue one skill that moves the legs; return how it failed, or None where it did not."""
+        episode = self._episode
+        episode.start(skill, goal)
+        episode.run(WALK, self._look)
+        result = episode.result
+        if episode.loss is not None:
+            return self._failed(episode.loss, "lower_body")
+        if result is None:
+            return self._failed(Loss("timeout", f"It is not there after {WALK:g} s."), "navigator")
+        if not result.success:
+            return self._failed(Loss(result.stage, result.reason, result.trace), result.slot or "navigator")
         return None
 
     def _look(self) -> bool:
