@@ -20,8 +20,9 @@ from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.episodes.pick_claims import claims
 from golem.evaluation.episodes.survey import survey
 from golem.evaluation.rungs.navigate_hall import DISTANCE, GUESS, SPREAD, true_pose
-from golem.evaluation.rungs.pick_screw import SETTLE, PickOptions, PickRung, PickWatch, judge_pick
+from golem.evaluation.rungs.pick_screw import SETTLE, PickOptions, PickRung, PickWatch, balance, judge_pick
 from golem.interfaces import topics
+from golem.middleware.bus import News
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.worlds.conditions import LayoutKind
 from golem.runtime.lockstep import build_robot
@@ -185,15 +186,26 @@ class _Trial:
         running, robot = self._episode.running, self._episode.robot
         watch = PickWatch(running, self._oracle, BalanceRecorder(robot))
         goal = DisassembleGoal(1, self._docks, pick=PickGoal(side="either"))
-        result = running.execute("disassemble", goal, watch=watch)
+        news, since = News(running.bus, topics.FEEDBACK), running.executor.t
+
+        def look() -> None:
+            nonlocal since
+            watch()
+            said = news.read()
+            if said is not None and said.skill == "dock":
+                since = running.executor.t
+
+        result = running.execute("disassemble", goal, watch=look)
         running.executor.run(running.executor.t + SETTLE, watch.look)
         outcome = judge_pick(self._stack, result, self._oracle, watch, lost(running, watch.recorder))
         found = result.value if isinstance(result.value, DisassembleReport) else DisassembleReport()
         pick = found.picks[-1] if found.picks else PickReport()
         fasteners = self._oracle.fasteners()
         served = sum(load_map().serves(side, f.in_base) for f in fasteners if f.loose for side in SIDES)
+        assert watch.recorder is not None
         series = {
             **outcome.series,
+            **balance(watch.recorder.trace(running.executor.t - since)),
             **self._series,
             **self._placed("after"),
             **claims(pick, fasteners, bool(self._oracle.screws_in_tray())),
