@@ -44,6 +44,8 @@ TURN = math.radians(4.0)
 """The same of the heading [rad] [own: the paper gives none]."""
 STAGE = 0.75
 """Distance before the stance up to which the navigator brings the robot [m]: nearer its arms are above the pack."""
+NEAR = 0.1
+"""Distance from there with which it is content [m]."""
 STILL = 4.0
 """Time the robot stands before anything begins [s]: the odometry starts from rest."""
 WALK = 120.0
@@ -160,7 +162,7 @@ class _Trial:
     def _come(self) -> TrialOutcome | None:
         """Walk to the pack; return how that failed, or None where it did not."""
         stage = self._stance @ PlanarPose(-STAGE, 0.0, 0.0)
-        came = self._walk("navigate", NavigateGoal(stage.x, stage.y, stage.yaw, "map", WALK))
+        came = self._walk("navigate", NavigateGoal(stage.x, stage.y, stage.yaw, "map", WALK, NEAR))
         return came or (None if self._docks else self._walk(ByMap(), self._stance))
 
     def _walk(self, skill: str | ByMap, goal: object) -> TrialOutcome | None:
