@@ -17,7 +17,7 @@ from golem.skills.disassemble import Disassemble, DisassembleGoal
 from golem.skills.dock import Dock, DockGoal, DockReport
 from golem.skills.pick import Pick
 from golem.skills.pick_config import PickGoal
-from golem.skills.pick_report import PickOutcome, PickReport
+from golem.skills.pick_report import PickOutcome, PickReport, Tried
 from golem.skills.runner import SkillRun
 
 GONE = PickOutcome.OUT_OF_REACH
@@ -77,12 +77,27 @@ def test_it_docks_again_where_nothing_is_within_reach() -> None:
 
 
 def test_it_ends_where_another_stance_would_not_help_or_none_is_left() -> None:
-    result, docks, picks = work(DisassembleGoal(), [docked()], [picked(PickOutcome.JAMMED)])
-    assert not result.success and (docks, picks) == (1, 1) and result.value.picks[0].outcome == "jammed"
+    result, docks, picks = work(DisassembleGoal(), [docked()], [picked(PickOutcome.SLIPPED)])
+    assert not result.success and (docks, picks) == (1, 1) and result.value.picks[0].outcome == "slipped"
     result, docks, picks = work(DisassembleGoal(docks=2), [docked()] * 2, [picked(GONE)] * 2)
     assert not result.success and (docks, picks) == (2, 2)
     result, docks, picks = work(DisassembleGoal(docks=0), [], [picked(GONE)])
     assert not result.success and (docks, picks) == (0, 1)
+
+
+def test_what_was_tight_is_avoided_at_the_next_stance() -> None:
+    tight = picked(PickOutcome.TIGHT)
+    tight.value.tried = [Tried("right", 0.4, -0.1, 0.0, "tight"), Tried("left", 0.5, 0.1, 0.0, "failed")]
+    skills = {
+        "dock": Scripted(Dock, [docked()] * 2),
+        "pick": Scripted(Pick, [tight, picked(PickOutcome.PICKED)]),
+    }
+    context = Context(Bus(), Kinematics(), 0.01, modules(skill=skills.__getitem__))
+    run = SkillRun("disassemble", Disassemble().run(context, DisassembleGoal()))
+    for _ in range(100):
+        run.step()
+    assert run.result is not None and run.result.success
+    assert [goal.avoid for goal in skills["dock"].goals] == [(), (0.4, -0.1)]
 
 
 def test_a_docking_that_fails_ends_it_unless_something_is_within_reach() -> None:

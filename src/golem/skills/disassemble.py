@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from golem.options import require
 from golem.skills.base import SkillResult
@@ -11,8 +11,10 @@ from golem.skills.dock import DockGoal, DockReport
 from golem.skills.pick_config import PickGoal
 from golem.skills.pick_report import PickOutcome, PickReport
 
-AGAIN = (PickOutcome.OUT_OF_REACH, PickOutcome.TRAY_MISSING)
-"""What a pick says where another stance may help."""
+AGAIN = (PickOutcome.OUT_OF_REACH, PickOutcome.TRAY_MISSING, PickOutcome.TIGHT, PickOutcome.JAMMED)
+"""What a pick says where another stance may help: others are within reach there."""
+LEFT = (PickOutcome.TIGHT.value, PickOutcome.JAMMED.value)
+"""What is said of a fastener that is not tried again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +96,8 @@ class Disassemble:
             if found.outcome not in AGAIN or not docks:
                 return SkillResult(False, result.stage, result.slot, result.reason, timings, report)
             context.say(result.stage, f"{result.reason} Looking for another stance.")
+            left = [place for one in found.tried if one.outcome in LEFT for place in (one.x, one.y)]
+            goal = replace(goal, dock=replace(goal.dock, avoid=(*goal.dock.avoid, *left)))
             await self._dock(context, goal, report)
             docks -= 1
 

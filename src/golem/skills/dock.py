@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from golem.capabilities.navigation.edge_fit import NearEdge
 from golem.capabilities.navigation.goto import GoTo
 from golem.errors import ConfigError
@@ -43,6 +45,7 @@ class DockGoal:
         turned: the same of the heading [rad].
         approaches: how often it is tried.
         label, container: classes of the fasteners and of where they are put.
+        avoid: x, y in odom of fasteners that are not wanted any more, one after the other [m].
     """
 
     stance: Literal["reach", "edge"] = "reach"
@@ -53,6 +56,7 @@ class DockGoal:
     approaches: int = 4
     label: str = "screw"
     container: str = "tray"
+    avoid: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the numbers.
@@ -69,6 +73,8 @@ class DockGoal:
             ("turned", self.turned, 0.0 < self.turned <= 0.5, angle),
             ("approaches", self.approaches, 1 <= self.approaches <= 10, "from 1 to 10"),
         )
+        if len(self.avoid) % 2 or not all(map(math.isfinite, self.avoid)):
+            raise ConfigError("What docking is to avoid are pairs of finite numbers, x and y of each place.")
         if not (self.label and self.container):
             raise ConfigError("Docking names the class of the fasteners and that of their container.")
 
@@ -160,7 +166,8 @@ class Dock:
         view = _View(edge.pose @ PlanarPose(-goal.standoff, goal.lateral, 0.0), edge)
         across = edge.pose.to(PlanarPose(0.0, 0.0, 0.0))
         if goal.stance == "reach" and -across.x < goal.standoff + IN_VIEW:
-            seen = await see_fasteners(context, goal.label, goal.container)
+            avoid = np.array(goal.avoid).reshape(-1, 2)
+            seen = await see_fasteners(context, goal.label, goal.container, avoid)
             if len(seen.places):
                 best = best_stance(edge.pose, seen.places, seen.weights, seen.tray)
                 here = stance_here(seen.places, seen.weights, seen.tray)

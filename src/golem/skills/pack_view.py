@@ -77,8 +77,14 @@ async def see_edge(context: Context) -> NearEdge:
     return edge
 
 
-async def see_fasteners(context: Context, label: str, container: str) -> Fasteners:
-    """Return what the head camera shows of fasteners and container in some frames; nothing where no frame comes."""
+async def see_fasteners(context: Context, label: str, container: str, avoid: Array) -> Fasteners:
+    """Return what the head camera shows of fasteners and container in some frames; nothing where no frame comes.
+
+    Args:
+        context: of the skill.
+        label, container: their classes.
+        avoid: (n, 2) in odom, of fasteners that are left out [m].
+    """
     seen: list[tuple[Array, list[float]]] = []
     trays: list[tuple[float, Array]] = []
     with context.watch("head", label, container) as eye:
@@ -90,7 +96,7 @@ async def see_fasteners(context: Context, label: str, container: str) -> Fastene
                 place = T[:3, :3].T @ (o.position - T[:3, 3])
                 if o.label == container:
                     trays.append((float(o.detection.score), place))
-                elif o.label == label:
+                elif o.label == label and not (np.hypot(*(avoid - o.position[:2]).T) < SAME).any():
                     _add(seen, place, _weight(o))
     tray = max(trays, key=lambda one: one[0])[1] if trays else None
     places = np.array([place for place, _ in seen]).reshape(-1, 3)

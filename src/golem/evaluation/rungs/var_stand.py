@@ -29,10 +29,10 @@ from golem.runtime.lockstep import build_robot
 from golem.skills.approach import APPROACH, approach
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
-from golem.skills.disassemble import AGAIN, DisassembleGoal, DisassembleReport
+from golem.skills.disassemble import DisassembleGoal, DisassembleReport
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pick_config import PickGoal
-from golem.skills.pick_report import PickReport
+from golem.skills.pick_report import PickOutcome, PickReport
 from golem.stack import Stack, load_stack
 from golem.types import SIDES, PlanarPose
 
@@ -202,7 +202,12 @@ class _Trial:
         outcome = judge_pick(self._stack, result, self._oracle, watch, lost(running, watch.recorder))
         found = result.value if isinstance(result.value, DisassembleReport) else DisassembleReport()
         pick = found.picks[-1] if found.picks else PickReport()
+        # The robot tells places in its own odom, which has drifted on the way.
+        base = self._episode.running.bus.latest(topics.BASE)
         fasteners = self._oracle.fasteners()
+        if base is not None:
+            T = base.T_odom_base
+            fasteners = [replace(f, position=T[:3, :3] @ f.in_base + T[:3, 3]) for f in fasteners]
         served = sum(load_map().serves(side, f.in_base) for f in fasteners if f.loose for side in SIDES)
         assert watch.recorder is not None
         series = {
@@ -219,7 +224,7 @@ class _Trial:
         outcome = replace(outcome, series=series)
         if outcome.success or outcome.stage in ("fall", "safety", "fault"):
             return outcome
-        stands_badly = not served or pick.outcome in AGAIN
+        stands_badly = not served or pick.outcome in (PickOutcome.OUT_OF_REACH, PickOutcome.TRAY_MISSING)
         if not stands_badly:
             return outcome
         return replace(outcome, stage="stance", module=self._who(found))
