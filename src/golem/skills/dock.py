@@ -17,7 +17,7 @@ from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.pack_view import CAMERA, LOOK, see_edge, see_fasteners
 from golem.skills.pose_goal import FIRST_REPORT, MARGIN
-from golem.skills.stance_choice import Stance, best_stance, stance_here
+from golem.skills.stance_choice import PackStance, best_stance, stance_here
 from golem.types import PlanarPose, Twist
 
 SETTLE = 1.0
@@ -109,8 +109,8 @@ class _View:
 
     left: PlanarPose
     edge: NearEdge
-    here: Stance | None = None
-    best: Stance | None = None
+    here: PackStance | None = None
+    best: PackStance | None = None
 
     @property
     def distance(self) -> float:

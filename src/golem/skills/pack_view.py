@@ -31,7 +31,7 @@ WANTED = (1.0, 0.3)
 
 
 @dataclass(frozen=True, slots=True)
-class Fasteners:
+class SeenFasteners:
     """What the head camera shows.
 
     Attributes:
@@ -77,12 +77,13 @@ async def see_edge(context: Context) -> NearEdge:
     return edge
 
 
-async def see_fasteners(context: Context, label: str, container: str, avoid: Array) -> Fasteners:
+async def see_fasteners(context: Context, label: str, container: str, avoid: Array) -> SeenFasteners:
     """Return what the head camera shows of fasteners and container in some frames; nothing where no frame comes.
 
     Args:
         context: of the skill.
-        label, container: their classes.
+        label: class of the fasteners.
+        container: class of the container.
         avoid: (n, 2) in odom, of fasteners that are left out [m].
     """
     seen: list[tuple[Array, list[float]]] = []
@@ -100,7 +101,7 @@ async def see_fasteners(context: Context, label: str, container: str, avoid: Arr
                     _add(seen, place, _weight(o))
     tray = max(trays, key=lambda one: one[0])[1] if trays else None
     places = np.array([place for place, _ in seen]).reshape(-1, 3)
-    return Fasteners(places, np.array([float(np.mean(w)) for _, w in seen]), tray)
+    return SeenFasteners(places, np.array([float(np.mean(w)) for _, w in seen]), tray)
 
 
 def _weight(o: LocalizedObject) -> float:

@@ -33,7 +33,7 @@ PER_METRE, PER_RADIAN = 0.2, 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class Stance:
+class PackStance:
     """A place to stand.
 
     Attributes:
@@ -47,13 +47,13 @@ class Stance:
     served: int
 
 
-def stance_here(screws: Array, weights: Array, tray: Array | None) -> Stance:
+def stance_here(screws: Array, weights: Array, tray: Array | None) -> PackStance:
     """Return how well the robot stands where it is; see `best_stance`."""
     quality, served = _judged(np.zeros((1, 3)), screws, weights, tray)
-    return Stance(PlanarPose(0.0, 0.0, 0.0), float(quality[0]), int(served[0]))
+    return PackStance(PlanarPose(0.0, 0.0, 0.0), float(quality[0]), int(served[0]))
 
 
-def best_stance(edge: PlanarPose, screws: Array, weights: Array, tray: Array | None) -> Stance:
+def best_stance(edge: PlanarPose, screws: Array, weights: Array, tray: Array | None) -> PackStance:
     """Return the best stance before an edge, the nearer of two that are equally good.
 
     A fastener counts by how far within reach it and the place above it are, for the hand that gets to the container
@@ -73,7 +73,7 @@ def best_stance(edge: PlanarPose, screws: Array, weights: Array, tray: Array | N
     quality, served = _judged(stances, screws, weights, tray)
     cost = PER_METRE * np.hypot(stances[:, 0], stances[:, 1]) + PER_RADIAN * np.abs(stances[:, 2])
     best = int(np.argmax(quality - cost))
-    return Stance(tried[best], float(quality[best]), int(served[best]))
+    return PackStance(tried[best], float(quality[best]), int(served[best]))
 
 
 def _judged(stances: Array, screws: Array, weights: Array, tray: Array | None) -> tuple[Array, Array]:
