@@ -54,6 +54,10 @@ class Stack:
         self.ros.do("act", self.node, name=ACTION, type=TYPE, **words)
         self.ros.do("mode", self.node, name=ACTION, mode=mode)
 
+    def asked(self) -> int:
+        """Return how many goals rclpy has begun to pursue."""
+        return len(self.ros.do("asked", self.node, name=ACTION))
+
     def begin(self, goal: PlanarPose = GOAL) -> None:
         """Set off."""
         self.bus.publish(topics.NAV_GOAL, NavGoal(goal, "map"), self.now())
@@ -75,7 +79,7 @@ def test_rclpy_gets_the_goal_drives_and_is_believed_when_it_has_arrived(node: Dd
     stack = Stack(node, ros)
     stack.serve("wait")
     stack.begin()
-    stack.until(lambda step: step.note == "nav2")
+    stack.until(lambda step: step.note == "nav2" and stack.asked() == 1)
     (asked,) = ros.do("asked", node, name=ACTION)
     pose = codec.deserialize(bytes.fromhex(asked), codec.action(TYPE).Goal).pose
     assert pose.header.frame_id == "map" and (pose.pose.position.x, pose.pose.position.y) == (2.0, 1.0)
@@ -103,12 +107,12 @@ def test_a_walk_that_is_cancelled_is_cancelled_at_rclpy(node: DdsNode, ros: Ros)
     stack = Stack(node, ros)
     stack.serve("wait")
     stack.begin()
-    stack.until(lambda step: step.note == "nav2" and len(ros.do("asked", node, name=ACTION)) == 1)
+    stack.until(lambda step: step.note == "nav2" and stack.asked() == 1)
     stack.bus.publish(topics.NAV_GOAL, NavGoal(None), stack.now())
     stack.bridge.step(stack.now())
     # rclpy waits with each goal until it is cancelled: it has ended the first one, and takes the next.
     stack.begin(PlanarPose(1.0, 0.0, 0.0))
-    stack.until(lambda step: len(ros.do("asked", node, name=ACTION)) == 2)
+    stack.until(lambda step: stack.asked() == 2)
     assert not stack.until(lambda step: step.note == "nav2").ended
 
 
