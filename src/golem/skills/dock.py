@@ -28,6 +28,8 @@ IN_VIEW = 0.35
 """Distance from the stance by the edge from which on the head camera is asked for fasteners [m]."""
 GOOD = 0.8
 """Share of the best stance's quality with which the robot stays where it is."""
+GAIN = 0.05
+"""Quality that an approach has to win for another one to be tried."""
 NOTHING = 0.02
 """Quality of a stance from which no hand gets anywhere."""
 
@@ -121,7 +123,8 @@ class _View:
 class Dock:
     """Stand before the pack where the hands can work: look, approach with small steps, settle, look again.
 
-    Stages: `look`, `approach`, `done`. It ends when the stance is good enough, or after the approaches of the goal.
+    Stages: `look`, `approach`, `done`. It ends when the stance is good enough, when an approach has won nothing, or
+    after those of the goal. Where some fastener is within reach it has succeeded.
     """
 
     Goal, Result = DockGoal, DockReport
@@ -155,7 +158,10 @@ class Dock:
             context.say("approach", f"{100 * view.distance:.0f} cm to go.")
             await approach(context, navigator, PlanarPose.of(context.legs.pose) @ view.left)
             approaches += 1
-            view = await self._look(context, goal)
+            before, view = view, await self._look(context, goal)
+            if before.here is not None and view.here is not None:
+                if view.here.quality < before.here.quality + GAIN:
+                    break  # these legs stand no better
         return _result(view, goal, approaches, context.t - start)
 
     async def _look(self, context: Context, goal: DockGoal) -> _View:
@@ -173,8 +179,9 @@ class Dock:
                 here = stance_here(seen.places, seen.weights, seen.tray)
                 view = _View(best.pose, edge, here, best)
         text = f"{100 * view.distance:.1f} cm and {math.degrees(view.left.yaw):.1f} deg from the stance"
-        if view.here is not None:
-            text += f", {view.here.served} {goal.label}s within reach here"
+        if view.here is not None and view.best is not None:
+            text += f", {view.here.served} {goal.label}s within reach here, {view.best.served} there"
+            text += f" (quality {view.here.quality:.2f} and {view.best.quality:.2f})"
         context.say("look", f"{text}.", left=[view.left.x, view.left.y, view.left.yaw])
         return view
 
@@ -195,7 +202,7 @@ def _result(view: _View, goal: DockGoal, approaches: int, seconds: float) -> Ski
     if view.here is not None:
         report.quality, report.served = view.here.quality, view.here.served
         text += f"; {view.here.served} {goal.label}s are within reach"
-    if not _good(view, goal):
+    if not _good(view, goal) and not report.served:
         reason = f"Not good enough. {text}."
         return SkillResult(False, "approach", "lower_body", reason, value=report)
     return SkillResult(True, "done", None, f"{text}.", {"dock": seconds}, report)

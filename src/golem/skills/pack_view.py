@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from golem.capabilities.grasping.ground import height_above_ground
 from golem.capabilities.navigation.edge_fit import NearEdge, near_edge, table_height
+from golem.capabilities.planning.base import PlanRefused
 from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
+from golem.skills.pick_targets import TORSO
+from golem.skills.planned_motion import PlannedMotion
 from golem.types import Array, LocalizedObject, PlanarPose
 
 LOOK = 1.2
@@ -26,6 +30,10 @@ SAME = 0.03
 """Distance within which two sightings are of one fastener [m]."""
 PROUD = 0.0115
 """Height above its ground from which on a fastener is wanted most [m]; that of `pick`."""
+TURN = 0.35
+"""How far the torso turns to look for the container [rad]; that of `pick`."""
+SPEED = 0.25
+"""Speed of the hands meanwhile [m/s]."""
 WANTED = (1.0, 0.3)
 """Weight of a fastener that stands proud, or of which that is not known, and of one that is screwed down [own]."""
 
@@ -78,7 +86,9 @@ async def see_edge(context: Context) -> NearEdge:
 
 
 async def see_fasteners(context: Context, label: str, container: str, avoid: Array) -> SeenFasteners:
-    """Return what the head camera shows of fasteners and container in some frames; nothing where no frame comes.
+    """Return what the head camera shows of fasteners and container; nothing where no frame comes.
+
+    Where fasteners are in view and no container is, the torso turns to either side for another look.
 
     Args:
         context: of the skill.
@@ -88,6 +98,33 @@ async def see_fasteners(context: Context, label: str, container: str, avoid: Arr
     """
     seen: list[tuple[Array, list[float]]] = []
     trays: list[tuple[float, Array]] = []
+    await _look(context, label, container, avoid, seen, trays)
+    if seen and not trays:
+        motion, ahead = PlannedMotion(context), context.commanded_joints.copy()
+        for turn in (TURN, -TURN):
+            turned = ahead.copy()
+            turned[TORSO] += turn
+            with suppress(PlanRefused):
+                await motion.to_joints(turned, (), SPEED)
+                await _look(context, label, container, avoid, seen, trays)
+            if trays:
+                break
+        with suppress(PlanRefused):
+            await motion.to_joints(ahead, (), SPEED)
+    tray = max(trays, key=lambda one: one[0])[1] if trays else None
+    places = np.array([place for place, _ in seen]).reshape(-1, 3)
+    return SeenFasteners(places, np.array([float(np.mean(w)) for _, w in seen]), tray)
+
+
+async def _look(
+    context: Context,
+    label: str,
+    container: str,
+    avoid: Array,
+    seen: list[tuple[Array, list[float]]],
+    trays: list[tuple[float, Array]],
+) -> None:
+    """Add what the head camera shows in some frames to `seen` and `trays`, in base_link."""
     with context.watch("head", label, container) as eye:
         end, frames = context.t + CAMERA, 0
         while frames < FRAMES and (sightings := await eye.look(end - context.t)) is not None:
@@ -99,9 +136,6 @@ async def see_fasteners(context: Context, label: str, container: str, avoid: Arr
                     trays.append((float(o.detection.score), place))
                 elif o.label == label and not (np.hypot(*(avoid - o.position[:2]).T) < SAME).any():
                     _add(seen, place, _weight(o))
-    tray = max(trays, key=lambda one: one[0])[1] if trays else None
-    places = np.array([place for place, _ in seen]).reshape(-1, 3)
-    return SeenFasteners(places, np.array([float(np.mean(w)) for _, w in seen]), tray)
 
 
 def _weight(o: LocalizedObject) -> float:
