@@ -107,7 +107,7 @@ class VarStandRung(PickRung):
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
         seed, walks = episode_seed(spec.seed, spec.index), spec.case["start"] == "walked"
-        stance = _stance(spec, walks)
+        stance = drawn_stance(spec, walks)
         conditions = {k: v for k, v in spec.case.items() if k not in ("start", "dock")}
         stack = self._stack(spec.method, spec.profile, spec.overrides).with_options(
             "robot",
@@ -268,7 +268,7 @@ class _Trial:
         return f"{slot}: {self._stack.choice(slot).use}"
 
 
-def _stance(spec: TrialSpec, walks: bool) -> PlanarPose:
+def drawn_stance(spec: TrialSpec, walks: bool) -> PlanarPose:
     """Return where the robot should stand before the pack, from where it begins."""
     if walks:
         off = spec.rng("start").uniform(-1.0, 1.0, 3) * SPREAD
