@@ -18,7 +18,7 @@ from golem.skills.context import Context
 from golem.skills.pack_view import CAMERA, LOOK, see_edge, see_fasteners
 from golem.skills.pose_goal import FIRST_REPORT, MARGIN
 from golem.skills.stance_choice import PackStance, best_stance, stance_here
-from golem.types import PlanarPose, Twist
+from golem.types import Array, PlanarPose, Twist
 
 SETTLE = 1.0
 """Time that the body gets to come to rest before it looks [s]."""
@@ -129,6 +129,11 @@ class Dock:
 
     Goal, Result = DockGoal, DockReport
 
+    def __init__(self) -> None:
+        """Know of no container."""
+        self._tray: Array | None = None
+        """(3,) where it was seen last, in the odometry's frame [m]."""
+
     def timeout(self, goal: DockGoal) -> float:
         """Return the time it may take [s]; see `Skill`."""
         return (goal.approaches + 1) * (TIMEOUT + SETTLE + LOOK + CAMERA + 2.0) + MARGIN
@@ -173,10 +178,16 @@ class Dock:
         across = edge.pose.to(PlanarPose(0.0, 0.0, 0.0))
         if goal.stance == "reach" and -across.x < goal.standoff + IN_VIEW:
             avoid = np.array(goal.avoid).reshape(-1, 2)
-            seen = await see_fasteners(context, goal.label, goal.container, avoid)
+            known = self._tray is not None
+            seen = await see_fasteners(context, goal.label, goal.container, avoid, not known)
+            tray, T = seen.tray, context.legs.pose
+            if tray is not None:
+                self._tray = T[:3, :3] @ tray + T[:3, 3]
+            elif self._tray is not None:
+                tray = T[:3, :3].T @ (self._tray - T[:3, 3])
             if len(seen.places):
-                best = best_stance(edge.pose, seen.places, seen.weights, seen.tray)
-                here = stance_here(seen.places, seen.weights, seen.tray)
+                best = best_stance(edge.pose, seen.places, seen.weights, tray)
+                here = stance_here(seen.places, seen.weights, tray)
                 view = _View(best.pose, edge, here, best)
         text = f"{100 * view.distance:.1f} cm and {math.degrees(view.left.yaw):.1f} deg from the stance"
         if view.here is not None and view.best is not None:

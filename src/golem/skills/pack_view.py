@@ -16,6 +16,7 @@ from golem.skills.base import StageFailed
 from golem.skills.context import Context
 from golem.skills.pick_targets import TORSO
 from golem.skills.planned_motion import PlannedMotion
+from golem.skills.stance_choice import LOOK_TURN
 from golem.types import Array, LocalizedObject, PlanarPose
 
 LOOK = 1.2
@@ -30,8 +31,6 @@ SAME = 0.03
 """Distance within which two sightings are of one fastener [m]."""
 PROUD = 0.0115
 """Height above its ground from which on a fastener is wanted most [m]; that of `pick`."""
-TURN = 0.35
-"""How far the torso turns to look for the container [rad]; that of `pick`."""
 SPEED = 0.25
 """Speed of the hands meanwhile [m/s]."""
 WANTED = (1.0, 0.3)
@@ -85,23 +84,24 @@ async def see_edge(context: Context) -> NearEdge:
     return edge
 
 
-async def see_fasteners(context: Context, label: str, container: str, avoid: Array) -> SeenFasteners:
+async def see_fasteners(
+    context: Context, label: str, container: str, avoid: Array, around: bool
+) -> SeenFasteners:
     """Return what the head camera shows of fasteners and container; nothing where no frame comes.
-
-    Where fasteners are in view and no container is, the torso turns to either side for another look.
 
     Args:
         context: of the skill.
         label: class of the fasteners.
         container: class of the container.
         avoid: (n, 2) in odom, of fasteners that are left out [m].
+        around: whether the torso turns to either side where fasteners are in view and no container is.
     """
     seen: list[tuple[Array, list[float]]] = []
     trays: list[tuple[float, Array]] = []
     await _look(context, label, container, avoid, seen, trays)
-    if seen and not trays:
+    if around and seen and not trays:
         motion, ahead = PlannedMotion(context), context.commanded_joints.copy()
-        for turn in (TURN, -TURN):
+        for turn in (LOOK_TURN, -LOOK_TURN):
             turned = ahead.copy()
             turned[TORSO] += turn
             with suppress(PlanRefused):

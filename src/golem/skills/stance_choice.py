@@ -7,9 +7,12 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, map_coordinates
 
 from golem.capabilities.arms.reach_map import ReachMap, load_map
+from golem.robots.model.table import FRAMES
+from golem.robots.sensors.cameras import HEAD, project
 from golem.types import SIDES, Array, PlanarPose, Side
 
 ABOVE = 0.15
@@ -18,6 +21,12 @@ OVER_TRAY = 0.12
 """Height above the container's middle at which a hand lets go [m]."""
 ROOM = 0.10
 """Distance from the end of the reach beyond which more is of no use [m]."""
+LOOK_TURN = 0.35
+"""How far the torso turns to look for the container [rad]; that of `pick`."""
+VIEWS = (1.0, 0.8, 0.2)
+"""Share of the quality: container in view, in view of a turned torso, and in neither [own]."""
+BORDER = 30.0
+"""Distance from the border of the image within which something may not be seen whole [px]."""
 COUNT = 3
 """Fasteners that a stance is judged by, the best ones: a pick tries as many."""
 STANDOFF = (0.35, 0.52)
@@ -56,8 +65,9 @@ def stance_here(screws: Array, weights: Array, tray: Array | None) -> PackStance
 def best_stance(edge: PlanarPose, screws: Array, weights: Array, tray: Array | None) -> PackStance:
     """Return the best stance before an edge, the nearer of two that are equally good.
 
-    A fastener counts by how far within reach it and the place above it are, for the hand that gets to the container
-    as well; the product of both, of the best fasteners, is the quality.
+    A fastener that the head camera sees counts by how far within reach it and the place above it are, for the hand that
+    gets to the container as well; the product of both, of the best fasteners, is the quality. It is less where the
+    torso has to turn for the camera to see the container, and little where even that does not help.
 
     Args:
         edge: a point of the near edge, heading across it away from the robot, in base_link.
@@ -79,13 +89,33 @@ def best_stance(edge: PlanarPose, screws: Array, weights: Array, tray: Array | N
 def _judged(stances: Array, screws: Array, weights: Array, tray: Array | None) -> tuple[Array, Array]:
     """Return the (s,) quality of stances (s, 3), and how many fasteners each serves."""
     best = np.zeros((len(stances), len(screws)))
+    seen = _seen(stances, screws, 0.0)
     for side in SIDES:
         room = np.minimum(_room(stances, screws, side), _room(stances, screws + (0.0, 0.0, ABOVE), side))
         if tray is not None:
             room = room * _room(stances, (tray + (0.0, 0.0, OVER_TRAY))[None], side)
         best = np.maximum(best, room)
-    wanted = np.sort(best * weights, axis=1)[:, ::-1][:, :COUNT]
-    return wanted.sum(axis=1) / COUNT, (best > 0.0).sum(axis=1)
+    best = best * seen
+    quality = np.sort(best * weights, axis=1)[:, ::-1][:, :COUNT].sum(axis=1) / COUNT
+    if tray is not None:
+        turned = [_seen(stances, tray[None], turn)[:, 0] for turn in (LOOK_TURN, -LOOK_TURN)]
+        view = np.where(turned[0] | turned[1], VIEWS[1], VIEWS[2])
+        quality *= np.where(_seen(stances, tray[None], 0.0)[:, 0], VIEWS[0], view)
+    return quality, (best > 0.0).sum(axis=1)
+
+
+def _seen(stances: Array, points: Array, turn: float) -> NDArray[np.bool_]:
+    """Return (s, n) whether the head camera sees points (n, 3) from stances (s, 3) with the torso at `turn` [rad]."""
+    yaw = stances[:, 2:] + turn
+    x, y = points[:, 0] - stances[:, :1], points[:, 1] - stances[:, 1:2]
+    c, s = np.cos(yaw), np.sin(yaw)
+    local = np.stack([c * x + s * y, c * y - s * x, np.broadcast_to(points[:, 2], x.shape)], axis=-1)
+    T = FRAMES["camera_link"].T_parent_frame
+    link = (local - T[:3, 3]) @ T[:3, :3]
+    optical = np.stack([-link[..., 1], -link[..., 2], np.maximum(link[..., 0], 1e-3)], axis=-1)
+    pixel = project(HEAD, optical)
+    low, high = np.full(2, BORDER), np.array([HEAD.width, HEAD.height]) - BORDER
+    return ((pixel > low) & (pixel < high)).all(axis=-1) & (link[..., 0] > HEAD.near)
 
 
 def _room(stances: Array, points: Array, side: Side) -> Array:
