@@ -28,7 +28,7 @@ INTERRUPTED = 130
 
 
 def _demo(words: list[str]) -> int:
-    """The robot pulls loosened screws from a pack in front of you; --walk: it finds its way to one."""
+    """The robot pulls loosened screws from a pack in front of you; --walk: it walks to one first."""
     _prepare_graphics()
     from golem.demo import DemoConfig, run_demo
 

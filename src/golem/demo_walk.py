@@ -1,9 +1,10 @@
-"""`golem demo --walk`: the robot finds its way through a hall to the battery pack, in the live view or into a film."""
+"""`golem demo --walk`: the robot finds its way through a hall to the pack, and takes a screw out of it."""
 
 from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,17 +18,19 @@ from golem.evaluation.episodes.contacts import ContactWatch
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.run import Narrator, on_air, shown
-from golem.runtime.lockstep import build
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import SkillResult
-from golem.skills.dock import DockGoal
+from golem.skills.disassemble import DisassembleGoal
 from golem.skills.navigate import NavigateGoal
 from golem.stack import load_stack
 from golem.types import PlanarPose
 
 STACK = "hall"
 """The shipped stack that walks."""
-GOAL = NavigateGoal(6.7, 0.0, 0.0, "map")
-"""Where to: 1.2 to 1.9 m before the pack's edge; `dock` goes the rest, measured from that edge."""
+GOAL = NavigateGoal(6.4, 0.0, 0.0, "map", content=0.1)
+"""Where to: 1.2 m before the pack's edge; docking goes the rest, measured from that edge."""
+WORK = DisassembleGoal()
+"""What it does there: dock, and take one screw out."""
 FPS = 5.0
 """Pictures of the film per second of robot time."""
 
@@ -37,7 +40,8 @@ class WalkDemoResult:
     """How it went.
 
     Attributes:
-        success: whether the robot arrived within 25 cm, by the simulator's truth, docked, and touched nothing.
+        success: whether the robot arrived within 25 cm, by the simulator's truth, touched nothing on the way, and says
+            that it took a screw out.
         error: distance from the goal by the truth [m].
         films: the films, the GIF first; empty with the live view.
     """
@@ -70,7 +74,8 @@ def run_walk_demo(
         robot = shown(running, built)
         print(
             f"The robot stands in a hall, {math.hypot(GOAL.x, GOAL.y):.0f} m from the pack, and has no map.\n"
-            f"It shall find its way around walls and obstacles by its LiDAR (profile {profile}, seed {seed}).",
+            f"It shall find its way around walls and obstacles by its LiDAR, dock, and take a screw out "
+            f"(profile {profile}, seed {seed}).",
             flush=True,
         )
         narrator, recorder, contacts = Narrator(running), BalanceRecorder(robot), ContactWatch(robot)
@@ -80,10 +85,8 @@ def run_walk_demo(
                 narrator()
                 show()
                 recorder(running.executor.t)
-                contacts(running.executor.t)
 
             films: list[Path] = []
-            docked: SkillResult | None = None
             if headless:
                 with closing(Film(robot, fps=FPS, recorder=recorder)) as film:
 
@@ -91,10 +94,7 @@ def run_walk_demo(
                         watch()
                         film.tick(running)
 
-                    result = running.execute("navigate", GOAL, watch=filmed)
-                    true = true_pose(robot)
-                    if result.success:
-                        docked = running.execute("dock", DockGoal(), watch=filmed)
+                    ended = _errands(running, robot, contacts, running.execute, filmed)
                     film.frame(running)
                     print(f"Writing the film ({len(film)} pictures).", flush=True)
                     films = film.save(out / "walk.gif")
@@ -102,13 +102,26 @@ def run_walk_demo(
                 with LiveView(running, robot, port) as view:
                     print(f"Watch it at {view.url}.", flush=True)
                     view.await_spectator()
-                    result = view.run("navigate", GOAL, watch=watch)
-                    true = true_pose(robot)
-                    if result.success:
-                        docked = view.run("dock", DockGoal(), watch=watch)
-        return _told(
-            result, docked, true, contacts, films, out, {"stack": stack, "profile": profile, "seed": seed}
-        )
+                    ended = _errands(running, robot, contacts, view.run, watch)
+        return _told(*ended, contacts, films, out, {"stack": stack, "profile": profile, "seed": seed})
+
+
+def _errands(
+    running: LockstepRunner,
+    robot: MujocoRobot,
+    contacts: ContactWatch,
+    run: Callable[..., SkillResult],
+    watch: Callable[[], None],
+) -> tuple[SkillResult, SkillResult | None, PlanarPose]:
+    """Walk, then work; return how both ended, and where the robot stood in between, by the truth."""
+
+    def watch_walk() -> None:
+        watch()
+        contacts(running.executor.t)
+
+    result = run("navigate", GOAL, watch=watch_walk)
+    true = true_pose(robot)
+    return result, run("disassemble", WORK, watch=watch) if result.success else None, true
 
 
 def true_pose(robot: MujocoRobot) -> PlanarPose:
@@ -119,7 +132,7 @@ def true_pose(robot: MujocoRobot) -> PlanarPose:
 
 def _told(
     result: SkillResult,
-    docked: SkillResult | None,
+    worked: SkillResult | None,
     true: PlanarPose,
     contacts: ContactWatch,
     films: list[Path],
@@ -128,20 +141,20 @@ def _told(
 ) -> WalkDemoResult:
     """Print and write how it went."""
     error = math.hypot(true.x - GOAL.x, true.y - GOAL.y)
-    success = docked is not None and docked.success and error < 0.25 and not contacts.touched
+    success = worked is not None and worked.success and error < 0.25 and not contacts.touched
     touched = f", touched {', '.join(contacts.touched)}" if contacts.touched else ", touched nothing"
     print(
         f"{'Done' if success else 'Failed'}: {result.reason} By the truth {100 * error:.1f} cm off{touched}."
     )
-    if docked is not None:
-        print(f"Before the pack: {docked.reason}")
+    if worked is not None:
+        print(f"Before the pack: {worked.reason}")
     for film in films:
         print(f"Film:   {film}")
     figures = {
         **facts,
         "success": success,
         "reason": result.reason,
-        "docked": None if docked is None else docked.reason,
+        "worked": None if worked is None else worked.reason,
         "error": round(error, 4),
         "touched": contacts.touched,
     }

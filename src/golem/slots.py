@@ -143,6 +143,7 @@ SLOTS: dict[str, Slot] = {
     "skill": Slot(
         "golem.skills.base:Skill",
         {
+            "disassemble": "golem.skills.disassemble:Disassemble",
             "dock": "golem.skills.dock:Dock",
             "explore": "golem.skills.explore:Explore",
             "navigate": "golem.skills.navigate:Navigate",

@@ -130,3 +130,14 @@ def test_a_goal_that_is_too_far_for_its_time_is_refused() -> None:
     )
     with pytest.raises(ConfigError, match="finite"):
         NavigateGoal(float("nan"))
+
+
+def test_a_robot_that_is_content_to_be_near_stands_at_once() -> None:
+    exact, near = Mapped(offset=0.0), Mapped(offset=0.0)
+    assert outcome(exact.run(Navigate().run(exact.context, NavigateGoal(1.0)))).success
+    result = outcome(near.run(Navigate().run(near.context, NavigateGoal(1.0, content=0.2))))
+    assert result.success and near.twist == Twist() and near.context.t < exact.context.t - 1.0
+    left = (near.place @ PlanarPose(1.0, 0.0, 0.0)).to(near.pose)
+    assert 0.1 < math.hypot(left.x, left.y) < 0.25
+    with pytest.raises(ConfigError, match="content of a goal"):
+        NavigateGoal(1.0, content=-1.0)

@@ -42,6 +42,7 @@ RUNGS: dict[str, str] = {
     "walk-rubble": "golem.evaluation.rungs.walk_rough:WalkRubble",
     "navigate-line": "golem.evaluation.rungs.navigate_line:NavigateLine",
     "navigate": "golem.evaluation.rungs.navigate_hall:NavigateRung",
+    "var-stand": "golem.evaluation.rungs.var_stand:VarStandRung",
     "base-estimation": "golem.evaluation.rungs.base_estimation:BaseEstimation",
     "odometry": "golem.evaluation.rungs.odometry:OdometryRung",
     "memory": "golem.evaluation.rungs.spatial_memory:MemoryRung",

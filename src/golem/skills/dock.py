@@ -1,36 +1,37 @@
-"""Docking: the robot puts its feet where its hands can work, measured from the edge of the pack before it."""
+"""Docking: the robot puts its feet where its hands can work, by the pack's near edge and the fasteners it sees."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from golem.capabilities.navigation.base import NavInputs
-from golem.capabilities.navigation.edge_fit import NearEdge, near_edge
-from golem.capabilities.navigation.goto import GoTo, GoToConfig
+from golem.capabilities.navigation.edge_fit import NearEdge
+from golem.capabilities.navigation.goto import GoTo
 from golem.errors import ConfigError
-from golem.interfaces import topics
-from golem.interfaces.nav_payloads import NavStep
-from golem.middleware.bus import News
 from golem.options import require
+from golem.skills.approach import APPROACH, TIMEOUT, approach
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
+from golem.skills.pack_view import CAMERA, LOOK, see_edge, see_fasteners
 from golem.skills.pose_goal import FIRST_REPORT, MARGIN
+from golem.skills.stance_choice import PackStance, best_stance, stance_here
 from golem.types import Array, PlanarPose, Twist
 
-RIM = (0.84, 1.06)
-"""Heights above the floor between which points are the pack's and not its stand's [m]."""
-LOOK = 1.2
-"""Time over which scans are put together while the robot stands [s]."""
 SETTLE = 1.0
-"""Time that the body gets to come to rest before [s]."""
+"""Time that the body gets to come to rest before it looks [s]."""
 FARTHEST = 1.8
 """Longest way to the stance [m]: more is a way for `navigate`."""
-STEP = 30.0
-"""Time that one approach may take [s]."""
-APPROACH = GoToConfig(speed=(0.2, 0.15, 0.3), face=5.0)
+IN_VIEW = 0.35
+"""Distance from the stance by the edge from which on the head camera is asked for fasteners [m]."""
+GOOD = 0.8
+"""Share of the best stance's quality with which the robot stays where it is."""
+GAIN = 0.05
+"""Quality that an approach has to win for another one to be tried."""
+NOTHING = 0.02
+"""Quality of a stance from which no hand gets anywhere."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,18 +39,26 @@ class DockGoal:
     """Where to stand.
 
     Attributes:
+        stance: `reach`: where the hands get to the fasteners that are seen, and to the container; `edge`: as
+            `standoff` and `lateral` say, which also hold as long as no fastener is seen.
         standoff: distance from base_link to the edge [m].
         lateral: where along the edge, from its middle, to the left [m].
         tolerance: distance from the stance that is good enough [m]: a stop moves the robot by more than 1 cm.
         turned: the same of the heading [rad].
-        approaches: how often it is tried; the best counts.
+        approaches: how often it is tried.
+        label, container: classes of the fasteners and of where they are put.
+        avoid: x, y in odom of fasteners that are not wanted any more, one after the other [m].
     """
 
+    stance: Literal["reach", "edge"] = "reach"
     standoff: float = 0.42
     lateral: float = 0.0
     tolerance: float = 0.03
     turned: float = 0.05
-    approaches: int = 3
+    approaches: int = 4
+    label: str = "screw"
+    container: str = "tray"
+    avoid: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the numbers.
@@ -57,32 +66,77 @@ class DockGoal:
         Raises:
             ConfigError: one of them cannot be meant.
         """
+        near, angle = "a positive distance of at most 0.2 m", "a positive angle of at most 0.5 rad"
         require(
             "goal of docking: ",
             ("standoff", self.standoff, 0.3 <= self.standoff <= 1.5, "from 0.3 to 1.5 m"),
             ("lateral", self.lateral, abs(self.lateral) <= 1.0, "at most 1 m to either side"),
-            (
-                "tolerance",
-                self.tolerance,
-                0.0 < self.tolerance <= 0.2,
-                "a positive distance of at most 0.2 m",
-            ),
-            ("turned", self.turned, 0.0 < self.turned <= 0.5, "a positive angle of at most 0.5 rad"),
+            ("tolerance", self.tolerance, 0.0 < self.tolerance <= 0.2, near),
+            ("turned", self.turned, 0.0 < self.turned <= 0.5, angle),
             ("approaches", self.approaches, 1 <= self.approaches <= 10, "from 1 to 10"),
         )
+        if len(self.avoid) % 2 or not all(map(math.isfinite, self.avoid)):
+            raise ConfigError("What docking is to avoid are pairs of finite numbers, x and y of each place.")
+        if not (self.label and self.container):
+            raise ConfigError("Docking names the class of the fasteners and that of their container.")
+
+
+@dataclass
+class DockReport:
+    """How the robot stands.
+
+    Attributes:
+        left: x, y [m] and yaw [rad] of the stance as seen from the robot.
+        quality: how far within reach fasteners and container are, 0 to 1; 0 where none was seen.
+        served: fasteners within reach.
+        approaches: how often it moved.
+    """
+
+    left: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    quality: float = 0.0
+    served: int = 0
+    approaches: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class _View:
+    """What one look says.
+
+    Attributes:
+        left: the stance as seen from the robot.
+        edge: the near edge.
+        here: how the robot stands now; None where no fastener was seen.
+        best: how it could; likewise.
+    """
+
+    left: PlanarPose
+    edge: NearEdge
+    here: PackStance | None = None
+    best: PackStance | None = None
+
+    @property
+    def distance(self) -> float:
+        """Length of the way to the stance [m]."""
+        return math.hypot(self.left.x, self.left.y)
 
 
 class Dock:
-    """Stand before the pack, measured from its near edge: look, approach with small steps, settle, look again.
+    """Stand before the pack where the hands can work: look, approach with small steps, settle, look again.
 
-    Stages: `look`, `approach`, `done`. It ends when the stance is good enough, or no approach has made it better.
+    Stages: `look`, `approach`, `done`. It ends when the stance is good enough, when an approach has won nothing, or
+    after those of the goal. Where some fastener is within reach it has succeeded.
     """
 
-    Goal = DockGoal
+    Goal, Result = DockGoal, DockReport
+
+    def __init__(self) -> None:
+        """Know of no container."""
+        self._tray: Array | None = None
+        """(3,) where it was seen last, in the odometry's frame [m]."""
 
     def timeout(self, goal: DockGoal) -> float:
         """Return the time it may take [s]; see `Skill`."""
-        return (goal.approaches + 1) * (STEP + SETTLE + LOOK + 2.0) + MARGIN
+        return (goal.approaches + 1) * (TIMEOUT + SETTLE + LOOK + CAMERA + 2.0) + MARGIN
 
     async def run(self, context: Context, goal: DockGoal) -> SkillResult:
         """Dock; see `Skill`."""
@@ -91,7 +145,7 @@ class Dock:
         except StageFailed as failure:
             context.legs.drive(Twist())
             context.say(failure.stage, str(failure), failed=True)
-            return SkillResult(False, failure.stage, failure.slot, str(failure))
+            return SkillResult(False, failure.stage, failure.slot, str(failure), value=DockReport())
 
     async def _dock(self, context: Context, goal: DockGoal) -> SkillResult:
         start, navigator = context.t, GoTo(APPROACH)
@@ -100,71 +154,66 @@ class Dock:
             raise ConfigError(
                 f"The legs, '{context.legs.status.controller}', do not walk; choose others, such as almi."
             )
-        left, edge = await self._look(context, goal)
-        approaches = 0
-        while not self._good(left, goal) and approaches < goal.approaches:
-            if math.hypot(left.x, left.y) > FARTHEST:
+        view, approaches = await self._look(context, goal), 0
+        while not _good(view, goal) and approaches < goal.approaches:
+            if view.distance > FARTHEST:
                 raise StageFailed(
-                    "look",
-                    "dock",
-                    f"The stance is {math.hypot(left.x, left.y):.2f} m away; navigate nearer first.",
+                    "look", "dock", f"The stance is {view.distance:.2f} m away; navigate nearer first."
                 )
-            await self._approach(context, navigator, PlanarPose.of(context.legs.pose) @ left)
+            context.say("approach", f"{100 * view.distance:.0f} cm to go.")
+            await approach(context, navigator, PlanarPose.of(context.legs.pose) @ view.left)
             approaches += 1
-            left, edge = await self._look(context, goal)
-        off, turn = math.hypot(left.x, left.y), math.degrees(left.yaw)
-        text = (
-            f"Standing {100 * off:.1f} cm and {turn:.1f} deg from the stance after {approaches} approaches, by an edge "
-            f"of {edge.length:.2f} m that is straight to {1e3 * edge.spread:.0f} mm."
-        )
-        context.say("done", text, left=[left.x, left.y, left.yaw])
-        if not self._good(left, goal):
-            return SkillResult(False, "approach", "lower_body", f"Not near enough. {text}")
-        return SkillResult(True, "done", None, text, {"dock": context.t - start})
+            before, view = view, await self._look(context, goal)
+            if before.here is not None and view.here is not None:
+                if view.here.quality < before.here.quality + GAIN:
+                    break  # these legs stand no better
+        return _result(view, goal, approaches, context.t - start)
 
-    def _good(self, left: PlanarPose, goal: DockGoal) -> bool:
-        return math.hypot(left.x, left.y) <= goal.tolerance and abs(left.yaw) <= goal.turned
-
-    async def _look(self, context: Context, goal: DockGoal) -> tuple[PlanarPose, NearEdge]:
-        """Return the stance as seen from the robot, and the edge that it was measured from."""
+    async def _look(self, context: Context, goal: DockGoal) -> _View:
+        """Measure where the stance is, as seen from the robot."""
         context.legs.drive(Twist())
         await context.sleep(SETTLE)
-        news, points = News(context.bus, topics.SCAN), list[Array]()
-        end = context.t + LOOK
-        while context.t < end:
-            await context.tick()
-            scan = news.read()
-            if scan is not None:
-                heights = scan.heights
-                points.append(scan.points[(heights > RIM[0]) & (heights < RIM[1]), :2])
-        if not points:
-            raise StageFailed(
-                "look", "robot", "No scan comes: docking needs a LiDAR, and an odometry that goes by it."
-            )
-        here = PlanarPose.of(context.legs.pose)
-        edge = near_edge(np.concatenate(points), here)
-        if isinstance(edge, str):
-            raise StageFailed("look", "dock", edge)
-        left = here.to(edge.pose @ PlanarPose(-goal.standoff, goal.lateral, 0.0))
-        context.say(
-            "look",
-            f"{100 * math.hypot(left.x, left.y):.1f} cm from the stance.",
-            left=[left.x, left.y, left.yaw],
-        )
-        return left, edge
+        edge = await see_edge(context)
+        view = _View(edge.pose @ PlanarPose(-goal.standoff, goal.lateral, 0.0), edge)
+        across = edge.pose.to(PlanarPose(0.0, 0.0, 0.0))
+        if goal.stance == "reach" and -across.x < goal.standoff + IN_VIEW:
+            avoid = np.array(goal.avoid).reshape(-1, 2)
+            known = self._tray is not None
+            seen = await see_fasteners(context, goal.label, goal.container, avoid, not known)
+            tray, T = seen.tray, context.legs.pose
+            if tray is not None:
+                self._tray = T[:3, :3] @ tray + T[:3, 3]
+            elif self._tray is not None:
+                tray = T[:3, :3].T @ (self._tray - T[:3, 3])
+            if len(seen.places):
+                best = best_stance(edge.pose, seen.places, seen.weights, tray)
+                here = stance_here(seen.places, seen.weights, tray)
+                view = _View(best.pose, edge, here, best)
+        text = f"{100 * view.distance:.1f} cm and {math.degrees(view.left.yaw):.1f} deg from the stance"
+        if view.here is not None and view.best is not None:
+            text += f", {view.here.served} {goal.label}s within reach here, {view.best.served} there"
+            text += f" (quality {view.here.quality:.2f} and {view.best.quality:.2f})"
+        context.say("look", f"{text}.", left=[view.left.x, view.left.y, view.left.yaw])
+        return view
 
-    async def _approach(self, context: Context, navigator: GoTo, target: PlanarPose) -> None:
-        """Go straight to a pose in odom, and stand."""
-        navigator.start(target)
-        end = context.t + STEP
-        try:
-            while context.t < end:
-                await context.tick()
-                status = context.legs.status
-                pose = PlanarPose.of(context.legs.pose) @ status.rest
-                step: NavStep = navigator.step(NavInputs(pose, status.moving), context.period)
-                context.legs.drive(step.twist)
-                if step.arrived:
-                    return
-        finally:
-            context.legs.drive(Twist())
+
+def _good(view: _View, goal: DockGoal) -> bool:
+    """Return whether the robot may stay where it is."""
+    if view.here is not None and view.best is not None and view.best.quality > NOTHING:
+        return view.here.quality >= GOOD * view.best.quality
+    return view.distance <= goal.tolerance and abs(view.left.yaw) <= goal.turned
+
+
+def _result(view: _View, goal: DockGoal, approaches: int, seconds: float) -> SkillResult:
+    """Say how the robot stands."""
+    left, edge = view.left, view.edge
+    report = DockReport((left.x, left.y, left.yaw), approaches=approaches)
+    text = f"Standing {100 * view.distance:.1f} cm and {math.degrees(left.yaw):.1f} deg from the stance"
+    text += f" after {approaches} approaches, by an edge of {edge.length:.2f} m, straight to {1e3 * edge.spread:.0f} mm"
+    if view.here is not None:
+        report.quality, report.served = view.here.quality, view.here.served
+        text += f"; {view.here.served} {goal.label}s are within reach"
+    if not _good(view, goal) and not report.served:
+        reason = f"Not good enough. {text}."
+        return SkillResult(False, "approach", "lower_body", reason, value=report)
+    return SkillResult(True, "done", None, f"{text}.", {"dock": seconds}, report)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from golem.options import require
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.pose_goal import FIRST_REPORT, MARGIN, check_numbers, check_reach, go_to
@@ -23,6 +24,8 @@ class NavigateGoal:
         x, y, yaw: pose of base_link on the floor [m], [rad].
         frame: what the pose is given in: `map`; `odom`; or `base_link`, where the robot stands when the skill begins.
         timeout: time after which the robot gives up and stands [s].
+        content: distance from the goal within which the robot stands at once [m]: for a place on the way to another;
+            0 has the navigator correct every stop.
     """
 
     x: float
@@ -30,6 +33,7 @@ class NavigateGoal:
     yaw: float = 0.0
     frame: Literal["map", "odom", "base_link"] = "map"
     timeout: float = 180.0
+    content: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the numbers.
@@ -38,6 +42,9 @@ class NavigateGoal:
             ConfigError: one is not finite, or there is no time to walk in.
         """
         check_numbers(self.x, self.y, self.yaw, self.timeout)
+        require(
+            "", ("content of a goal", self.content, 0.0 <= self.content <= 1.0, "a distance of at most 1 m")
+        )
 
 
 class Navigate:
@@ -56,7 +63,7 @@ class Navigate:
         """Go to one pose; see `Skill`."""
         try:
             target, frame = await self._target(context, goal)
-            return await go_to(context, target, frame, goal.timeout, "navigate")
+            return await go_to(context, target, frame, goal.timeout, "navigate", goal.content)
         except StageFailed as failure:
             context.legs.drive(Twist())
             context.say(failure.stage, str(failure), failed=True)

@@ -18,6 +18,8 @@ FIRST_REPORT = 0.1
 """Time the legs get to report at all [s]."""
 MARGIN = 10.0
 """Time a skill that moves the legs gets on top of what its goal says [s]: it ends by itself unless it hangs."""
+TURNED = 0.15
+"""Error of the heading with which a robot may stand that is content to be near its goal [rad]."""
 Frame = Literal["odom", "map"]
 
 
@@ -53,9 +55,11 @@ def check_reach(context: Context, distance: float, timeout: float) -> None:
 
 
 async def go_to(
-    context: Context, target: PlanarPose, frame: Frame, timeout: float, stage: str
+    context: Context, target: PlanarPose, frame: Frame, timeout: float, stage: str, content: float = 0.0
 ) -> SkillResult:
     """Let the navigator bring base_link to `target`, in `frame`, and stand there.
+
+    Within `content` [m] of it, and `TURNED`, the robot stands at once; 0 leaves that to the navigator.
 
     Feedback about once a second with the data `left` [x, y, yaw] as seen from the robot.
 
@@ -68,7 +72,8 @@ async def go_to(
             await context.tick()
             status, step, left = context.legs.status, way.newest, way.remaining
             distance, turn = math.hypot(left.x, left.y), math.degrees(left.yaw)
-            if step is not None and step.arrived:
+            near = distance < content and abs(left.yaw) < TURNED
+            if step is not None and (step.arrived or near):
                 text = (
                     f"Standing {distance * 1e3:.0f} mm and {turn:.1f} deg from the goal{context.legs.doubt}."
                 )

@@ -42,6 +42,7 @@ class CostmapAstarConfig:
         near: distance from the goal within which it is approached in a straight line [m].
         replan: time between two searches for a way [s].
         shy: by how much more it keeps from what is not in the map: that may move [m].
+        ahead: time for which the way of those who walk is kept free [s]; 0 takes everything for standing.
         stale: age of the newest scan or map from which on the robot stands [s].
         lost: time it waits for scan or map, or for a place in the costmap, before it gives up [s].
         patience: time without a way on before it recovers [s].
@@ -56,6 +57,7 @@ class CostmapAstarConfig:
     near: float = 0.8
     replan: float = 1.0
     shy: float = 0.25
+    ahead: float = 1.4
     stale: float = 0.6
     lost: float = 5.0
     patience: float = 2.0
@@ -80,6 +82,7 @@ class CostmapAstarConfig:
             *((n, v, 0.0 < v < math.inf, "a positive number") for n, v in rows),
             ("beta", self.beta, 0.0 <= self.beta < math.inf, "not negative"),
             ("shy", self.shy, 0.0 <= self.shy < math.inf, "a distance, not negative"),
+            ("ahead", self.ahead, 0.0 <= self.ahead <= 10.0, "a time of at most 10 s"),
             ("rounds", self.rounds, self.rounds >= 0, "not negative"),
         )
 
@@ -102,7 +105,7 @@ class CostmapAstar:
         self.config = c = config or CostmapAstarConfig()
         self._local = LocalController(c.local)
         self._approach = GoTo(c.stop)
-        self._surroundings = Surroundings(c.costmap, c.shy)
+        self._surroundings = Surroundings(c.costmap, c.shy, c.ahead)
         self._recovery = Fallback(
             InSequence(Action(self._wait), Action(self._replanned)),
             InSequence(Action(self._clear), Action(self._replanned)),

@@ -17,6 +17,12 @@ INLIER = 0.02
 FEWEST = 8
 """Slices that make an edge: 0.4 m."""
 TRIES = 60
+LEVELS = (0.6, 1.3)
+"""Heights between which the top of a table is looked for [m]."""
+LEVEL = 0.02
+"""Height of the slices of that search [m]."""
+ENOUGH = 200
+"""Points that make a search worth while."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +40,27 @@ class NearEdge:
     length: float
     spread: float
     slices: int
+
+
+def table_height(local: Array, heights: Array) -> float | None:
+    """Return the height above the floor of the largest level surface ahead [m]; None where there is none.
+
+    Args:
+        local: (n, 2) points as seen from the robot, which looks along x [m].
+        heights: (n,) above the floor [m].
+    """
+    low, high = LEVELS
+    ahead = (local[:, 0] > 0.1) & (local[:, 0] < 2.5) & (np.abs(local[:, 1]) < 1.0)
+    ahead &= (heights > low) & (heights < high)
+    if ahead.sum() < ENOUGH:
+        return None
+    count, edges = np.histogram(heights[ahead], bins=round((high - low) / LEVEL), range=LEVELS)
+    # Three levels together: the noise of the ranges spreads a surface over as many.
+    together = np.convolve(count, np.ones(3), mode="same")
+    best = int(together.argmax())
+    near = slice(max(best - 1, 0), best + 2)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    return float(np.average(middles[near], weights=count[near]))
 
 
 def near_edge(points: Array, view: PlanarPose, reach: float = 2.5, half_width: float = 1.4) -> NearEdge | str:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from golem.capabilities.navigation.costmap import Costmap, CostmapConfig, distance_to
+from golem.capabilities.navigation.movers import Movers
 from golem.interfaces.nav_payloads import OccupancyGrid, Scan
 from golem.types import Array, PlanarPose
 
@@ -28,23 +29,27 @@ class Surroundings:
         clearance: (rows, columns) of the window, the distance from the nearest obstacle [m]; what is not in the map
             counts as nearer than it is by `shy`.
         frame: (5,) x, y, cosine and sine of the corner of the window in the frame of the map, and its resolution.
-        new: (n, 2) points of the newest scan that are in no obstacle of the map [m].
+        new: (n, 2) points of the newest scan that are in no obstacle of the map, and where those who walk will be
+            within `ahead` [m].
     """
 
-    def __init__(self, config: CostmapConfig, shy: float) -> None:
+    def __init__(self, config: CostmapConfig, shy: float, ahead: float) -> None:
         """Wait for a map.
 
         Args:
             config: of the costmap.
             shy: see `clearance` [m].
+            ahead: time for which the way of those who walk is kept free [s]; 0 takes everything for standing.
         """
-        self._config, self._shy = config, shy
+        self._config, self._shy, self._ahead = config, shy, ahead
+        self._movers = Movers()
         self.forget()
 
     def forget(self) -> None:
         """Wait for a map again."""
         self.costmap: Costmap | None = None
         self._grid: OccupancyGrid | None = None
+        self._movers.forget()
         self.clearance: Array = np.full((1, 1), 10.0)
         self.frame: Array = np.array([0.0, 0.0, 1.0, 0.0, 1.0])
         self.new: Array = np.zeros((0, 2))
@@ -73,6 +78,9 @@ class Surroundings:
             square = ((points - (pose.x, pose.y)) ** 2).sum(axis=1)
             points = points[(height > BAND[0]) & (height < BAND[1]) & (square < REACH**2)]
             self.new = points[costmap.free_at(points) > KNOWN]
+            if self._ahead > 0.0:
+                self._movers.update(scan.t, points, (pose.x, pose.y))
+                self.new = np.concatenate([self.new, self._movers.ahead(self._ahead)])
         self._window(costmap, pose)
 
     def with_new(self, radius: float) -> Costmap | None:

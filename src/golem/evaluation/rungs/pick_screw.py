@@ -119,12 +119,12 @@ class PickRung(Rung[PickOptions]):
                     )
                 running.executor.run(running.executor.t + RELEASED)
             before = oracle.fasteners()
-            watch = _Watch(running, oracle, BalanceRecorder(robot) if self.balances else None)
+            watch = PickWatch(running, oracle, BalanceRecorder(robot) if self.balances else None)
             result = running.execute("pick", self._goal, watch=watch)
             running.executor.run(running.executor.t + SETTLE, watch.look)
             if artefacts is not None and watch.recorder is not None:
                 watch.recorder.trace().save(artefacts / TRACE)
-            outcome = _judge(stack, result, oracle, watch, lost(running, watch.recorder))
+            outcome = judge_pick(stack, result, oracle, watch, lost(running, watch.recorder))
             said = result.value if isinstance(result.value, PickReport) else PickReport()
             right = claims(said, before, bool(oracle.screws_in_tray()))
             return replace(outcome, series={**outcome.series, **right})
@@ -168,7 +168,7 @@ class StandRung(PickRung):
     name = STANDING
 
 
-class _Watch:
+class PickWatch:
     """Looks on after every tick and remembers the decisive moments."""
 
     def __init__(self, running: LockstepRunner, oracle: Oracle, recorder: BalanceRecorder | None) -> None:
@@ -188,6 +188,7 @@ class _Watch:
         return False
 
     def __call__(self) -> None:
+        """Look on while the errand runs."""
         self.look()
         feedback = self._news.read()
         if self._stage == "extract":
@@ -204,8 +205,8 @@ class _Watch:
             self.picture = self._oracle.picture()
 
 
-def _judge(
-    stack: Stack, result: SkillResult, oracle: Oracle, watch: _Watch, loss: Loss | None
+def judge_pick(
+    stack: Stack, result: SkillResult, oracle: Oracle, watch: PickWatch, loss: Loss | None
 ) -> TrialOutcome:
     """Say whether a screw is in the tray and the robot still there, and if not, which module lost it."""
     truth = watch.grasp

@@ -13,7 +13,9 @@ from golem.robots.mujoco.hoist import HoistConfig
 from golem.robots.worlds.conditions import LayoutKind, check_condition
 
 Support = Literal["hoist", "ground"]
-World = Literal["pack", "open", "slope", "rubble", "furnished", "corridor"]
+World = Literal["pack", "plant", "open", "slope", "rubble", "furnished", "corridor"]
+WITH_PACK = ("pack", "plant")
+"""Worlds with a pack to work on."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,9 @@ class MujocoConfig:
             upright until it is released.
         world: `pack`: the hall with the battery pack; `open`: the empty hall; `slope`: a ramp ahead; `rubble`: tiles
             of uneven height all around. The floor is flat for a metre around the start in each. `furnished`: a hall
-            with walls, shelves, pillars, gantry and packs, drawn from the seed; `corridor`: two bare walls.
+            with walls, shelves, pillars, gantry and packs, drawn from the seed; `plant`: that hall with the pack to
+            work on; `corridor`: two bare walls.
+        stance: where the robot should stand before the pack: x, y [m] and yaw [rad] from where it begins.
         layout: `nominal`: pack and tray stand where `PackLayout` says, under a robot in the hoist; under one that
             stands they are lowered with it. `varied`: places, light, finishes and clutter are drawn from the seed.
         conditions: those of `worlds.conditions` that are not left to the layout, e.g. `{light: 0.3}`.
@@ -36,8 +40,8 @@ class MujocoConfig:
         near: distance of a finger from a screw below which physics runs at the fine step [m].
         slope: inclination of the ramp [rad].
         rubble: height of the highest tile [m]; the others are drawn from 0 to it.
-        people: how many people walk about in the furnished hall.
-        obstacles: how many walls and obstacles stand in the lane of the furnished hall, a way left between them.
+        people: how many people walk about in the furnished hall or the plant.
+        obstacles: how many walls and obstacles stand in the lane of the furnished hall or the plant; a way is left.
         self_collision: whether limbs stop each other; they do unless this is False.
         feet: what the soles are to the floor.
         cone: friction cone of the solver; by default the pack's bores need an elliptic one, other worlds do without.
@@ -51,6 +55,7 @@ class MujocoConfig:
 
     support: Support = "hoist"
     world: World = "pack"
+    stance: tuple[float, float, float] = (0.0, 0.0, 0.0)
     layout: LayoutKind = "nominal"
     conditions: dict[str, float | str] = field(default_factory=dict[str, "float | str"])
     hoist: HoistConfig = field(default_factory=HoistConfig)
@@ -86,6 +91,9 @@ class MujocoConfig:
             ("payload", self.payload[0], 0.0, 20.0),
             ("payload", self.payload[1], 0.0, 20.0),
             ("latency", self.latency, 0.0, 0.2),
+            ("stance x", self.stance[0], -0.5, 20.0),
+            ("stance y", self.stance[1], -10.0, 10.0),
+            ("stance yaw", self.stance[2], -math.pi, math.pi),
         ):
             if not minimum <= value <= maximum:
                 raise ConfigError(f"The twin's {name} is from {minimum:g} to {maximum:g}, not {value:g}.")
@@ -93,7 +101,7 @@ class MujocoConfig:
             raise ConfigError("The twin's conditions are a mapping, e.g. {light: 0.3}.")
         for name, value in self.conditions.items():
             check_condition(name, value)
-        if self.world != "pack" and (self.conditions or self.layout != "nominal"):
+        if self.world not in WITH_PACK and (self.conditions or self.layout != "nominal"):
             raise ConfigError(
                 f"The world '{self.world}' has no pack whose layout or conditions could differ."
             )

@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from golem.interfaces.lidar import LidarImu, LidarScan
 from golem.robots.model.imu_mount import torso_motion
 from golem.robots.model.table import BASE_LINK, FRAMES
+from golem.robots.mujoco.quaternion_kernel import matrix, turn, turned
+from golem.robots.mujoco.ray_kernel import KNOWN, cast
 from golem.robots.mujoco.scene import Scene
 from golem.robots.sensors.imu import ImuModel
 from golem.robots.sensors.mid360 import (
@@ -22,6 +23,7 @@ from golem.robots.sensors.mid360 import (
     P_LIDAR_IMU,
     POINT_RATE,
     SCAN,
+    TURNS,
     directions,
     draw_mount,
     lidar_errors,
@@ -86,12 +88,15 @@ class LidarSensor:
         self.mount = draw_mount(profile, seed) if mount is None else mount
         self._model = model = visible(scene.model)
         self._data = mujoco.MjData(model)
+        self._shapes, self._others = seen_shapes(model)
+        self._kinds: NDArray[np.int64] = model.geom_type.astype(np.int64)
         self._people = [(model.body(p.name).mocapid[0], p) for p in scene.people]
         self._torso = model.body("torso_link").id
         base, waist = model.joint("base"), model.joint("torso_joint")
         self._q, self._v = int(base.qposadr[0]), int(base.dofadr[0])
         self._waist, self._waist_v = int(waist.qposadr[0]), int(waist.dofadr[0])
         self._T_torso_lidar = FRAMES["lidar_link"].T_parent_frame @ self.mount
+        self._arm: Array = self._T_torso_lidar[:3, 3] + self._T_torso_lidar[:3, :3] @ P_LIDAR_IMU
         self._gravity: Array = model.opt.gravity.copy()
         self._imu_model = ImuModel(
             errors.imu, errors.imu.draw_bias(stream(seed, "lidar/bias")), stream(seed, "lidar/imu")
@@ -141,30 +146,34 @@ class LidarSensor:
         """Add the IMU's sample at time `t` [s], the mean since the one before."""
         late, early = self._moments[-1], self._moments[-2]
         share = (t - early.t) / (late.t - early.t)
-        (R0, v0), (R1, v1) = self._motion(early), self._motion(late)
-        turn = Rotation.from_matrix(R0.T @ R1).as_rotvec()
-        R = R0 @ Rotation.from_rotvec(share * turn).as_matrix()
-        v = v0 + share * (v1 - v0)
+        (q0, v0), (q1, v1) = self._motion(early), self._motion(late)
+        q, v = turned(q0, share * turn(q0, q1)), v0 + share * (v1 - v0)
         if self._before is not None:
-            R_before, v_before = self._before
-            rotvec = Rotation.from_matrix(R_before.T @ R).as_rotvec()
-            R_mid = R_before @ Rotation.from_rotvec(0.5 * rotvec).as_matrix()
+            q_before, v_before = self._before
+            rotvec, mount = turn(q_before, q), self._T_torso_lidar[:3, :3]
+            R_mid = matrix(turned(q_before, 0.5 * rotvec)) @ mount
             force = R_mid.T @ ((v - v_before) / IMU_PERIOD - self._gravity)
-            told = self._imu_model.measure(_UPRIGHT, rotvec / IMU_PERIOD, force)
+            told = self._imu_model.measure(_UPRIGHT, mount.T @ rotvec / IMU_PERIOD, force)
             self._imu.append(LidarImu(t, told.gyro, told.acc))
-        self._before = R, v
+        self._before = q, v
 
     def _motion(self, moment: LidarMoment) -> tuple[Array, Array]:
-        """Return rotation (3, 3) and velocity (3,) [m/s] of the sensor's IMU in the world."""
+        """Return orientation (4,) of the torso, and velocity (3,) of the sensor's IMU in the world [m/s]."""
         q, v = moment.qpos, moment.qvel
         quat = q[self._q + 3 : self._q + 7]
         torso, rate = torso_motion(
             quat, v[self._v + 3 : self._v + 6], float(q[self._waist]), float(v[self._waist_v])
         )
-        R = Rotation.from_quat(torso, scalar_first=True).as_matrix()
-        arm = self._T_torso_lidar[:3, 3] + self._T_torso_lidar[:3, :3] @ P_LIDAR_IMU
+        arm = self._arm
+        spin = np.array(
+            [
+                rate[1] * arm[2] - rate[2] * arm[1],
+                rate[2] * arm[0] - rate[0] * arm[2],
+                rate[0] * arm[1] - rate[1] * arm[0],
+            ]
+        )
         # base_link and torso have one origin, on the axis of the waist.
-        return R @ self._T_torso_lidar[:3, :3], v[self._v : self._v + 3] + R @ np.cross(rate, arm)
+        return torso, v[self._v : self._v + 3] + matrix(torso) @ spin
 
     def _draw(self) -> tuple[Array, Array]:
         """Draw the errors of one scan: (n, 3) of range and direction, and (n,) for the losses."""
@@ -182,7 +191,11 @@ class LidarSensor:
             rays_true = shaken / np.linalg.norm(shaken, axis=1, keepdims=True)
         else:
             rays_true = rays
-        distance, hit = np.empty(n), np.empty(n, dtype=np.int32)
+        distance = np.empty(n)
+        azimuth, slack = (
+            2.0 * np.pi * np.mod(TURNS * (start + offsets), 1.0),
+            SLACK + 6.0 * errors.direction_noise,
+        )
         times = np.array([m.t for m in track]) - start
         edges = np.searchsorted(offsets, 0.5 * (times[1:] + times[:-1]))
         edges = np.concatenate([[0], edges, [n]])
@@ -201,25 +214,40 @@ class LidarSensor:
             # Directions turn with the sensor between the moments; its place is that of the nearest moment.
             local = rays_true[part]
             turned = local + np.cross(self._rate(moment), local) * (offsets[part] - times[i])[:, None]
-            world = (turned @ R.T).ravel()
-            mujoco.mj_multiRay(
-                self._model,
-                data,
-                origin,
-                world,
-                _GROUPS,
-                True,
-                -1,
-                hit[part],
-                distance[part],
-                None,
-                count,
-                errors.far,
-            )
+            world = np.ascontiguousarray(turned @ R.T)
+            half = np.pi * TURNS * count / POINT_RATE
+            wedge = np.array([np.angle(np.exp(1j * (azimuth[part.start] + half))), half + slack])
+            cast(origin, R, wedge, world, self._shapes, self._kinds, self._model.geom_size, self._model.geom_rbound,
+                 data.geom_xpos, data.geom_xmat, distance[part])  # fmt: skip
+            if self._others:
+                self._cast_others(origin, world, distance[part])
         ranges = distance + errors.range_noise * noise[:, 0]
-        kept = (hit >= 0) & (distance > errors.near) & (distance < errors.far) & (lost >= errors.dropout)
+        kept = (
+            (distance >= 0.0) & (distance > errors.near) & (distance < errors.far) & (lost >= errors.dropout)
+        )
         points = (rays[kept] * ranges[kept, None]).astype(np.float32)
         return LidarScan(start + SCAN, points, offsets[kept].astype(np.float32), SCAN)
+
+    def _cast_others(self, origin: Array, rays: Array, distance: Array) -> None:
+        """Let MuJoCo cast rays (n, 3) against shapes that the kernel does not know; `distance` (n,) gets the nearer."""
+        n = len(rays)
+        other, hit = np.empty(n), np.empty(n, dtype=np.int32)
+        mujoco.mj_multiRay(
+            self._model,
+            self._data,
+            origin,
+            rays.ravel(),
+            _GROUPS,
+            True,
+            -1,
+            hit,
+            other,
+            None,
+            n,
+            self.errors.far,
+        )
+        nearer = (hit >= 0) & ((distance < 0.0) | (other < distance))
+        distance[nearer] = other[nearer]
 
     def _rate(self, moment: LidarMoment) -> Array:
         """Return the (3,) angular rate of the sensor in its own axes [rad/s]."""
@@ -229,20 +257,40 @@ class LidarSensor:
         return self._T_torso_lidar[:3, :3].T @ turning
 
 
+SLACK = 0.03
+"""Width that the motion within a moment adds to the wedge of azimuths that its rays are in [rad]."""
 _UPRIGHT: Array = np.array([1.0, 0.0, 0.0, 0.0])
 """The IMU's orientation, which it does not report."""
+
+
+def seen_shapes(model: mujoco.MjModel) -> tuple[NDArray[np.int64], bool]:
+    """Return the shapes of `visible` that the kernel casts against, and whether there are others.
+
+    Those that the kernel knows are hidden from MuJoCo's own rays.
+    """
+    seen = np.isin(model.geom_group, (_SEEN, _ROBOT)) & (_alpha(model) > 0.0)
+    known = seen & np.isin(model.geom_type, KNOWN)
+    model.geom_group[known] = _HIDDEN
+    return np.flatnonzero(known).astype(np.int64), bool((seen & ~known).any())
+
+
+def _alpha(model: mujoco.MjModel) -> Array:
+    """Return the (n,) opacity of each shape, by its material if it has one."""
+    material = model.geom_matid
+    return np.where(material >= 0, model.mat_rgba[material, 3] if model.nmat else 1.0, model.geom_rgba[:, 3])
 
 
 def visible(model: mujoco.MjModel) -> mujoco.MjModel:
     """Return a copy of `model` in which rays meet what the LiDAR sees: the world's looks, the robot's contact shapes.
 
-    The robot's looks are meshes, which cost many times what its contact shapes do.
+    The robot's looks are meshes, which cost many times what its contact shapes do. The world's meshes are the heads of
+    screws, smaller than the noise of the ranges; rays pass them.
     """
     out = copy.copy(model)
     robot = out.body_rootid[out.geom_bodyid] == out.body(BASE_LINK).id
     shape = robot & (out.geom_group == COLLISION_GROUP)
     shape[out.geom(HOUSING).id] = False
-    looks = ~robot & (out.geom_group < COLLISION_GROUP)
+    looks = ~robot & (out.geom_group < COLLISION_GROUP) & (out.geom_type != mujoco.mjtGeom.mjGEOM_MESH)
     out.geom_group[:] = np.where(shape, _ROBOT, np.where(looks, _SEEN, _HIDDEN))
     out.geom_rgba[shape, 3] = 1.0
     out.geom_matid[shape] = -1

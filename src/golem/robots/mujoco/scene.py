@@ -12,7 +12,7 @@ from golem.errors import ConfigError
 from golem.robots.model import contact_shapes, magpie_model, mjcf
 from golem.robots.model.looks import VISUAL_GROUP
 from golem.robots.model.table import BASE_LINK, JOINT_NAMES
-from golem.robots.mujoco.config import MujocoConfig
+from golem.robots.mujoco.config import WITH_PACK, MujocoConfig
 from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds import furnished, parts, terrain
@@ -23,7 +23,7 @@ from golem.robots.worlds.furnished import Person
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
 from golem.robots.worlds.screws import ScrewDraw, draw_screws
-from golem.types import SIDES, Array, CameraInfo
+from golem.types import SIDES, Array, CameraInfo, PlanarPose
 
 COARSE_STEP = 0.002
 """Physics step while nothing delicate is touched [s]."""
@@ -48,6 +48,7 @@ class Scene:
         model: the model.
         names: what the pack added; nothing in a world without one.
         layout: where the pack stands.
+        nominal: where it would under nominal conditions, for a robot at its place.
         draws: the loosened screws.
         people: those who walk about.
         conditions: what of the work place differs from the nominal one.
@@ -56,6 +57,7 @@ class Scene:
     model: mujoco.MjModel
     names: PackNames
     layout: PackLayout
+    nominal: PackLayout
     draws: tuple[ScrewDraw, ...]
     people: tuple[Person, ...] = ()
     conditions: Conditions = Conditions()
@@ -71,7 +73,7 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
 
     Args:
         config: robot and world.
-        layout: where the pack nominally stands; x, y from the robot's pelvis, z from the floor.
+        layout: where the pack nominally stands; x, y from where the robot should stand, z from the floor.
         profile: ranges of the screws.
         seed: draws screws or terrain.
 
@@ -83,15 +85,19 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
     people: tuple[Person, ...] = ()
     names = PackNames((), np.zeros((0, 3)), "", ())
     conditions = draw_conditions(config.layout, config.conditions, stream(seed, "world/conditions"))
-    if config.world == "pack":
+    nominal, stance = layout, PlanarPose(*config.stance)
+    if config.world == "plant":
+        people = _add_terrain(spec, config, seed)
+    if config.world in WITH_PACK:
         layout = arranged(layout, conditions)
         reach_y = config.reach_y if config.layout == "nominal" else REACH_Y
         places = draw_fasteners(layout, conditions, reach_y, stream(seed, "world/fasteners"))
         layout = replace(layout, empty_holes=(*layout.empty_holes, *places.missing))
         draws = draw_screws(stream(seed, "world/screws"), profile.screws, places.loose)
-        names = add_pack(spec, layout, draws)
+        layout = layout.seen_with(stance)
+        names = add_pack(spec, layout, draws, stance=stance, workshop=config.world == "pack")
         add_clutter(spec, layout, round(conditions.clutter), stream(seed, "world/clutter"))
-        dress(spec, conditions)
+        dress(spec, conditions, stance)
         _add_onlooker(spec, layout)
     else:
         people = _add_terrain(spec, config, seed)
@@ -103,7 +109,7 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
     spec.option.noslip_iterations = config.noslip
     spec.option.timestep = COARSE_STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    return Scene(spec.compile(), names, layout, tuple(draws), people, conditions)
+    return Scene(spec.compile(), names, layout, nominal, tuple(draws), people, conditions)
 
 
 def _robot(config: MujocoConfig) -> mujoco.MjSpec:
@@ -189,9 +195,9 @@ def _add_payload(hand: mujoco.MjsBody, mass: float) -> None:
 
 
 def _add_terrain(spec: mujoco.MjSpec, config: MujocoConfig, seed: int) -> tuple[Person, ...]:
-    """Add the ground of a world without a pack to work on, and return the people on it."""
-    if config.world == "furnished":
-        furnished.add_furnished_hall(spec, stream(seed, "world/furniture"))
+    """Add the ground of a world other than the workshop, and return the people on it."""
+    if config.world in ("furnished", "plant"):
+        furnished.add_furnished_hall(spec, stream(seed, "world/furniture"), bare=config.world == "plant")
         furnished.add_course(spec, stream(seed, "world/course"), config.obstacles)
         return furnished.add_people(spec, stream(seed, "world/people"), config.people)
     if config.world == "corridor":
@@ -207,8 +213,9 @@ def _add_terrain(spec: mujoco.MjSpec, config: MujocoConfig, seed: int) -> tuple[
 
 def _add_onlooker(spec: mujoco.MjSpec, layout: PackLayout) -> None:
     """Add a fixed camera that watches hands and near edge from the robot's left; no module of a stack sees it."""
-    eye = np.array([layout.near_edge + 0.95, 0.75, layout.top_z + 0.70])
-    target = np.array([layout.near_edge + 0.02, -0.15, layout.top_z + 0.06])
+    T = layout.pose()
+    eye = (T @ (0.95, 0.75 - layout.center_y, 0.70, 1.0))[:3]
+    target = (T @ (0.02, -0.15 - layout.center_y, 0.06, 1.0))[:3]
     _aim(spec.worldbody.add_camera(name=ONLOOKER.name), eye, target)
 
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from golem.robots.model.spatial import rotation_rpy
 from golem.robots.worlds.conditions import COATS, TRAYS, Conditions, Finish
-from golem.robots.worlds.hall import MATERIALS
+from golem.robots.worlds.hall import HERE, MATERIALS
+from golem.types import PlanarPose
 
 Surface = tuple[tuple[float, float, float], float, float]
 """Colour (r, g, b), specular, shininess."""
@@ -43,14 +44,14 @@ def _lighter(coat: tuple[float, float, float]) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def dress(spec: mujoco.MjSpec, conditions: Conditions) -> None:
-    """Give the materials and lamps of a work place with a pack their looks."""
+def dress(spec: mujoco.MjSpec, conditions: Conditions, stance: PlanarPose = HERE) -> None:
+    """Give the materials and lamps of a work place with a pack their looks; the robot stands at `stance`."""
     for name, (colour, specular, shininess) in surfaces(conditions).items():
         material = spec.material(name)
         material.rgba, material.specular, material.shininess = [*colour, 1.0], specular, shininess
-    turn = rotation_rpy(0.0, 0.0, conditions.light_azimuth)
+    turn, middle = rotation_rpy(0.0, 0.0, conditions.light_azimuth), stance.matrix()[:3, 3]
     for light in spec.lights:
-        light.pos = (turn @ light.pos).tolist()
+        light.pos = (turn @ (light.pos - middle) + middle).tolist()
         light.dir = (turn @ light.dir).tolist()
 
 

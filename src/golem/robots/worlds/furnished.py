@@ -56,14 +56,15 @@ class Person:
         return np.append(self.places[0] + share * (self.places[1] - self.places[0]), 0.0)
 
 
-def add_furnished_hall(spec: mujoco.MjSpec, rng: np.random.Generator) -> None:
+def add_furnished_hall(spec: mujoco.MjSpec, rng: np.random.Generator, *, bare: bool = False) -> None:
     """Add a hall with walls, shelves, pillars, a gantry, two packs on stands and boxes.
 
     Args:
         spec: the world to extend.
         rng: draws sizes and places.
+        bare: leave out the pack ahead and the lamps, for the one to work on.
     """
-    _ground(spec, 14.0)
+    _ground(spec, 14.0, lit=not bare)
     body = spec.worldbody.add_body(name="furniture")
     back, front = -rng.uniform(2.5, 4.0), rng.uniform(10.0, 12.5)
     right, left = -rng.uniform(4.0, 5.0), rng.uniform(5.5, 6.5)
@@ -82,7 +83,9 @@ def add_furnished_hall(spec: mujoco.MjSpec, rng: np.random.Generator) -> None:
         size = rng.uniform((0.2, 0.2, 0.2), (0.5, 0.5, 0.7))
         turn = rng.uniform(0.0, np.pi)
         _solid(body, tuple(size), (x, y, size[2]), quat=(np.cos(turn / 2), 0.0, 0.0, np.sin(turn / 2)))
-    _pack(body, (float(rng.uniform(7.9, 8.6)), float(rng.uniform(-0.3, 0.3))))
+    ahead = float(rng.uniform(7.9, 8.6)), float(rng.uniform(-0.3, 0.3))
+    if not bare:
+        _pack(body, ahead)
     _pack(body, (float(rng.uniform(2.0, 5.0)), left - 1.3), across=True)
     _gantry(body, (float(rng.uniform(-0.1, 0.1)), float(rng.uniform(-0.1, 0.1))))
 
@@ -125,7 +128,7 @@ def add_course(spec: mujoco.MjSpec, rng: np.random.Generator, count: int) -> Non
         _solid(body, size, at, kind=_CYLINDER if one.round else _BOX, quat=turn)
 
 
-def _ground(spec: mujoco.MjSpec, half: float) -> None:
+def _ground(spec: mujoco.MjSpec, half: float, *, lit: bool = True) -> None:
     """Add floor, lights and materials, without the walls of `hall.add_hall`, which are seen only."""
     hall.add_materials(spec)
     world = spec.worldbody
@@ -134,7 +137,7 @@ def _ground(spec: mujoco.MjSpec, half: float) -> None:
         contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1,
         friction=[hall.FLOOR_FRICTION, 0.01, 0.001],
     )  # fmt: skip
-    for x, y in ((0.0, 2.0), (6.0, -2.0)):
+    for x, y in ((0.0, 2.0), (6.0, -2.0)) if lit else ():
         world.add_light(
             pos=[x, y, HEIGHT], dir=[0.0, 0.0, -1.0], diffuse=[0.5] * 3, ambient=[0.15] * 3, castshadow=False
         )

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import mujoco
+import numpy as np
 
 from golem.robots.worlds import parts
+from golem.robots.worlds.layout import yaw_quat
+from golem.types import PlanarPose
 
 MATERIALS: dict[str, tuple[tuple[float, float, float, float], float, float, float]] = {
     # name: rgba, specular, shininess, reflectance
@@ -31,6 +34,8 @@ MATERIALS: dict[str, tuple[tuple[float, float, float, float], float, float, floa
 FLOOR_FRICTION = 1.0
 """Sliding friction of the floor."""
 
+HERE = PlanarPose(0.0, 0.0, 0.0)
+
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 
 
@@ -42,15 +47,16 @@ def add_materials(spec: mujoco.MjSpec) -> None:
         )
 
 
-def add_hall(spec: mujoco.MjSpec, half: float = 6.0, *, marks: bool = True) -> None:
-    """Add the floor (collides), walls and sky (seen only) and three lights without shadows.
-
-    Shadows cost five times the rendering time on a CPU; set `model.light_castshadow` for figures.
+def add_hall(
+    spec: mujoco.MjSpec, half: float = 6.0, *, marks: bool = True, stance: PlanarPose = HERE
+) -> None:
+    """Add the floor (collides), walls and sky (seen only) and the lamps.
 
     Args:
         spec: the world to extend.
         half: half side of the hall [m].
         marks: paint the yellow lines of the work place ahead of the robot.
+        stance: middle and heading of the hall, where the robot works.
     """
     texture = mujoco.mjtTexture
     builtin = mujoco.mjtBuiltin
@@ -73,7 +79,7 @@ def add_hall(spec: mujoco.MjSpec, half: float = 6.0, *, marks: bool = True) -> N
         contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1,
         friction=[FLOOR_FRICTION, 0.01, 0.001],
     )  # fmt: skip
-    hall = world.add_body(name="hall")
+    hall = world.add_body(name="hall", pos=[stance.x, stance.y, 0.0], quat=yaw_quat(stance.yaw))
     for side in (-1, 1) if marks else ():
         parts.visual(hall, _BOX, (0.05, 2.6, 0.002), (0.95, side * 1.9, 0.001),
                      material="warning_yellow", quat=(0.70710678, 0, 0, 0.70710678))  # fmt: skip
@@ -85,9 +91,18 @@ def add_hall(spec: mujoco.MjSpec, half: float = 6.0, *, marks: bool = True) -> N
         parts.visual(hall, _BOX, (half, 0.06, 0.45), (0, side * (half - 0.02), 0.45), material="wall_band")
     for y in (-4, -2, 0, 2, 4):
         parts.visual(hall, _BOX, (0.08, 0.08, 2.0), (half - 0.1, y, 2.0), material="aluminium")
+    add_lamps(spec, stance)
+
+
+def add_lamps(spec: mujoco.MjSpec, stance: PlanarPose = HERE) -> None:
+    """Add three lights without shadows above the work place before which the robot stands at `stance`.
+
+    Shadows cost five times the rendering time on a CPU; set `model.light_castshadow` for figures.
+    """
+    T = stance.matrix()
     for x, y, z, level in ((0.2, 1.6, 3.2, 0.42), (0.2, -1.6, 3.2, 0.36), (2.6, 0.0, 3.4, 0.30)):
-        aim = [0.9 - x, -y, 1.0 - z]
-        world.add_light(
-            pos=[x, y, z], dir=aim, diffuse=[level] * 3, specular=[level * 0.6] * 3, ambient=[0.06] * 3,
-            castshadow=False, cutoff=70, exponent=1.0,
+        aim = T[:3, :3] @ np.array([0.9 - x, -y, 1.0 - z])
+        spec.worldbody.add_light(
+            pos=(T @ (x, y, z, 1.0))[:3].tolist(), dir=aim.tolist(), diffuse=[level] * 3,
+            specular=[level * 0.6] * 3, ambient=[0.06] * 3, castshadow=False, cutoff=70, exponent=1.0,
         )  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from golem.robots.model.spatial import rotation_rpy, transform
-from golem.types import Array
+from golem.types import Array, PlanarPose
 
 RIM_INSET = 0.022
 """Distance of the fastener line from the cover's edge [m]."""
@@ -59,6 +59,21 @@ class PackLayout:
     def raised(self, by: float) -> PackLayout:
         """Return the layout with pack and tray `by` higher [m]."""
         return replace(self, top_z=self.top_z + by, tray_z=self.tray_z + by)
+
+    def seen_with(self, stance: PlanarPose) -> PackLayout:
+        """Return the layout of a robot that stands elsewhere: `stance` is where it should stand, in its own frame."""
+        if stance == PlanarPose(0.0, 0.0, 0.0):
+            return self  # to the last bit where it was
+        pack = stance @ PlanarPose(self.near_edge, self.center_y, self.yaw)
+        tray = stance @ PlanarPose(*self.tray_xy, self.tray_yaw)
+        return replace(
+            self,
+            near_edge=pack.x,
+            center_y=pack.y,
+            yaw=pack.yaw,
+            tray_xy=(tray.x, tray.y),
+            tray_yaw=tray.yaw,
+        )
 
     def pose(self) -> Array:
         """Return the (4, 4) pose of the pack frame (origin: middle of the near edge, on the rim) in the world."""

@@ -16,7 +16,7 @@ from golem.errors import ConfigError
 from golem.robots.worlds import hall, parts, screws, tray
 from golem.robots.worlds.layout import HOLE_CELL, PackLayout, yaw_quat
 from golem.robots.worlds.screws import ScrewDraw
-from golem.types import Array
+from golem.types import Array, PlanarPose
 
 COVER = 0.030
 """Height of the cover above the pack's frame [m]; bores are inside it."""
@@ -72,15 +72,23 @@ def set_contact_options(spec: mujoco.MjSpec) -> None:
 
 
 def add_pack(
-    spec: mujoco.MjSpec, layout: PackLayout, draws: Sequence[ScrewDraw], *, sleep: bool = True
+    spec: mujoco.MjSpec,
+    layout: PackLayout,
+    draws: Sequence[ScrewDraw],
+    *,
+    sleep: bool = True,
+    stance: PlanarPose = hall.HERE,
+    workshop: bool = True,
 ) -> PackNames:
-    """Add hall, pack, stand, tray and loosened screws to `spec`, which may already hold the robot.
+    """Add pack, stand, tray and loosened screws to `spec`, which may already hold the robot.
 
     Args:
         spec: the world to extend.
         layout: where things stand.
         draws: the loosened screws; the other fasteners are fixed.
         sleep: let undisturbed screws sleep.
+        stance: where the robot should stand before the pack: lamps and workshop are placed by it.
+        workshop: add the workshop around it; a world without has materials and floor already.
 
     Raises:
         ConfigError: two screws share a place, a place does not exist or is an empty hole.
@@ -94,8 +102,11 @@ def add_pack(
             f"{', '.join(map(str, layout.empty_holes))}; asked for {', '.join(map(str, slots))}."
         )
     set_contact_options(spec)
-    hall.add_materials(spec)
-    hall.add_hall(spec)
+    if workshop:
+        hall.add_materials(spec)
+        hall.add_hall(spec, stance=stance)
+    else:
+        hall.add_lamps(spec, stance)
     T = layout.pose()
     body = spec.worldbody.add_body(name="pack", pos=T[:3, 3].tolist(), quat=yaw_quat(layout.yaw))
     holes = {draw.slot: draw.bore_radius for draw in draws} | dict.fromkeys(layout.empty_holes, 0.003)

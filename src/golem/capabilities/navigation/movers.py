@@ -1,0 +1,117 @@
+"""Who walks about near the robot, and where they will be in the next moments, from the points of scans alone.
+
+Points are put together to blobs, blobs of the size of a person are followed from scan to scan, and each gets the
+velocity of the line through its last places. Nothing is known of whom they mean to go to: straight on is assumed.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from golem.types import Array
+
+CELL = 0.12
+"""Side of the cells in which points are put together [m]: neighbouring cells are of one blob."""
+SIZE = (0.1, 1.1)
+"""Extent of a blob that may be a person, the larger of both directions [m]."""
+FEWEST = 6
+"""Points of a blob."""
+REACH = 5.0
+"""Distance from the robot up to which blobs are followed [m]."""
+GATE = 0.4
+"""Distance of a blob from where one is expected within which it is that one [m]."""
+LOST = 0.35
+"""Time after which a blob that is not seen is forgotten [s]."""
+HISTORY, ENOUGH = 8, 5
+"""Places of a blob that are kept, and from how many on it has a velocity."""
+WALKS = (0.3, 2.5)
+"""Speeds of somebody who walks [m/s]: less is noise, more is a mistake."""
+
+
+@dataclass
+class _Blob:
+    """Something that is followed.
+
+    Attributes:
+        places: time and middle [s], [m], the newest last.
+        points: (n, 2) of the newest scan that showed it [m].
+        velocity: (2,) [m/s]; zero while it is not known.
+    """
+
+    places: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=HISTORY))
+    points: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    velocity: Array = field(default_factory=lambda: np.zeros(2))
+
+    def take(self, t: float, points: Array) -> None:
+        """Take what a scan at time `t` showed of it."""
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        self.places.append((t, float(middle[0]), float(middle[1])))
+        self.points = points
+        if len(self.places) >= ENOUGH:
+            rows = np.array(self.places)
+            slope = np.polyfit(rows[:, 0] - rows[-1, 0], rows[:, 1:], 1)[0]
+            speed = float(np.hypot(*slope))
+            self.velocity = slope if WALKS[0] < speed < WALKS[1] else np.zeros(2)
+
+    def expected(self, t: float) -> Array:
+        """Return the (2,) place at time `t` [m]."""
+        then, x, y = self.places[-1]
+        return np.array([x, y]) + (t - then) * self.velocity
+
+
+class Movers:
+    """Follows blobs; all points are in one frame."""
+
+    def __init__(self) -> None:
+        """Know of nobody."""
+        self.forget()
+
+    def forget(self) -> None:
+        """Know of nobody again."""
+        self._blobs: list[_Blob] = []
+
+    def update(self, t: float, points: Array, here: tuple[float, float]) -> None:
+        """Take a scan.
+
+        Args:
+            t: its time [s].
+            points: (n, 2) what it hit at the heights of a person [m].
+            here: where the robot is [m].
+        """
+        self._blobs = [blob for blob in self._blobs if 0.0 < t - blob.places[-1][0] < LOST]
+        free = list(self._blobs)
+        near = points[((points - here) ** 2).sum(axis=1) < REACH**2]
+        for part in _blobs(near):
+            middle = 0.5 * (part.min(axis=0) + part.max(axis=0))
+            away = [float(np.hypot(*(blob.expected(t) - middle))) for blob in free]
+            if away and min(away) < GATE:
+                free.pop(int(np.argmin(away))).take(t, part)
+            else:
+                blob = _Blob()
+                blob.take(t, part)
+                self._blobs.append(blob)
+
+    def ahead(self, horizon: float, step: float = 0.2) -> Array:
+        """Return (m, 2) where those who walk will be within `horizon` [s], every `step` [s], in m."""
+        walking = [blob for blob in self._blobs if blob.velocity.any()]
+        times = np.arange(step, horizon + 1e-9, step)
+        swept = [blob.points + dt * blob.velocity for blob in walking for dt in times]
+        return np.concatenate(swept) if swept else np.zeros((0, 2))
+
+
+def _blobs(points: Array) -> list[Array]:
+    """Return the points (n, 2) of each blob of the size of a person."""
+    if len(points) < FEWEST:
+        return []
+    cells = np.floor((points - points.min(axis=0)) / CELL).astype(int)
+    full = np.zeros(cells.max(axis=0) + 1, np.uint8)
+    full[cells[:, 0], cells[:, 1]] = 1
+    count, labels = cv2.connectedComponents(full, connectivity=8)
+    label = np.asarray(labels)[cells[:, 0], cells[:, 1]]
+    order = np.argsort(label, kind="stable")
+    parts = np.split(points[order], np.searchsorted(label[order], np.arange(2, count)))
+    return [p for p in parts if len(p) >= FEWEST and SIZE[0] <= float(np.ptp(p, axis=0).max()) <= SIZE[1]]

@@ -1,0 +1,107 @@
+"""Working along a pack: dock, pick, and dock again where a pick says that nothing more is within reach."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from golem.options import require
+from golem.skills.base import SkillResult
+from golem.skills.context import Context
+from golem.skills.dock import DockGoal, DockReport
+from golem.skills.pick_config import PickGoal
+from golem.skills.pick_report import PickOutcome, PickReport
+
+AGAIN = (PickOutcome.OUT_OF_REACH, PickOutcome.TRAY_MISSING, PickOutcome.TIGHT, PickOutcome.JAMMED)
+"""What a pick says where another stance may help: others are within reach there."""
+LEFT = (PickOutcome.TIGHT.value, PickOutcome.JAMMED.value)
+"""What is said of a fastener that is not tried again."""
+
+
+@dataclass(frozen=True, slots=True)
+class DisassembleGoal:
+    """What to take out.
+
+    Attributes:
+        count: objects to pick.
+        docks: how often the robot may look for another stance, the first time included; 0 stays where it is.
+        dock: how it docks.
+        pick: what it picks, with which hand.
+    """
+
+    count: int = 1
+    docks: int = 3
+    dock: DockGoal = field(default_factory=DockGoal)
+    pick: PickGoal = field(default_factory=lambda: PickGoal(side="either"))
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ConfigError: one of them cannot be meant.
+        """
+        require(
+            "goal of disassembling: ",
+            ("count", self.count, 1 <= self.count <= 100, "from 1 to 100"),
+            ("docks", self.docks, 0 <= self.docks <= 20, "from 0 to 20"),
+        )
+
+
+@dataclass
+class DisassembleReport:
+    """What was done.
+
+    Attributes:
+        picked: objects in the container.
+        docks: how the robot stood after every docking, in order.
+        picks: what every pick found out, in order.
+    """
+
+    picked: int = 0
+    docks: list[DockReport] = field(default_factory=list[DockReport])
+    picks: list[PickReport] = field(default_factory=list[PickReport])
+
+
+class Disassemble:
+    """Take fasteners out of a pack: dock, pick, and dock again where none is within reach any more.
+
+    Stages: those of `dock` and `pick`, and `done`.
+    """
+
+    Goal, Result = DisassembleGoal, DisassembleReport
+
+    def timeout(self, goal: DisassembleGoal) -> float:
+        """Return the time it may take [s]; see `Skill`."""
+        return 180.0 * (goal.docks + 1) + 120.0 * (goal.count + goal.docks)
+
+    async def run(self, context: Context, goal: DisassembleGoal) -> SkillResult:
+        """Go along the pack; see `Skill`."""
+        start, report, docks = context.t, DisassembleReport(), goal.docks
+        if docks:
+            docked = await self._dock(context, goal, report)
+            docks -= 1
+            if not docked.success and not report.docks[-1].served:
+                return SkillResult(False, docked.stage, docked.slot, docked.reason, value=report)
+        while True:
+            result = await context.run("pick", goal.pick)
+            found = result.value if isinstance(result.value, PickReport) else PickReport()
+            report.picks.append(found)
+            report.picked += result.success
+            timings = {"total": context.t - start, **result.timings}
+            if report.picked >= goal.count:
+                text = f"{report.picked} of {goal.count} picked after {len(report.docks)} dockings."
+                context.say("done", text)
+                return SkillResult(True, "done", None, text, timings, report)
+            if result.success:
+                continue
+            if found.outcome not in AGAIN or not docks:
+                return SkillResult(False, result.stage, result.slot, result.reason, timings, report)
+            context.say(result.stage, f"{result.reason} Looking for another stance.")
+            left = [place for one in found.tried if one.outcome in LEFT for place in (one.x, one.y)]
+            goal = replace(goal, dock=replace(goal.dock, avoid=(*goal.dock.avoid, *left)))
+            await self._dock(context, goal, report)
+            docks -= 1
+
+    async def _dock(self, context: Context, goal: DisassembleGoal, report: DisassembleReport) -> SkillResult:
+        docked = await context.run("dock", goal.dock)
+        report.docks.append(docked.value if isinstance(docked.value, DockReport) else DockReport())
+        return docked

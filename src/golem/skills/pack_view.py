@@ -1,0 +1,152 @@
+"""What a standing robot sees of the pack: its near edge by the LiDAR, fasteners and tray by the head camera."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.capabilities.grasping.ground import height_above_ground
+from golem.capabilities.navigation.edge_fit import NearEdge, near_edge, table_height
+from golem.capabilities.planning.base import PlanRefused
+from golem.interfaces import topics
+from golem.middleware.bus import News
+from golem.skills.base import StageFailed
+from golem.skills.context import Context
+from golem.skills.pick_targets import TORSO
+from golem.skills.planned_motion import PlannedMotion
+from golem.skills.stance_choice import LOOK_TURN
+from golem.types import Array, LocalizedObject, PlanarPose
+
+LOOK = 1.2
+"""Time over which scans are put together while the robot stands [s]."""
+RIM = (-0.12, 0.02)
+"""Heights from the top between which points are the pack's near side [m]."""
+CAMERA = 2.5
+"""Time that the head camera gets to show fasteners [s]."""
+FRAMES = 3
+"""Frames of it that are put together."""
+SAME = 0.03
+"""Distance within which two sightings are of one fastener [m]."""
+PROUD = 0.0115
+"""Height above its ground from which on a fastener is wanted most [m]; that of `pick`."""
+SPEED = 0.25
+"""Speed of the hands meanwhile [m/s]."""
+WANTED = (1.0, 0.3)
+"""Weight of a fastener that stands proud, or of which that is not known, and of one that is screwed down [own]."""
+
+
+@dataclass(frozen=True, slots=True)
+class SeenFasteners:
+    """What the head camera shows.
+
+    Attributes:
+        places: (n, 3) fasteners in base_link [m].
+        weights: (n,) how much each is wanted.
+        tray: (3,) the container in base_link [m]; None where it was not seen.
+    """
+
+    places: Array
+    weights: Array
+    tray: Array | None
+
+
+async def see_edge(context: Context) -> NearEdge:
+    """Return the near edge of the pack, in base_link. The robot has to stand still.
+
+    Raises:
+        StageFailed: there is none, or no scan.
+    """
+    news, points, heights = News(context.bus, topics.SCAN), list[Array](), list[Array]()
+    end = context.t + LOOK
+    while context.t < end:
+        await context.tick()
+        scan = news.read()
+        if scan is not None:
+            points.append(scan.points[:, :2])
+            heights.append(scan.heights)
+    if not points:
+        raise StageFailed(
+            "look", "robot", "No scan comes: docking needs a LiDAR, and an odometry that goes by it."
+        )
+    here = PlanarPose.of(context.legs.pose)
+    T = here.matrix()
+    local = (np.concatenate(points) - T[:2, 3]) @ T[:2, :2]
+    height = np.concatenate(heights)
+    top = table_height(local, height)
+    if top is None:
+        raise StageFailed("look", "dock", "Nothing like a table is ahead.")
+    side = (height > top + RIM[0]) & (height < top + RIM[1])
+    edge = near_edge(local[side], PlanarPose(0.0, 0.0, 0.0))
+    if isinstance(edge, str):
+        raise StageFailed("look", "dock", edge)
+    return edge
+
+
+async def see_fasteners(
+    context: Context, label: str, container: str, avoid: Array, around: bool
+) -> SeenFasteners:
+    """Return what the head camera shows of fasteners and container; nothing where no frame comes.
+
+    Args:
+        context: of the skill.
+        label: class of the fasteners.
+        container: class of the container.
+        avoid: (n, 2) in odom, of fasteners that are left out [m].
+        around: whether the torso turns to either side where fasteners are in view and no container is.
+    """
+    seen: list[tuple[Array, list[float]]] = []
+    trays: list[tuple[float, Array]] = []
+    await _look(context, label, container, avoid, seen, trays)
+    if around and seen and not trays:
+        motion, ahead = PlannedMotion(context), context.commanded_joints.copy()
+        for turn in (LOOK_TURN, -LOOK_TURN):
+            turned = ahead.copy()
+            turned[TORSO] += turn
+            with suppress(PlanRefused):
+                await motion.to_joints(turned, (), SPEED)
+                await _look(context, label, container, avoid, seen, trays)
+            if trays:
+                break
+        with suppress(PlanRefused):
+            await motion.to_joints(ahead, (), SPEED)
+    tray = max(trays, key=lambda one: one[0])[1] if trays else None
+    places = np.array([place for place, _ in seen]).reshape(-1, 3)
+    return SeenFasteners(places, np.array([float(np.mean(w)) for _, w in seen]), tray)
+
+
+async def _look(
+    context: Context,
+    label: str,
+    container: str,
+    avoid: Array,
+    seen: list[tuple[Array, list[float]]],
+    trays: list[tuple[float, Array]],
+) -> None:
+    """Add what the head camera shows in some frames to `seen` and `trays`, in base_link."""
+    with context.watch("head", label, container) as eye:
+        end, frames = context.t + CAMERA, 0
+        while frames < FRAMES and (sightings := await eye.look(end - context.t)) is not None:
+            frames += 1
+            T = context.T_odom_base
+            for o in sightings.objects:
+                place = T[:3, :3].T @ (o.position - T[:3, 3])
+                if o.label == container:
+                    trays.append((float(o.detection.score), place))
+                elif o.label == label and not (np.hypot(*(avoid - o.position[:2]).T) < SAME).any():
+                    _add(seen, place, _weight(o))
+
+
+def _weight(o: LocalizedObject) -> float:
+    height = height_above_ground(o)
+    return WANTED[0] if height is None or height >= PROUD else WANTED[1]
+
+
+def _add(seen: list[tuple[Array, list[float]]], place: Array, weight: float) -> None:
+    """Add one sighting to those of the same fastener, or as a new one."""
+    for known, weights in seen:
+        if np.hypot(*(known - place)[:2]) < SAME:
+            weights.append(weight)
+            return
+    seen.append((place, [weight]))

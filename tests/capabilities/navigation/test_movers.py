@@ -1,0 +1,51 @@
+"""Those who walk are followed and expected straight on; what stands is not expected anywhere else."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from golem.capabilities.navigation.movers import Movers
+from golem.types import Array
+
+
+def person(rng: np.random.Generator, at: Array) -> Array:
+    """Return what a LiDAR sees of somebody: the near half of a trunk, with noise."""
+    turns = rng.uniform(-2.6, -0.5, 40)
+    return at + 0.2 * np.column_stack([np.cos(turns), np.sin(turns)]) + 0.02 * rng.standard_normal((40, 2))
+
+
+def wall(rng: np.random.Generator) -> Array:
+    return np.column_stack([rng.uniform(-3.0, 3.0, 300), np.full(300, 3.5)]) + 0.02 * rng.standard_normal(
+        (300, 2)
+    )
+
+
+def watch(velocity: Array, scans: int = 12) -> tuple[Movers, Array]:
+    rng, movers, at = np.random.default_rng(0), Movers(), np.array([-1.0, 2.0])
+    for k in range(scans):
+        at = np.array([-1.0, 2.0]) + 0.1 * k * velocity
+        movers.update(0.1 * k, np.concatenate([person(rng, at), wall(rng)]), (0.0, 0.0))
+    return movers, at
+
+
+def test_somebody_who_walks_is_expected_straight_on() -> None:
+    velocity = np.array([1.0, -0.3])
+    movers, at = watch(velocity)
+    ahead = movers.ahead(1.0)
+    assert len(ahead)
+    goes = (ahead - at) @ velocity / np.hypot(*velocity)
+    aside = np.abs((ahead - at) @ np.array([0.3, 1.0]) / np.hypot(*velocity))
+    assert 0.8 < goes.max() < 1.5 and aside.max() < 0.45
+
+
+def test_who_stands_and_walls_are_expected_nowhere_else() -> None:
+    movers, _ = watch(np.zeros(2))
+    assert len(movers.ahead(1.0)) == 0
+
+
+def test_who_is_out_of_sight_is_forgotten() -> None:
+    movers, _ = watch(np.array([1.0, 0.0]))
+    movers.update(3.0, np.zeros((0, 2)), (0.0, 0.0))
+    assert len(movers.ahead(1.0)) == 0
+    movers.update(2.0, np.zeros((0, 2)), (0.0, 0.0))  # another clock
+    assert len(movers.ahead(1.0)) == 0

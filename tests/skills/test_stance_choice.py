@@ -1,0 +1,54 @@
+"""Stances before a pack: within reach of what is wanted, and no further than needed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from golem.skills.stance_choice import STANDOFF, best_stance, stance_here
+from golem.types import Array, PlanarPose
+
+SCREWS = np.array([[0.43, 0.05 + 0.095 * k, -0.03] for k in range(-4, 5)])
+WANTED = np.ones(len(SCREWS))
+TRAY = np.array([0.48, -0.28, -0.02])
+EDGE = PlanarPose(0.41, 0.0, 0.0)
+
+
+def moved(points: Array, off: PlanarPose) -> Array:
+    """Return what a robot sees of `points` that stands at `off` from where they are given."""
+    T = np.linalg.inv(off.matrix())
+    return points @ T[:3, :3].T + T[:3, 3]
+
+
+def test_the_nominal_stance_serves_and_better_ones_are_near_it() -> None:
+    here, best = stance_here(SCREWS, WANTED, TRAY), best_stance(EDGE, SCREWS, WANTED, TRAY)
+    assert here.served >= 3 and here.quality > 0.1
+    assert best.quality >= here.quality
+    assert np.hypot(best.pose.x, best.pose.y) < 0.35
+
+
+@pytest.mark.parametrize(
+    "off", [PlanarPose(-0.3, 0.1, 0.1), PlanarPose(-0.1, -0.5, 0.0), PlanarPose(0.05, 0.3, -0.2)]
+)
+def test_a_robot_that_stands_badly_is_sent_to_where_it_serves(off: PlanarPose) -> None:
+    screws, tray = moved(SCREWS, off), moved(TRAY[None], off)[0]
+    edge = off.to(EDGE)
+    best = best_stance(edge, screws, WANTED, tray)
+    there = stance_here(moved(screws, best.pose), WANTED, moved(tray[None], best.pose)[0])
+    assert there.quality == pytest.approx(best.quality, abs=1e-9) and there.served == best.served >= 3
+    assert there.quality > stance_here(screws, WANTED, tray).quality
+    across = edge.to(best.pose)
+    assert STANDOFF[0] - 1e-6 <= -across.x <= STANDOFF[1] + 1e-6
+
+
+def test_what_is_wanted_most_decides() -> None:
+    ends = np.array([[0.43, -0.6, -0.03], [0.43, 0.6, -0.03]])
+    left = best_stance(EDGE, ends, np.array([0.1, 1.0]), None)
+    right = best_stance(EDGE, ends, np.array([1.0, 0.1]), None)
+    assert left.pose.y > 0.1 > -0.1 > right.pose.y
+
+
+def test_without_a_fastener_in_reach_there_is_no_quality() -> None:
+    far = np.array([[3.0, 0.0, 0.0]])
+    assert stance_here(far, np.ones(1), None).quality == 0.0
+    assert best_stance(EDGE, far, np.ones(1), None).served == 0
