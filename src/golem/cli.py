@@ -189,6 +189,13 @@ def _safety(words: list[str]) -> int:
     return 0
 
 
+def _bringup(words: list[str]) -> int:
+    """Bring a robot up step by step, each one checked; --rehearse: with a twin, and a fault to be found."""
+    from golem.evaluation.rehearsal.rehearse import BringupCommandConfig, run_bringup_command
+
+    return 0 if run_bringup_command(_parse(BringupCommandConfig, "bringup", words)) else FAILED
+
+
 def _drivers(words: list[str]) -> int:
     """Put a device on a domain: `drivers camera`, `hands` and `lidar`; `drivers estop PORT` tries the e-stop board."""
     return _one_of(words, "drivers", "device", DEVICES)
@@ -305,6 +312,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "train": _train,
     "twin": _twin,
     "safety": _safety,
+    "bringup": _bringup,
     "drivers": _drivers,
     "up": _up,
     "launch": _launch,

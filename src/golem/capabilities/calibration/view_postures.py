@@ -1,0 +1,86 @@
+"""Postures of an arm in which the head camera sees the tags on its hand, as different from each other as possible."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from golem.capabilities.arms.postures import posture
+from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.magpie_model import hand_name
+from golem.robots.model.tag_cuff import cuff_tags
+from golem.robots.sensors.cameras import HEAD, project
+from golem.types import NUM_JOINTS, UPPER, Array, Side
+
+SPREAD = np.array([0.6, 0.5, 0.7, 0.6, 0.9, 0.4, 0.5])
+"""How far each joint of the arm goes from where it is ready [rad]."""
+MARGIN = 60.0
+"""How far inside the image the tag's middle has to be [px]: the camera sits elsewhere than the model says."""
+RANGE = (0.30, 0.75)
+"""Distances of the tag from the camera [m]."""
+STEEPEST = 0.55
+"""Least cosine between the tag's normal and the ray."""
+LOWEST = 0.10
+"""Least height of the fingertips above base_link [m]: the pack's lid is at about 0."""
+ARM = {"left": slice(1, 8), "right": slice(8, 15)}
+"""Columns of each arm in a posture of the upper body."""
+CANDIDATES = 400
+
+
+def view_postures(side: Side, count: int, free: Callable[[Array], bool], seed: int = 0) -> list[Array]:
+    """Return up to `count` postures (15,) of torso and arms; the other arm is at home.
+
+    Args:
+        side: which hand is seen.
+        count: how many.
+        free: says of a posture whether it may be gone to.
+        seed: of the draws.
+    """
+    rng = np.random.default_rng(seed)
+    kinematics = Kinematics()
+    ready = posture(f"ready_{side}")
+    found: list[Array] = []
+    for _ in range(40 * CANDIDATES):
+        if len(found) >= CANDIDATES:
+            break
+        q = ready.copy()
+        q[ARM[side]] += SPREAD * rng.uniform(-1.0, 1.0, 7)
+        if visible_tags(q, side, kinematics) and free(q):
+            found.append(q)
+    return _spread(found, count, side)
+
+
+def visible_tags(q: Array, side: Side, kinematics: Kinematics) -> list[int]:
+    """Return the tags of a hand that the head camera should see in a posture (15,); arms that hide them are ignored."""
+    joints = np.zeros(NUM_JOINTS)
+    joints[UPPER] = q
+    kinematics.update(joints)
+    if kinematics.pose(f"{side}_gripper")[2, 3] < LOWEST:
+        return []
+    T = np.linalg.solve(kinematics.pose("head_camera_optical"), kinematics.pose(hand_name(side)))
+    seen: list[int] = []
+    for number, T_hand_tag in cuff_tags(side).items():
+        tag = T @ T_hand_tag
+        p = tag[:3, 3]
+        distance = float(np.linalg.norm(p))
+        if p[2] <= 0.0 or not RANGE[0] <= distance <= RANGE[1]:
+            continue
+        u, v = project(HEAD, p)
+        inside = MARGIN <= u <= HEAD.width - MARGIN and MARGIN <= v <= HEAD.height - MARGIN
+        if inside and tag[:3, 2] @ p / distance >= STEEPEST:
+            seen.append(number)
+    return seen
+
+
+def _spread(found: list[Array], count: int, side: Side) -> list[Array]:
+    """Return those farthest apart, one after the other: each next one is the farthest from all before."""
+    if not found:
+        return []
+    points = np.array([q[ARM[side]] / SPREAD for q in found])
+    chosen = [0]
+    distance = np.linalg.norm(points - points[0], axis=1)
+    while len(chosen) < min(count, len(found)):
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return [found[i] for i in chosen]
