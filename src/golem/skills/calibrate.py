@@ -116,8 +116,8 @@ class Calibrate:
         if goal.file:
             found.save(Path(goal.file))
         text = (
-            f"{report.views} views, {report.residual:.2f} px left; the head camera was off by "
-            f"{report.camera * 1e3:.0f} mm at 1 m (+- {report.camera_sigma * 1e3:.1f})"
+            f"{report.views} views, {report.residual:.2f} px left; the head camera sits "
+            f"{report.camera * 1e3:.0f} mm (+- {report.camera_sigma * 1e3:.1f}) from where the model has it, at 1 m"
         )
         context.say("done", text)
         return SkillResult(True, "done", None, f"{text}.", {"calibrate": context.t - start}, report)
@@ -125,14 +125,16 @@ class Calibrate:
     async def _views(self, context: Context, goal: CalibrateGoal) -> tuple[list[TagView], CameraInfo | None]:
         """Show the hands one after the other; return what was seen, and the camera."""
         detector, motion = TagDetector(), PlannedMotion(context)
-        space = JointSpace(PlanningRobot(), context.joints)
+        robot = PlanningRobot()
+        space = JointSpace(robot, context.joints)
         views: list[TagView] = []
         info: CameraInfo | None = None
         for side in SIDES:
             home = context.commanded_joints.copy()
-            for k, q in enumerate(
-                view_postures(side, goal.views, lambda q: space.verdict(q) == 0, goal.seed)
-            ):
+            postures = view_postures(
+                side, goal.views, lambda q: space.verdict(q) == 0, robot.model().placed, goal.seed
+            )
+            for k, q in enumerate(postures):
                 context.say("look", f"{side} hand, view {k + 1} of {goal.views}.")
                 q[0] = home[0]
                 try:

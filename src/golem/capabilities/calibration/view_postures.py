@@ -25,40 +25,53 @@ LOWEST = 0.10
 """Least height of the fingertips above base_link [m]: the pack's lid is at about 0."""
 ARM = {"left": slice(1, 8), "right": slice(8, 15)}
 """Columns of each arm in a posture of the upper body."""
-CANDIDATES = 400
+CANDIDATES = 150
+"""Postures among which the most different ones are chosen."""
+DRAWS = 4000
+"""Postures that are drawn to find them, at most."""
+NEAR = 0.07
+"""What is nearer than this to the camera, or to the tag, does not hide it [m]."""
+CLEARANCE = 0.02
+"""Distance of the ray to a tag's middle from what would hide it [m]: half a tag, where it is near."""
 
 
-def view_postures(side: Side, count: int, free: Callable[[Array], bool], seed: int = 0) -> list[Array]:
+def view_postures(
+    side: Side, count: int, free: Callable[[Array], bool], spheres: Callable[[Array], Array], seed: int = 0
+) -> list[Array]:
     """Return up to `count` postures (15,) of torso and arms; the other arm is at home.
 
     Args:
         side: which hand is seen.
         count: how many.
         free: says of a posture whether it may be gone to.
+        spheres: returns the (m, 4) spheres of the robot in a posture, centres in base_link and radii [m].
         seed: of the draws.
     """
     rng = np.random.default_rng(seed)
     kinematics = Kinematics()
     ready = posture(f"ready_{side}")
     found: list[Array] = []
-    for _ in range(40 * CANDIDATES):
+    for _ in range(DRAWS):
         if len(found) >= CANDIDATES:
             break
         q = ready.copy()
         q[ARM[side]] += SPREAD * rng.uniform(-1.0, 1.0, 7)
-        if visible_tags(q, side, kinematics) and free(q):
+        if visible_tags(q, side, kinematics, spheres) and free(q):
             found.append(q)
     return _spread(found, count, side)
 
 
-def visible_tags(q: Array, side: Side, kinematics: Kinematics) -> list[int]:
-    """Return the tags of a hand that the head camera should see in a posture (15,); arms that hide them are ignored."""
+def visible_tags(
+    q: Array, side: Side, kinematics: Kinematics, spheres: Callable[[Array], Array]
+) -> list[int]:
+    """Return the tags of a hand that the head camera should see in a posture (15,); see `view_postures`."""
     joints = np.zeros(NUM_JOINTS)
     joints[UPPER] = q
     kinematics.update(joints)
     if kinematics.pose(f"{side}_gripper")[2, 3] < LOWEST:
         return []
-    T = np.linalg.solve(kinematics.pose("head_camera_optical"), kinematics.pose(hand_name(side)))
+    T_base_optical = kinematics.pose("head_camera_optical")
+    T = np.linalg.solve(T_base_optical, kinematics.pose(hand_name(side)))
     seen: list[int] = []
     for number, T_hand_tag in cuff_tags(side).items():
         tag = T @ T_hand_tag
@@ -69,8 +82,21 @@ def visible_tags(q: Array, side: Side, kinematics: Kinematics) -> list[int]:
         u, v = project(HEAD, p)
         inside = MARGIN <= u <= HEAD.width - MARGIN and MARGIN <= v <= HEAD.height - MARGIN
         if inside and tag[:3, 2] @ p / distance >= STEEPEST:
-            seen.append(number)
+            at = (T_base_optical @ tag)[:3, 3]
+            if not _hidden(T_base_optical[:3, 3], at, spheres(q)):
+                seen.append(number)
     return seen
+
+
+def _hidden(eye: Array, tag: Array, spheres: Array) -> bool:
+    """Return whether a sphere stands between `eye` and `tag`, (3,) each; what is right at either does not count."""
+    ray = tag - eye
+    length = float(np.linalg.norm(ray))
+    ray /= length
+    along = (spheres[:, :3] - eye) @ ray
+    beside = np.linalg.norm(spheres[:, :3] - eye - along[:, None] * ray, axis=1)
+    between = (along > NEAR) & (along < length - NEAR)
+    return bool((between & (beside < spheres[:, 3] + CLEARANCE)).any())
 
 
 def _spread(found: list[Array], count: int, side: Side) -> list[Array]:

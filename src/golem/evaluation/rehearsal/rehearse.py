@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from golem.errors import ConfigError, unknown_name
@@ -13,7 +13,7 @@ from golem.evaluation.rehearsal.scripted_person import ScriptedPerson
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros.future import RosError
 from golem.runtime.bringup.base import BringupConfig
-from golem.runtime.bringup.bringup_command import run_bringup
+from golem.runtime.bringup.bringup_command import CHECKS, run_bringup
 from golem.runtime.bringup.bringup_report import FILE
 from golem.runtime.bringup.robot_link import RobotLink
 from golem.runtime.live.launch import Process
@@ -60,6 +60,7 @@ def run_bringup_command(config: BringupCommandConfig) -> bool:
 
 def rehearse(config: BringupConfig, fault: str) -> bool:
     """Do the bring-up with a twin that has `fault`; return whether it passed, or failed at the check that finds it."""
+    again = [c.name for c in CHECKS if c.lasting and c.name == FAULTS[fault]]
     with tempfile.TemporaryDirectory() as folder:
         stack = Path(folder) / "miswired.yaml"
         stack.write_text(STACK.format(fault=fault), encoding="utf-8")
@@ -67,7 +68,7 @@ def rehearse(config: BringupConfig, fault: str) -> bool:
         twin = Process("twin", ["twin", str(stack), *config.dds.words()])
         try:
             _wait_for_robot(config.dds)
-            run_bringup(config, person)
+            run_bringup(replace(config, again=(*config.again, *again)), person)
         finally:
             person.leave()
             twin.end()

@@ -1,7 +1,7 @@
 """A cuff with AprilTags that is clamped around each hand for the calibration of cameras and encoders.
 
 Four plates stand around the hand's approach axis, each with one tag of the family 36h11; the left hand has the tags 0
-to 3, the right one 4 to 7. The cuff sits against the adapter of the hand, whose screws locate it.
+to 3, the right one 4 to 7. The cuff sits on the link that carries the hand, against the hand's adapter.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ CELLS = 8
 """Cells of a tag across, its black border among them."""
 PLATE = 0.050
 """Side of a plate [m]: the tag, and one white cell around it."""
-DISTANCE = 0.045
+DISTANCE = 0.050
 """Distance of a plate from the approach axis [m]."""
-HEIGHT = 0.000
-"""Place of the tags' centres along it, in the hand frame [m]."""
+HEIGHT = -0.040
+"""Place of the tags' centres along it, in the hand frame [m]: over the wrist, where no finger hides them."""
 
 
 def cuff_tags(side: Side) -> dict[int, Array]:

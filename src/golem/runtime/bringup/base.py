@@ -91,8 +91,8 @@ class BringupConfig:
 
     report: str = "runs/bringup"
     """Folder of the report; its `bringup.json` says what has passed."""
-    again: bool = False
-    """Repeat everything."""
+    again: tuple[str, ...] = ()
+    """Checks to repeat that have passed before: joints, motion, sensors."""
     without: tuple[str, ...] = ()
     """Devices that this robot does not have, e.g. "lidar" "left hand"; the report says so."""
     share: float = 0.25

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
+from golem.errors import unknown_name
 from golem.runtime.bringup.base import BringupConfig, Check, Finding, Person, Refusal, Task, Workbench
 from golem.runtime.bringup.bringup_report import BringupReport
 from golem.runtime.bringup.joint_checks import check_joints
@@ -56,6 +57,10 @@ def run_bringup(config: BringupConfig, person: Person | None = None) -> bool:
         OutputError: the report cannot be written.
     """
     person = person or Terminal()
+    lasting = [check.name for check in CHECKS if check.lasting]
+    for name in config.again:
+        if name not in lasting:
+            raise unknown_name("check that lasts", name, lasting)
     report = BringupReport(Path(config.report), str(config.dds))
     stops = ["--black-box", f"{config.report}/stops"]
     words = ["safety", *stops, *config.estop.words(), *config.dds.words()]
@@ -75,14 +80,14 @@ def run_checks(
     bench: Workbench,
     report: BringupReport,
     checks: tuple[Check, ...],
-    again: bool,
+    again: Collection[str],
     tell: Callable[[str], None] | None = None,
 ) -> bool:
     """Do the checks in order, those left out that last and have passed; return whether none failed."""
     tell = tell or bench.person.tell
     for number, check in enumerate(checks, 1):
         head = f"{number}/{len(checks)} {check.title}"
-        if check.lasting and report.passed(check.name) and not again:
+        if check.lasting and report.passed(check.name) and check.name not in again:
             tell(f"{head}: has passed before.")
             continue
         tell(f"{head} ...")
