@@ -43,7 +43,7 @@ class CalibrateGoal:
     """
 
     file: str = "calibration.json"
-    views: int = 12
+    views: int = 20
     settle: float = 0.6
     seed: int = 0
 

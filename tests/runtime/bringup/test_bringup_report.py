@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 
 from golem.errors import ConfigError
-from golem.runtime.bringup.base import BringupConfig, Check, Finding, Refusal, Task, Workbench
+from golem.runtime.bringup.base import BringupConfig, BringupStep, StepFinding, StepRefused, Task, Workbench
 from golem.runtime.bringup.bringup_command import CHECKS, run_checks
 from golem.runtime.bringup.bringup_report import FILE, BringupReport
 
@@ -34,17 +34,17 @@ def bench() -> Workbench:
     return Workbench(cast(Any, None), Nobody(), BringupConfig(), lambda: cast(Any, None))
 
 
-def checks(done: list[str], outcomes: dict[str, bool], lasting: str = "") -> tuple[Check, ...]:
+def checks(done: list[str], outcomes: dict[str, bool], lasting: str = "") -> tuple[BringupStep, ...]:
     """Return checks called as `outcomes`, which write down that they were done."""
 
-    def make(name: str) -> Check:
-        def run(_: Workbench) -> Finding:
+    def make(name: str) -> BringupStep:
+        def run(_: Workbench) -> StepFinding:
             done.append(name)
             if name == "refuses":
-                raise Refusal("the gate has ended")
-            return Finding(outcomes[name], f"about {name}", {"figure": 1.5})
+                raise StepRefused("the gate has ended")
+            return StepFinding(outcomes[name], f"about {name}", {"figure": 1.5})
 
-        return Check(name, f"Title of {name}", run, lasting=name == lasting)
+        return BringupStep(name, f"Title of {name}", run, lasting=name == lasting)
 
     return tuple(map(make, outcomes))
 
@@ -76,7 +76,7 @@ def test_a_refusal_fails_its_check(tmp_path: Path) -> None:
 
 
 def test_a_report_of_another_robot_or_none_is_refused(tmp_path: Path) -> None:
-    BringupReport(tmp_path, "domain 1").add("one", Finding(True, "fine"))
+    BringupReport(tmp_path, "domain 1").add("one", StepFinding(True, "fine"))
     with pytest.raises(ConfigError, match="not on domain 2"):
         BringupReport(tmp_path, "domain 2")
     (tmp_path / FILE).write_text(json.dumps({"where": "domain 1"}))

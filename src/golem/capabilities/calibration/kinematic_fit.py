@@ -10,7 +10,7 @@ zero plays no part.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -22,7 +22,7 @@ from golem.robots.model.magpie_model import hand_name
 from golem.robots.model.table import T_TORSO_HEAD_OPTICAL
 from golem.robots.model.tag_cuff import cuff_tags, tag_corners
 from golem.robots.sensors.calibration_file import Calibration
-from golem.robots.sensors.cameras import project
+from golem.robots.sensors.cameras import HEAD, project
 from golem.types import NUM_JOINTS, SIDES, Array, CameraInfo, Side
 
 PIXEL = 0.4
@@ -33,10 +33,12 @@ ZERO = 0.05
 """Prior of an encoder's zero [rad]."""
 CUFF = (0.003, 0.0005)
 """How well a cuff sits on its hand, rotation [rad] and translation [m]."""
+STEP = 1e-5
+"""Change of an unknown over which a derivative is taken [rad, m]."""
 VIEWS = 6
 """Views of each hand that are the least to work with."""
 OUTLIER = 3.0
-"""Residuals from which a corner counts less, in `PIXEL`."""
+"""Residuals, in `PIXEL`, from which a corner counts less at first; a tag that is as far off in the mean is left out."""
 ARM = {"left": slice(13, 20), "right": slice(20, 27)}
 """Joints of each arm, in motor order."""
 
@@ -72,7 +74,10 @@ def fit(views: Sequence[TagView], info: CameraInfo) -> Calibration:
             raise ConfigError(f"The {side} hand's tags were seen in {n} postures; {VIEWS} are the least.")
     problem = _Problem(views, info)
     start = np.zeros(problem.size)
-    found = least_squares(problem.residuals, start, loss="soft_l1", f_scale=OUTLIER, x_scale=problem.scale)
+    rough = least_squares(problem.residuals, start, loss="soft_l1", f_scale=OUTLIER, x_scale=problem.scale)
+    # A tag that is partly hidden has corners where it has none.
+    problem.keep(rough.x)
+    found = least_squares(problem.residuals, rough.x, x_scale=problem.scale)
     residuals = problem.pixels(found.x)
     covariance = np.linalg.inv(found.jac.T @ found.jac)
     offset = np.zeros(NUM_JOINTS)
@@ -87,15 +92,35 @@ def fit(views: Sequence[TagView], info: CameraInfo) -> Calibration:
         joint_offset=offset,
         joint_sigma=sigma,
         residual=float(np.sqrt(np.mean(residuals**2))),
-        views=len(views),
+        views=problem.count,
     )
+
+
+def information(side: Side, q: Array, tags: Sequence[int]) -> Array:
+    """Return what a view would tell of mount, the arm's zeros and the cuff, (19, 19), in units of their priors.
+
+    Args:
+        side: which hand is seen.
+        q: (27,) joints [rad].
+        tags: which of its tags are.
+    """
+    problem = _Problem([TagView(side, q, dict.fromkeys(tags, np.zeros((4, 2))))], HEAD)
+    k = SIDES.index(side)
+    columns = (*range(6), *range(6 + 7 * k, 13 + 7 * k), *range(20 + 6 * k, 26 + 6 * k))
+    here = problem.pixels(np.zeros(problem.size))
+    J = np.empty((len(here), len(columns)))
+    for row, column in enumerate(columns):
+        x = np.zeros(problem.size)
+        x[column] = STEP
+        J[:, row] = (problem.pixels(x) - here) / STEP * (problem.scale[column] / PIXEL)
+    return J.T @ J
 
 
 class _Problem:
     """The unknowns: mount (rotation vector, translation), left arm's zeros, right arm's, left cuff's pose, right's."""
 
     def __init__(self, views: Sequence[TagView], info: CameraInfo) -> None:
-        self._views, self._info = views, info
+        self._views, self._info = list(views), info
         self._kinematics = Kinematics()
         self._corners = np.column_stack([tag_corners(), np.ones(4)])
         self._tags = {side: cuff_tags(side) for side in SIDES}
@@ -104,9 +129,25 @@ class _Problem:
         self.scale = np.concatenate([mount, np.full(14, ZERO), cuff, cuff])
         self.size = len(self.scale)
 
+    @property
+    def count(self) -> int:
+        """How many views count."""
+        return len(self._views)
+
     def residuals(self, x: Array) -> Array:
         """Return the corners' errors and the priors', each by its standard deviation."""
         return np.concatenate([self.pixels(x) / PIXEL, x / self.scale])
+
+    def keep(self, x: Array) -> None:
+        """Leave out the tags that `x` does not explain."""
+        kept: list[TagView] = []
+        for view in tuple(self._views):
+            self._views = [view]
+            errors = self.pixels(x).reshape(len(view.corners), 8)
+            good = np.sqrt(np.mean(errors**2, axis=1)) < OUTLIER * PIXEL
+            corners = {n: c for (n, c), ok in zip(view.corners.items(), good, strict=True) if ok}
+            kept.append(replace(view, corners=corners))
+        self._views = [view for view in kept if view.corners]
 
     def pixels(self, x: Array) -> Array:
         """Return predicted minus seen corners [px]."""

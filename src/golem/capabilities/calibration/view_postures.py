@@ -1,4 +1,4 @@
-"""Postures of an arm in which the head camera sees the tags on its hand, as different from each other as possible."""
+"""Postures of an arm in which the head camera sees the tags on its hand, and which tell the most of its mount."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from collections.abc import Callable
 import numpy as np
 
 from golem.capabilities.arms.postures import posture
+from golem.capabilities.calibration.kinematic_fit import information
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.magpie_model import hand_name
 from golem.robots.model.tag_cuff import cuff_tags
 from golem.robots.sensors.cameras import HEAD, project
 from golem.types import NUM_JOINTS, UPPER, Array, Side
 
-SPREAD = np.array([0.6, 0.5, 0.7, 0.6, 0.9, 0.4, 0.5])
+SPREAD = np.array([0.9, 0.75, 1.05, 0.9, 1.35, 0.6, 0.75])
 """How far each joint of the arm goes from where it is ready [rad]."""
 MARGIN = 60.0
 """How far inside the image the tag's middle has to be [px]: the camera sits elsewhere than the model says."""
@@ -25,8 +26,8 @@ LOWEST = 0.10
 """Least height of the fingertips above base_link [m]: the pack's lid is at about 0."""
 ARM = {"left": slice(1, 8), "right": slice(8, 15)}
 """Columns of each arm in a posture of the upper body."""
-CANDIDATES = 150
-"""Postures among which the most different ones are chosen."""
+CANDIDATES = 250
+"""Postures among which the most telling ones are chosen."""
 DRAWS = 4000
 """Postures that are drawn to find them, at most."""
 NEAR = 0.07
@@ -50,15 +51,16 @@ def view_postures(
     rng = np.random.default_rng(seed)
     kinematics = Kinematics()
     ready = posture(f"ready_{side}")
-    found: list[Array] = []
+    found: list[tuple[Array, list[int]]] = []
     for _ in range(DRAWS):
         if len(found) >= CANDIDATES:
             break
         q = ready.copy()
         q[ARM[side]] += SPREAD * rng.uniform(-1.0, 1.0, 7)
-        if visible_tags(q, side, kinematics, spheres) and free(q):
-            found.append(q)
-    return _spread(found, count, side)
+        tags = visible_tags(q, side, kinematics, spheres)
+        if tags and free(q):
+            found.append((q, tags))
+    return _telling(found, count, side) if found else []
 
 
 def visible_tags(
@@ -99,14 +101,19 @@ def _hidden(eye: Array, tag: Array, spheres: Array) -> bool:
     return bool((between & (beside < spheres[:, 3] + CLEARANCE)).any())
 
 
-def _spread(found: list[Array], count: int, side: Side) -> list[Array]:
-    """Return those farthest apart, one after the other: each next one is the farthest from all before."""
-    if not found:
-        return []
-    points = np.array([q[ARM[side]] / SPREAD for q in found])
-    chosen = [0]
-    distance = np.linalg.norm(points - points[0], axis=1)
-    while len(chosen) < min(count, len(found)):
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return [found[i] for i in chosen]
+def _telling(found: list[tuple[Array, list[int]]], count: int, side: Side) -> list[Array]:
+    """Return the postures that tell the most together: each next one adds most to the determinant of information."""
+    joints = np.zeros(NUM_JOINTS)
+    told: list[Array] = []
+    for q, tags in found:
+        joints[UPPER] = q
+        told.append(information(side, joints, tags))
+    views = np.array(told)
+    total = np.eye(views.shape[1])
+    chosen: list[int] = []
+    for _ in range(min(count, len(found))):
+        gain = np.linalg.slogdet(total + views)[1]
+        gain[chosen] = -np.inf
+        chosen.append(int(np.argmax(gain)))
+        total = total + views[chosen[-1]]
+    return [found[i][0] for i in chosen]

@@ -40,7 +40,7 @@ class MiswiredTwinConfig(MujocoConfig):
     fault: str = "none"
 
     def __post_init__(self) -> None:
-        """Check the options."""
+        """BringupStep the options."""
         super().__post_init__()
         if self.fault not in FAULTS:
             raise unknown_name("fault of a bring-up", self.fault, FAULTS)

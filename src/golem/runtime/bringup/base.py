@@ -21,7 +21,7 @@ DEVICES = (*(f"{camera} camera" for camera in CAMERAS), "lidar", *(f"{side} hand
 """What can be declared absent."""
 
 
-class Refusal(GolemError):
+class StepRefused(GolemError):
     """A check failed; the bring-up goes no further until it passes."""
 
 
@@ -51,7 +51,7 @@ class Task:
     positive: bool = True
 
 
-class Person(Protocol):
+class BringupPerson(Protocol):
     """Whoever stands beside the robot."""
 
     def tell(self, text: str) -> None:
@@ -68,7 +68,7 @@ class Person(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class StepFinding:
     """What a check found.
 
     Attributes:
@@ -128,7 +128,7 @@ class Workbench:
     """
 
     link: RobotLink
-    person: Person
+    person: BringupPerson
     config: BringupConfig
     start_gate: Callable[[], Process]
     gate: Process | None = None
@@ -137,16 +137,16 @@ class Workbench:
         """Start the gate unless it runs.
 
         Raises:
-            Refusal: it has ended.
+            StepRefused: it has ended.
         """
         if self.gate is None:
             self.gate = self.start_gate()
         if self.gate.code is not None:
-            raise Refusal(f"The safety gate has ended with exit code {self.gate.code}.")
+            raise StepRefused(f"The safety gate has ended with exit code {self.gate.code}.")
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class BringupStep:
     """One step.
 
     Attributes:
@@ -158,5 +158,5 @@ class Check:
 
     name: str
     title: str
-    run: Callable[[Workbench], Finding]
+    run: Callable[[Workbench], StepFinding]
     lasting: bool = False

@@ -6,7 +6,15 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 
 from golem.errors import unknown_name
-from golem.runtime.bringup.base import BringupConfig, Check, Finding, Person, Refusal, Task, Workbench
+from golem.runtime.bringup.base import (
+    BringupConfig,
+    BringupPerson,
+    BringupStep,
+    StepFinding,
+    StepRefused,
+    Task,
+    Workbench,
+)
 from golem.runtime.bringup.bringup_report import BringupReport
 from golem.runtime.bringup.joint_checks import check_joints
 from golem.runtime.bringup.listening_checks import check_domain, check_state
@@ -16,15 +24,15 @@ from golem.runtime.bringup.sensor_checks import check_sensors
 from golem.runtime.live.launch import Process
 from golem.runtime.live.node_setup import log_line, member
 
-CHECKS: tuple[Check, ...] = (
-    Check("domain", "The robot alone on its domain", check_domain),
-    Check("hoist", "Hung up", check_hoist),
-    Check("state", "What it reports", check_state),
-    Check("joints", "Joint order and signs, by hand", check_joints, lasting=True),
-    Check("estop", "The emergency stop, pressed", check_estop),
-    Check("release", "Its own controllers let go", check_release),
-    Check("motion", "First motion, with low gains", check_motion, lasting=True),
-    Check("sensors", "Cameras, LiDAR, hands", check_sensors, lasting=True),
+CHECKS: tuple[BringupStep, ...] = (
+    BringupStep("domain", "The robot alone on its domain", check_domain),
+    BringupStep("hoist", "Hung up", check_hoist),
+    BringupStep("state", "What it reports", check_state),
+    BringupStep("joints", "Joint order and signs, by hand", check_joints, lasting=True),
+    BringupStep("estop", "The emergency stop, pressed", check_estop),
+    BringupStep("release", "Its own controllers let go", check_release),
+    BringupStep("motion", "First motion, with low gains", check_motion, lasting=True),
+    BringupStep("sensors", "Cameras, LiDAR, hands", check_sensors, lasting=True),
 )
 """In this order; each needs those before it."""
 
@@ -48,7 +56,7 @@ class Terminal:
         log_line(f"  -> {task.text}")
 
 
-def run_bringup(config: BringupConfig, person: Person | None = None) -> bool:
+def run_bringup(config: BringupConfig, person: BringupPerson | None = None) -> bool:
     """Do what has not passed yet; return whether everything has by the end.
 
     Raises:
@@ -79,7 +87,7 @@ def run_bringup(config: BringupConfig, person: Person | None = None) -> bool:
 def run_checks(
     bench: Workbench,
     report: BringupReport,
-    checks: tuple[Check, ...],
+    checks: tuple[BringupStep, ...],
     again: Collection[str],
     tell: Callable[[str], None] | None = None,
 ) -> bool:
@@ -93,8 +101,8 @@ def run_checks(
         tell(f"{head} ...")
         try:
             finding = check.run(bench)
-        except Refusal as refusal:
-            finding = Finding(False, str(refusal))
+        except StepRefused as refusal:
+            finding = StepFinding(False, str(refusal))
         report.add(check.name, finding)
         tell(f"{head}: {'passed' if finding.passed else 'FAILED'}: {finding.text}.")
         if not finding.passed:

@@ -11,7 +11,7 @@ from typing import Any
 
 from golem import __version__
 from golem.errors import ConfigError, OutputError
-from golem.runtime.bringup.base import Check, Finding
+from golem.runtime.bringup.base import BringupStep, StepFinding
 
 FILE, PAGE = "bringup.json", "report.md"
 
@@ -21,7 +21,7 @@ class Entry:
     """What was found, and when (ISO 8601, local time)."""
 
     at: str
-    finding: Finding
+    finding: StepFinding
 
 
 class BringupReport:
@@ -42,7 +42,7 @@ class BringupReport:
             known: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             old = str(known["where"])
             self._entries = {
-                name: Entry(row["at"], Finding(row["passed"], row["text"], row["figures"]))
+                name: Entry(row["at"], StepFinding(row["passed"], row["text"], row["figures"]))
                 for name, row in known["checks"].items()
             }
         except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -54,7 +54,7 @@ class BringupReport:
         """Return whether a check has passed before."""
         return name in self._entries and self._entries[name].finding.passed
 
-    def add(self, name: str, finding: Finding) -> None:
+    def add(self, name: str, finding: StepFinding) -> None:
         """Keep what a check found.
 
         Raises:
@@ -72,7 +72,7 @@ class BringupReport:
         }
         self._write(FILE, json.dumps({"where": self._where, "checks": rows}, indent=1) + "\n")
 
-    def page(self, checks: Sequence[Check]) -> Path:
+    def page(self, checks: Sequence[BringupStep]) -> Path:
         """Write the report of all checks; return its path.
 
         Raises:

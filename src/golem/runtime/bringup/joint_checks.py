@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from golem.robots.model.table import JOINT_NAMES, JOINTS
-from golem.runtime.bringup.base import Act, Finding, Task, Workbench
+from golem.runtime.bringup.base import Act, StepFinding, Task, Workbench
 from golem.runtime.bringup.hand_moves import HandMove, hand_move, wrong_with
 from golem.runtime.bringup.joint_motion_words import motion_words
 
 
-def check_joints(bench: Workbench) -> Finding:
+def check_joints(bench: Workbench) -> StepFinding:
     """Each joint, moved by hand, is the one that reports it, with the right sign."""
     bench.person.tell("The robot hangs in its own damping mode. Move one joint at a time, by about 0.2 rad.")
     angles: dict[str, float | str] = {}
     for joint, name in enumerate(JOINT_NAMES):
         wrong, angle = _move(bench, joint)
         if wrong:
-            return Finding(False, wrong, angles)
+            return StepFinding(False, wrong, angles)
         angles[name] = round(angle, 3)
-    return Finding(True, f"{len(angles)} joints report what was done to them", angles)
+    return StepFinding(True, f"{len(angles)} joints report what was done to them", angles)
 
 
 def _move(bench: Workbench, joint: int) -> tuple[str, float]:

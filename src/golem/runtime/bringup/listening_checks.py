@@ -10,7 +10,7 @@ from golem.hardware.safety.motor_reports import MotorReports, MotorWatch
 from golem.hardware.safety.senses import LIMBS
 from golem.middleware.wire import convert, hg
 from golem.robots.model.table import JOINT_NAMES
-from golem.runtime.bringup.base import Finding, Workbench
+from golem.runtime.bringup.base import StepFinding, Workbench
 from golem.types import LowState
 
 LISTEN = 3.0
@@ -27,38 +27,40 @@ STILL = 0.05
 """Mean rate of the torso of one [rad/s]: above it the gyroscope has an offset, or the robot swings."""
 
 
-def check_domain(bench: Workbench) -> Finding:
+def check_domain(bench: Workbench) -> StepFinding:
     """One robot is there, and nobody who would command it."""
     link = bench.link
     link.spin(5.0, lambda: link.state is not None and link.others() > 0)
     link.spin(1.0)
     robots = link.writers("/lowstate")
     if not robots:
-        return Finding(
+        return StepFinding(
             False, f"no robot on {bench.config.dds}: look at its power, the cable and the interface's address"
         )
     if len(robots) > 1:
-        return Finding(False, f"{len(robots)} robots write /lowstate: {', '.join(robots)}")
+        return StepFinding(False, f"{len(robots)} robots write /lowstate: {', '.join(robots)}")
     stacks = link.writers("/safety/lowcmd_in")
     if stacks:
-        return Finding(False, f"a stack is on the domain, end it first: {', '.join(stacks)}")
+        return StepFinding(False, f"a stack is on the domain, end it first: {', '.join(stacks)}")
     gates = [who for who in link.writers("/lowcmd") if who.startswith("golem ")]
     if gates:
-        return Finding(False, f"a gate is on the domain, end it first: {', '.join(gates)}")
+        return StepFinding(False, f"a gate is on the domain, end it first: {', '.join(gates)}")
     own = link.writers("/lowcmd")
-    return Finding(
+    return StepFinding(
         True,
         f"{bench.config.dds}; the robot is {robots[0]}",
         {"others on the domain": float(link.others()), "other writers of /lowcmd": ", ".join(own) or "none"},
     )
 
 
-def check_state(bench: Workbench) -> Finding:
+def check_state(bench: Workbench) -> StepFinding:
     """The state comes at its rate, lives, and what it says can be true."""
     link = bench.link
     heard = link.listen(LISTEN)
     if len(heard) < 100:
-        return Finding(False, f"{len(heard)} states in {LISTEN:g} s, and {link.damaged} that cannot be read")
+        return StepFinding(
+            False, f"{len(heard)} states in {LISTEN:g} s, and {link.damaged} that cannot be read"
+        )
     states = [s for _, s in heard]
     robot, ours = states[-1].t - states[0].t, heard[-1][0] - heard[0][0]
     rate, lost = robot / ours, 1.0 - (len(states) - 1) / (FREQUENCY * robot)
@@ -99,7 +101,7 @@ def check_state(bench: Workbench) -> Finding:
         wrong = fault.detail
     elif len(out):
         wrong = f"{JOINT_NAMES[out[0]]} is out of its range at {states[-1].q[out[0]]:.2f} rad"
-    return Finding(not wrong, wrong or "sound", figures)
+    return StepFinding(not wrong, wrong or "sound", figures)
 
 
 def frozen_groups(states: list[LowState]) -> list[str]:

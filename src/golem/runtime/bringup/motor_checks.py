@@ -11,7 +11,7 @@ from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gains import default_gains
 from golem.interfaces.payloads import GateState, Reason
 from golem.robots.model.table import JOINT_NAMES
-from golem.runtime.bringup.base import Act, Finding, Task, Workbench
+from golem.runtime.bringup.base import Act, StepFinding, Task, Workbench
 from golem.types import NUM_JOINTS, Array
 
 RISE = 3.0
@@ -26,16 +26,16 @@ DRIFT = 0.35
 """How far any joint may move while the gains rise [rad]."""
 
 
-def check_hoist(bench: Workbench) -> Finding:
+def check_hoist(bench: Workbench) -> StepFinding:
     """A person says that the robot hangs and holds its own stop, and the legs carry nothing."""
     ready = bench.person.confirm(
         "The robot hangs, its feet are clear of the floor, and you hold its own emergency stop. Type 'hanging'.",
         "hanging",
     )
-    return Finding(ready, "a person said so" if ready else "nobody says that the robot hangs")
+    return StepFinding(ready, "a person said so" if ready else "nobody says that the robot hangs")
 
 
-def check_estop(bench: Workbench) -> Finding:
+def check_estop(bench: Workbench) -> StepFinding:
     """The gate hears the button pressed, and released again."""
     bench.need_gate()
     link = bench.link
@@ -47,39 +47,39 @@ def check_estop(bench: Workbench) -> Finding:
     silent = (Reason.ESTOP_MISSING, Reason.ESTOP_STALE)
     if not link.spin(patience, lambda: link.gate is not None and reason() not in silent):
         why = "it says nothing" if link.gate is None else link.gate.why
-        return Finding(False, f"the gate hears no emergency stop: {why}")
+        return StepFinding(False, f"the gate hears no emergency stop: {why}")
     bench.person.act(Task(Act.PRESS, "Press the emergency stop."))
     asked = time.monotonic()
     if not link.spin(patience, lambda: reason() is Reason.ESTOP_PRESSED):
-        return Finding(False, f"the button was to be pressed, and no press arrived within {patience:g} s")
+        return StepFinding(False, f"the button was to be pressed, and no press arrived within {patience:g} s")
     pressed = time.monotonic() - asked
     bench.person.act(Task(Act.RELEASE, "Release it again."))
     if not link.spin(patience, lambda: link.gate is not None and reason() is not Reason.ESTOP_PRESSED):
-        return Finding(False, "the button was to be released, and the gate still hears it pressed")
-    return Finding(True, "pressed and released", {"from the request to the press [s]": round(pressed, 2)})
+        return StepFinding(False, "the button was to be released, and the gate still hears it pressed")
+    return StepFinding(True, "pressed and released", {"from the request to the press [s]": round(pressed, 2)})
 
 
-def check_release(bench: Workbench) -> Finding:
+def check_release(bench: Workbench) -> StepFinding:
     """The robot's own controllers have let go of the motors, and the gate is armed."""
     bench.need_gate()
     link, person, switcher = bench.link, bench.person, bench.link.switcher()
     if not link.spin(10.0, lambda: switcher.known):
-        return Finding(False, "the robot does not say which of its own controllers has the motors")
+        return StepFinding(False, "the robot does not say which of its own controllers has the motors")
     owner = switcher.owner
     if owner:
         if not person.confirm(
             f"'{owner}' has the motors; released, the robot goes limp. Type 'limp'.", "limp"
         ):
-            return Finding(False, f"'{owner}' keeps the motors")
+            return StepFinding(False, f"'{owner}' keeps the motors")
         switcher.release()
         if not link.spin(10.0, lambda: switcher.free):
-            return Finding(
+            return StepFinding(
                 False, f"'{owner}' still has the motors: switch to the debug mode by remote control"
             )
     if not link.spin(20.0, lambda: link.gate is not None and link.gate.state is GateState.ARMED):
         why = "it is silent" if link.gate is None else link.gate.why
-        return Finding(False, f"the gate is not armed: {why}")
-    return Finding(
+        return StepFinding(False, f"the gate is not armed: {why}")
+    return StepFinding(
         True, f"released by '{owner}'" if owner else "nobody had them", {"before": owner or "none"}
     )
 
@@ -118,12 +118,12 @@ class LowGainMotion:
         self.target = self._rest.copy()
 
 
-def check_motion(bench: Workbench) -> Finding:
+def check_motion(bench: Workbench) -> StepFinding:
     """With a share of the gains every motor moves its own joint, in its direction; then the gate stops the robot."""
     bench.need_gate()
     link = bench.link
     if not link.spin(bench.config.patience, link.calm):
-        return Finding(False, "the robot does not come to rest")
+        return StepFinding(False, "the robot does not come to rest")
     start = link.states[-1][1].q.copy()
     motion = LowGainMotion(start, bench.config.share)
 
@@ -133,7 +133,7 @@ def check_motion(bench: Workbench) -> Finding:
     link.pass_time(0.5, send)
     answer = link.ask("activate", send)
     if link.gate is None or not link.spin(2.0, _is(bench, GateState.ACTIVE), send):
-        return Finding(False, f"the gate does not open: {answer}")
+        return StepFinding(False, f"the gate does not open: {answer}")
     began = link.states[-1][1].t
 
     def rise() -> None:
@@ -165,7 +165,9 @@ def check_motion(bench: Workbench) -> Finding:
     if not link.spin(2.0, lambda: link.gate is not None and link.gate.stopped):
         wrong = wrong or "the gate was asked to stop and did not"
     figures["from the request to the stop [s]"] = round(time.monotonic() - asked, 3)
-    return Finding(not wrong, wrong or f"{NUM_JOINTS} motors move their joints; stopped on request", figures)
+    return StepFinding(
+        not wrong, wrong or f"{NUM_JOINTS} motors move their joints; stopped on request", figures
+    )
 
 
 def _is(bench: Workbench, state: GateState) -> Callable[[], bool]:

@@ -11,7 +11,7 @@ from golem.interfaces import public
 from golem.interfaces.ros_convert import seconds
 from golem.middleware.ros.message import CodecError
 from golem.robots.sensors.cameras import CAMERAS
-from golem.runtime.bringup.base import DEVICES, Finding, Workbench
+from golem.runtime.bringup.base import DEVICES, StepFinding, Workbench
 from golem.types import SIDES
 
 LISTEN = 4.0
@@ -54,7 +54,7 @@ class DeviceEars:
             self.faults.append(wrong)
 
 
-def check_sensors(bench: Workbench) -> Finding:
+def check_sensors(bench: Workbench) -> StepFinding:
     """Every device that was not declared absent delivers at its rate, and what it says can be used."""
     wanted = [name for name in DEVICES if name not in bench.config.without]
     ears = {name: _ears(bench, name) for name in wanted}
@@ -80,7 +80,7 @@ def check_sensors(bench: Workbench) -> Finding:
         for mine in ears.values():
             for ear in mine:
                 ear.close()
-    return Finding(not wrong, "; ".join(wrong) or f"{len(wanted)} devices deliver", figures)
+    return StepFinding(not wrong, "; ".join(wrong) or f"{len(wanted)} devices deliver", figures)
 
 
 def _judge(name: str, ear: DeviceEars, passed: float, figures: dict[str, float | str]) -> list[str]:

@@ -39,7 +39,7 @@ ERRORS = ("before", "after", "sigma", "joint_before", "joint_after", "views", "r
 class CalibrationOptions:
     """How long it is looked."""
 
-    views: int = 16
+    views: int = 20
     """Postures per hand."""
 
 
