@@ -30,7 +30,7 @@ class CalibrateConfig:
     """Seed of the episode, and so of the errors that are to be found."""
     file: str = "calibration.json"
     """File that is written; a stack takes it as `calibration: {file: calibration.json}`."""
-    views: int = 20
+    views: int = 16
     """Postures of each hand."""
 
 

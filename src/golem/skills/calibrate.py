@@ -11,11 +11,12 @@ import numpy as np
 from golem.capabilities.calibration.kinematic_fit import TagView, fit
 from golem.capabilities.calibration.tag_detector import TagDetector
 from golem.capabilities.calibration.view_postures import view_postures
+from golem.capabilities.collision.obstacles import Obstacle, World
 from golem.capabilities.planning.base import PlanRefused
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.interfaces import topics
 from golem.options import require
-from golem.robots.model.spatial import skew
+from golem.robots.model.spatial import skew, transform
 from golem.robots.model.tag_cuff import cuff_tags
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
@@ -23,7 +24,9 @@ from golem.skills.planned_motion import PlannedMotion
 from golem.types import SIDES, CameraInfo, Side
 
 CAMERA = "head"
-SPEED = 0.5
+WORK_PLACE = World((Obstacle("box", transform((0.85, 0.0, -0.22)), (0.55, 1.3, 0.28), "work place"),))
+"""What the arms keep out of, in base_link [m]: whatever stands before the robot, up to 6 cm above its pelvis."""
+SPEED = 0.4
 """How fast a hand goes from view to view [m/s]."""
 FRAMES = 2
 """Frames that are looked at in one posture: the second one tells nothing new of a tag, but may show one at all."""
@@ -43,8 +46,8 @@ class CalibrateGoal:
     """
 
     file: str = "calibration.json"
-    views: int = 20
-    settle: float = 0.6
+    views: int = 16
+    settle: float = 0.5
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -126,7 +129,8 @@ class Calibrate:
         """Show the hands one after the other; return what was seen, and the camera."""
         detector, motion = TagDetector(), PlannedMotion(context)
         robot = PlanningRobot()
-        space = JointSpace(robot, context.joints)
+        motion.world = WORK_PLACE
+        space = JointSpace(robot, context.joints, WORK_PLACE)
         views: list[TagView] = []
         info: CameraInfo | None = None
         for side in SIDES:

@@ -32,7 +32,7 @@ def seen(side: Side, q: Array, mount: Array, offset: Array, rng: np.random.Gener
     corners: dict[int, Array] = {}
     for number, tag in cuff_tags(side).items():
         T_tag = T @ tag
-        if T_tag[:3, 2] @ T_tag[:3, 3] > 0.5 * np.linalg.norm(T_tag[:3, 3]):
+        if T_tag[:3, 2] @ T_tag[:3, 3] > 0.4 * np.linalg.norm(T_tag[:3, 3]):
             points = (T_tag @ np.column_stack([tag_corners(), np.ones(4)]).T).T[:, :3]
             corners[number] = project(HEAD, points) + PIXEL * rng.standard_normal((4, 2))
     return TagView(side, q + offset, corners)

@@ -74,7 +74,7 @@ def fit(views: Sequence[TagView], info: CameraInfo) -> Calibration:
             raise ConfigError(f"The {side} hand's tags were seen in {n} postures; {VIEWS} are the least.")
     problem = _Problem(views, info)
     start = np.zeros(problem.size)
-    rough = least_squares(problem.residuals, start, loss="soft_l1", f_scale=OUTLIER, x_scale=problem.scale)
+    rough = least_squares(problem.residuals, start, loss="cauchy", f_scale=OUTLIER, x_scale=problem.scale)
     # A tag that is partly hidden has corners where it has none.
     problem.keep(rough.x)
     found = least_squares(problem.residuals, rough.x, x_scale=problem.scale)

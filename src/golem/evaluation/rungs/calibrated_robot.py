@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +15,13 @@ from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import episode_seed
-from golem.evaluation.rungs.pick_screw import SLOT, PickRung
+from golem.evaluation.rungs.pick_screw import SLOT, PickOptions, PickRung
 from golem.provenance import stack_facts
+from golem.robots.model.spatial import skew
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.robots.sensors.calibration_file import read_calibration
-from golem.runtime.lockstep import build
+from golem.robots.sensors.calibration_file import Calibration, read_calibration
+from golem.runtime.lockstep import build, build_robot
+from golem.skills.base import SkillResult
 from golem.stack import Stack, load_stack
 from golem.types import Array
 
@@ -37,10 +38,22 @@ ERRORS = ("before", "after", "sigma", "joint_before", "joint_after", "views", "r
 
 @dataclass(frozen=True)
 class CalibrationOptions:
-    """How long it is looked."""
+    """How it is calibrated."""
 
-    views: int = 20
-    """Postures per hand."""
+    views: int = 16
+    """Postures of each hand."""
+    keep: str = ""
+    """Folder in which calibrations are kept, by profile and episode, and from which they are taken where they are."""
+
+
+@dataclass(frozen=True)
+class CalibratedPickOptions(PickOptions):
+    """The work place, and how the robot was calibrated."""
+
+    views: int = 16
+    """Postures of each hand."""
+    keep: str = ""
+    """Folder in which calibrations are kept, by profile and episode, and from which they are taken where they are."""
 
 
 class CalibrationRung(Rung[CalibrationOptions]):
@@ -60,22 +73,17 @@ class CalibrationRung(Rung[CalibrationOptions]):
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
-        running, robot = build(
-            tagged_stack(spec.profile, spec.overrides), episode_seed(spec.seed, spec.index)
-        )
-        with closing(robot), tempfile.TemporaryDirectory() as folder:
-            file = (artefacts or Path(folder)) / "calibration.json"
-            goal = {"file": str(file), "views": self.options.views}
-            result = running.execute(spec.method, goal)
-            if not result.success:
-                return TrialOutcome(False, result.stage, result.slot, result.reason, result.timings)
-            found = read_calibration(file)
-            true, claimed = robot.calibration["head"], found.cameras["head"]
+        stack = tagged_stack(spec.profile, spec.overrides)
+        seed = episode_seed(spec.seed, spec.index)
+        found = calibrate(stack, seed, self.options.views, self.options.keep)
+        if isinstance(found, SkillResult):
+            return TrialOutcome(False, found.stage, found.slot, found.reason, found.timings)
+        with closing(build_robot(stack, seed)) as robot:
             zeros = robot.true_joint_offset[13:], found.joint_offset[13:]
             values = (
-                _apart(true),
-                _apart(claimed),
-                result.value.camera_sigma,
+                _apart(robot.calibration["head"]),
+                _apart(found.cameras["head"]),
+                _sigma(found),
                 _rms(zeros[0]),
                 _rms(zeros[0] - zeros[1]),
                 float(found.views),
@@ -88,7 +96,7 @@ class CalibrationRung(Rung[CalibrationOptions]):
             DONE if good else "fit",
             None if good else f"skill: {spec.method}",
             f"Head camera {values[0] * 1e3:.0f} -> {values[1] * 1e3:.1f} mm at 1 m.",
-            result.timings,
+            {},
             series,
         )
 
@@ -97,20 +105,23 @@ class CalibratedTether(PickRung):
     """Rung `tether` with a robot that was calibrated first: the same screws and errors, and a calibration's file."""
 
     name = "tether-calibrated"
+    Options = CalibratedPickOptions
 
-    def __init__(self, options: Any = None) -> None:
+    def __init__(self, options: CalibratedPickOptions | None = None) -> None:
         """Read the sweep; see `Rung`."""
         super().__init__(options)
+        self._how = options or CalibratedPickOptions()
         self._file: Path | None = None
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Calibrate, then run one trial; see `Rung`."""
+        seed = episode_seed(spec.seed, spec.index)
+        found = calibrate(tagged_stack(spec.profile, {}), seed, self._how.views, self._how.keep)
+        if isinstance(found, SkillResult):
+            return TrialOutcome(False, found.stage, found.slot, found.reason, found.timings)
         with tempfile.TemporaryDirectory() as folder:
-            text = calibrated(spec.profile, episode_seed(spec.seed, spec.index))
-            if not text:
-                return TrialOutcome(False, "calibrate", f"skill: {SKILL}", "The calibration failed.")
             self._file = Path(folder) / "calibration.json"
-            self._file.write_text(text, encoding="utf-8")
+            found.save(self._file)
             try:
                 return super().run(spec, artefacts)
             finally:
@@ -125,14 +136,23 @@ class CalibratedTether(PickRung):
         return stack if self._file is None else stack.with_part("calibration", file=str(self._file))
 
 
-@lru_cache(maxsize=64)
-def calibrated(profile: str, seed: int) -> str:
-    """Return the calibration of a twin as its file's text; empty where it failed."""
-    running, robot = build(tagged_stack(profile, {}), seed)
+def calibrate(stack: Stack, seed: int, views: int, keep: str = "") -> Calibration | SkillResult:
+    """Return the calibration of a twin that wears its tags, or how it failed.
+
+    Args:
+        stack: of that twin.
+        seed: of the episode.
+        views: postures of each hand.
+        keep: see `CalibrationOptions`.
+    """
+    kept = Path(keep) / f"{stack.profile}-{views}-{seed}.json" if keep else None
+    if kept is not None and kept.is_file():
+        return read_calibration(kept)
+    running, robot = build(stack, seed)
     with closing(robot), tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "calibration.json"
-        result = running.execute(SKILL, {"file": str(file), "views": CalibrationOptions().views})
-        return file.read_text(encoding="utf-8") if result.success else ""
+        file = kept or Path(folder) / "calibration.json"
+        result = running.execute(SKILL, {"file": str(file), "views": views})
+        return read_calibration(file) if result.success else result
 
 
 def tagged_stack(profile: str, overrides: Mapping[str, str]) -> Stack:
@@ -152,6 +172,12 @@ def tagged_stack(profile: str, overrides: Mapping[str, str]) -> Stack:
 def _apart(T: Array) -> float:
     """Return how far the pose `T` (4, 4) moves the point at which the camera is judged [m]; the truth moves nothing."""
     return float(np.linalg.norm(T @ AHEAD - AHEAD))
+
+
+def _sigma(found: Calibration) -> float:
+    """Return the standard deviation that the calibration claims for that point, of its worst axis [m]."""
+    J = np.hstack([skew(-AHEAD[:3]), np.eye(3)])
+    return float(np.sqrt(np.linalg.eigvalsh(J @ found.covariances["head"] @ J.T).max()))
 
 
 def _rms(v: Array) -> float:
