@@ -244,14 +244,13 @@ class _NoOptions:
     """Report what this machine lacks to run GOLEM, and the line that installs it."""
 
 
-def _command(
-    doc: str, module: str, config: str, run: str, graphics: bool = False
-) -> Callable[[list[str]], int]:
-    """Return the command that `run` of `module` does with the options `config`, failing where it returns False."""
+def _command(doc: str, module: str, names: str, graphics: bool = False) -> Callable[[list[str]], int]:
+    """Return the command of a `module` that parses the first of `names`, `CONFIG:function`, and calls the second."""
 
     def command(words: list[str]) -> int:
         if graphics:
             _prepare_graphics()
+        config, _, run = names.partition(":")
         owner = importlib.import_module(module)
         name = next(name for name, known in COMMANDS.items() if known is command)
         return FAILED if getattr(owner, run)(_parse(getattr(owner, config), name, words)) is False else 0
@@ -260,76 +259,44 @@ def _command(
     return command
 
 
+# fmt: off
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "demo": _demo,
     "run": _run,
     "options": _options,
     "ladder": _ladder,
     "faults": _faults,
-    "compare": _command(
-        "Compare two ladder runs on the same seeds, e.g. tether with stand.",
-        "golem.evaluation.metrics.compare",
-        "CompareConfig",
-        "run_compare",
-    ),
-    "results": _command(
-        "Write the tables of run folders as Markdown, as they stand in the documentation.",
-        "golem.evaluation.metrics.results",
-        "ResultsConfig",
-        "run_results",
-    ),
+    "compare": _command("Compare two ladder runs on the same seeds, e.g. tether with stand.",
+                        "golem.evaluation.metrics.compare", "CompareConfig:run_compare"),
+    "results": _command("Write the tables of run folders as Markdown, as they stand in the documentation.",
+                        "golem.evaluation.metrics.results", "ResultsConfig:run_results"),
     "model": _model,
     "bench": _bench,
-    "reach": _command(
-        "Show where the hands can be: table, picture, and the map that skills ask.",
-        "golem.evaluation.speed.reach_command",
-        "ReachConfig",
-        "run_reach",
-    ),
+    "reach": _command("Show where the hands can be: table, picture, and the map that skills ask.",
+                      "golem.evaluation.speed.reach_command", "ReachConfig:run_reach"),
     "train": _train,
     "twin": _twin,
     "safety": _safety,
-    "calibrate": _command(
-        "Calibrate the head camera and the arms' encoders by tags on the hands.",
-        "golem.runtime.calibrate_command",
-        "CalibrateConfig",
-        "run_calibrate",
-        True,
-    ),
-    "bringup": _command(
-        "Bring a robot up step by step, each one checked; --rehearse: with a twin, and a fault to be found.",
-        "golem.evaluation.rehearsal.rehearse",
-        "BringupCommandConfig",
-        "run_bringup_command",
-    ),
+    "bringup": _command("Bring a robot up step by step, each one checked; --rehearse: with a twin that has a fault.",
+                        "golem.evaluation.rehearsal.rehearse", "BringupCommandConfig:run_bringup_command"),
+    "calibrate": _command("Calibrate the head camera and the arms' encoders by tags on the hands.",
+                          "golem.runtime.calibrate_command", "CalibrateConfig:run_calibrate", True),
     "drivers": _drivers,
     "up": _up,
     "launch": _launch,
-    "restart": _command(
-        "Restart one process of a launched robot: twin, safety or up.",
-        "golem.runtime.live.operator",
-        "RestartConfig",
-        "run_restart",
-    ),
+    "restart": _command("Restart one process of a launched robot: twin, safety or up.",
+                        "golem.runtime.live.operator", "RestartConfig:run_restart"),
     "skill": _skill,
-    "topics": _command(
-        "List what is on a domain, with rates and bytes.",
-        "golem.runtime.live.topic_stats",
-        "TopicStatsConfig",
-        "run_topic_stats",
-    ),
+    "topics": _command("List what is on a domain, with rates and bytes.",
+                       "golem.runtime.live.topic_stats", "TopicStatsConfig:run_topic_stats"),
     "record": _record,
     "replay": _replay,
-    "view": _command(
-        "Show a domain live in Foxglove.",
-        "golem.runtime.live.foxglove_view",
-        "ViewConfig",
-        "run_view",
-    ),
+    "view": _command("Show a domain live in Foxglove.", "golem.runtime.live.foxglove_view", "ViewConfig:run_view"),
     "check": _check,
     "new": _new,
     "doctor": _doctor,
 }
+# fmt: on
 
 
 def main() -> None:

@@ -26,7 +26,7 @@ from golem.types import SIDES, CameraInfo, Side
 CAMERA = "head"
 WORK_PLACE = World((Obstacle("box", transform((0.85, 0.0, -0.22)), (0.55, 1.3, 0.28), "work place"),))
 """What the arms keep out of, in base_link [m]: whatever stands before the robot, up to 6 cm above its pelvis."""
-SPEED = 0.4
+SPEED = 0.6
 """How fast a hand goes from view to view [m/s]."""
 FRAMES = 2
 """Frames that are looked at in one posture: the second one tells nothing new of a tag, but may show one at all."""

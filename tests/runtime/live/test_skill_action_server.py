@@ -373,7 +373,8 @@ def test_the_skills_and_their_goals_are_on_a_latched_topic(mine: Callable[[str],
         (
             "cuont",
             "{}",
-            "Unknown skill 'cuont'; valid: asleep, count, dock, explore, navigate, pick, stand, walk. Did you",
+            "Unknown skill 'cuont'; valid: asleep, calibrate, count, dock, explore, navigate, pick, stand, walk. "
+            "Did you",
         ),
         ("", "", "Unknown skill ''"),
         ("count", "", "'to' has no default"),

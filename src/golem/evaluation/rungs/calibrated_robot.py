@@ -156,7 +156,7 @@ def calibrate(stack: Stack, seed: int, views: int, keep: str = "") -> Calibratio
 
 
 def tagged_stack(profile: str, overrides: Mapping[str, str]) -> Stack:
-    """Return the stack whose robot wears the tags.
+    """Return the stack whose robot wears the tags, in an empty hall: it is the same robot as at the pack.
 
     Raises:
         ConfigError: an override is wrong, or brings another robot.
@@ -166,7 +166,7 @@ def tagged_stack(profile: str, overrides: Mapping[str, str]) -> Stack:
         stack = stack.with_choice(slot, use)
     if not issubclass(registry.load("robot", stack.choice("robot").use), MujocoRobot):
         raise ConfigError("This rung judges on the simulator's truth; leave out --use robot=...")
-    return stack.with_options("robot", tags=True)
+    return stack.with_options("robot", tags=True, world="open")
 
 
 def _apart(T: Array) -> float:
