@@ -17,7 +17,8 @@ BROKEN = {
     "command": (["ladr"], "Did you mean 'ladder'?"),
     "rung": (
         ["ladder", "--rung", "teter"],
-        "valid: base-estimation, faults, gate-limits, memory, mpc-rate, navigate, navigate-line, odometry, push, ",
+        "valid: base-estimation, calibration, faults, gate-limits, memory, mpc-rate, navigate, navigate-line, "
+        "odometry, push, ",
     ),
     "method": (["ladder", "--method", "centriod"], "Did you mean 'centroid'?"),
     "method file": (["ladder", "--method", "x.py:Mine"], "does not exist"),
@@ -36,7 +37,7 @@ BROKEN = {
     "run profile": (["run", "--profile", "feild"], "Did you mean 'field'?"),
     "skill": (
         ["run", "--skill", "pik"],
-        "valid: dock, explore, navigate, pick, recall, remember, stand, walk. Did you mean 'pick'?",
+        "stand, walk. Did you mean 'pick'?",
     ),
     "skill goal": (["run", "--skill", "walk", "--x", "nan"], "'x' is a finite number"),
     "skill and by hand": (["run", "--skill", "pick", "--operate"], "give it or --skill, not both"),

@@ -86,22 +86,6 @@ def _faults(words: list[str]) -> int:
     return _ladder(["--rung", "faults", *words])
 
 
-def _compare(words: list[str]) -> int:
-    """Compare two ladder runs on the same seeds, e.g. tether with stand."""
-    from golem.evaluation.metrics.compare import CompareConfig, run_compare
-
-    run_compare(_parse(CompareConfig, "compare", words))
-    return 0
-
-
-def _results(words: list[str]) -> int:
-    """Write the tables of run folders as Markdown, as they stand in the documentation."""
-    from golem.evaluation.metrics.results import ResultsConfig, run_results
-
-    run_results(_parse(ResultsConfig, "results", words))
-    return 0
-
-
 def _model(words: list[str]) -> int:
     """Export the robot model as URDF or MJCF, or cover a robot with spheres: `model export`, `model spheres`."""
     return _one_of(words, "model", "model command", MODEL_COMMANDS)
@@ -130,14 +114,6 @@ BENCHES = {
     "dds": ("golem.evaluation.speed.dds_bench", "DdsBenchConfig", "run_dds_bench"),
     "memory": ("golem.evaluation.speed.memory_bench", "MemoryBenchConfig", "run_memory_bench"),
 }
-
-
-def _reach(words: list[str]) -> int:
-    """Show where the hands can be: table, picture, and the map that skills ask."""
-    from golem.evaluation.speed.reach_command import ReachConfig, run_reach
-
-    run_reach(_parse(ReachConfig, "reach", words))
-    return 0
 
 
 def _train(words: list[str]) -> int:
@@ -218,26 +194,11 @@ def _launch(words: list[str]) -> int:
     return 0 if run_launch(_parse(LaunchConfig, "launch", words)) else FAILED
 
 
-def _restart(words: list[str]) -> int:
-    """Restart one process of a launched robot: twin, safety or up."""
-    from golem.runtime.live.operator import RestartConfig, run_restart
-
-    return 0 if run_restart(_parse(RestartConfig, "restart", words)) else FAILED
-
-
 def _skill(words: list[str]) -> int:
     """Call a skill of the robot on a domain; `skill --help` lists those of its stack."""
     from golem.runtime.live.skill_client import run_skill
 
     return run_skill(words)
-
-
-def _topics(words: list[str]) -> int:
-    """List what is on a domain, with rates and bytes."""
-    from golem.runtime.live.topic_stats import TopicStatsConfig, run_topic_stats
-
-    run_topic_stats(_parse(TopicStatsConfig, "topics", words))
-    return 0
 
 
 def _record(words: list[str]) -> int:
@@ -252,14 +213,6 @@ def _replay(words: list[str]) -> int:
     from golem.runtime.live.record_commands import ReplayBagConfig, run_replay
 
     return 0 if run_replay(_parse(ReplayBagConfig, "replay", words)) else FAILED
-
-
-def _view(words: list[str]) -> int:
-    """Show a domain live in Foxglove."""
-    from golem.runtime.live.foxglove_view import ViewConfig, run_view
-
-    run_view(_parse(ViewConfig, "view", words))
-    return 0
 
 
 def _check(words: list[str]) -> int:
@@ -291,33 +244,59 @@ class _NoOptions:
     """Report what this machine lacks to run GOLEM, and the line that installs it."""
 
 
+def _command(doc: str, module: str, names: str, graphics: bool = False) -> Callable[[list[str]], int]:
+    """Return the command of a `module` that parses the first of `names`, `CONFIG:function`, and calls the second."""
+
+    def command(words: list[str]) -> int:
+        if graphics:
+            _prepare_graphics()
+        config, _, run = names.partition(":")
+        owner = importlib.import_module(module)
+        name = next(name for name, known in COMMANDS.items() if known is command)
+        return FAILED if getattr(owner, run)(_parse(getattr(owner, config), name, words)) is False else 0
+
+    command.__doc__ = doc
+    return command
+
+
+# fmt: off
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "demo": _demo,
     "run": _run,
     "options": _options,
     "ladder": _ladder,
     "faults": _faults,
-    "compare": _compare,
-    "results": _results,
+    "compare": _command("Compare two ladder runs on the same seeds, e.g. tether with stand.",
+                        "golem.evaluation.metrics.compare", "CompareConfig:run_compare"),
+    "results": _command("Write the tables of run folders as Markdown, as they stand in the documentation.",
+                        "golem.evaluation.metrics.results", "ResultsConfig:run_results"),
     "model": _model,
     "bench": _bench,
-    "reach": _reach,
+    "reach": _command("Show where the hands can be: table, picture, and the map that skills ask.",
+                      "golem.evaluation.speed.reach_command", "ReachConfig:run_reach"),
     "train": _train,
     "twin": _twin,
     "safety": _safety,
+    "bringup": _command("Bring a robot up step by step, each one checked; --rehearse: with a twin that has a fault.",
+                        "golem.evaluation.rehearsal.rehearse", "BringupCommandConfig:run_bringup_command"),
+    "calibrate": _command("Calibrate the head camera and the arms' encoders by tags on the hands.",
+                          "golem.runtime.calibrate_command", "CalibrateConfig:run_calibrate", True),
     "drivers": _drivers,
     "up": _up,
     "launch": _launch,
-    "restart": _restart,
+    "restart": _command("Restart one process of a launched robot: twin, safety or up.",
+                        "golem.runtime.live.operator", "RestartConfig:run_restart"),
     "skill": _skill,
-    "topics": _topics,
+    "topics": _command("List what is on a domain, with rates and bytes.",
+                       "golem.runtime.live.topic_stats", "TopicStatsConfig:run_topic_stats"),
     "record": _record,
     "replay": _replay,
-    "view": _view,
+    "view": _command("Show a domain live in Foxglove.", "golem.runtime.live.foxglove_view", "ViewConfig:run_view"),
     "check": _check,
     "new": _new,
     "doctor": _doctor,
 }
+# fmt: on
 
 
 def main() -> None:

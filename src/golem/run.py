@@ -64,6 +64,8 @@ class RunConfig:
     """Show a skill live in the browser, paced by the wall clock; operating always does."""
     port: int = 8080
     """Port of the live view."""
+    host: str = "127.0.0.1"
+    """Address that it listens on; 0.0.0.0 lets other machines in that know the token in the printed address."""
     record: Annotated[Path | None, arg(metavar="PATH", help_behavior_hint="")] = None
     """Write everything public of a skill into a bag, a new folder of this name."""
     foxglove: bool = False
@@ -127,7 +129,7 @@ def run_stack(config: RunConfig, goal_words: Sequence[str] = ()) -> SkillResult:
             show()
 
         if config.view:
-            view = closing.enter_context(LiveView(running, shown(running, robot), config.port))
+            view = closing.enter_context(LiveView(running, shown(running, robot), config.port, config.host))
             print(f"Live view: {view.url}   (Ctrl-C ends it)")
             result = view.run(name, goal, watch=watch)
         else:
@@ -144,7 +146,9 @@ def _operate(config: RunConfig, stack: Stack) -> SkillResult:
     with ExitStack() as closing:
         running, robot = build(stack, config.seed)
         closing.callback(lambda: robot.close())
-        view = closing.enter_context(LiveView(running, shown(running, robot), config.port, restarts=True))
+        view = closing.enter_context(
+            LiveView(running, shown(running, robot), config.port, config.host, restarts=True)
+        )
         print(f"Open {view.url} to drive, push and start skills. Ctrl-C ends it.", flush=True)
         if not no_display():
             webbrowser.open(view.url)

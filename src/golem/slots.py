@@ -143,6 +143,7 @@ SLOTS: dict[str, Slot] = {
     "skill": Slot(
         "golem.skills.base:Skill",
         {
+            "calibrate": "golem.skills.calibrate:Calibrate",
             "disassemble": "golem.skills.disassemble:Disassemble",
             "dock": "golem.skills.dock:Dock",
             "explore": "golem.skills.explore:Explore",
@@ -180,6 +181,7 @@ KEYS: dict[str, StackKey] = {
 """Where a stack has one module each, by key of the stack file. Skills, of which it has any number, are no key."""
 
 PARTS: dict[str, str] = {
+    "calibration": "golem.robots.sensors.calibration_file:CalibrationPart",
     "estop": "golem.hardware.estop.estop_config:EstopConfig",
     "locomotion": "golem.capabilities.legs.locomotion:LocomotionConfig",
 }

@@ -168,6 +168,16 @@ class Stack:
         old = self.choice(key)
         return self.with_choice(key, Choice(old.use, {**old.options, **options}))
 
+    def with_part(self, name: str, **options: object) -> Stack:
+        """Return a copy in which a part, a key of `golem.slots.PARTS`, has some other options.
+
+        Raises:
+            ConfigError: an option is wrong.
+        """
+        parts = {**self.parts, name: {**self.parts.get(name, {}), **options}}
+        registry.part(name, parts[name])
+        return replace(self, parts=parts)
+
     def digest(self) -> str:
         """Return 12 hex digits that change whenever anything in the stack changes."""
         return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:12]

@@ -28,6 +28,7 @@ from golem.errors import ConfigError, GolemError
 from golem.hardware.safety.base import OperatorRequest
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState
+from golem.middleware.token_gate import TokenGate, is_loopback
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
@@ -82,15 +83,20 @@ class LiveView:
             running: the stack.
             robot: its twin.
             port: TCP port; 0 takes a free one.
-            host: address to listen at; the default is reachable from this machine only.
+            host: address to listen at; the default is reachable from this machine only, any other asks for a token.
             restarts: whether there is a button to start over, which makes `operate` return.
             passive: whether somebody else drives the robot, and this shows every tick of it.
 
         Raises:
             ConfigError: the port cannot be had.
         """
-        self._server = _serve(host, port)
-        self.url = f"http://{host}:{self._server.get_port()}"
+        local = is_loopback(host)
+        self._server = _serve(host, port) if local else _serve("127.0.0.1", 0)
+        inside = self._server.get_port()
+        self._gate = None if local else TokenGate(host, port, inside)
+        self.url = f"http://{host}:{inside}"
+        if self._gate is not None:
+            self.url = f"http://{host}:{self._gate.port}/?token={self._gate.token}"
         standing = running.stack.on_ground
         first = "pick" if robot.scene.names.screws else "walk"
         self._skills = running.skills
@@ -328,6 +334,8 @@ class LiveView:
 
     def close(self) -> None:
         """Stop serving."""
+        if self._gate is not None:
+            self._gate.close()
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
         self._view.close()

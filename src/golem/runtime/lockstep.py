@@ -66,7 +66,9 @@ class LockstepRunner:
         gantry = robot if isinstance(robot, HasGantry) else None
         lidar = hears_lidar(stack)
         seen = partial(detection_requested, self.bus)
-        self._robot = RobotNodes(self.bus, stack, robot, seen, lambda: lidar)
+        calibration = stack.part("calibration").load()
+        offset = calibration.joint_offset if calibration.joint_offset.any() else None
+        self._robot = RobotNodes(self.bus, stack, robot, seen, lambda: lidar, offset)
         limits = limits or SafetyLimits.from_profile(stack.limits)
         if not isinstance(robot, HasLivingSensors):
             limits = limits.believing()
@@ -74,7 +76,7 @@ class LockstepRunner:
             limits = limits.still()
         standing = StandingLegs if stack.on_ground else None
         self._safety = SafetyNodes(self.bus, limits, self.estop, standing)
-        self._stack = StackNodes(self.bus, stack, robot.calibration, gantry, LATENCY)
+        self._stack = StackNodes(self.bus, stack, calibration.merged(robot.calibration), gantry, LATENCY)
         placed = self._robot.nodes + self._safety.nodes + self._stack.nodes
         self.executor = Executor(self.bus, in_order(placed))
         self.request(OperatorRequest.ACTIVATE)

@@ -101,6 +101,7 @@ class RobotNodes:
         robot: Robot,
         wanted: Callable[[str], Callable[[], bool]] | None,
         lidar_wanted: Callable[[], bool],
+        joint_offset: Array | None = None,
     ) -> None:
         """Connect `robot` to `bus`.
 
@@ -111,13 +112,14 @@ class RobotNodes:
             wanted: called with the name of a camera, returns what says whether it is to be exposed; None where that
                 is another process's business.
             lidar_wanted: says whether anybody listens to the LiDAR.
+            joint_offset: (27,) reported minus true joint positions by calibration [rad]; None believes them.
 
         Raises:
             ConfigError, ModuleFault: see `ModuleFactory.make`; about the on-board legs.
         """
         contract = ContractCheck("robot", stack.choice("robot").use)
-        self.act = nodes.ActNode(bus, robot, contract)
-        self.nodes: list[Placed] = [(Phase.MEASURE, nodes.SenseNode(bus, robot, contract))]
+        self.act = nodes.ActNode(bus, robot, contract, joint_offset)
+        self.nodes: list[Placed] = [(Phase.MEASURE, nodes.SenseNode(bus, robot, contract, joint_offset))]
         if wanted is not None:
             for name in robot.cameras:
                 camera = perception_nodes.CameraNode(bus, robot, name, wanted(name), contract)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -60,14 +61,15 @@ class SenseNode:
 
     period = TICK
 
-    def __init__(self, bus: Bus, robot: Robot, contract: ContractCheck) -> None:
-        """Read `robot`."""
-        self._bus, self._robot, self._contract = bus, robot, contract
+    def __init__(self, bus: Bus, robot: Robot, contract: ContractCheck, offset: Array | None = None) -> None:
+        """Read `robot`, whose joints report `offset` (27,) more than they are [rad]; None believes them."""
+        self._bus, self._robot, self._contract, self._offset = bus, robot, contract, offset
 
     def step(self, t: float) -> None:
         """Publish one sample of everything."""
         call = self._contract.call
         q, dq, tau = call(self._robot.joints)
+        q = q if self._offset is None else q - self._offset
         self._bus.publish(topics.LOW_STATE, LowState(t, q, dq, tau, call(self._robot.imu)), t)
         for side in SIDES:
             self._bus.publish(topics.hand_state(side), call(self._robot.hand, side, t), t)
@@ -78,15 +80,17 @@ class ActNode:
 
     period = TICK
 
-    def __init__(self, bus: Bus, robot: Robot, contract: ContractCheck) -> None:
-        """Drive `robot`."""
-        self._bus, self._robot, self._contract = bus, robot, contract
+    def __init__(self, bus: Bus, robot: Robot, contract: ContractCheck, offset: Array | None = None) -> None:
+        """Drive `robot`; `offset` as for `SenseNode`."""
+        self._bus, self._robot, self._contract, self._offset = bus, robot, contract, offset
 
     def step(self, t: float) -> None:
         """Advance the robot by one tick; motors without a command of late are limp."""
         command = self._bus.latest(topics.LOW_CMD)
         if command is None or t - command.t > WATCHDOG:
             command = _limp(t)
+        if self._offset is not None:
+            command = replace(command, q=command.q + self._offset)
         hands: dict[Side, HandCommand] = {}
         for side in SIDES:
             hand = self._bus.latest(topics.hand_command(side))

@@ -384,7 +384,7 @@ def test_the_skills_and_their_goals_are_on_a_latched_topic(mine: Callable[[str],
         (
             "cuont",
             "{}",
-            "Unknown skill 'cuont'; valid: asleep, count, dock, explore, navigate, pick, recall, remember",
+            "stand, walk. Did you mean 'count'?",
         ),
         ("", "", "Unknown skill ''"),
         ("count", "", "'to' has no default"),

@@ -61,7 +61,9 @@ class StandingGate:
                 standing = self._legs.step(inputs.state, self.gate.limits.damping)
             except GolemError:
                 standing = None  # the gate then damps
-        result = self.gate.step(replace(inputs, stands=self._make is not None, standing=standing))
+        if self._make is not None:
+            inputs = replace(inputs, stands=True, standing=standing)
+        result = self.gate.step(inputs)
         if result.state is GateState.STOP2 and before.mode is not GateState.STOP2:
             self.prepare()
             assert self._legs is not None and result.memory.state is not None

@@ -13,6 +13,7 @@ from typing import Any
 from golem.errors import ConfigError, MissingExtra
 from golem.middleware.bags.base import BagMessage, BagTopic
 from golem.middleware.bags.recorder import Recorder
+from golem.middleware.token_gate import TokenGate, is_loopback
 
 try:
     import foxglove
@@ -30,7 +31,7 @@ class ServerConfig:
     """Where the viewers connect.
 
     Attributes:
-        host: address of the interface to listen on; `0.0.0.0` lets other machines in.
+        host: address of the interface to listen on; `0.0.0.0` lets other machines in that know the token.
         port: port to listen on; 0 chooses a free one.
         backlog: messages that are kept for a viewer that is too slow; then the oldest is dropped.
     """
@@ -56,11 +57,12 @@ class FoxgloveServer:
         self._newcomers: set[str] = set()
         self._lock = threading.Lock()
         self._now = self._announced = -TIME_STEP
+        local = is_loopback(config.host)
         try:
             self._server = foxglove.start_server(
                 name="golem",
-                host=config.host,
-                port=config.port,
+                host=config.host if local else "127.0.0.1",
+                port=config.port if local else 0,
                 capabilities=[Capability.Time],
                 supported_encodings=["cdr"],
                 server_listener=_Listener(self),
@@ -71,7 +73,10 @@ class FoxgloveServer:
             raise ConfigError(
                 f"Cannot listen on {config.host}:{config.port} ({error}); choose another port or host."
             ) from error
+        self._gate = None if local else TokenGate(config.host, config.port, self._server.port)
         self.url = f"ws://{config.host}:{self._server.port}"
+        if self._gate is not None:
+            self.url = f"ws://{config.host}:{self._gate.port}/?token={self._gate.token}"
 
     def wanted(self, topic: BagTopic) -> bool:
         """Offer `topic` to the viewers, and return whether one subscribes to it."""
@@ -114,6 +119,8 @@ class FoxgloveServer:
 
     def close(self) -> None:
         """Send the viewers away; see `Sink`."""
+        if self._gate is not None:
+            self._gate.close()
         self._server.stop()
         for channel in self._channels.values():
             channel.close()

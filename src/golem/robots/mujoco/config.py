@@ -51,6 +51,7 @@ class MujocoConfig:
         latency: delay of motor commands on top of the profile's [s].
         mjcf: the robot from this file instead of ours: the joints, motors, `imu` site and link names of the vendor's
             27-motor model, to which our hands are mounted. Its soles, torque limits and contacts are its own.
+        tags: whether the hands wear their cuffs of tags, for a calibration.
     """
 
     support: Support = "hoist"
@@ -74,6 +75,7 @@ class MujocoConfig:
     payload: tuple[float, float] = (0.0, 0.0)
     latency: float = 0.0
     mjcf: Path | None = None
+    tags: bool = False
 
     def __post_init__(self) -> None:
         """Check the numbers.

@@ -48,7 +48,8 @@ _MOMENT = mujoco.mjtState.mjSTATE_INTEGRATION
 class MujocoRobot:
     """The twin; see `golem.robots.base.Robot`.
 
-    `scene`, `data` and `truth` are the truth: for `golem.evaluation` and viewers of the simulation only, as is `push`.
+    `scene`, `data` and `truth` are the truth: for `golem.evaluation` and viewers of the simulation only, as are
+    `push` and `true_joint_offset`.
     Modules of a stack never hold a robot.
     """
 
@@ -133,6 +134,11 @@ class MujocoRobot:
     def living(self) -> bool:
         """Whether the sensors have noise; see `HasLivingSensors`."""
         return self.profile.lives
+
+    @property
+    def true_joint_offset(self) -> Array:
+        """(27,) reported minus true joint positions [rad]: for judges, as is `truth`."""
+        return self._errors.joint_offset.copy()
 
     @property
     def on_gantry(self) -> bool:

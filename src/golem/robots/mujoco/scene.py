@@ -13,6 +13,7 @@ from golem.robots.model import contact_shapes, magpie_model, mjcf
 from golem.robots.model.looks import VISUAL_GROUP
 from golem.robots.model.table import BASE_LINK, JOINT_NAMES
 from golem.robots.mujoco.config import WITH_PACK, MujocoConfig
+from golem.robots.mujoco.tag_plates import add_tag_cuffs
 from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds import furnished, parts, terrain
@@ -130,6 +131,8 @@ def _robot(config: MujocoConfig) -> mujoco.MjSpec:
     for side, mass in zip(SIDES, config.payload, strict=True):
         if mass > 0.0:
             _add_payload(spec.body(magpie_model.hand_name(side)), mass)
+    if config.tags:
+        add_tag_cuffs(spec)
     return spec
 
 

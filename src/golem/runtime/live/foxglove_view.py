@@ -34,7 +34,7 @@ class ViewConfig:
     topics: tuple[str, ...] = ()
     """Public topics to offer, by their ROS names; default: all, images as they are."""
     host: str = "127.0.0.1"
-    """Address to listen on; 0.0.0.0 lets other machines in."""
+    """Address to listen on; 0.0.0.0 lets other machines in that know the token in the address that is printed."""
     port: int = 8765
     """Port to listen on."""
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)

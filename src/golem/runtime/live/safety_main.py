@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -22,6 +22,7 @@ from golem.runtime.live.exclusive_writers import owner, refuse_second
 from golem.runtime.live.node_setup import AsyncLogger, member, settle
 from golem.runtime.live.safety_process import SafetyProcess
 from golem.runtime.live.safety_status import report
+from golem.runtime.live.unknown_senders import SenderWatch
 from golem.types import TICK
 
 if TYPE_CHECKING:
@@ -84,8 +85,10 @@ def run_safety(config: SafetyConfig) -> None:
         interrupted(also=(signal.SIGTSTP, signal.SIGQUIT)) as stop,
         closing(AsyncLogger()) as tell,
         member("safety", config.dds, tell) as (participant, node),
+        ExitStack() as watching,
     ):
         refuse_second(participant, config.dds, "/lowcmd")
+        senders = watching.enter_context(closing(SenderWatch(participant)))
         who = partial(owner, participant)
         gate = SafetyProcess(
             participant,
@@ -97,6 +100,7 @@ def run_safety(config: SafetyConfig) -> None:
             real=config.dds.robot,
             standing=standing,
             black_box=_black_box(config, tell),
+            senders=lambda: senders.found,
         )
         tell(f"The safety gate is on {config.dds}. Ctrl-C stops the robot and ends it.")
         if config.still:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -61,6 +61,7 @@ class SafetyProcess:
         real: bool = False,
         standing: Callable[[], StandingController] | None = None,
         black_box: BlackBox | None = None,
+        senders: Callable[[], Sequence[str]] = tuple,
     ) -> None:
         """Guard the robot on the domain.
 
@@ -76,6 +77,7 @@ class SafetyProcess:
                 motors must hear us then, and its time must run as ours does; that of a twin stands still at times.
             standing: makes what the legs are given to where a stop leaves them and the state sound; None damps.
             black_box: keeps what happened around each stop; None keeps nothing.
+            senders: names who writes what moves the robot and is none of ours, at once.
         """
         if patient:
             limits = sim_sync.relaxed_limits(limits)
@@ -84,7 +86,7 @@ class SafetyProcess:
         self._node, self._clock, self._who = node, clock, who
         self._endpoints = endpoints = RoleEndpoints("safety", participant, node)
         self._arrivals = Arrivals(endpoints, clock, limits, None if black_box is None else black_box.add)
-        self._black_box = black_box
+        self._black_box, self._senders = black_box, senders
         self.commands = self._arrivals.commands
         self._out = endpoints.writer("/lowcmd")
         # Best effort, as the robot's own reader may be: a reliable one does not see writers that are.
@@ -168,7 +170,9 @@ class SafetyProcess:
         )
         self._steps += 1
         self.command = result.command
-        self.status = status = GateStatus(now, result.state, result.reason, result.detail)
+        strangers = "" if result.reason else "; ".join(self._senders())
+        detail = f"unknown senders: {strangers}" if strangers else result.detail
+        self.status = status = GateStatus(now, result.state, result.reason, detail)
         if status.stopped and now - self._foreign < FOREIGN:
             # To say "stopped" would be to lie: the motors follow whoever wrote last.
             detail = f"ALARM, the motors get another's commands; stopped for {status.why}"
@@ -290,6 +294,7 @@ class SafetyProcess:
         for name, frames in self._arrivals.damaged.items():
             values[f"damaged frames of {name}"] = frames.dropped
         values["check of sensors that stand still"] = "on" if self._frozen else "off: declared still"
+        values["unknown senders"] = "; ".join(self._senders()) or "none"
         values["on-board controller"] = self._switcher.owner or "none"
         level = DiagnosticStatus.ERROR if self.status.stopped else DiagnosticStatus.OK
         if self.status.state in (GateState.INIT, GateState.ARMED):

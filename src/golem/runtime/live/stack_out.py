@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,17 +22,18 @@ from golem.robots.model import magpie_model
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.runtime.live.bridge import Encoders
 from golem.runtime.nodes import moving
-from golem.types import BaseEstimate, LowCommand, Side
+from golem.types import Array, BaseEstimate, LowCommand, Side
 
 SHUT = "The safety gate is shut, see /safety/status."
 
 
-def encoders(bus: Bus, mode_machine: Callable[[], int]) -> Encoders:
+def encoders(bus: Bus, mode_machine: Callable[[], int], joint_offset: Array | None = None) -> Encoders:
     """Return what makes the messages that take the newest state on `bus` beside their value.
 
     Args:
         bus: of the stack.
         mode_machine: returns the machine type that the robot reports, which its commands repeat.
+        joint_offset: (27,) reported minus true joint positions by calibration [rad]; None believes them.
     """
 
     def odometry(estimate: BaseEstimate) -> Odometry | None:
@@ -51,7 +53,11 @@ def encoders(bus: Bus, mode_machine: Callable[[], int]) -> Encoders:
     def request(command: LowCommand) -> bytes | None:
         """Return what the stack wants of the motors, with the time of the state that it answers."""
         state = bus.latest(topics.LOW_STATE)
-        return None if state is None else encode_low_command(command, mode_machine(), answers=state.t)
+        if state is None:
+            return None
+        if joint_offset is not None:
+            command = replace(command, q=command.q + joint_offset)
+        return encode_low_command(command, mode_machine(), answers=state.t)
 
     return {"/odom": odometry, "/tf": frames, "/safety/lowcmd_in": request}
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 
@@ -98,6 +99,7 @@ class StackProcess:
         self._bus = Bus()
         self._clock = clock
         self._heard = clock()
+        self._calibrated = stack.part("calibration").load()
         self._calibration: dict[str, Array] = {name: np.eye(4) for name in public.CAMERAS}
         self._endpoints = endpoints = RoleEndpoints("stack", participant, node)
         self.side: StackNodes | None = None
@@ -154,6 +156,7 @@ class StackProcess:
         if self._robot.restarted or self._executor is None:
             self.restarts += self._robot.restarted
             self._executor = self._build(state.t)
+        state = replace(state, q=state.q - self._calibrated.joint_offset)
         self._bus.publish(topics.LOW_STATE, state, state.t)
         self._executor.advance(state.t, CATCH_UP)
         self._heard = self._clock()
@@ -178,7 +181,14 @@ class StackProcess:
             self.side.memory.close()
         epoch = time.time() - t
         side = self.side = StackNodes(
-            bus, self._stack, self._calibration, self._gantry, 0.0, self._pools, self._real, epoch
+            bus,
+            self._stack,
+            self._calibrated.merged(self._calibration),
+            self._gantry,
+            0.0,
+            self._pools,
+            self._real,
+            epoch,
         )
         side.legs.realtime, side.running.live = self._real, True
         self._skills.attach(side)
@@ -190,7 +200,9 @@ class StackProcess:
             (Phase.RECEIVE, AnswersIn(bus, service, self._calls, identities)),
             *self._nav2(bus),
             *side.nodes,
-            *outgoing(bus, endpoints, out.encoders(bus, lambda: self._mode_machine)),
+            *outgoing(
+                bus, endpoints, out.encoders(bus, lambda: self._mode_machine, self._calibrated.joint_offset)
+            ),
             (Phase.SEND, CallsOut(bus, service, self._calls, identities)),
             (Phase.SEND, self._skills),
             (Phase.SEND, LegsMonitor(bus, self._tell)),

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.hardware.safety.base import SafetyLimits
+from golem.hardware.safety.limiter import BRAKE
 from golem.hardware.safety.monitor import at_rest
 from golem.training.legs.training_model import KD, KP, STANCE, STEP
 from golem.types import LEGS, TICK, Array
@@ -54,18 +55,25 @@ class LegGate:
         """Return the (n, 12) positions that arrive now of `targets` that were sent `delay` (n,) physics steps ago.
 
         As `golem.hardware.safety.limiter`: the position inside its range and within reach of the last one, then pulled
-        towards the measured one until the torque kp (q_cmd - q) - kd dq that it predicts is within its bound.
+        towards the measured one until the torque kp (q_cmd - q) - kd dq that it predicts is within its bound. A joint
+        that is too fast, or too close to the end of its range for its speed, is braked whatever its target: where the
+        gate does that by a feed-forward torque, the position that arrives stands for it. Legs have no feed-forward of
+        their own, so that the bound of its rate is not met here.
         """
         then = (self._newest - delay) % REMEMBERED
         q, dq = self._q[then, self._rows], self._dq[then, self._rows]
-        rest = np.clip(-KD * dq, -self._bound, self._bound)
+        damp = np.clip(-KD * dq, -self._bound, self._bound)
+        end, brake = at_rest(q, dq, self._deceleration), BRAKE * self._bound
+        highest = np.where((dq > self._velocity) | (end > self._upper), -brake, self._bound)
+        lowest = np.where((dq < -self._velocity) | (end < self._lower), brake, -self._bound)
+        rest = np.minimum(np.maximum(damp, lowest), highest)
         up = np.sqrt(2.0 * self._deceleration * np.maximum(self._range[1] - self._sent, 0.0))
         down = np.sqrt(2.0 * self._deceleration * np.maximum(self._sent - self._range[0], 0.0))
         minimum = self._sent - np.minimum(down, self._slew) * STEP
         maximum = self._sent + np.minimum(up, self._slew) * STEP
         slewed = np.clip(np.clip(targets, *self._range), minimum, maximum)
-        self._sent = np.clip(slewed, q - (self._bound + rest) / KP, q + (self._bound - rest) / KP)
-        return self._sent
+        self._sent = np.minimum(np.maximum(slewed, q + (lowest - rest) / KP), q + (highest - rest) / KP)
+        return self._sent + (rest - damp) / KP
 
     def judge(self, q: Array, dq: Array, torque: Array) -> NDArray[np.bool_]:
         """Take in the state after a physics step, (n, 12) each; return (n,) whether it stops the robot."""

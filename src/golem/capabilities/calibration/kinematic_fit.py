@@ -1,0 +1,179 @@
+"""Fits the head camera's mount and the zeros of the arms' encoders to views of tags on the hands.
+
+Least squares over the corners' pixels, weighed by their noise, with priors on every unknown (the maximum a posteriori
+estimate of a kinematic calibration; e.g. Hollerbach, Khalil, Gautier: "Model identification", Springer Handbook of
+Robotics). Both hands are needed: a turn of the camera about an arm's first axis looks like a wrong zero of that axis,
+and only the other arm, whose axis leans the other way, tells them apart. The torso carries camera and arms, so its
+zero plays no part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from golem.errors import ConfigError
+from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.magpie_model import hand_name
+from golem.robots.model.table import T_TORSO_HEAD_OPTICAL
+from golem.robots.model.tag_cuff import cuff_tags, tag_corners
+from golem.robots.sensors.calibration_file import Calibration
+from golem.robots.sensors.cameras import HEAD, project
+from golem.types import NUM_JOINTS, SIDES, Array, CameraInfo, Side
+
+PIXEL = 0.4
+"""Noise of a corner [px]."""
+MOUNT = (0.05, 0.05)
+"""Prior of the camera's mount, rotation [rad] and translation [m]."""
+ZERO = 0.05
+"""Prior of an encoder's zero [rad]."""
+CUFF = (0.003, 0.0005)
+"""How well a cuff sits on its hand, rotation [rad] and translation [m]."""
+STEP = 1e-5
+"""Change of an unknown over which a derivative is taken [rad, m]."""
+VIEWS = 6
+"""Views of each hand that are the least to work with."""
+OUTLIER = 3.0
+"""Residuals, in `PIXEL`, from which a corner counts less at first; a tag that is as far off in the mean is left out."""
+ARM = {"left": slice(13, 20), "right": slice(20, 27)}
+"""Joints of each arm, in motor order."""
+
+
+@dataclass(frozen=True, slots=True)
+class TagView:
+    """What the head camera saw of one hand in one posture.
+
+    Attributes:
+        side: which hand.
+        q: (27,) joints as they were reported [rad].
+        corners: (4, 2) of each tag seen [px], by its number.
+    """
+
+    side: Side
+    q: Array
+    corners: dict[int, Array]
+
+
+def fit(views: Sequence[TagView], info: CameraInfo) -> Calibration:
+    """Return the calibration that explains the views best.
+
+    Args:
+        views: of both hands.
+        info: of the head camera.
+
+    Raises:
+        ConfigError: too few views of a hand.
+    """
+    for side in SIDES:
+        n = sum(view.side == side for view in views)
+        if n < VIEWS:
+            raise ConfigError(f"The {side} hand's tags were seen in {n} postures; {VIEWS} are the least.")
+    problem = _Problem(views, info)
+    start = np.zeros(problem.size)
+    rough = least_squares(problem.residuals, start, loss="cauchy", f_scale=OUTLIER, x_scale=problem.scale)
+    # A tag that is partly hidden has corners where it has none.
+    problem.keep(rough.x)
+    found = least_squares(problem.residuals, rough.x, x_scale=problem.scale)
+    residuals = problem.pixels(found.x)
+    covariance = np.linalg.inv(found.jac.T @ found.jac)
+    offset = np.zeros(NUM_JOINTS)
+    sigma = np.zeros(NUM_JOINTS)
+    for k, side in enumerate(SIDES):
+        part = slice(6 + 7 * k, 13 + 7 * k)
+        offset[ARM[side]] = found.x[part]
+        sigma[ARM[side]] = np.sqrt(np.diag(covariance)[part])
+    return Calibration(
+        cameras={"head": _pose(found.x[:6])},
+        covariances={"head": covariance[:6, :6]},
+        joint_offset=offset,
+        joint_sigma=sigma,
+        residual=float(np.sqrt(np.mean(residuals**2))),
+        views=problem.count,
+    )
+
+
+def information(side: Side, q: Array, tags: Sequence[int]) -> Array:
+    """Return what a view would tell of mount, the arm's zeros and the cuff, (19, 19), in units of their priors.
+
+    Args:
+        side: which hand is seen.
+        q: (27,) joints [rad].
+        tags: which of its tags are.
+    """
+    problem = _Problem([TagView(side, q, dict.fromkeys(tags, np.zeros((4, 2))))], HEAD)
+    k = SIDES.index(side)
+    columns = (*range(6), *range(6 + 7 * k, 13 + 7 * k), *range(20 + 6 * k, 26 + 6 * k))
+    here = problem.pixels(np.zeros(problem.size))
+    J = np.empty((len(here), len(columns)))
+    for row, column in enumerate(columns):
+        x = np.zeros(problem.size)
+        x[column] = STEP
+        J[:, row] = (problem.pixels(x) - here) / STEP * (problem.scale[column] / PIXEL)
+    return J.T @ J
+
+
+class _Problem:
+    """The unknowns: mount (rotation vector, translation), left arm's zeros, right arm's, left cuff's pose, right's."""
+
+    def __init__(self, views: Sequence[TagView], info: CameraInfo) -> None:
+        self._views, self._info = list(views), info
+        self._kinematics = Kinematics()
+        self._corners = np.column_stack([tag_corners(), np.ones(4)])
+        self._tags = {side: cuff_tags(side) for side in SIDES}
+        mount = np.repeat(MOUNT, 3)
+        cuff = np.repeat(CUFF, 3)
+        self.scale = np.concatenate([mount, np.full(14, ZERO), cuff, cuff])
+        self.size = len(self.scale)
+
+    @property
+    def count(self) -> int:
+        """How many views count."""
+        return len(self._views)
+
+    def residuals(self, x: Array) -> Array:
+        """Return the corners' errors and the priors', each by its standard deviation."""
+        return np.concatenate([self.pixels(x) / PIXEL, x / self.scale])
+
+    def keep(self, x: Array) -> None:
+        """Leave out the tags that `x` does not explain."""
+        kept: list[TagView] = []
+        for view in tuple(self._views):
+            self._views = [view]
+            errors = self.pixels(x).reshape(len(view.corners), 8)
+            good = np.sqrt(np.mean(errors**2, axis=1)) < OUTLIER * PIXEL
+            corners = {n: c for (n, c), ok in zip(view.corners.items(), good, strict=True) if ok}
+            kept.append(replace(view, corners=corners))
+        self._views = [view for view in kept if view.corners]
+
+    def pixels(self, x: Array) -> Array:
+        """Return predicted minus seen corners [px]."""
+        T_optical_torso = np.linalg.inv(T_TORSO_HEAD_OPTICAL @ _pose(x[:6]))
+        errors: list[Array] = []
+        for view in self._views:
+            k = SIDES.index(view.side)
+            q = view.q.copy()
+            q[ARM[view.side]] -= x[6 + 7 * k : 13 + 7 * k]
+            self._kinematics.update(q)
+            T_base_torso = self._kinematics.pose("torso_link")
+            T_base_hand = self._kinematics.pose(hand_name(view.side))
+            T = (
+                T_optical_torso
+                @ np.linalg.solve(T_base_torso, T_base_hand)
+                @ _pose(x[20 + 6 * k : 26 + 6 * k])
+            )
+            for number, seen in view.corners.items():
+                points = (T @ self._tags[view.side][number] @ self._corners.T).T[:, :3]
+                errors.append((project(self._info, points) - seen).ravel())
+        return np.concatenate(errors)
+
+
+def _pose(x: Array) -> Array:
+    """Return the (4, 4) pose with rotation vector and translation `x` (6,)."""
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec(x[:3]).as_matrix()
+    T[:3, 3] = x[3:]
+    return T

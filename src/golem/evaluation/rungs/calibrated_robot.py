@@ -1,0 +1,184 @@
+"""Rungs `calibration` and `tether-calibrated`: what a calibration by tags is worth, by the simulator's truth."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from golem import registry
+from golem.errors import ConfigError
+from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.episodes.episode import episode_seed
+from golem.evaluation.rungs.pick_screw import SLOT, PickOptions, PickRung
+from golem.provenance import stack_facts
+from golem.robots.model.spatial import skew
+from golem.robots.mujoco.engine import MujocoRobot
+from golem.robots.sensors.calibration_file import Calibration, read_calibration
+from golem.runtime.lockstep import build, build_robot
+from golem.skills.base import SkillResult
+from golem.stack import Stack, load_stack
+from golem.types import Array
+
+STACK = "tether"
+"""The shipped stack whose robot is calibrated."""
+SKILL = "calibrate"
+AHEAD = np.array([0.0, 0.0, 1.0, 1.0])
+"""Point on the optical axis at which the head camera is judged [m], as in the realism profiles."""
+GOOD = 0.005
+"""Error there that counts as calibrated [m]."""
+ERRORS = ("before", "after", "sigma", "joint_before", "joint_after", "views", "residual")
+"""What is recorded: of the camera [m], of the arms' encoders, root mean square [rad]."""
+
+
+@dataclass(frozen=True)
+class CalibrationOptions:
+    """How it is calibrated."""
+
+    views: int = 16
+    """Postures of each hand."""
+    keep: str = ""
+    """Folder in which calibrations are kept, by profile and episode, and from which they are taken where they are."""
+
+
+@dataclass(frozen=True)
+class CalibratedPickOptions(PickOptions):
+    """The work place, and how the robot was calibrated."""
+
+    views: int = 16
+    """Postures of each hand."""
+    keep: str = ""
+    """Folder in which calibrations are kept, by profile and episode, and from which they are taken where they are."""
+
+
+class CalibrationRung(Rung[CalibrationOptions]):
+    """Calibrate a robot that was never calibrated: success is a head camera within 5 mm at 1 m."""
+
+    name = "calibration"
+    Options = CalibrationOptions
+    default_methods = (SKILL,)
+
+    def methods(self) -> tuple[str, ...]:
+        """Return the one shipped skill; one's own may be named."""
+        return (SKILL,)
+
+    def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
+        """Return what determines a trial besides its seed; see `Rung`."""
+        return stack_facts(tagged_stack(profile, overrides))
+
+    def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
+        """Run one trial; see `Rung`."""
+        stack = tagged_stack(spec.profile, spec.overrides)
+        seed = episode_seed(spec.seed, spec.index)
+        found = calibrate(stack, seed, self.options.views, self.options.keep)
+        if isinstance(found, SkillResult):
+            return TrialOutcome(False, found.stage, found.slot, found.reason, found.timings)
+        with closing(build_robot(stack, seed)) as robot:
+            zeros = robot.true_joint_offset[13:], found.joint_offset[13:]
+            values = (
+                _apart(robot.calibration["head"]),
+                _apart(found.cameras["head"]),
+                _sigma(found),
+                _rms(zeros[0]),
+                _rms(zeros[0] - zeros[1]),
+                float(found.views),
+                found.residual,
+            )
+        good = values[1] <= GOOD
+        series: dict[str, float] = dict(zip(ERRORS, values, strict=True))
+        return TrialOutcome(
+            good,
+            DONE if good else "fit",
+            None if good else f"skill: {spec.method}",
+            f"Head camera {values[0] * 1e3:.0f} -> {values[1] * 1e3:.1f} mm at 1 m.",
+            {},
+            series,
+        )
+
+
+class CalibratedTether(PickRung):
+    """Rung `tether` with a robot that was calibrated first: the same screws and errors, and a calibration's file."""
+
+    name = "tether-calibrated"
+    Options = CalibratedPickOptions
+
+    def __init__(self, options: CalibratedPickOptions | None = None) -> None:
+        """Read the sweep; see `Rung`."""
+        super().__init__(options)
+        self._how = options or CalibratedPickOptions()
+        self._file: Path | None = None
+
+    def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
+        """Calibrate, then run one trial; see `Rung`."""
+        seed = episode_seed(spec.seed, spec.index)
+        found = calibrate(tagged_stack(spec.profile, {}), seed, self._how.views, self._how.keep)
+        if isinstance(found, SkillResult):
+            return TrialOutcome(False, found.stage, found.slot, found.reason, found.timings)
+        with tempfile.TemporaryDirectory() as folder:
+            self._file = Path(folder) / "calibration.json"
+            found.save(self._file)
+            try:
+                return super().run(spec, artefacts)
+            finally:
+                self._file = None
+
+    def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
+        if SLOT in overrides:
+            raise ConfigError(f"The method is what sits in {SLOT}; leave out --use {SLOT}=...")
+        stack = load_stack(STACK, profile=profile).with_choice(SLOT, method)
+        for slot, use in overrides.items():
+            stack = stack.with_choice(slot, use)
+        return stack if self._file is None else stack.with_part("calibration", file=str(self._file))
+
+
+def calibrate(stack: Stack, seed: int, views: int, keep: str = "") -> Calibration | SkillResult:
+    """Return the calibration of a twin that wears its tags, or how it failed.
+
+    Args:
+        stack: of that twin.
+        seed: of the episode.
+        views: postures of each hand.
+        keep: see `CalibrationOptions`.
+    """
+    kept = Path(keep) / f"{stack.profile}-{views}-{seed}.json" if keep else None
+    if kept is not None and kept.is_file():
+        return read_calibration(kept)
+    running, robot = build(stack, seed)
+    with closing(robot), tempfile.TemporaryDirectory() as folder:
+        file = kept or Path(folder) / "calibration.json"
+        result = running.execute(SKILL, {"file": str(file), "views": views})
+        return read_calibration(file) if result.success else result
+
+
+def tagged_stack(profile: str, overrides: Mapping[str, str]) -> Stack:
+    """Return the stack whose robot wears the tags, in an empty hall: it is the same robot as at the pack.
+
+    Raises:
+        ConfigError: an override is wrong, or brings another robot.
+    """
+    stack = load_stack(STACK, profile=profile)
+    for slot, use in overrides.items():
+        stack = stack.with_choice(slot, use)
+    if not issubclass(registry.load("robot", stack.choice("robot").use), MujocoRobot):
+        raise ConfigError("This rung judges on the simulator's truth; leave out --use robot=...")
+    return stack.with_options("robot", tags=True, world="open")
+
+
+def _apart(T: Array) -> float:
+    """Return how far the pose `T` (4, 4) moves the point at which the camera is judged [m]; the truth moves nothing."""
+    return float(np.linalg.norm(T @ AHEAD - AHEAD))
+
+
+def _sigma(found: Calibration) -> float:
+    """Return the standard deviation that the calibration claims for that point, of its worst axis [m]."""
+    J = np.hstack([skew(-AHEAD[:3]), np.eye(3)])
+    return float(np.sqrt(np.linalg.eigvalsh(J @ found.covariances["head"] @ J.T).max()))
+
+
+def _rms(v: Array) -> float:
+    return float(np.sqrt(np.mean(v * v)))

@@ -1,0 +1,115 @@
+"""What a calibration found, in a file that a stack takes: `calibration: {file: calibration.json}`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from golem.errors import ConfigError, OutputError
+from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
+from golem.robots.sensors.calibration import OPTICAL_FRAMES
+from golem.types import NUM_JOINTS, Array
+
+
+def _none() -> Array:
+    return np.zeros(NUM_JOINTS)
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Where cameras sit and where encoders count from.
+
+    Attributes:
+        cameras: by camera, the (4, 4) pose of its optical frame in that of the nominal model.
+        covariances: by camera, the (6, 6) covariance of that pose: rotation vector [rad], translation [m].
+        joint_offset: (27,) reported minus true joint position [rad].
+        joint_sigma: (27,) standard deviation of that [rad]; 0 where it was not looked for.
+        residual: what is left of the corners' errors, root mean square [px].
+        views: how many it was found from.
+    """
+
+    cameras: dict[str, Array] = field(default_factory=dict[str, Array])
+    covariances: dict[str, Array] = field(default_factory=dict[str, Array])
+    joint_offset: Array = field(default_factory=_none)
+    joint_sigma: Array = field(default_factory=_none)
+    residual: float = 0.0
+    views: int = 0
+
+    def merged(self, cameras: Mapping[str, Array]) -> dict[str, Array]:
+        """Return `cameras`, poses as above, with those that were calibrated in the place of theirs."""
+        return {name: self.cameras.get(name, T) for name, T in cameras.items()}
+
+    def save(self, path: Path) -> None:
+        """Write it.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        rows = {
+            "cameras": {
+                name: {"pose": T.tolist(), "covariance": self.covariances[name].tolist()}
+                for name, T in self.cameras.items()
+            },
+            "joints": {
+                name: {"offset": float(self.joint_offset[i]), "sigma": float(self.joint_sigma[i])}
+                for i, name in enumerate(JOINT_NAMES)
+                if self.joint_sigma[i] > 0.0
+            },
+            "residual": self.residual,
+            "views": self.views,
+        }
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise OutputError(f"The calibration '{path}' cannot be written: {error}.") from error
+
+
+def read_calibration(path: Path) -> Calibration:
+    """Read what `Calibration.save` wrote.
+
+    Raises:
+        ConfigError: it cannot be read, or is none.
+    """
+    try:
+        rows: Any = json.loads(path.read_text(encoding="utf-8"))
+        cameras = {name: np.array(row["pose"], float) for name, row in rows["cameras"].items()}
+        covariances = {name: np.array(row["covariance"], float) for name, row in rows["cameras"].items()}
+        offset, sigma = _none(), _none()
+        for name, row in rows["joints"].items():
+            offset[JOINT_INDEX[name]], sigma[JOINT_INDEX[name]] = row["offset"], row["sigma"]
+        found = Calibration(cameras, covariances, offset, sigma, float(rows["residual"]), int(rows["views"]))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ConfigError(
+            f"'{path}' is no calibration: {error!r}; golem calibrate head writes one."
+        ) from error
+    unknown = [name for name in cameras if name not in OPTICAL_FRAMES]
+    if unknown or any(T.shape != (4, 4) or not np.isfinite(T).all() for T in cameras.values()):
+        raise ConfigError(f"'{path}' is no calibration: a camera is unknown, or its pose no (4, 4) matrix.")
+    if not np.isfinite(offset).all() or np.abs(offset).max() > 0.3:
+        raise ConfigError(f"'{path}' shifts a joint by more than 0.3 rad: that is no encoder's zero.")
+    return found
+
+
+@dataclass(frozen=True)
+class CalibrationPart:
+    """The calibration that a stack uses.
+
+    Attributes:
+        file: what `golem calibrate` wrote; without one cameras are where the robot says, and encoders are believed.
+    """
+
+    file: Path | None = None
+
+    def load(self) -> Calibration:
+        """Return it.
+
+        Raises:
+            ConfigError: the file cannot be read, or is no calibration.
+        """
+        return Calibration() if self.file is None else read_calibration(self.file)

@@ -1,0 +1,119 @@
+"""The checks that only listen: who is on the domain, what the robot reports, and whether it can be true."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from golem.hardware.safety.base import SafetyLimits
+from golem.hardware.safety.monitor import tilt
+from golem.hardware.safety.motor_reports import MotorReports, MotorWatch
+from golem.hardware.safety.senses import LIMBS
+from golem.middleware.wire import convert, hg
+from golem.robots.model.table import JOINT_NAMES
+from golem.runtime.bringup.base import StepFinding, Workbench
+from golem.types import LowState
+
+LISTEN = 3.0
+"""Time over which states are gathered [s]."""
+FREQUENCY = 500.0
+"""States per second of the robot's time."""
+LOST = 0.02
+"""Share of states that may be lost on the way."""
+UPRIGHT = 0.26
+"""How far a hanging torso may lean [rad]."""
+GRAVITY = (9.3, 10.3)
+"""Mean specific force of a robot at rest [m/s^2]."""
+STILL = 0.05
+"""Mean rate of the torso of one [rad/s]: above it the gyroscope has an offset, or the robot swings."""
+
+
+def check_domain(bench: Workbench) -> StepFinding:
+    """One robot is there, and nobody who would command it."""
+    link = bench.link
+    link.spin(5.0, lambda: link.state is not None and link.others() > 0)
+    link.spin(1.0)
+    robots = link.writers("/lowstate")
+    if not robots:
+        return StepFinding(
+            False, f"no robot on {bench.config.dds}: look at its power, the cable and the interface's address"
+        )
+    if len(robots) > 1:
+        return StepFinding(False, f"{len(robots)} robots write /lowstate: {', '.join(robots)}")
+    stacks = link.writers("/safety/lowcmd_in")
+    if stacks:
+        return StepFinding(False, f"a stack is on the domain, end it first: {', '.join(stacks)}")
+    gates = [who for who in link.writers("/lowcmd") if who.startswith("golem ")]
+    if gates:
+        return StepFinding(False, f"a gate is on the domain, end it first: {', '.join(gates)}")
+    own = link.writers("/lowcmd")
+    return StepFinding(
+        True,
+        f"{bench.config.dds}; the robot is {robots[0]}",
+        {"others on the domain": float(link.others()), "other writers of /lowcmd": ", ".join(own) or "none"},
+    )
+
+
+def check_state(bench: Workbench) -> StepFinding:
+    """The state comes at its rate, lives, and what it says can be true."""
+    link = bench.link
+    heard = link.listen(LISTEN)
+    if len(heard) < 100:
+        return StepFinding(
+            False, f"{len(heard)} states in {LISTEN:g} s, and {link.damaged} that cannot be read"
+        )
+    states = [s for _, s in heard]
+    robot, ours = states[-1].t - states[0].t, heard[-1][0] - heard[0][0]
+    rate, lost = robot / ours, 1.0 - (len(states) - 1) / (FREQUENCY * robot)
+    force = np.mean([s.imu.acc for s in states], axis=0)
+    spin = np.mean([s.imu.gyro for s in states], axis=0)
+    lean = tilt(states[-1].imu.quat)
+    figures: dict[str, float | str] = {
+        "states per second of the robot's time": round((len(states) - 1) / robot, 1),
+        "robot's time by ours": round(rate, 3),
+        "unreadable states": float(link.damaged),
+        "specific force [m/s^2]": round(float(np.linalg.norm(force)), 2),
+        "mean rate [rad/s]": round(float(np.linalg.norm(spin)), 4),
+        "lean [deg]": round(float(np.degrees(lean)), 1),
+        "mode_machine": float(convert.mode_machine(link.payload)),
+    }
+    limits = SafetyLimits.from_profile()
+    mode, error, temperature, voltage = convert.motor_columns(link.payload)
+    watch = MotorWatch(limits)
+    reports = MotorReports(mode == hg.ENABLE, error, temperature, voltage)
+    fault = next((f for f in (watch.add(reports) for _ in range(10)) if f is not None), None)
+    out = np.flatnonzero((states[-1].q < limits.state_lower) | (states[-1].q > limits.state_upper))
+    wrong = ""
+    if link.damaged > 0.02 * len(heard):
+        wrong = f"{link.damaged} states cannot be read: checksum, or another firmware"
+    elif lost > LOST:
+        wrong = f"{100 * lost:.0f} % of the states are lost, or its tick is no millisecond"
+    elif bench.config.dds.robot and not 0.98 <= rate <= 1.02:
+        wrong = f"the robot's time runs at {rate:.2f} of ours"
+    elif (frozen := frozen_groups(states)) and bench.config.dds.robot:
+        wrong = f"{', '.join(frozen)} repeat the very same numbers: the bus is dead"
+    elif not GRAVITY[0] <= np.linalg.norm(force) <= GRAVITY[1]:
+        wrong = f"the IMU feels {np.linalg.norm(force):.1f} m/s^2"
+    elif np.linalg.norm(spin) > STILL:
+        wrong = f"the IMU turns at {np.linalg.norm(spin):.2f} rad/s: let the robot hang still"
+    elif lean > UPRIGHT:
+        wrong = f"the torso leans by {np.degrees(lean):.0f} degrees by its IMU: hang it upright"
+    elif fault is not None:
+        wrong = fault.detail
+    elif len(out):
+        wrong = f"{JOINT_NAMES[out[0]]} is out of its range at {states[-1].q[out[0]]:.2f} rad"
+    return StepFinding(not wrong, wrong or "sound", figures)
+
+
+def frozen_groups(states: list[LowState]) -> list[str]:
+    """Return the limbs, and "IMU", whose numbers never change in `states`."""
+    frozen = [
+        name
+        for name, part in LIMBS.items()
+        if all(
+            (s.q[part] == states[0].q[part]).all() and (s.dq[part] == states[0].dq[part]).all()
+            for s in states
+        )
+    ]
+    if all((s.imu.gyro == states[0].imu.gyro).all() for s in states):
+        frozen.append("IMU")
+    return frozen

@@ -1,0 +1,172 @@
+"""Calibrate the head camera and the arms' encoders by the tags on the hands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from golem.capabilities.calibration.kinematic_fit import TagView, fit
+from golem.capabilities.calibration.tag_detector import TagDetector
+from golem.capabilities.calibration.view_postures import view_postures
+from golem.capabilities.collision.obstacles import Obstacle, World
+from golem.capabilities.planning.base import PlanRefused
+from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
+from golem.interfaces import topics
+from golem.options import require
+from golem.robots.model.spatial import skew, transform
+from golem.robots.model.tag_cuff import cuff_tags
+from golem.skills.base import SkillResult, StageFailed
+from golem.skills.context import Context
+from golem.skills.planned_motion import PlannedMotion
+from golem.types import SIDES, CameraInfo, Side
+
+CAMERA = "head"
+WORK_PLACE = World((Obstacle("box", transform((0.85, 0.0, -0.22)), (0.55, 1.3, 0.28), "work place"),))
+"""What the arms keep out of, in base_link [m]: whatever stands before the robot, up to 6 cm above its pelvis."""
+SPEED = 0.6
+"""How fast a hand goes from view to view [m/s]."""
+FRAMES = 2
+"""Frames that are looked at in one posture: the second one tells nothing new of a tag, but may show one at all."""
+FRAME_TIME = 1.0
+"""How long a frame is waited for [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrateGoal:
+    """What to calibrate by.
+
+    Attributes:
+        file: where the calibration is written; empty writes none.
+        views: postures per hand.
+        settle: time the arm gets to come to rest in each [s].
+        seed: of the postures.
+    """
+
+    file: str = "calibration.json"
+    views: int = 16
+    settle: float = 0.5
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ConfigError: one is outside its range.
+        """
+        require(
+            "",
+            ("number of views per hand", self.views, 6 <= self.views <= 60, "6 to 60"),
+            ("time to settle", self.settle, 0.0 <= self.settle <= 5.0, "0 to 5 s"),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrateReport:
+    """What was found.
+
+    Attributes:
+        views: postures in which tags were seen.
+        residual: root mean square error that is left of the tags' corners [px].
+        camera: by how much the head camera's mount moves a point 1 m ahead [m].
+        camera_sigma: standard deviation of that point, the largest of its axes [m].
+        joint: largest zero error of an encoder that was found [rad].
+        joint_sigma: largest standard deviation of one [rad].
+    """
+
+    views: int = 0
+    residual: float = 0.0
+    camera: float = 0.0
+    camera_sigma: float = 0.0
+    joint: float = 0.0
+    joint_sigma: float = 0.0
+
+
+class Calibrate:
+    """Show the head camera both hands in many postures, and find its mount and the arms' encoder zeros.
+
+    The hands wear their cuffs of tags. Stages: `look`, `fit`, `done`.
+    """
+
+    Goal = CalibrateGoal
+    Result = CalibrateReport
+
+    def timeout(self, goal: CalibrateGoal) -> float:
+        """Return the time it may take [s]; see `Skill`."""
+        return 60.0 + 2 * goal.views * (8.0 + goal.settle)
+
+    async def run(self, context: Context, goal: CalibrateGoal) -> SkillResult:
+        """Calibrate; see `Skill`."""
+        start = context.t
+        views, info = await self._views(context, goal)
+        if info is None:
+            raise StageFailed("look", "robot", "The head camera sends no images.")
+        context.say("fit", f"Fitting {len(views)} views.")
+        found = fit(views, info)
+        ahead = np.array([0.0, 0.0, 1.0])
+        T, J = found.cameras[CAMERA], np.hstack([skew(-ahead), np.eye(3)])
+        spread = J @ found.covariances[CAMERA] @ J.T
+        report = CalibrateReport(
+            found.views,
+            found.residual,
+            float(np.linalg.norm(T[:3, :3] @ ahead + T[:3, 3] - ahead)),
+            math.sqrt(float(np.linalg.eigvalsh(spread).max())),
+            float(np.abs(found.joint_offset).max()),
+            float(found.joint_sigma.max()),
+        )
+        if goal.file:
+            found.save(Path(goal.file))
+        text = (
+            f"{report.views} views, {report.residual:.2f} px left; the head camera sits "
+            f"{report.camera * 1e3:.0f} mm (+- {report.camera_sigma * 1e3:.1f}) from where the model has it, at 1 m"
+        )
+        context.say("done", text)
+        return SkillResult(True, "done", None, f"{text}.", {"calibrate": context.t - start}, report)
+
+    async def _views(self, context: Context, goal: CalibrateGoal) -> tuple[list[TagView], CameraInfo | None]:
+        """Show the hands one after the other; return what was seen, and the camera."""
+        detector, motion = TagDetector(), PlannedMotion(context)
+        robot = PlanningRobot()
+        motion.world = WORK_PLACE
+        space = JointSpace(robot, context.joints, WORK_PLACE)
+        views: list[TagView] = []
+        info: CameraInfo | None = None
+        for side in SIDES:
+            home = context.commanded_joints.copy()
+            postures = view_postures(
+                side, goal.views, lambda q: space.verdict(q) == 0, robot.model().placed, goal.seed
+            )
+            for k, q in enumerate(postures):
+                context.say("look", f"{side} hand, view {k + 1} of {goal.views}.")
+                q[0] = home[0]
+                try:
+                    await motion.to_joints(q, (side,), SPEED)
+                except PlanRefused:
+                    continue
+                await context.sleep(goal.settle)
+                seen, info = await self._look(context, detector, side, info)
+                if seen is not None:
+                    views.append(seen)
+            await motion.to_joints(home, (side,), SPEED)
+        return views, info
+
+    async def _look(
+        self, context: Context, detector: TagDetector, side: Side, info: CameraInfo | None
+    ) -> tuple[TagView | None, CameraInfo | None]:
+        """Look at a hand that rests; return what was seen with the joints of that moment, None for nothing."""
+        own = cuff_tags(side)
+        with context.watch(CAMERA, "screw") as stream:
+            for _ in range(FRAMES):
+                if await stream.look(FRAME_TIME) is None:
+                    continue
+                frame = context.bus.latest(topics.rgbd_images(CAMERA))
+                state = context.bus.latest(topics.LOW_STATE)
+                if frame is None or state is None:
+                    continue
+                info = frame.info
+                corners = {n: c for n, c in detector.find(frame.rgb).items() if n in own}
+                if corners:
+                    return TagView(side, state.q.copy(), corners), info
+        return None, info

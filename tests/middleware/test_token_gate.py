@@ -1,0 +1,107 @@
+"""Nobody passes without the token; who has it once gets through again by the cookie."""
+
+from __future__ import annotations
+
+import http.server
+import re
+import socket
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from golem.errors import ConfigError
+from golem.middleware.token_gate import TokenGate, is_loopback
+
+
+class Hello(http.server.BaseHTTPRequestHandler):
+    """A server that greets."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.send_header("Content-Length", "5")
+        self.end_headers()
+        self.wfile.write(b"hello")
+
+    def log_message(self, format: str, *args: object) -> None:
+        return
+
+
+@pytest.fixture
+def gate() -> Iterator[TokenGate]:
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Hello)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    gate = TokenGate("127.0.0.1", 0, server.server_address[1])
+    yield gate
+    gate.close()
+    server.shutdown()
+    server.server_close()
+
+
+def ask(gate: TokenGate, path: str, *headers: str) -> str:
+    """Return the whole answer to a request."""
+    with socket.create_connection(("127.0.0.1", gate.port), 5.0) as connection:
+        lines = [f"GET {path} HTTP/1.1", "Host: x", *headers, "Connection: close", "", ""]
+        connection.sendall("\r\n".join(lines).encode())
+        data = b""
+        while more := connection.recv(4096):
+            data += more
+    return data.decode()
+
+
+def test_the_token_opens_and_its_cookie_opens_again(gate: TokenGate) -> None:
+    answer = ask(gate, f"/?token={gate.token}")
+    assert answer.startswith("HTTP/1.0 200") and answer.endswith("hello")
+    cookie = re.search(r"^Set-Cookie: (golem_token=[\w-]+);.*HttpOnly; SameSite=Strict\r$", answer, re.M)
+    assert cookie is not None
+    again = ask(gate, "/assets/x.js", f"Cookie: other=1; {cookie[1]}")
+    assert again.endswith("hello") and "Set-Cookie" not in again
+
+
+@pytest.mark.parametrize(
+    ("path", "header"),
+    [
+        ("/", "X: y"),
+        ("/?token=", "X: y"),
+        ("/?token=wrong", "X: y"),
+        ("/", "Cookie: golem_token=wrong"),
+        ("/?x=1", "Referer: http://x/?token=wrong"),
+    ],
+)
+def test_nobody_else_gets_through(gate: TokenGate, path: str, header: str) -> None:
+    answer = ask(gate, path, header)
+    assert answer.startswith("HTTP/1.1 403") and "hello" not in answer
+
+
+def test_garbage_and_silence_end_the_connection(gate: TokenGate) -> None:
+    with socket.create_connection(("127.0.0.1", gate.port), 5.0) as connection:
+        connection.sendall(b"\x00\xff" * 10_000)
+        connection.shutdown(socket.SHUT_WR)
+        try:
+            assert connection.recv(64).startswith(b"HTTP/1.1 403")
+        except ConnectionResetError:  # it had not read all of it
+            pass
+    assert ask(gate, f"/?token={gate.token}").endswith("hello")
+
+
+def test_a_taken_port_is_said_and_tokens_differ(gate: TokenGate) -> None:
+    with pytest.raises(ConfigError, match="choose another port or host"):
+        TokenGate("127.0.0.1", gate.port, 1)
+    other = TokenGate("127.0.0.1", 0, 1)
+    other.close()
+    assert other.token != gate.token and len(gate.token) >= 20
+
+
+@pytest.mark.parametrize(
+    ("host", "local"),
+    [
+        ("127.0.0.1", True),
+        ("localhost", True),
+        ("::1", True),
+        ("0.0.0.0", False),
+        ("192.168.1.2", False),
+        ("x", False),
+    ],
+)
+def test_which_addresses_are_this_machines_alone(host: str, local: bool) -> None:
+    assert is_loopback(host) is local

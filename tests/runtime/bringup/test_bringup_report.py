@@ -1,0 +1,101 @@
+"""What has passed is kept, what lasts is not repeated, and nothing goes on where a check fails."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+from golem.errors import ConfigError
+from golem.runtime.bringup.base import BringupConfig, BringupStep, StepFinding, StepRefused, Task, Workbench
+from golem.runtime.bringup.bringup_command import CHECKS, run_checks
+from golem.runtime.bringup.bringup_report import FILE, BringupReport
+
+
+class Nobody:
+    """A person who hears everything and does nothing."""
+
+    def __init__(self) -> None:
+        self.heard: list[str] = []
+
+    def tell(self, text: str) -> None:
+        self.heard.append(text)
+
+    def confirm(self, question: str, word: str) -> bool:
+        return False
+
+    def act(self, task: Task) -> None:
+        raise AssertionError("nothing is to be done here")
+
+
+def bench() -> Workbench:
+    return Workbench(cast(Any, None), Nobody(), BringupConfig(), lambda: cast(Any, None))
+
+
+def checks(done: list[str], outcomes: dict[str, bool], lasting: str = "") -> tuple[BringupStep, ...]:
+    """Return checks called as `outcomes`, which write down that they were done."""
+
+    def make(name: str) -> BringupStep:
+        def run(_: Workbench) -> StepFinding:
+            done.append(name)
+            if name == "refuses":
+                raise StepRefused("the gate has ended")
+            return StepFinding(outcomes[name], f"about {name}", {"figure": 1.5})
+
+        return BringupStep(name, f"Title of {name}", run, lasting=name == lasting)
+
+    return tuple(map(make, outcomes))
+
+
+def test_nothing_goes_on_where_a_check_fails(tmp_path: Path) -> None:
+    done: list[str] = []
+    row = checks(done, {"one": True, "two": False, "three": True})
+    report = BringupReport(tmp_path, "domain 1")
+    assert not run_checks(bench(), report, row, again=())
+    assert done == ["one", "two"]
+    page = report.page(row).read_text()
+    assert "Title of one: passed" in page and "Title of two: FAILED" in page
+    assert "Title of three: not reached" in page and "| figure | 1.5 |" in page
+
+
+def test_what_lasts_is_not_repeated_unless_asked(tmp_path: Path) -> None:
+    done: list[str] = []
+    row = checks(done, {"one": True, "two": True}, lasting="two")
+    assert run_checks(bench(), BringupReport(tmp_path, "domain 1"), row, again=())
+    assert run_checks(bench(), BringupReport(tmp_path, "domain 1"), row, again=())
+    assert run_checks(bench(), BringupReport(tmp_path, "domain 1"), row, again=("two",))
+    assert done == ["one", "two", "one", "one", "two"]
+
+
+def test_a_refusal_fails_its_check(tmp_path: Path) -> None:
+    report = BringupReport(tmp_path, "domain 1")
+    assert not run_checks(bench(), report, checks([], {"refuses": True}), again=())
+    assert "the gate has ended" in (tmp_path / FILE).read_text()
+
+
+def test_a_report_of_another_robot_or_none_is_refused(tmp_path: Path) -> None:
+    BringupReport(tmp_path, "domain 1").add("one", StepFinding(True, "fine"))
+    with pytest.raises(ConfigError, match="not on domain 2"):
+        BringupReport(tmp_path, "domain 2")
+    (tmp_path / FILE).write_text(json.dumps({"where": "domain 1"}))
+    with pytest.raises(ConfigError, match="no file of a bring-up"):
+        BringupReport(tmp_path, "domain 1")
+
+
+def test_what_must_hold_each_time_is_repeated_each_time() -> None:
+    assert {check.name for check in CHECKS if not check.lasting} == {
+        "domain",
+        "hoist",
+        "state",
+        "estop",
+        "release",
+    }
+
+
+def test_a_real_robot_needs_its_button_and_devices_have_names() -> None:
+    with pytest.raises(ConfigError, match="choose among: head camera"):
+        BringupConfig(without=("camera",))
+    with pytest.raises(ConfigError, match="share"):
+        BringupConfig(share=1.0)
