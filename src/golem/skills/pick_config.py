@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from golem.errors import ConfigError
+from golem.types import Side
 
 Hand = Literal["left", "right", "either"]
 
@@ -47,6 +48,8 @@ class PickConfig:
         comfort: x, y in base_link around which the arm works best [m]; the nearest object is taken first.
         attempts: how often a method that looks again may try to grasp and pull one object.
         candidates: how many objects it may try.
+        slack: how far beside the reach of a hand the head camera may see what is tried all the same [m]; it is off by
+            that much.
         proud: height above the ground around it [m] from which on an object comes before lower ones: as the head camera
             sees them, half of the tight screws are lower than 9 mm, and half of the loosened ones higher than 15 mm.
         turn: how far the torso turns to either side where object or container are not in view [rad]; 0: not at all.
@@ -63,8 +66,10 @@ class PickConfig:
         pull: length of the straight extraction [m]; longer than any screw.
         pull_speed: how fast [m/s].
         tolerance: distance from a commanded pose at which the arm counts as arrived [m].
+        drop_margin: distance of the place where it lets go from the container's rim [m].
         drop_height: height of the fingertips above the container's floor when they open [m].
         release_gap: opening that lets go [m].
+        looks_after: pictures of the head camera in which it looks for what was dropped; 0 does not look.
         look_timeout: time a camera may take to show the object [s].
         timeout: time after which the pick is given up [s]; the paper's grasps took 75 +- 16 s by the clock.
     """
@@ -74,7 +79,8 @@ class PickConfig:
     container_radius: float = 0.15
     comfort: tuple[float, float] = (0.45, -0.12)
     attempts: int = 2
-    candidates: int = 3
+    candidates: int = 8
+    slack: float = 0.04
     proud: float = 0.0115
     turn: float = 0.35
     travel: Literal["lines", "planned"] = "planned"
@@ -89,7 +95,13 @@ class PickConfig:
     pull: float = 0.06
     pull_speed: float = 0.05
     tolerance: float = 0.006
+    drop_margin: float = 0.04
     drop_height: float = 0.10
     release_gap: float = 0.060
-    look_timeout: float = 3.0
+    looks_after: int = 5
+    look_timeout: float = 1.0
     timeout: float = 90.0
+
+    def heading(self, side: Side) -> float:
+        """Return `yaw` for a hand [rad]."""
+        return self.yaw if side == "right" else -self.yaw

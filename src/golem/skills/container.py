@@ -1,0 +1,77 @@
+"""What a pick drops things into: where to let go of them, and which lie in it already."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.capabilities.perception.open_box import OpenBox, fit_open_box
+from golem.types import Array, LocalizedObject
+
+BRIM = 0.01
+"""What is this far outside of the rim may still lie inside [m]: as much is the depth off."""
+APART = 0.03
+"""Distance between two places that are tried [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Container:
+    """A container as the head camera saw it.
+
+    Attributes:
+        sighting: that view.
+        box: its shape; None where the view does not tell.
+        radius: what is nearer to its middle than this lies in it, where the shape is not known [m].
+    """
+
+    sighting: LocalizedObject
+    box: OpenBox | None
+    radius: float
+
+    @classmethod
+    def of(cls, sighting: LocalizedObject, radius: float) -> Container:
+        """Return the container that a sighting shows; `radius` as above."""
+        return cls(sighting, fit_open_box(sighting), radius)
+
+    def holds(self, points: Array) -> NDArray[np.bool_]:
+        """Return (n,) which of the points (n, 3) in odom lie in it, seen from above."""
+        if self.box is not None:
+            return self.box.contains(points, -BRIM)
+        away = points[:, :2] - self.sighting.position[:2]
+        return np.linalg.norm(away, axis=1) < self.radius
+
+    def places(self, margin: float) -> Array:
+        """Return (n, 3) places on its floor in odom, `margin` [m] inside its rim and apart, the middle first."""
+        if self.box is None:
+            return self.sighting.position[None]
+        chosen: list[Array] = []
+        for place in self.box.places(margin):
+            if all(np.linalg.norm(place - one) > APART for one in chosen):
+                chosen.append(place)
+        return np.array(chosen)
+
+
+def shift_of(seen: Array, expected: Array, others: Array) -> Array:
+    """Return by how much a hand misses what the head camera shows, to send it elsewhere by the same.
+
+    Head camera and encoders are off by centimetres, and the palm camera tells by how much at the object that was
+    taken. What looks alike in a row may be mistaken for its neighbour. So what the difference has in the direction
+    of the nearest of `others` counts only up to a quarter of their distance.
+
+    Args:
+        seen: (3,) where the palm camera saw the object, in odom [m].
+        expected: (3,) where the head camera did.
+        others: (n, 3) where the head camera saw such objects, this one included.
+    """
+    shift = seen - expected
+    away = others - expected
+    distance = np.linalg.norm(away, axis=1)
+    apart = distance > 1e-6
+    if not apart.any():
+        return shift
+    k = int(np.argmin(np.where(apart, distance, np.inf)))
+    direction = away[k] / distance[k]
+    along = float(shift @ direction)
+    return shift - along * direction if abs(along) > 0.25 * distance[k] else shift
