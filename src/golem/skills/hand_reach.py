@@ -30,16 +30,22 @@ class HandReach:
         x0, x1, y0, y1, z0, z1 = self._config.workspace
         return x0 <= x <= x1 and y0 <= y <= y1 and z0 <= z <= z1
 
-    def drops(self, side: Side, places: Array) -> NDArray[np.bool_]:
-        """Return (n,) above which of `places` (n, 3) in odom a hand can let go, as far as the head camera tells."""
+    def drops(self, side: Side, places: Array, slack: bool) -> NDArray[np.bool_]:
+        """Return (n,) above which of `places` (n, 3) in odom a hand can let go.
+
+        Args:
+            side: which hand.
+            places: in odom [m].
+            slack: whether those count, too, that the head camera may show a little too far away.
+        """
         over = self._in_base(side, places + (0.0, 0.0, self._config.drop_height))
         if not self._mapped:
             return over[:, 1] <= self._config.workspace[3]
-        slack = self._config.slack * AROUND
-        return np.array([any(load_map().serves("right", p + d) for d in slack) for p in over])
+        around = self._config.slack * AROUND if slack else AROUND[:1]
+        return np.array([any(load_map().serves("right", p + d) for d in around) for p in over])
 
     def drop_order(self, side: Side, places: Array, most: int) -> Array:
-        """Return up to `most` of `places` (n, 3) to try: half of them as they come and surely in reach, then the nearest.
+        """Return up to `most` of `places` (n, 3) to try: half of them as they come, surely in reach, then near ones.
 
         Args:
             side: which hand.
@@ -47,7 +53,7 @@ class HandReach:
             most: how many.
         """
         over = self._in_base(side, places + (0.0, 0.0, self._config.drop_height))
-        surely = [k for k, p in enumerate(over) if not self._mapped or load_map().serves("right", p)]
+        surely = np.flatnonzero(self.drops(side, places, slack=False)).tolist()
         away = np.hypot(over[:, 0] - self._config.comfort[0], over[:, 1] - self._config.comfort[1])
         return places[list(dict.fromkeys([*surely[: most // 2], *np.argsort(away).tolist()]))[:most]]
 

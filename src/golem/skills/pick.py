@@ -120,7 +120,8 @@ class Pick:
         if not grasps:
             raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {attempt.label}.")
         grasp = grasps[0]
-        context.say("approach", "Bringing the hand over it.", target=grasp.T_odom_gripper[:3, 3].tolist())
+        target, count = grasp.T_odom_gripper[:3, 3].tolist(), len(self._report.tried)
+        context.say("approach", "Bringing the hand over it.", target=target, side=attempt.side, attempt=count)
         context.hands[attempt.side].open(grasp.gap)
         T = grasp.T_odom_gripper
         await self._travel.over(attempt.side, lifted(T, self._config.clearance), T, self._config.travel_speed)

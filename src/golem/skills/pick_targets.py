@@ -20,6 +20,8 @@ from golem.types import SIDES, Array, LocalizedObject, Side
 
 TORSO = 0
 """Column of the torso's yaw among the joints of torso and arms."""
+MOST = 0.5
+"""A hand that reaches this share of the container's places surely reaches some, however much the head camera is off."""
 SAME = 0.04
 """What two looks show this near to each other is one object [m]; screws stand 9 cm apart."""
 
@@ -82,8 +84,8 @@ class TargetChoice:
     async def look(self, context: Context, goal: PickGoal) -> Choice:
         """Look with the head camera: the reachable objects and the container.
 
-        Where something is missing, the torso turns to either side for another look. Objects that stand proud come
-        first, and of them the most comfortable ones.
+        Where something is missing, the torso turns to either side for another look. The hand comes first that reaches
+        most of the container; then objects that stand proud, and of them the most comfortable ones.
 
         Raises:
             PickFailed: something is missing, or out of reach, or the container is full.
@@ -100,10 +102,18 @@ class TargetChoice:
         if box is not None and box.full:
             raise PickFailed(PickOutcome.TRAY_FULL, "detect", "localizer", f"The {goal.container} is full.")
         reach = HandReach(context, self._config)
-        attempts = view.attempts
-        attempts.sort(key=lambda a: (self._stands_low(a.target), reach.discomfort(a.side, a.target.position)))
-        chosen = attempts[: self._config.candidates]
-        text = f"{len(attempts)} {goal.label}s in reach."
+        places = view.container.places(self._config.drop_margin)
+        share = {side: float(reach.drops(side, places, slack=False).mean()) for side in SIDES}
+
+        def order(a: Attempt) -> tuple[bool, bool, float]:
+            return (
+                share[a.side] < MOST,
+                self._stands_low(a.target),
+                reach.discomfort(a.side, a.target.position),
+            )
+
+        chosen = sorted(view.attempts, key=order)[: self._config.candidates]
+        text = f"{len(view.attempts)} {goal.label}s in reach."
         context.say("detect", text, target=chosen[0].target.position.tolist())
         return Choice(chosen, view.container, np.array([o.position for o in view.objects]))
 
@@ -165,7 +175,7 @@ class TargetChoice:
         if container is None:
             return _View(objects, container, [], _missing(PickOutcome.TRAY_MISSING, goal.container))
         places = container.places(self._config.drop_margin)
-        left = [a for a in attempts if reach.drops(a.side, places).any()]
+        left = [a for a in attempts if reach.drops(a.side, places, slack=True).any()]
         if left:
             return _View(objects, container, left)
         text = f"No hand that reaches a {goal.label} reaches any place in the {goal.container}."

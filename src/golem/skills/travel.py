@@ -36,6 +36,10 @@ class Travel(Protocol):
         """Take the world from what the head camera shows now; `targets` (3,) in odom are what is to be gone to."""
         ...
 
+    def displace(self, by: Array) -> None:
+        """Take what was seen for being elsewhere by `by` (3,) in odom [m]."""
+        ...
+
     async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
         """Bring an empty hand above an object, from where it can go straight down to `T_object` and up again.
 
@@ -83,6 +87,9 @@ class LineTravel:
 
     def look(self, targets: Sequence[Array]) -> None:
         """Look at nothing."""
+
+    def displace(self, by: Array) -> None:
+        """Nothing was seen."""
 
     async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
         """Go up, across and down; see `Travel`."""
@@ -132,6 +139,10 @@ class PlannedTravel:
     def look(self, targets: Sequence[Array]) -> None:
         """Take the head camera's cloud for the world; see `Travel`."""
         self._motion.look([(target, SPARED) for target in targets])
+
+    def displace(self, by: Array) -> None:
+        """Move the cloud; see `Travel`."""
+        self._motion.displace(by)
 
     async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
         """Go there in a posture from which the way down is straight, or half of it, or at last in any; see `Travel`.

@@ -45,7 +45,7 @@ REACH_Y = 0.35
 either side reaches."""
 
 ASIDE = 0.05
-"""How far from the robot's middle a screw stands that a hand surely takes; as far beyond it the hand mostly does [m]."""
+"""How far from the robot's middle a screw is surely one for a hand; as far beyond it, mostly [m]."""
 ROOM = 0.04
 """Room that a hand needs between a screw and the tray [m]."""
 
@@ -228,7 +228,7 @@ def draw_fasteners(
     order = np.argsort(luck[:, 0])
     count = max(1, round(conditions.loose * len(spots))) if spots else 0
     aside = [_on_trays_side(layout, s) for s in spots]
-    others = [k for k in order.tolist() if aside[k] > ASIDE]
+    others = [k for least in (ASIDE, -ASIDE) for k in order.tolist() if aside[k] > least]
     if others and not any(aside[k] > -ASIDE for k in order[:count]):
         order[count - 1] = others[0]
     chosen = set(order[:count].tolist())
