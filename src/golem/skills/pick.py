@@ -9,6 +9,7 @@ from golem.capabilities.grasping.base import Grasp, GraspMethod, ServoLaw, Servo
 from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
+from golem.skills.force_guard import ForceGuard
 from golem.skills.pick_config import PickConfig, PickGoal
 from golem.skills.pick_place import look_after, place
 from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight, outcome_of, slipped
@@ -176,6 +177,7 @@ class Pick:
         arm, hand = context.arms[attempt.side], context.hands[attempt.side]
         end = context.t + self._config.servo_timeout
         closing = False
+        below = ForceGuard(context, attempt.side, arm.commanded[:3, 2], self._config.press_force)
         with context.watch(f"{attempt.side}_hand", attempt.label) as eye:
             while context.t < end and not (closing and hand.status.state in CLOSED):
                 fresh = eye.fresh()
@@ -199,6 +201,9 @@ class Pick:
                     elif step.status is ServoStatus.STALLED:
                         text = "The hand makes no progress towards the target."
                         raise PickFailed(PickOutcome.OUT_OF_REACH, "servo", "upper_body", text)
+                if not closing and below():
+                    text = f"The hand presses on something with {below.largest:.0f} N."
+                    raise PickFailed(PickOutcome.BLOCKED, "servo", "localizer", text)
                 if not closing or hand.status.state is GripState.CLOSING:
                     arm.approach(step.T_odom_gripper, self._config.servo_speed)
                 await context.tick()
@@ -233,13 +238,19 @@ class Pick:
         centred[:3, 3] += hand.status.offset * centred[:3, 1]
         await arm.move(centred, self._config.pull_speed)
         context.say("extract", "Pulling straight out.")
+        guard = ForceGuard(
+            context, attempt.side, -arm.commanded[:3, 2], self._config.guard_force, self._config.guard_length
+        )
         await self._travel.line(
             attempt.side,
             retracted(arm.commanded, self._config.pull),
             self._config.pull_speed,
             "extract",
-            stop=lambda: not hand.status.holding,
+            stop=lambda: guard() or not hand.status.holding,
         )
+        if guard.stuck:
+            text = f"The {attempt.label} does not move at {guard.largest:.0f} N."
+            raise PickFailed(slipped(self._heights), "extract", "grasp_method", text)
         await arm.move(
             lifted(arm.commanded, self._config.clearance - self._config.pull),
             self._config.travel_speed,

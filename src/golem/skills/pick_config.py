@@ -60,11 +60,15 @@ class PickConfig:
         travel_speed: between places [m/s].
         descend_speed: straight down to an open-loop grasp [m/s].
         servo_speed: limit of the visual servo [m/s].
+        press_force: force at which the servo's way down is given up [N]: fingers stand on something.
         servo_timeout: time after which the servo is given up [s].
         force: force of each finger [N].
         close_timeout: time the fingers may take [s].
         pull: length of the straight extraction [m]; longer than any screw.
         pull_speed: how fast [m/s].
+        guard_force: force at which the first millimetres of a pull are given up [N]: loosened screws resist with 2 to 4,
+            tight ones with 16 until the fingers slip.
+        guard_length: how long these millimetres are, of the commanded pose [m]; 0 feels nothing.
         tolerance: distance from a commanded pose at which the arm counts as arrived [m].
         drop_margin: distance of the place where it lets go from the container's rim [m].
         drop_height: height of the fingertips above the container's floor when they open [m].
@@ -89,11 +93,14 @@ class PickConfig:
     travel_speed: float = 0.25
     descend_speed: float = 0.10
     servo_speed: float = 0.15
+    press_force: float = 15.0
     servo_timeout: float = 20.0
     force: float = 16.0
     close_timeout: float = 2.5
     pull: float = 0.06
     pull_speed: float = 0.05
+    guard_force: float = 10.0
+    guard_length: float = 0.015
     tolerance: float = 0.006
     drop_margin: float = 0.04
     drop_height: float = 0.10
