@@ -12,6 +12,12 @@ from golem.types import Array, LocalizedObject
 
 BRIM = 0.01
 """What is this far outside of the rim may still lie inside [m]: as much is the depth off."""
+KNOWN = 0.6
+"""Share of the inside that two looks have to show."""
+RISE = 0.004
+"""What is higher than before by this is new [m]: a screw lies 10 mm high, and the noise of a cell is 1 mm."""
+SPOTS = 3
+"""Cells that have to be higher."""
 APART = 0.03
 """Distance between two places that are tried [m]."""
 SURE = 0.02
@@ -49,6 +55,21 @@ class Container:
             return self.box.contains(points, -BRIM)
         away = points[:, :2] - self.sighting.position[:2]
         return np.linalg.norm(away, axis=1) < self.radius
+
+    def gained(self, points: Array) -> bool | None:
+        """Return whether something lies in it that was not there when it was sighted; None where that is not in view.
+
+        Args:
+            points: (n, 3) what the same camera shows of it now, in odom [m].
+        """
+        if self.box is None or not len(points):
+            return None
+        change = self.box.heights(points) - self.box.heights(self.sighting.points)
+        known = np.isfinite(change)
+        if known.mean() < KNOWN:
+            return None
+        raised = known & (change - np.median(change[known]) > RISE)
+        return bool(raised.sum() >= SPOTS)
 
     def places(self, margin: float) -> Array:
         """Return (n, 3) places on its floor in odom, `margin` [m] inside its rim and apart, the middle first."""

@@ -185,7 +185,7 @@ class Pick:
                 if not closing:
                     if fresh is not None:
                         text = f"Servoing, sigma {step.sigma * 1e3:.1f} mm."
-                        context.say("servo", text, target=step.target.tolist())
+                        context.say("servo", text, target=step.target.tolist(), hand=arm.pose[:3, 3].tolist())
                     if step.status is ServoStatus.CONVERGED:
                         closing = True
                         end = context.t + self._config.close_timeout

@@ -66,8 +66,8 @@ class PickConfig:
         close_timeout: time the fingers may take [s].
         pull: length of the straight extraction [m]; longer than any screw.
         pull_speed: how fast [m/s].
-        guard_force: force at which the first millimetres of a pull are given up [N]: loosened screws resist with 2 to 4,
-            tight ones with 16 until the fingers slip.
+        guard_force: force at which the first millimetres of a pull are given up [N]: loosened screws resist with 2 to
+            4 N, tight ones with 16 N until the fingers slip.
         guard_length: how long these millimetres are, of the commanded pose [m]; 0 feels nothing.
         tolerance: distance from a commanded pose at which the arm counts as arrived [m].
         drop_margin: distance of the place where it lets go from the container's rim [m].

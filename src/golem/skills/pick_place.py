@@ -96,11 +96,11 @@ async def look_after(
 ) -> None:
     """Look with the head camera at container and bore, and write into the report what it saw.
 
-    The object is in the container if in most of the pictures more such objects are seen there than before. Its place
-    is empty if one of those that were seen around it before is seen in none.
+    The object is in the container if something rises there now, or more such objects are seen there than before. Its
+    place is empty if one of those that were seen around it before is seen no more.
     """
     frames: list[Array] = []
-    tray_seen = 0
+    clouds: list[Array] = []
     with context.watch("head", attempt.label, attempt.container) as eye:
         end = context.t + config.look_timeout
         while len(frames) < config.looks_after:
@@ -108,13 +108,15 @@ async def look_after(
             if sightings is None:
                 break
             frames.append(positions(sightings, attempt.label))
-            tray_seen += any(o.label == attempt.container for o in sightings.objects)
+            clouds += [o.points for o in sightings.objects if o.label == attempt.container]
     if not frames:
         return
     inside = choice.container.holds(choice.seen)
-    if 2 * tray_seen > len(frames):
+    if clouds:
         more = [int(choice.container.holds(points).sum()) > int(inside.sum()) for points in frames]
-        report.in_tray = (Sight.YES if 2 * sum(more) >= len(more) else Sight.NO).value
+        gained = choice.container.gained(np.concatenate(clouds))
+        if gained is not None or any(more):
+            report.in_tray = (Sight.YES if gained or 2 * sum(more) > len(more) else Sight.NO).value
     taken = report.tried[-1]
     stood = choice.seen[~inside]
     around = stood[np.hypot(stood[:, 0] - taken.x, stood[:, 1] - taken.y) < NEAR]

@@ -20,6 +20,12 @@ EDGE = 0.01
 """Share of the walls' points that may lie beyond each side: they are off."""
 SIDES_FROM, SIDES_TO = 0.06, 0.60
 """Range of the sides of a box [m]."""
+GRID = 0.008
+"""Side of the cells in which heights inside are told [m]: half of a screw."""
+EDGE_ROOM = 0.02
+"""What is this near to the rim may be wall [m]."""
+LEAST = 4
+"""Points that tell the height of a cell."""
 FULL = 0.020
 """A box whose contents come this near to its rim is full [m]."""
 
@@ -51,6 +57,22 @@ class OpenBox:
         """Return (n,) which of `points` (n, 2) or (n, 3) are, from above, inside the rim and `margin` [m] off it."""
         turned = np.abs((points[:, :2] - self.center) @ _axes(self.yaw))
         return np.all(turned <= 0.5 * self.size - margin, axis=1)
+
+    def heights(self, points: Array) -> Array:
+        """Return (nx, ny) mean heights of what lies inside, on a grid of `GRID`, `EDGE_ROOM` inside the rim [m].
+
+        Args:
+            points: (n, 3) of one or more views in odom [m]; cells with fewer than `LEAST` of them are NaN.
+        """
+        halves = np.maximum(0.5 * self.size - EDGE_ROOM, GRID)
+        turned = (points[:, :2] - self.center) @ _axes(self.yaw)
+        shape = np.ceil(2.0 * halves / GRID).astype(int)
+        index = np.floor((turned + halves) / GRID).astype(int)
+        inside = np.all((index >= 0) & (index < shape), axis=1)
+        flat = np.ravel_multi_index(tuple(index[inside].T), tuple(shape))
+        count = np.bincount(flat, minlength=int(shape.prod()))
+        total = np.bincount(flat, weights=points[inside, 2], minlength=int(shape.prod()))
+        return np.where(count >= LEAST, total / np.maximum(count, 1), np.nan).reshape(shape)
 
     def places(self, margin: float, spacing: float = 0.02) -> Array:
         """Return (n, 3) places at the height of `level`, `margin` [m] inside the rim, the middle first.

@@ -16,6 +16,10 @@ from golem.types import SIDES, Array, Side
 
 HEADING = np.pi / 2
 """Heading of the gripper's x axis, left hand; mirrored for the right [rad]."""
+NEAREST = 10
+"""Places above the tray that are tried, those first that are near to where an arm works best."""
+TURNS = (0.0, 0.4, -0.4)
+"""Turns from it that are tried [rad]."""
 
 
 @cache
@@ -31,9 +35,12 @@ def reaches(side: Side, position: Array) -> bool:
     goals, robot = _tools()
     ready = POSTURES["ready"]
     space = JointSpace(robot, ready)
-    T = grasp_pose(position, HEADING if side == "left" else -HEADING)
-    left, right = (T if side == one else None for one in SIDES)
-    return len(goals.find(left, right, ready, lambda q: space.verdict(q) == 0, most=1)) > 0
+    for turn in TURNS:
+        T = grasp_pose(position, (HEADING if side == "left" else -HEADING) + turn)
+        left, right = (T if side == one else None for one in SIDES)
+        if len(goals.find(left, right, ready, lambda q: space.verdict(q) == 0, most=1)):
+            return True
+    return False
 
 
 def doable(fasteners: Sequence[Fastener], drops: Array) -> bool:
@@ -47,6 +54,6 @@ def doable(fasteners: Sequence[Fastener], drops: Array) -> bool:
     for side in SIDES:
         own = 1.0 if side == "left" else -1.0
         near = sorted(drops, key=lambda p: float(np.hypot(p[0] - 0.4, p[1] - own * 0.2)))
-        if any(reaches(side, p) for p in near[:6]) and any(reaches(side, p) for p in loose):
+        if any(reaches(side, p) for p in near[:NEAREST]) and any(reaches(side, p) for p in loose):
             return True
     return False

@@ -51,7 +51,7 @@ def claims(
     fasteners: Sequence[Fastener],
     taken: set[int],
     in_tray: bool,
-    hands: Mapping[int, Array],
+    looked_at: Mapping[int, Array],
 ) -> dict[str, float]:
     """Return for each outcome that was claimed, as `claim_NAME`, which share of its claims is right.
 
@@ -62,8 +62,8 @@ def claims(
         fasteners: the truth at the beginning.
         taken: which of them are out of their bores at the end.
         in_tray: whether a screw is in the tray at the end.
-        hands: where the hand really was at last when it looked at an object, (3,) in odom [m], by its place in the
-            report; an object that none came to has none.
+        looked_at: where what a hand looked at last really was, (3,) in odom [m], by its place in the report; an object
+            that none came to has none.
     """
     judged: dict[str, list[float]] = defaultdict(list)
     if not report.tried:
@@ -71,21 +71,21 @@ def claims(
         if right is not None:
             judged[report.outcome].append(float(right))
     for i, tried in enumerate(report.tried):
-        right = _one(tried, fasteners, in_tray, hands.get(i))
+        right = _one(tried, fasteners, in_tray, looked_at.get(i))
         if right is not None:
             judged[tried.outcome].append(float(right))
     for name, said, true in (
         ("in_tray", report.in_tray, in_tray),
-        ("bore_empty", report.bore_empty, _emptied(fasteners, taken, hands.get(len(report.tried) - 1))),
+        ("bore_empty", report.bore_empty, _emptied(fasteners, taken, looked_at.get(len(report.tried) - 1))),
     ):
         if said != Sight.UNKNOWN:
             judged[name].append(float((said == Sight.YES) == true))
     return {f"claim_{name}": float(np.mean(values)) for name, values in judged.items()}
 
 
-def _emptied(fasteners: Sequence[Fastener], taken: set[int], hand: Array | None) -> bool:
-    """Return whether the fastener that the hand went to last is out."""
-    near = None if hand is None else _nearest(hand, fasteners, SEEN)
+def _emptied(fasteners: Sequence[Fastener], taken: set[int], place: Array | None) -> bool:
+    """Return whether the fastener that was looked at last is out."""
+    near = None if place is None else _nearest(place, fasteners, SEEN)
     return near is not None and fasteners.index(near) in taken
 
 
@@ -101,12 +101,12 @@ def _whole(outcome: str, fasteners: Sequence[Fastener]) -> bool | None:
     return None
 
 
-def _one(tried: Tried, fasteners: Sequence[Fastener], in_tray: bool, hand: Array | None) -> bool | None:
+def _one(tried: Tried, fasteners: Sequence[Fastener], in_tray: bool, looked: Array | None) -> bool | None:
     """Return whether a claim about one screw is right."""
     if tried.outcome == PickOutcome.PICKED:
         return in_tray
-    place = np.array([tried.x, tried.y, tried.z]) if hand is None else hand
-    near = _nearest(place, fasteners, LOOKED if hand is None else SEEN)
+    place = np.array([tried.x, tried.y, tried.z]) if looked is None else looked
+    near = _nearest(place, fasteners, LOOKED if looked is None else SEEN)
     if tried.outcome == PickOutcome.NOTHING_THERE:
         return near is None
     if tried.outcome in (PickOutcome.TIGHT, PickOutcome.JAMMED):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from golem.evaluation.base import DONE
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
 from golem.evaluation.episodes.pick_touches import PickTouches
@@ -24,8 +26,8 @@ class PickWatch:
         grasp: where hand and screw were when the fingers last began to close; None if they never did.
         picture: PNG of the decisive moment.
         pull: (4, 4) poses of the hand while it last pulled.
-        hands: where the hand was at last when it looked at an object, (3,) in odom [m], by the object's place in the
-            pick's report.
+        looked_at: where what the hand looked at last really was, (3,) in odom [m], by the object's place in the pick's
+            report.
         drop_inside: how far inside the tray's rim the hand was when it let go [m]; None if it never did.
     """
 
@@ -43,7 +45,7 @@ class PickWatch:
         self.grasp: GraspTruth | None = None
         self.picture: bytes | None = None
         self.pull: list[Array] = []
-        self.hands: dict[int, Array] = {}
+        self.looked_at: dict[int, Array] = {}
         self.drop_inside: float | None = None
         self._side: Side = "right"
         self._attempt = 0
@@ -74,7 +76,14 @@ class PickWatch:
         if feedback.stage == "approach" and "side" in feedback.data:
             self._side, self._attempt = feedback.data["side"], feedback.data["attempt"] - 1
         if feedback.stage in LOOKING:
-            self.hands[self._attempt] = self._oracle.gripper(self._side)[:3, 3]
+            # What it looks at is as far from the true hand as it believes it to be from the hand.
+            looked = (
+                np.subtract(feedback.data["target"], feedback.data["hand"])
+                if "hand" in feedback.data
+                else 0.0
+            )
+            if self._attempt not in self.looked_at or "hand" in feedback.data:
+                self.looked_at[self._attempt] = self._oracle.gripper(self._side)[:3, 3] + looked
         if feedback.stage == "grasp" and not feedback.data.get("failed"):
             self.grasp = self._oracle.grasp(self._side, self._running.commanded(self._side))
         if feedback.stage == DONE or feedback.data.get("failed"):

@@ -131,7 +131,7 @@ class PickRung(Rung[PickOptions]):
             outcome = _judge(stack, result, oracle, watch, lost(running, watch.recorder))
             said = result.value if isinstance(result.value, PickReport) else PickReport()
             in_tray = bool(oracle.screws_in_tray())
-            right = claims(said, before, oracle.taken(before), in_tray, watch.hands)
+            right = claims(said, before, oracle.taken(before), in_tray, watch.looked_at)
             ended = verdict(said, outcome.success, feasible)
             return replace(outcome, series={**outcome.series, **touches.series(), **right, **ended})
         finally:
