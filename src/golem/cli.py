@@ -38,7 +38,7 @@ def _demo(words: list[str]) -> int:
 
         stack = STACK if config.stack == DemoConfig.stack else config.stack
         walked = run_walk_demo(
-            stack, config.profile, config.seed, config.out, config.port, config.headless, config.record
+            stack, config.profile, config.seed or 0, config.out, config.port, config.headless, config.record
         )
         return 0 if walked.success else FAILED
     return 0 if run_demo(config).success else FAILED

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import secrets
 import time
 import webbrowser
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,11 +26,12 @@ from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.shoves import Pusher, shove
 from golem.robots.mujoco.spectator import SpectatorView
+from golem.robots.worlds.conditions import LayoutKind, Value
 from golem.run import Narrator, no_display, on_air, shown
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import CANCELLED, SkillResult
 from golem.skills.pick_config import PickGoal
-from golem.stack import load_stack
+from golem.stack import Stack, load_stack
 
 FPS = 10.0
 """Pictures of the film per second of robot time."""
@@ -46,6 +48,11 @@ QUIET = 0.5
 """Time of standing quietly that shows that it does [s]."""
 
 
+SHOWN: dict[str, Value] = {"loose": 0.8, "tray_y": 0.05, "light": 1.0}
+"""What the seed does not draw of a varied work place: light for the film, and room for several loose screws on the
+tray's side."""
+
+
 @dataclass(frozen=True)
 class DemoConfig:
     """The robot stands before a battery pack, pulls loosened screws out of it and drops them in a tray."""
@@ -60,8 +67,10 @@ class DemoConfig:
     """Screws to put in the tray; up to twice as many picks are tried."""
     profile: str = "bench"
     """Realism profile: ideal, bench or field."""
-    seed: int = 0
-    """Seed of the episode."""
+    layout: LayoutKind = "varied"
+    """varied: pack, tray, finishes and clutter as the seed draws them. nominal: always the same."""
+    seed: int | None = None
+    """Seed of the work place and the errors; a new one each time by default, which is printed."""
     out: Path = Path("runs/demo")
     """Folder for film, report and figures."""
     port: int = 8080
@@ -269,7 +278,9 @@ def run_demo(config: DemoConfig) -> DemoResult:
     if config.screws < 1:
         raise ConfigError(f"--screws is {config.screws}; give a number from 1 on.")
     _prepare(config.out)
-    running, built = build(load_stack(config.stack, profile=config.profile), config.seed)
+    seed = secrets.randbelow(1_000_000) if config.seed is None else config.seed
+    config = replace(config, seed=seed)
+    running, built = build(_work_place(config), seed)
     with ExitStack() as stack:
         stack.callback(built.close)
         robot = shown(running, built)
@@ -294,7 +305,21 @@ def run_demo(config: DemoConfig) -> DemoResult:
             return _filmed(config, demo, running, robot)
         view = LiveView(running, robot, config.port)
         stack.callback(view.close)
-        return _shown(demo, running, view)
+        return _shown(config, demo, running, view)
+
+
+def _work_place(config: DemoConfig) -> Stack:
+    """Return the stack, with its pack as the seed draws it."""
+    stack = load_stack(config.stack, profile=config.profile)
+    world = stack.choice("robot").options.get("world", "pack")
+    if config.layout == "nominal" or world != "pack":
+        return stack
+    return stack.with_options("robot", layout=config.layout, conditions=dict(SHOWN))
+
+
+def _goal(config: DemoConfig) -> PickGoal:
+    """Return what to pick: with either hand where the tray is on either side."""
+    return PickGoal(side="either" if config.layout == "varied" else "right")
 
 
 def _filmed(config: DemoConfig, demo: Demo, running: LockstepRunner, robot: MujocoRobot) -> DemoResult:
@@ -310,7 +335,7 @@ def _filmed(config: DemoConfig, demo: Demo, running: LockstepRunner, robot: Mujo
     try:
         while not demo.over():
             film.headline = f"{len(demo.in_tray())} of {config.screws} screws in the tray"
-            demo.pick(lambda: running.execute("pick", PickGoal(), watch=watch))
+            demo.pick(lambda: running.execute("pick", _goal(config), watch=watch))
         film.headline = f"{len(demo.in_tray())} of {config.screws} screws in the tray"
         film.frame(running)
         if running.stack.on_ground and not demo.lost():
@@ -322,7 +347,7 @@ def _filmed(config: DemoConfig, demo: Demo, running: LockstepRunner, robot: Mujo
         film.close()
 
 
-def _shown(demo: Demo, running: LockstepRunner, view: LiveView) -> DemoResult:
+def _shown(config: DemoConfig, demo: Demo, running: LockstepRunner, view: LiveView) -> DemoResult:
     """Demonstrate in real time in the browser; afterwards the operator may go on until Ctrl-C."""
     print(f"Watch it at {view.url} (it should open by itself).", flush=True)
     webbrowser.open(view.url)
@@ -334,7 +359,7 @@ def _shown(demo: Demo, running: LockstepRunner, view: LiveView) -> DemoResult:
 
     view.await_spectator()
     while not demo.over():
-        demo.pick(lambda: view.run("pick", PickGoal(), watch=watch))
+        demo.pick(lambda: view.run("pick", _goal(config), watch=watch))
     result = demo.write([])
     print("The view stays open: its buttons start further skills. Ctrl-C ends it.", flush=True)
     try:

@@ -6,6 +6,7 @@ import math
 import os
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,8 +65,13 @@ SAFETY_COLOURS = {
 
 
 def shots(robot: MujocoRobot) -> dict[str, Shot]:
-    """Return the cameras that show `robot` at work: `wide` and `close`."""
-    return STANDING if robot.config.support == "ground" else HANGING
+    """Return the cameras that show `robot` at work: `wide` and `close`, which is on the tray's side."""
+    found = STANDING if robot.config.support == "ground" else HANGING
+    if robot.config.world != "pack" or robot.scene.layout.tray_xy[1] < 0.0:
+        return found
+    close = found["close"]
+    x, y, z = close.look_at
+    return found | {"close": replace(close, look_at=(x, -y, z), azimuth=-close.azimuth)}
 
 
 class Film:

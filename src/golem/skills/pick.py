@@ -9,12 +9,14 @@ from golem.capabilities.grasping.base import Grasp, GraspMethod, ServoLaw, Servo
 from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
+from golem.skills.force_guard import ForceGuard
 from golem.skills.pick_config import PickConfig, PickGoal
-from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, outcome_of, slipped
+from golem.skills.pick_place import look_after, place
+from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight, outcome_of, slipped
 from golem.skills.pick_targets import Attempt, TargetChoice
 from golem.skills.poses import lifted, retracted
 from golem.skills.travel import LineTravel, PlannedTravel, Travel
-from golem.types import LocalizedObject, Side
+from golem.types import Side
 
 CLOSED = (GripState.HOLDING, GripState.EMPTY)
 """States of a hand whose fingers have closed, on something or on nothing."""
@@ -58,10 +60,10 @@ class Pick:
         reason = f"The {goal.label} was dropped in the {goal.container}."
         result = SkillResult(True, "done", None, reason, timings)
         try:
-            attempts, container = await TargetChoice(self._config).look(context, goal)
-            self._travel.look([attempt.target.position for attempt in attempts])
-            attempt = await self._take_one(context, attempts, timings, tried)
-            await self._place(context, attempt, container)
+            choice = await TargetChoice(self._config).look(context, goal)
+            self._travel.look([attempt.target.position for attempt in choice.attempts])
+            attempt = await self._take_one(context, choice.attempts, timings, tried)
+            await place(context, self._config, self._travel, attempt, self._report.tried[-1], choice)
             self._report.outcome = self._report.tried[-1].outcome = PickOutcome.PICKED.value
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
@@ -73,7 +75,9 @@ class Pick:
         for side in _hands(goal, tried):
             await self._travel.home(side, self._config.travel_speed)
         if result.success:
-            context.say("done", f"The {goal.label} is in the {goal.container}.")
+            await look_after(context, self._config, attempt, choice, self._report)
+            result = replace(result, reason=f"{result.reason[:-1]}{_seen(self._report)}.")
+            context.say("done", result.reason)
         return replace(result, value=self._report)
 
     def _note(self, failure: StageFailed) -> None:
@@ -112,12 +116,13 @@ class Pick:
 
     async def _approach(self, context: Context, attempt: Attempt) -> Grasp:
         """Bring the open hand over the object."""
-        yaw = self._config.yaw if attempt.side == "right" else -self._config.yaw
+        yaw = self._config.heading(attempt.side)
         grasps = await context.propose(self._method, attempt.target, attempt.side, yaw)
         if not grasps:
             raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {attempt.label}.")
         grasp = grasps[0]
-        context.say("approach", "Bringing the hand over it.", target=grasp.T_odom_gripper[:3, 3].tolist())
+        target, count = grasp.T_odom_gripper[:3, 3].tolist(), len(self._report.tried)
+        context.say("approach", "Bringing the hand over it.", target=target, side=attempt.side, attempt=count)
         context.hands[attempt.side].open(grasp.gap)
         T = grasp.T_odom_gripper
         await self._travel.over(attempt.side, lifted(T, self._config.clearance), T, self._config.travel_speed)
@@ -172,6 +177,7 @@ class Pick:
         arm, hand = context.arms[attempt.side], context.hands[attempt.side]
         end = context.t + self._config.servo_timeout
         closing = False
+        below = ForceGuard(context, attempt.side, arm.commanded[:3, 2], self._config.press_force)
         with context.watch(f"{attempt.side}_hand", attempt.label) as eye:
             while context.t < end and not (closing and hand.status.state in CLOSED):
                 fresh = eye.fresh()
@@ -179,7 +185,7 @@ class Pick:
                 if not closing:
                     if fresh is not None:
                         text = f"Servoing, sigma {step.sigma * 1e3:.1f} mm."
-                        context.say("servo", text, target=step.target.tolist())
+                        context.say("servo", text, target=step.target.tolist(), hand=arm.pose[:3, 3].tolist())
                     if step.status is ServoStatus.CONVERGED:
                         closing = True
                         end = context.t + self._config.close_timeout
@@ -195,6 +201,9 @@ class Pick:
                     elif step.status is ServoStatus.STALLED:
                         text = "The hand makes no progress towards the target."
                         raise PickFailed(PickOutcome.OUT_OF_REACH, "servo", "upper_body", text)
+                if not closing and below():
+                    text = f"The hand presses on something with {below.largest:.0f} N."
+                    raise PickFailed(PickOutcome.BLOCKED, "servo", "localizer", text)
                 if not closing or hand.status.state is GripState.CLOSING:
                     arm.approach(step.T_odom_gripper, self._config.servo_speed)
                 await context.tick()
@@ -229,13 +238,19 @@ class Pick:
         centred[:3, 3] += hand.status.offset * centred[:3, 1]
         await arm.move(centred, self._config.pull_speed)
         context.say("extract", "Pulling straight out.")
+        guard = ForceGuard(
+            context, attempt.side, -arm.commanded[:3, 2], self._config.guard_force, self._config.guard_length
+        )
         await self._travel.line(
             attempt.side,
             retracted(arm.commanded, self._config.pull),
             self._config.pull_speed,
             "extract",
-            stop=lambda: not hand.status.holding,
+            stop=lambda: guard() or not hand.status.holding,
         )
+        if guard.stuck:
+            text = f"The {attempt.label} does not move at {guard.largest:.0f} N."
+            raise PickFailed(slipped(self._heights), "extract", "grasp_method", text)
         await arm.move(
             lifted(arm.commanded, self._config.clearance - self._config.pull),
             self._config.travel_speed,
@@ -244,19 +259,6 @@ class Pick:
         if not hand.status.holding:
             text = f"The {attempt.label} slipped out of the fingers."
             raise PickFailed(slipped(self._heights), "extract", "grasp_method", text)
-
-    async def _place(self, context: Context, attempt: Attempt, container: LocalizedObject) -> None:
-        """Carry it over the container and let go."""
-        context.say("place", f"Carrying it to the {attempt.container}.", target=container.position.tolist())
-        arm, hand = context.arms[attempt.side], context.hands[attempt.side]
-        T = arm.commanded.copy()
-        T[:3, 3] = container.position + (0.0, 0.0, self._config.drop_height)
-        await self._travel.carry(attempt.side, T, self._config.travel_speed)
-        if not hand.status.holding:
-            text = f"The {attempt.label} was lost on the way."
-            raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", text)
-        hand.open(self._config.release_gap)
-        await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
 
     async def _back_off(self, context: Context, side: Side) -> None:
         """Go straight up, away from what was not taken, with the fingers open."""
@@ -267,3 +269,13 @@ class Pick:
 def _hands(goal: PickGoal, tried: Sequence[Attempt]) -> list[Side]:
     """Return the hand of the goal, or those of the attempts, each once."""
     return list(dict.fromkeys(attempt.side for attempt in tried)) if goal.side == "either" else [goal.side]
+
+
+def _seen(report: PickReport) -> str:
+    """Return what the look afterwards adds to a sentence."""
+    words = {
+        Sight.YES.value: ", and is seen there",
+        Sight.NO.value: ", but is not seen there",
+        Sight.UNKNOWN.value: "",
+    }[report.in_tray]
+    return words + ("; its place still looks taken" if report.bore_empty == Sight.NO else "")

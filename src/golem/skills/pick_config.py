@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from golem.errors import ConfigError
+from golem.types import Side
 
 Hand = Literal["left", "right", "either"]
 
@@ -47,6 +48,8 @@ class PickConfig:
         comfort: x, y in base_link around which the arm works best [m]; the nearest object is taken first.
         attempts: how often a method that looks again may try to grasp and pull one object.
         candidates: how many objects it may try.
+        slack: how far beside the reach of a hand the head camera may see what is tried all the same [m]; it is off by
+            that much.
         proud: height above the ground around it [m] from which on an object comes before lower ones: as the head camera
             sees them, half of the tight screws are lower than 9 mm, and half of the loosened ones higher than 15 mm.
         turn: how far the torso turns to either side where object or container are not in view [rad]; 0: not at all.
@@ -57,14 +60,20 @@ class PickConfig:
         travel_speed: between places [m/s].
         descend_speed: straight down to an open-loop grasp [m/s].
         servo_speed: limit of the visual servo [m/s].
+        press_force: force at which the servo's way down is given up [N]: fingers stand on something.
         servo_timeout: time after which the servo is given up [s].
         force: force of each finger [N].
         close_timeout: time the fingers may take [s].
         pull: length of the straight extraction [m]; longer than any screw.
         pull_speed: how fast [m/s].
+        guard_force: force at which the first millimetres of a pull are given up [N]: loosened screws resist with 2 to
+            4 N, tight ones with 16 N until the fingers slip.
+        guard_length: how long these millimetres are, of the commanded pose [m]; 0 feels nothing.
         tolerance: distance from a commanded pose at which the arm counts as arrived [m].
+        drop_margin: distance of the place where it lets go from the container's rim [m].
         drop_height: height of the fingertips above the container's floor when they open [m].
         release_gap: opening that lets go [m].
+        looks_after: pictures of the head camera in which it looks for what was dropped; 0 does not look.
         look_timeout: time a camera may take to show the object [s].
         timeout: time after which the pick is given up [s]; the paper's grasps took 75 +- 16 s by the clock.
     """
@@ -74,7 +83,8 @@ class PickConfig:
     container_radius: float = 0.15
     comfort: tuple[float, float] = (0.45, -0.12)
     attempts: int = 2
-    candidates: int = 3
+    candidates: int = 8
+    slack: float = 0.04
     proud: float = 0.0115
     turn: float = 0.35
     travel: Literal["lines", "planned"] = "planned"
@@ -83,13 +93,22 @@ class PickConfig:
     travel_speed: float = 0.25
     descend_speed: float = 0.10
     servo_speed: float = 0.15
+    press_force: float = 15.0
     servo_timeout: float = 20.0
     force: float = 16.0
     close_timeout: float = 2.5
     pull: float = 0.06
     pull_speed: float = 0.05
+    guard_force: float = 10.0
+    guard_length: float = 0.015
     tolerance: float = 0.006
+    drop_margin: float = 0.04
     drop_height: float = 0.10
     release_gap: float = 0.060
-    look_timeout: float = 3.0
+    looks_after: int = 5
+    look_timeout: float = 1.0
     timeout: float = 90.0
+
+    def heading(self, side: Side) -> float:
+        """Return `yaw` for a hand [rad]."""
+        return self.yaw if side == "right" else -self.yaw

@@ -27,6 +27,10 @@ class PickOutcome(StrEnum):
     """No such object was seen, or the fingers closed on nothing."""
     TRAY_MISSING = "tray_missing"
     """The container was not seen."""
+    TRAY_FULL = "tray_full"
+    """What lies in the container reaches up to its rim."""
+    TRAY_OUT_OF_REACH = "tray_out_of_reach"
+    """No hand gets to any place in the container, or none that gets to such an object, too."""
     TIGHT = "tight"
     """It did not move."""
     JAMMED = "jammed"
@@ -35,6 +39,15 @@ class PickOutcome(StrEnum):
     """It slipped out of the fingers, and nobody looked whether it had moved; or it was lost on the way."""
     FAILED = "failed"
     """Anything else."""
+
+
+class Sight(StrEnum):
+    """What a look said."""
+
+    YES = "yes"
+    NO = "no"
+    UNKNOWN = "unknown"
+    """Nobody looked, or the place was not in view."""
 
 
 @dataclass
@@ -61,10 +74,14 @@ class PickReport:
     Attributes:
         outcome: one of `PickOutcome`, of the whole.
         tried: every object that was approached, in order.
+        in_tray: whether the head camera saw it in the container afterwards, one of `Sight`.
+        bore_empty: whether it saw that the object's place is empty, one of `Sight`.
     """
 
     outcome: str = PickOutcome.FAILED.value
     tried: list[Tried] = field(default_factory=list[Tried])
+    in_tray: str = Sight.UNKNOWN.value
+    bore_empty: str = Sight.UNKNOWN.value
 
 
 class PickFailed(StageFailed):

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.grasping.ground import height_above_ground
 from golem.capabilities.planning.base import PlanRefused
 from golem.interfaces.payloads import Detections
+from golem.skills.container import Container
 from golem.skills.context import Context
+from golem.skills.hand_reach import HandReach
 from golem.skills.pick_config import PickConfig, PickGoal
 from golem.skills.pick_report import PickFailed, PickOutcome, Tried
 from golem.skills.planned_motion import PlannedMotion
@@ -19,6 +20,10 @@ from golem.types import SIDES, Array, LocalizedObject, Side
 
 TORSO = 0
 """Column of the torso's yaw among the joints of torso and arms."""
+MOST = 0.5
+"""A hand that reaches this share of the container's places surely reaches some, however much the head camera is off."""
+SAME = 0.04
+"""What two looks show this near to each other is one object [m]; screws stand 9 cm apart."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,30 +43,35 @@ class Attempt:
 
 
 @dataclass(frozen=True, slots=True)
+class Choice:
+    """What a pick goes for.
+
+    Attributes:
+        attempts: the objects to try, in order.
+        container: what to drop one into.
+        seen: (n, 3) where the head camera saw such objects, those in the container, too, in odom [m].
+    """
+
+    attempts: list[Attempt]
+    container: Container
+    seen: Array
+
+
+@dataclass(frozen=True, slots=True)
 class _View:
     """What is known after a look.
 
     Attributes:
-        attempts: the reachable objects.
+        objects: all such objects.
         container: the container.
+        attempts: the objects that a hand can take which reaches the container.
         problem: what is missing, as a failure.
     """
 
+    objects: list[LocalizedObject] = field(default_factory=list[LocalizedObject])
+    container: Container | None = None
     attempts: list[Attempt] = field(default_factory=list[Attempt])
-    container: LocalizedObject | None = None
     problem: PickFailed | None = None
-
-
-def _missing(
-    goal: PickGoal, container: LocalizedObject | None, attempts: list[Attempt], seen: bool
-) -> PickFailed | None:
-    """Return what a look lacks; `seen`: whether it showed such an object at all."""
-    if attempts and container is not None:
-        return None
-    missing = goal.container if attempts else f"reachable {goal.label}"
-    outcome = PickOutcome.OUT_OF_REACH if seen else PickOutcome.NOTHING_THERE
-    outcome = PickOutcome.TRAY_MISSING if container is None and seen else outcome
-    return PickFailed(outcome, "detect", "localizer", f"The head camera shows no {missing}.")
 
 
 class TargetChoice:
@@ -71,11 +81,14 @@ class TargetChoice:
         """Take workspace and comfort from `config`."""
         self._config = config
 
-    async def look(self, context: Context, goal: PickGoal) -> tuple[list[Attempt], LocalizedObject]:
+    async def look(self, context: Context, goal: PickGoal) -> Choice:
         """Look with the head camera: the reachable objects and the container.
 
-        Where one of them is not in view, the torso turns to either side for another look. Objects that stand proud
-        come first, and of them the most comfortable ones.
+        Where something is missing, the torso turns to either side for another look. The hand comes first that reaches
+        most of the container; then objects that stand proud, and of them the most comfortable ones.
+
+        Raises:
+            PickFailed: something is missing, or out of reach, or the container is full.
         """
         context.say("detect", f"Looking for a {goal.label} and a {goal.container}.")
         view = await self._see(context, goal, _View())
@@ -85,17 +98,27 @@ class TargetChoice:
         if view.problem is not None:
             raise view.problem
         assert view.container is not None  # it would be the problem
-        attempts = view.attempts
-        if goal.side == "either":
-            attempts = [a for a in attempts if self._serves(context, a.side, view.container)] or attempts
-        attempts.sort(key=lambda a: (self._stands_low(a.target), self._discomfort(context, a.side, a.target)))
-        chosen = attempts[: self._config.candidates]
-        text = f"{len(attempts)} {goal.label}s in reach."
+        box = view.container.box
+        if box is not None and box.full:
+            raise PickFailed(PickOutcome.TRAY_FULL, "detect", "localizer", f"The {goal.container} is full.")
+        reach = HandReach(context, self._config)
+        places = view.container.places(self._config.drop_margin)
+        share = {side: float(reach.drops(side, places, slack=False).mean()) for side in SIDES}
+
+        def order(a: Attempt) -> tuple[bool, bool, float]:
+            return (
+                share[a.side] < MOST,
+                self._stands_low(a.target),
+                reach.discomfort(a.side, a.target.position),
+            )
+
+        chosen = sorted(view.attempts, key=order)[: self._config.candidates]
+        text = f"{len(view.attempts)} {goal.label}s in reach."
         context.say("detect", text, target=chosen[0].target.position.tolist())
-        return chosen, view.container
+        return Choice(chosen, view.container, np.array([o.position for o in view.objects]))
 
     async def _look_around(self, context: Context, goal: PickGoal, view: _View) -> _View:
-        """Turn the torso to either side until both are seen, and back; the arms come along."""
+        """Turn the torso to either side until nothing is missing, and back; the arms come along."""
         motion, ahead = PlannedMotion(context), context.commanded_joints.copy()
         context.say("detect", f"{view.problem} Looking around.")
         for turn in (self._config.turn, -self._config.turn):
@@ -111,70 +134,64 @@ class TargetChoice:
         return view
 
     async def _see(self, context: Context, goal: PickGoal, before: _View) -> _View:
-        """Look until object and container are known, from this view or from those `before`."""
-        sides: tuple[Side, ...] = SIDES if goal.side == "either" else (goal.side,)
-        container, attempts = before.container, before.attempts
-        problem: PickFailed | None = PickFailed(
-            PickOutcome.FAILED, "detect", "localizer", "The head camera gave no detections in time."
+        """Look until nothing is missing, adding to what is known from the view `before`."""
+        view = _View(
+            before.objects,
+            before.container,
+            problem=PickFailed(
+                PickOutcome.FAILED, "detect", "localizer", "The head camera gave no detections in time."
+            ),
         )
         with context.watch("head", goal.label, goal.container) as eye:
             end = context.t + self._config.look_timeout
-            while problem is not None:
+            while view.problem is not None:
                 sightings = await eye.look(end - context.t)
                 if sightings is None:
                     break
-                containers = [o for o in sightings.objects if o.label == goal.container]
-                container = max(containers, key=lambda o: o.detection.score, default=before.container)
-                attempts = before.attempts or [
-                    Attempt(goal.label, goal.container, side, o)
-                    for side in sides
-                    for o in self._reachable(context, goal, side, sightings, container)
-                ]
-                seen = bool(before.attempts) or any(o.label == goal.label for o in sightings.objects)
-                problem = _missing(goal, container, attempts, seen)
-        return _View(attempts, container, problem)
+                view = self._added(context, goal, view, sightings)
+        return view
 
-    def _reachable(
-        self,
-        context: Context,
-        goal: PickGoal,
-        side: Side,
-        sightings: Detections,
-        container: LocalizedObject | None,
-    ) -> list[LocalizedObject]:
-        """Return the objects within the workspace of a hand, without those that lie in the container already."""
-        x0, x1, y0, y1, z0, z1 = self._config.workspace
-
-        def wanted(o: LocalizedObject) -> bool:
-            if o.label != goal.label:
-                return False
-            if container is not None:
-                apart = np.hypot(*(o.position - container.position)[:2])
-                if apart < self._config.container_radius:
-                    return False
-            x, y, z = p = _in_base(context, side, o.position)
-            if self._config.travel == "planned":
-                return load_map().serves("right", p)
-            return x0 <= x <= x1 and y0 <= y <= y1 and z0 <= z <= z1
-
-        return [o for o in sightings.objects if wanted(o)]
-
-    def _serves(self, context: Context, side: Side, container: LocalizedObject) -> bool:
-        """Return whether a hand need not reach across the body to the container."""
-        return bool(_in_base(context, side, container.position)[1] <= self._config.workspace[3])
+    def _added(self, context: Context, goal: PickGoal, view: _View, sightings: Detections) -> _View:
+        """Return what is known after one more picture."""
+        container, objects = view.container, list(view.objects)
+        containers = [o for o in sightings.objects if o.label == goal.container]
+        if containers:
+            best = max(containers, key=lambda o: o.detection.score)
+            container = Container.of(best, self._config.container_radius)
+        for new in (o for o in sightings.objects if o.label == goal.label):
+            if all(np.linalg.norm(new.position - known.position) > SAME for known in objects):
+                objects.append(new)
+        reach = HandReach(context, self._config)
+        attempts = [
+            Attempt(goal.label, goal.container, side, o)
+            for side in (SIDES if goal.side == "either" else (goal.side,))
+            for o in objects
+            if reach.takes(side, o.position) and not (container and container.holds(o.position[None])[0])
+        ]
+        if not attempts:
+            outcome = PickOutcome.OUT_OF_REACH if objects else PickOutcome.NOTHING_THERE
+            outcome = PickOutcome.TRAY_MISSING if objects and container is None else outcome
+            return _View(objects, container, [], _missing(outcome, f"reachable {goal.label}"))
+        if container is None:
+            return _View(objects, container, [], _missing(PickOutcome.TRAY_MISSING, goal.container))
+        places = container.places(self._config.drop_margin)
+        left = [a for a in attempts if reach.drops(a.side, places, slack=True).any()]
+        if left:
+            return _View(objects, container, left)
+        text = f"No hand that reaches a {goal.label} reaches any place in the {goal.container}."
+        problem = PickFailed(PickOutcome.TRAY_OUT_OF_REACH, "detect", "upper_body", text)
+        return _View(objects, container, [], problem)
 
     def _stands_low(self, o: LocalizedObject) -> bool:
         """Return whether an object looks as if it were screwed down; the head camera is not sure of it."""
         height = height_above_ground(o)
         return height is not None and height < self._config.proud
 
-    def _discomfort(self, context: Context, side: Side, o: LocalizedObject) -> float:
-        x, y, _ = _in_base(context, side, o.position)
-        return float(np.hypot(x - self._config.comfort[0], y - self._config.comfort[1]))
+
+def _missing(outcome: PickOutcome, what: str) -> PickFailed:
+    return PickFailed(outcome, "detect", "localizer", f"The head camera shows no {what}.")
 
 
-def _in_base(context: Context, side: Side, position: Array) -> Array:
-    """Return (3,) `position` in base_link [m], mirrored for the left hand as if it were the right."""
-    T = context.T_odom_base
-    p = T[:3, :3].T @ (position - T[:3, 3])
-    return p if side == "right" else p * (1.0, -1.0, 1.0)
+def positions(sightings: Detections, label: str) -> Array:
+    """Return (n, 3) where the objects of a class are, in odom [m]."""
+    return np.array([o.position for o in sightings.objects if o.label == label]).reshape(-1, 3)

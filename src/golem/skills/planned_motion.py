@@ -12,7 +12,7 @@ from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.goal_postures import POSITION, GoalPostures
 from golem.capabilities.arms.line_check import LineChecker
 from golem.capabilities.collision.obstacles import World
-from golem.capabilities.collision.scene_cloud import cleared, scene_world
+from golem.capabilities.collision.scene_cloud import cleared, displaced, scene_world
 from golem.capabilities.planning.base import Held, Plan, PlanRefused, PlanRequest, Refusal
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.plan_kernel import WORLD
@@ -80,6 +80,10 @@ class PlannedMotion:
             points, spheres, [(T[:3, :3] @ centre + T[:3, 3], radius) for centre, radius in spared]
         )
         return 0 if self.world.cloud is None else len(self.world.cloud.balls)
+
+    def displace(self, by: Array) -> None:
+        """Move what the head camera showed by `by` (3,) in odom [m]."""
+        self.world = displaced(self.world, self._context.T_odom_base[:3, :3].T @ by)
 
     async def to(
         self,

@@ -19,7 +19,7 @@ APPROACH = (0.010, np.deg2rad(3.0))
 """How far a hand on its way down may leave the line that the head camera suggests, and turn [m, rad]: the palm camera
 corrects it."""
 OVER = 0.015
-"""How far from its place above an object a hand may arrive [m]: it looks from there, and does not grasp."""
+"""How far from its place above an object or a container a hand may arrive [m]: it does not grasp there."""
 PULL = (0.003, np.deg2rad(1.5))
 """The same of a hand that pulls; sway and encoders off by 0.03 rad do as much."""
 ARM_BLAMED = (Refusal.UNREACHABLE, Refusal.OFF_LINE)
@@ -36,6 +36,10 @@ class Travel(Protocol):
         """Take the world from what the head camera shows now; `targets` (3,) in odom are what is to be gone to."""
         ...
 
+    def displace(self, by: Array) -> None:
+        """Take what was seen for being elsewhere by `by` (3,) in odom [m]."""
+        ...
+
     async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
         """Bring an empty hand above an object, from where it can go straight down to `T_object` and up again.
 
@@ -44,11 +48,11 @@ class Travel(Protocol):
         """
         ...
 
-    async def carry(self, side: Side, T_goal: Array, speed: float) -> None:
-        """Bring a hand that holds something to a pose.
+    async def carry(self, side: Side, goals: Sequence[Array], speed: float) -> None:
+        """Bring a hand that holds something to the first of some poses that it gets to.
 
         Raises:
-            StageFailed: it cannot be brought there.
+            StageFailed: it cannot be brought to any.
         """
         ...
 
@@ -84,13 +88,16 @@ class LineTravel:
     def look(self, targets: Sequence[Array]) -> None:
         """Look at nothing."""
 
+    def displace(self, by: Array) -> None:
+        """Nothing was seen."""
+
     async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
         """Go up, across and down; see `Travel`."""
         await self._go(side, T_above, speed)
 
-    async def carry(self, side: Side, T_goal: Array, speed: float) -> None:
-        """Go up, across and down; see `Travel`."""
-        await self._go(side, T_goal, speed)
+    async def carry(self, side: Side, goals: Sequence[Array], speed: float) -> None:
+        """Go up, across and down to the first; see `Travel`."""
+        await self._go(side, goals[0], speed)
 
     async def line(
         self, side: Side, T_goal: Array, speed: float, stage: str, stop: Callable[[], bool] = _never
@@ -133,6 +140,10 @@ class PlannedTravel:
         """Take the head camera's cloud for the world; see `Travel`."""
         self._motion.look([(target, SPARED) for target in targets])
 
+    def displace(self, by: Array) -> None:
+        """Move the cloud; see `Travel`."""
+        self._motion.displace(by)
+
     async def over(self, side: Side, T_above: Array, T_object: Array, speed: float) -> None:
         """Go there in a posture from which the way down is straight, or half of it, or at last in any; see `Travel`.
 
@@ -152,11 +163,16 @@ class PlannedTravel:
                     raise
         await self._to("approach", side, T_above, speed, near=OVER)
 
-    async def carry(self, side: Side, T_goal: Array, speed: float) -> None:
+    async def carry(self, side: Side, goals: Sequence[Array], speed: float) -> None:
         """Go around what is in the way of the hand and of the screw; see `Travel`."""
         from golem.skills.planned_motion import SCREW
 
-        await self._to("place", side, T_goal, speed, held=[Held(side, SCREW)])
+        for i, T in enumerate(goals, start=1):
+            try:
+                return await self._to("place", side, T, speed, held=[Held(side, SCREW)], near=OVER)
+            except StageFailed:
+                if i == len(goals):
+                    raise
 
     async def line(
         self, side: Side, T_goal: Array, speed: float, stage: str, stop: Callable[[], bool] = _never

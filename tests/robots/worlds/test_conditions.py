@@ -92,8 +92,9 @@ def test_screws_are_loose_tight_or_gone_and_none_stands_under_the_tray() -> None
         assert 1 <= len(found.loose) <= 3
         assert not set(found.loose) & set(found.missing)
         assert not set(found.loose) & under
+        assert min(found.loose) <= 10, "the hand on the tray's side takes those up to the robot's middle"
         kinds.add(found.loose)
-    assert len(kinds) > 10
+    assert len(kinds) > 6
 
 
 def test_every_screw_of_a_varied_place_stands_in_its_bore() -> None:

@@ -52,3 +52,13 @@ def cleared(grid: CloudGrid, spheres: Array, margin: float) -> CloudGrid:
     renumbered[left] = np.arange(len(left))
     cells = renumbered[grid.cells]
     return CloudGrid(grid.balls[left], cells, cell_steps(cells), grid.frame, grid.dropped)
+
+
+def displaced(world: World, by: Array) -> World:
+    """Return the world with its cloud moved by `by` (3,) [m]: what showed it is off by that much the other way."""
+    if world.cloud is None:
+        return world
+    cloud = world.cloud
+    step = np.append(by, 0.0)
+    moved = CloudGrid(cloud.balls + step, cloud.cells, cloud.steps, cloud.frame + step, cloud.dropped)
+    return World(world.obstacles, moved)

@@ -29,7 +29,7 @@ class ServoLawConfig:
         sigma_lateral: standard deviation of one sighting across the optical axis [m].
         sigma_depth: the same along the axis, at close range [m].
         gate: squared Mahalanobis distance beyond which a sighting is another object (chi2, 3 dof, p = 0.999).
-        first_radius: how far from the head camera's guess the first sighting may be [m].
+        first_radius: how far from the hand the first sighting may be [m]: one pitch of the screws and half of one.
         confirm: sightings needed before the hand leaves its stand-off.
         standoff: height above the grasp at which the hand centres itself [m].
         slope: metres of height the hand keeps per metre of lateral error beyond `tolerance`.
@@ -51,7 +51,7 @@ class ServoLawConfig:
     sigma_lateral: float = 0.002
     sigma_depth: float = 0.002
     gate: float = 16.3
-    first_radius: float = 0.20
+    first_radius: float = 0.14
     confirm: int = 3
     standoff: float = 0.07
     slope: float = 6.0
@@ -151,11 +151,14 @@ class CentroidServo:
             return False
         noise = np.array([c.sigma_lateral**2, c.sigma_lateral**2, c.sigma_depth**2])
         if self._sightings == 0:
-            # The head camera may be off by more than the pitch of the screws: take what is under the hand.
+            # The head camera may be off by more than the pitch of the screws: take what is under the hand, and of that
+            # what does not look tight.
             boresight = T_odom_gripper[:2, 3]
-            nearest = min(candidates, key=lambda s: float(np.hypot(*(s.position[:2] - boresight))))
-            if np.hypot(*(nearest.position[:2] - boresight)) > c.first_radius:
+            away = {id(s): float(np.hypot(*(s.position[:2] - boresight))) for s in candidates}
+            near = [s for s in candidates if away[id(s)] <= c.first_radius]
+            if not near:
                 return False
+            nearest = min(near, key=lambda s: (self._looks_tight(s), away[id(s)]))
             self._x, self._variance = nearest.position.copy(), noise
             self._depth = self._wanted_depth(nearest)
         else:
@@ -182,6 +185,11 @@ class CentroidServo:
             self._heights.append(height)
             mixed = self._normal + self._config.normal_gain * (normal - self._normal)
             self._normal = mixed / np.linalg.norm(mixed)
+
+    def _looks_tight(self, sighting: LocalizedObject) -> bool:
+        """Return whether one sighting shows an object that stands as low as one that is screwed down."""
+        loose, plane = self._config.loose_height.get(self.label), ground_plane(sighting)
+        return loose is not None and plane is not None and plane[1] < loose
 
     def _is_tight(self) -> bool:
         """Return whether the object stands as low as one that is screwed down, by the last looks at the ground."""

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
+from golem.capabilities.perception.open_box import OpenBox
 from golem.evaluation.episodes.pick_claims import Fastener
 from golem.robots.model import magpie_model
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.scene import ONLOOKER
 from golem.types import Array, Side
+
+OUT = 0.03
+"""A screw whose head is farther than this from its bore is out of it [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +75,32 @@ class Oracle:
                     Fastener((self._T_odom_world @ world)[:3], (T_base_world @ world)[:3], slot in loose)
                 )
         return found
+
+    def taken(self, fasteners: Sequence[Fastener]) -> set[int]:
+        """Return which of `fasteners`, by their index, are loose and no longer in their bores."""
+        heads = self.screw_heads()
+        away = [np.linalg.norm(heads - f.position, axis=1).min() if len(heads) else np.inf for f in fasteners]
+        return {i for i, f in enumerate(fasteners) if f.loose and away[i] > OUT}
+
+    @property
+    def T_world_odom(self) -> Array:
+        """(4, 4) odom in the world."""
+        return np.asarray(np.linalg.inv(self._T_odom_world), dtype=np.float64)
+
+    def drop_places(self) -> Array:
+        """Return (n, 3) places 8 cm above the tray's floor and 3 cm inside its rim, in base_link [m]."""
+        layout = self._robot.scene.layout
+        box = OpenBox(np.zeros(2), 0.0, np.array(layout.tray_size[:2]), layout.tray_size[2], 0.08)
+        flat = box.places(margin=0.03, spacing=0.03)
+        places = np.column_stack([flat, np.ones(len(flat))])
+        T = np.linalg.inv(self._robot.truth.base().T_world_base) @ layout.tray_pose()
+        return (places @ T.T)[:, :3]
+
+    def inside_tray(self, side: Side) -> float:
+        """Return how far a hand is inside the tray's rim, seen from above [m]; negative outside."""
+        layout = self._robot.scene.layout
+        T = np.linalg.inv(layout.tray_pose()) @ self.T_world_odom @ self.gripper(side)
+        return float((0.5 * np.array(layout.tray_size[:2]) - np.abs(T[:2, 3])).min())
 
     def gripper(self, side: Side) -> Array:
         """Return the true (4, 4) pose of a grasp frame in odom."""

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from golem.capabilities.arms.reach_map import load_map
-from golem.skills.pick_report import PickOutcome, PickReport, Tried
+from golem.skills.pick_report import PickOutcome, PickReport, Sight, Tried
 from golem.types import SIDES, Array
 
-SEEN = 0.025
-"""A screw this near to where the palm camera saw one is that one [m]: a quarter of their pitch."""
+SEEN = 0.045
+"""A screw this near to the hand that looks at one is that one [m]: half of their pitch."""
 LOOKED = 0.08
 """The same for the head camera, which is off by 5 cm and more in the profile `field` [m]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Fastener:
     """One that was in its place when the pick began.
 
@@ -33,7 +33,26 @@ class Fastener:
     loose: bool
 
 
-def claims(report: PickReport, fasteners: Sequence[Fastener], in_tray: bool) -> dict[str, float]:
+REFUSALS = (
+    PickOutcome.OUT_OF_REACH,
+    PickOutcome.BLOCKED,
+    PickOutcome.NOTHING_THERE,
+    PickOutcome.TRAY_MISSING,
+    PickOutcome.TRAY_FULL,
+    PickOutcome.TRAY_OUT_OF_REACH,
+    PickOutcome.TIGHT,
+    PickOutcome.JAMMED,
+)
+"""Outcomes that say of the work place that it cannot be done."""
+
+
+def claims(
+    report: PickReport,
+    fasteners: Sequence[Fastener],
+    taken: set[int],
+    in_tray: bool,
+    looked_at: Mapping[int, Array],
+) -> dict[str, float]:
     """Return for each outcome that was claimed, as `claim_NAME`, which share of its claims is right.
 
     `blocked`, `failed` and `slipped` claim nothing that is judged here.
@@ -41,18 +60,33 @@ def claims(report: PickReport, fasteners: Sequence[Fastener], in_tray: bool) -> 
     Args:
         report: what the pick says.
         fasteners: the truth at the beginning.
+        taken: which of them are out of their bores at the end.
         in_tray: whether a screw is in the tray at the end.
+        looked_at: where what a hand looked at last really was, (3,) in odom [m], by its place in the report; an object
+            that none came to has none.
     """
     judged: dict[str, list[float]] = defaultdict(list)
     if not report.tried:
         right = _whole(report.outcome, fasteners)
         if right is not None:
             judged[report.outcome].append(float(right))
-    for tried in report.tried:
-        right = _one(tried, fasteners, in_tray)
+    for i, tried in enumerate(report.tried):
+        right = _one(tried, fasteners, in_tray, looked_at.get(i))
         if right is not None:
             judged[tried.outcome].append(float(right))
+    for name, said, true in (
+        ("in_tray", report.in_tray, in_tray),
+        ("bore_empty", report.bore_empty, _emptied(fasteners, taken, looked_at.get(len(report.tried) - 1))),
+    ):
+        if said != Sight.UNKNOWN:
+            judged[name].append(float((said == Sight.YES) == true))
     return {f"claim_{name}": float(np.mean(values)) for name, values in judged.items()}
+
+
+def _emptied(fasteners: Sequence[Fastener], taken: set[int], place: Array | None) -> bool:
+    """Return whether the fastener that was looked at last is out."""
+    near = None if place is None else _nearest(place, fasteners, SEEN)
+    return near is not None and fasteners.index(near) in taken
 
 
 def _whole(outcome: str, fasteners: Sequence[Fastener]) -> bool | None:
@@ -67,26 +101,24 @@ def _whole(outcome: str, fasteners: Sequence[Fastener]) -> bool | None:
     return None
 
 
-def _one(tried: Tried, fasteners: Sequence[Fastener], in_tray: bool) -> bool | None:
+def _one(tried: Tried, fasteners: Sequence[Fastener], in_tray: bool, looked: Array | None) -> bool | None:
     """Return whether a claim about one screw is right."""
     if tried.outcome == PickOutcome.PICKED:
         return in_tray
-    wide = tried.outcome == PickOutcome.OUT_OF_REACH
-    near = _nearest(tried, fasteners, LOOKED if wide else SEEN)
+    place = np.array([tried.x, tried.y, tried.z]) if looked is None else looked
+    near = _nearest(place, fasteners, LOOKED if looked is None else SEEN)
     if tried.outcome == PickOutcome.NOTHING_THERE:
         return near is None
-    if near is None:
-        return None if tried.outcome not in (PickOutcome.TIGHT, PickOutcome.JAMMED) else False
-    if wide:
-        return not load_map().serves(tried.side, near.in_base)
     if tried.outcome in (PickOutcome.TIGHT, PickOutcome.JAMMED):
-        return near.loose == (tried.outcome == PickOutcome.JAMMED)
+        return near is not None and near.loose == (tried.outcome == PickOutcome.JAMMED)
+    if tried.outcome == PickOutcome.OUT_OF_REACH and near is not None:
+        return not load_map().serves(tried.side, near.in_base)
     return None
 
 
-def _nearest(tried: Tried, fasteners: Sequence[Fastener], within: float) -> Fastener | None:
-    """Return the fastener nearest to where one was tried, across, or None if none is `within` [m]."""
-    away = [float(np.hypot(f.position[0] - tried.x, f.position[1] - tried.y)) for f in fasteners]
+def _nearest(place: Array, fasteners: Sequence[Fastener], within: float) -> Fastener | None:
+    """Return the fastener nearest to a place, across, or None if none is `within` [m]."""
+    away = [float(np.hypot(f.position[0] - place[0], f.position[1] - place[1])) for f in fasteners]
     if not away or min(away) > within:
         return None
     return fasteners[int(np.argmin(away))]

@@ -15,26 +15,28 @@ import numpy as np
 
 from golem import registry
 from golem.errors import ConfigError
-from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.base import DONE, Case, Outcomes, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.episodes.doable import doable
 from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
 from golem.evaluation.episodes.pick_claims import claims
+from golem.evaluation.episodes.pick_touches import PickTouches
+from golem.evaluation.episodes.pick_verdict import verdict, verdict_tables
+from golem.evaluation.episodes.pick_watch import PickWatch
 from golem.evaluation.episodes.pull import straightness
 from golem.evaluation.harness.sweep import read_sweep
-from golem.interfaces import topics
-from golem.middleware.bus import News
+from golem.evaluation.metrics.text_table import TextTable
 from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.worlds.conditions import LayoutKind
-from golem.runtime.lockstep import LockstepRunner, build
+from golem.runtime.lockstep import build
 from golem.skills.base import FAULT, SkillResult
 from golem.skills.pick_config import PickGoal
 from golem.skills.pick_report import PickReport
 from golem.slots import KEYS
 from golem.stack import Stack, load_stack
-from golem.types import Array, Side
 
 SLOT = "grasp_method"
 """What the methods of these rungs are."""
@@ -119,18 +121,26 @@ class PickRung(Rung[PickOptions]):
                     )
                 running.executor.run(running.executor.t + RELEASED)
             before = oracle.fasteners()
-            watch = PickWatch(running, oracle, BalanceRecorder(robot) if self.balances else None)
+            feasible = doable(before, oracle.drop_places())
+            touches = PickTouches(robot, before, oracle.T_world_odom)
+            watch = PickWatch(running, oracle, BalanceRecorder(robot) if self.balances else None, touches)
             result = running.execute("pick", self._goal, watch=watch)
             running.executor.run(running.executor.t + SETTLE, watch.look)
             if artefacts is not None and watch.recorder is not None:
                 watch.recorder.trace().save(artefacts / TRACE)
             outcome = judge_pick(stack, result, oracle, watch, lost(running, watch.recorder))
             said = result.value if isinstance(result.value, PickReport) else PickReport()
-            right = claims(said, before, bool(oracle.screws_in_tray()))
-            return replace(outcome, series={**outcome.series, **right})
+            in_tray = bool(oracle.screws_in_tray())
+            right = claims(said, before, oracle.taken(before), in_tray, watch.looked_at)
+            ended = verdict(said, outcome.success, feasible)
+            return replace(outcome, series={**outcome.series, **touches.series(), **right, **ended})
         finally:
             oracle.close()
             robot.close()
+
+    def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
+        """Return what the robot said at the end, against what was possible; see `Rung`."""
+        return verdict_tables({method: [outcome for _, outcome in rows] for method, rows in outcomes.items()})
 
     @property
     def _goal(self) -> PickGoal:
@@ -168,43 +178,6 @@ class StandRung(PickRung):
     name = STANDING
 
 
-class PickWatch:
-    """Looks on after every tick and remembers the decisive moments."""
-
-    def __init__(self, running: LockstepRunner, oracle: Oracle, recorder: BalanceRecorder | None) -> None:
-        self._running, self._oracle = running, oracle
-        self.recorder = recorder
-        self._news = News(running.bus, topics.FEEDBACK)
-        self.grasp: GraspTruth | None = None
-        self.picture: bytes | None = None
-        self.pull: list[Array] = []
-        self._side: Side = "right"
-        self._stage = ""
-
-    def look(self) -> bool:
-        """Look on after the errand; it is never a reason to end."""
-        if self.recorder is not None:
-            self.recorder(self._running.executor.t)
-        return False
-
-    def __call__(self) -> None:
-        """Look on while the errand runs."""
-        self.look()
-        feedback = self._news.read()
-        if self._stage == "extract":
-            self.pull.append(self._oracle.gripper(self._side))
-        if feedback is None:
-            return
-        if feedback.stage != self._stage:
-            self._stage = feedback.stage
-            self.pull = [] if self._stage == "extract" else self.pull
-        if feedback.stage == "grasp" and not feedback.data.get("failed"):
-            self._side = side = feedback.data.get("side", "right")
-            self.grasp = self._oracle.grasp(side, self._running.commanded(side))
-        if feedback.stage == DONE or feedback.data.get("failed"):
-            self.picture = self._oracle.picture()
-
-
 def judge_pick(
     stack: Stack, result: SkillResult, oracle: Oracle, watch: PickWatch, loss: Loss | None
 ) -> TrialOutcome:
@@ -214,6 +187,8 @@ def judge_pick(
     pulled = straightness(watch.pull)
     if pulled is not None:
         series |= {"pull_beside": pulled[0], "pull_turn": pulled[1]}
+    if watch.drop_inside is not None:
+        series["drop_inside"] = watch.drop_inside
     if watch.recorder is not None:
         series |= balance(watch.recorder.trace())
     if loss is not None and result.stage not in ABORTED:

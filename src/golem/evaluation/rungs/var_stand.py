@@ -10,6 +10,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Literal
 
+import numpy as np
+
 from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.navigation.goto import GoTo
 from golem.errors import ConfigError
@@ -18,9 +20,11 @@ from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.episodes.pick_claims import claims
+from golem.evaluation.episodes.pick_touches import PickTouches
+from golem.evaluation.episodes.pick_watch import PickWatch
 from golem.evaluation.episodes.survey import survey
 from golem.evaluation.rungs.navigate_hall import DISTANCE, GUESS, SPREAD, true_pose
-from golem.evaluation.rungs.pick_screw import SETTLE, PickOptions, PickRung, PickWatch, balance, judge_pick
+from golem.evaluation.rungs.pick_screw import SETTLE, PickOptions, PickRung, balance, judge_pick
 from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.robots.mujoco.balance import BalanceRecorder
@@ -34,7 +38,7 @@ from golem.skills.navigate import NavigateGoal
 from golem.skills.pick_config import PickGoal
 from golem.skills.pick_report import PickOutcome, PickReport
 from golem.stack import Stack, load_stack
-from golem.types import SIDES, PlanarPose
+from golem.types import SIDES, Array, PlanarPose
 
 Start = Literal["placed", "walked"]
 Docking = Literal["no", "yes"]
@@ -51,6 +55,8 @@ STILL = 4.0
 WALK = 120.0
 """Time it gets for the walk [s]."""
 HERE = PlanarPose(0.0, 0.0, 0.0)
+NOWHERE_TO_WORK = (PickOutcome.OUT_OF_REACH, PickOutcome.TRAY_MISSING, PickOutcome.TRAY_OUT_OF_REACH)
+"""What a pick says of a robot that stands where it cannot work."""
 
 
 @dataclass(frozen=True)
@@ -186,7 +192,9 @@ class _Trial:
     def _pick(self) -> TrialOutcome:
         """Dock, if it is to, pick, and judge."""
         running, robot = self._episode.running, self._episode.robot
-        watch = PickWatch(running, self._oracle, BalanceRecorder(robot))
+        oracle, before = self._oracle, self._oracle.fasteners()
+        touches = PickTouches(robot, before, oracle.T_world_odom)
+        watch = PickWatch(running, oracle, BalanceRecorder(robot), touches)
         goal = DisassembleGoal(1, self._docks, pick=PickGoal(side="either"))
         news, since = News(running.bus, topics.FEEDBACK), running.executor.t
 
@@ -199,15 +207,18 @@ class _Trial:
 
         result = running.execute("disassemble", goal, watch=look)
         running.executor.run(running.executor.t + SETTLE, watch.look)
-        outcome = judge_pick(self._stack, result, self._oracle, watch, lost(running, watch.recorder))
+        outcome = judge_pick(self._stack, result, oracle, watch, lost(running, watch.recorder))
         found = result.value if isinstance(result.value, DisassembleReport) else DisassembleReport()
         pick = found.picks[-1] if found.picks else PickReport()
         # The robot tells places in its own odom, which has drifted on the way.
-        base = self._episode.running.bus.latest(topics.BASE)
-        fasteners = self._oracle.fasteners()
-        if base is not None:
-            T = base.T_odom_base
-            fasteners = [replace(f, position=T[:3, :3] @ f.in_base + T[:3, 3]) for f in fasteners]
+        estimate = running.bus.latest(topics.BASE)
+        T_base_odom = np.linalg.inv(robot.truth.base().T_world_base) @ oracle.T_world_odom
+        T = np.linalg.inv(T_base_odom) if estimate is None else estimate.T_odom_base
+        fasteners = [
+            replace(f, position=_at(T @ T_base_odom, f.position), in_base=_at(T_base_odom, f.position))
+            for f in before
+        ]
+        looked_at = {i: _at(T @ T_base_odom, place) for i, place in watch.looked_at.items()}
         served = sum(load_map().serves(side, f.in_base) for f in fasteners if f.loose for side in SIDES)
         assert watch.recorder is not None
         series = {
@@ -215,7 +226,8 @@ class _Trial:
             **balance(watch.recorder.trace(running.executor.t - since)),
             **self._series,
             **self._placed("after"),
-            **claims(pick, fasteners, bool(self._oracle.screws_in_tray())),
+            **touches.series(),
+            **claims(pick, fasteners, oracle.taken(before), bool(oracle.screws_in_tray()), looked_at),
             "dockings": float(len(found.docks)),
             "approaches": float(sum(dock.approaches for dock in found.docks)),
             "screws_served": float(served),
@@ -224,7 +236,7 @@ class _Trial:
         outcome = replace(outcome, series=series)
         if outcome.success or outcome.stage in ("fall", "safety", "fault"):
             return outcome
-        stands_badly = not served or pick.outcome in (PickOutcome.OUT_OF_REACH, PickOutcome.TRAY_MISSING)
+        stands_badly = not served or pick.outcome in NOWHERE_TO_WORK
         if not stands_badly:
             return outcome
         return replace(outcome, stage="stance", module=self._who(found))
@@ -275,3 +287,8 @@ def drawn_stance(spec: TrialSpec, walks: bool) -> PlanarPose:
         return PlanarPose(DISTANCE + float(off[0]), float(off[1]), float(off[2]))
     x, y, turn = spec.rng("placement").standard_normal(3) * (*PLACEMENT, TURN)
     return PlanarPose(float(x), float(y), float(turn)).to(HERE)
+
+
+def _at(T: Array, place: Array) -> Array:
+    """Return a point (3,) in the frame to which `T` (4, 4) leads."""
+    return T[:3, :3] @ place + T[:3, 3]

@@ -44,6 +44,8 @@ REACH_Y = 0.35
 """Near-edge fasteners up to this far from the pack's middle may be loose in a varied work place [m]: what an arm at
 either side reaches."""
 
+ASIDE = 0.05
+"""How far from the robot's middle a screw is surely one for a hand; as far beyond it, mostly [m]."""
 ROOM = 0.04
 """Room that a hand needs between a screw and the tray [m]."""
 
@@ -210,7 +212,8 @@ def draw_fasteners(
 ) -> Fasteners:
     """Return which of the near-edge fasteners are loose and which are gone; the others are tight.
 
-    At least one is loose where any could be. What a hand cannot come to for the tray stays tight.
+    At least one is loose where any could be, and of those, where there are such, one on the tray's side of the robot:
+    no hand carries a screw across. What a hand cannot come to for the tray stays tight.
 
     Args:
         layout: has the places.
@@ -224,10 +227,20 @@ def draw_fasteners(
     luck = rng.random((len(spots), 2))
     order = np.argsort(luck[:, 0])
     count = max(1, round(conditions.loose * len(spots))) if spots else 0
+    aside = [_on_trays_side(layout, s) for s in spots]
+    others = [k for least in (ASIDE, -ASIDE) for k in order.tolist() if aside[k] > least]
+    if others and not any(aside[k] > -ASIDE for k in order[:count]):
+        order[count - 1] = others[0]
     chosen = set(order[:count].tolist())
     rest = [k for k in range(len(spots)) if k not in chosen]
     gone = [spots[k] for k in rest if luck[k, 1] < conditions.missing]
     return Fasteners(tuple(spots[k] for k in sorted(chosen)), tuple(gone))
+
+
+def _on_trays_side(layout: PackLayout, slot: int) -> float:
+    """Return how far a place is from the robot's middle, to the side on which the tray is [m]."""
+    y = float((layout.pose() @ (*layout.fasteners()[slot], 0.0, 1.0))[1])
+    return float(np.copysign(1.0, layout.tray_xy[1])) * y
 
 
 def _under_tray(layout: PackLayout, slot: int) -> bool:

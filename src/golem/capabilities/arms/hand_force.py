@@ -1,0 +1,38 @@
+"""What a hand presses or pulls with, from the torques that its motors report."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from golem.capabilities.arms.arm_kinematics import UpperKinematics
+from golem.capabilities.arms.base import ARM_COLUMNS
+from golem.types import Array, Side
+
+
+class HandForce:
+    """Estimates the force at a grasp frame of an arm that moves slowly.
+
+    What the motors do beyond carrying the arm is done at the hand: tau - g(q) = J(q)^T F, in least squares over the
+    seven joints. Errors of the masses, friction and what is held remain in it; the difference to a moment before has
+    them cancelled.
+    """
+
+    def __init__(self) -> None:
+        """Build the arm's model."""
+        self._arm = UpperKinematics()
+
+    def __call__(self, side: Side, q: Array, tau: Array) -> Array:
+        """Return the (3,) force that a hand exerts on what it touches, in base_link [N].
+
+        Args:
+            side: which hand.
+            q: (15,) joints of torso, left arm, right arm [rad].
+            tau: (15,) their torques [N m].
+        """
+        arm, columns = self._arm, ARM_COLUMNS[side]
+        rest = tau - pin.computeGeneralizedGravity(arm.model, arm.data, q)
+        arm.update(q)
+        J = arm.jacobian(side)[:, columns]
+        wrench = np.linalg.lstsq(J.T, rest[columns], rcond=None)[0]
+        return np.asarray(arm.placement(side).rotation @ wrench[:3], dtype=np.float64)

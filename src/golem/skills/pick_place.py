@@ -1,0 +1,126 @@
+"""The end of a pick: where to let go of the object, and a look at whether it lies there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from golem.capabilities.planning.base import PlanRefused, Refusal
+from golem.interfaces.payloads import GripState
+from golem.skills.base import StageFailed
+from golem.skills.container import shift_of, wall_between
+from golem.skills.context import Context
+from golem.skills.hand_reach import HandReach
+from golem.skills.pick_config import PickConfig
+from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight, Tried
+from golem.skills.pick_targets import Attempt, Choice, positions
+from golem.skills.travel import Travel
+from golem.types import Array
+
+DROPS = 6
+"""Places in the container that are tried."""
+INSIDE = 0.035
+"""How far behind a wall the hand goes [m]."""
+PALM_TIMEOUT = 0.5
+"""Time that the palm camera may take for a picture [s]."""
+SAME = 0.035
+"""Two looks of the head camera at one object differ by less [m]; screws stand 9 cm apart."""
+NEAR = 0.12
+"""What vanished this near to where the hand took something is that: the palm camera may have seen its neighbour [m]."""
+
+
+async def place(
+    context: Context, config: PickConfig, travel: Travel, attempt: Attempt, tried: Tried, choice: Choice
+) -> None:
+    """Carry what a hand holds over the container and let go.
+
+    Args:
+        context: whose hands.
+        config: distances and speeds.
+        travel: moves them.
+        attempt: what is held.
+        tried: where it was taken.
+        choice: has the container.
+
+    Raises:
+        StageFailed: no place above the container is reached, or the object was lost.
+    """
+    container, arm, hand = choice.container, context.arms[attempt.side], context.hands[attempt.side]
+    others = np.array([o.target.position for o in choice.attempts])
+    shift = shift_of(np.array([tried.x, tried.y, tried.z]), attempt.target.position, others)
+    travel.displace(shift)
+    spots = container.places(config.drop_margin) + shift
+    goals: list[Array] = []
+    for spot in HandReach(context, config).drop_order(attempt.side, spots, DROPS):
+        T = arm.commanded.copy()
+        T[:3, 3] = spot + (0.0, 0.0, config.drop_height)
+        goals.append(T)
+    context.say(
+        "place", f"Carrying it to the {attempt.container}.", target=container.sighting.position.tolist()
+    )
+    try:
+        await travel.carry(attempt.side, goals, config.travel_speed)
+    except StageFailed as failure:
+        cause = failure.__cause__
+        if isinstance(cause, PlanRefused) and cause.refusal is Refusal.UNREACHABLE:
+            raise PickFailed(
+                PickOutcome.TRAY_OUT_OF_REACH, failure.stage, failure.slot, str(failure)
+            ) from cause
+        raise
+    if not hand.status.holding:
+        text = f"The {attempt.label} was lost on the way."
+        raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", text)
+    hand.open(config.release_gap)
+    await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
+
+
+def _above(T: Array, place: Array, config: PickConfig) -> Array:
+    """Return pose `T` (4, 4) moved to where the hand lets go above a place (3,) in odom [m]."""
+    moved = T.copy()
+    moved[:3, 3] = place + (0.0, 0.0, config.drop_height)
+    return moved
+
+
+async def _wall(context: Context, attempt: Attempt, middle: Array) -> float | None:
+    """Return where the palm camera sees a wall between the hand and the container's middle; see `wall_between`."""
+    camera = f"{attempt.side}_hand"
+    with context.watch(camera, attempt.container) as eye:
+        if await eye.look(PALM_TIMEOUT) is None:
+            return None
+    return wall_between(
+        context.scene(camera), context.arms[attempt.side].pose[:3, 3], middle, float(middle[2])
+    )
+
+
+async def look_after(
+    context: Context, config: PickConfig, attempt: Attempt, choice: Choice, report: PickReport
+) -> None:
+    """Look with the head camera at container and bore, and write into the report what it saw.
+
+    The object is in the container if something rises there now, or more such objects are seen there than before. Its
+    place is empty if one of those that were seen around it before is seen no more.
+    """
+    frames: list[Array] = []
+    clouds: list[Array] = []
+    with context.watch("head", attempt.label, attempt.container) as eye:
+        end = context.t + config.look_timeout
+        while len(frames) < config.looks_after:
+            sightings = await eye.look(end - context.t)
+            if sightings is None:
+                break
+            frames.append(positions(sightings, attempt.label))
+            clouds += [o.points for o in sightings.objects if o.label == attempt.container]
+    if not frames:
+        return
+    inside = choice.container.holds(choice.seen)
+    if clouds:
+        more = [int(choice.container.holds(points).sum()) > int(inside.sum()) for points in frames]
+        gained = choice.container.gained(np.concatenate(clouds))
+        if gained is not None or any(more):
+            report.in_tray = (Sight.YES if gained or 2 * sum(more) > len(more) else Sight.NO).value
+    taken = report.tried[-1]
+    stood = choice.seen[~inside]
+    around = stood[np.hypot(stood[:, 0] - taken.x, stood[:, 1] - taken.y) < NEAR]
+    now = np.concatenate(frames)
+    if len(around):
+        gone = [not len(now) or np.linalg.norm(now - one, axis=1).min() > SAME for one in around]
+        report.bore_empty = (Sight.YES if any(gone) else Sight.NO).value
