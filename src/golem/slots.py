@@ -103,7 +103,10 @@ SLOTS: dict[str, Slot] = {
     "grasp_method": Slot(
         "golem.capabilities.grasping.base:GraspMethod",
         {
+            "antipodal": "golem.capabilities.grasping.antipodal:Antipodal",
             "centroid": "golem.capabilities.grasping.centroid:Centroid",
+            "graspgen": "golem.capabilities.grasping.graspgen:GraspGen",
+            "reranked": "golem.capabilities.grasping.reranking:Reranking",
             "visual_servo": "golem.capabilities.grasping.visual_servo:VisualServo",
         },
     ),

@@ -48,6 +48,7 @@ OPTIONS: dict[tuple[str, str], Mapping[str, object]] = {
 }
 """What shipped modules without default options are checked with."""
 UNCHECKED: dict[tuple[str, str], str] = {
+    ("grasp_method", "graspgen"): "it needs a server: golem check grasp_method '{use: graspgen, host: HOST}'",
     ("robot", "replay"): "it needs a recording: golem check robot '{use: replay, file: BAG}'",
 }
 """Shipped modules that `golem check` leaves out where it is not asked for them, and why."""
