@@ -98,7 +98,10 @@ SLOTS: dict[str, Slot] = {
     ),
     "localizer": Slot(
         "golem.capabilities.perception.base:Localizer",
-        {"onnx": "golem.capabilities.perception.onnx_detector:OnnxDetector"},
+        {
+            "clusters": "golem.capabilities.perception.plane_clusters:PlaneClusters",
+            "onnx": "golem.capabilities.perception.onnx_detector:OnnxDetector",
+        },
     ),
     "grasp_method": Slot(
         "golem.capabilities.grasping.base:GraspMethod",
@@ -139,6 +142,7 @@ SLOTS: dict[str, Slot] = {
             "dock": "golem.skills.dock:Dock",
             "explore": "golem.skills.explore:Explore",
             "navigate": "golem.skills.navigate:Navigate",
+            "open": "golem.skills.open_door:OpenDoor",
             "pick": "golem.skills.pick:Pick",
             "stand": "golem.skills.walk:Stand",
             "walk": "golem.skills.walk:Walk",

@@ -28,6 +28,8 @@ DONE = "done"
 RUNGS: dict[str, str] = {
     "tether": "golem.evaluation.rungs.pick_screw:TetherRung",
     "stand": "golem.evaluation.rungs.pick_screw:StandRung",
+    "fridge-tether": "golem.evaluation.rungs.open_fridge:FridgeTether",
+    "fridge-stand": "golem.evaluation.rungs.open_fridge:FridgeStand",
     "push": "golem.evaluation.rungs.push:PushRung",
     "push-ramp": "golem.evaluation.rungs.push_ramp:PushRampRung",
     "push-limit": "golem.evaluation.rungs.push_limit:PushLimit",

@@ -1,7 +1,9 @@
 """Antipodal grasps: two points of a cloud between which the line lies in both friction cones (Nguyen 1988).
 
-Pairs are drawn from the object's cloud, hands are laid along each pair with approaches around the wanted one, and
-those whose fingers or palm would be where the cloud has something are dropped (ten Pas et al., GPD, IJRR 2017).
+Pairs are drawn from the object's cloud, by its normals, and from its outline as the coming hand sees it: one camera
+shows no more than the front of a thing, and the sides that fingers close on are its outline. Hands are laid along each
+pair with approaches around the wanted one, and those whose fingers or palm would be where the cloud has something are
+dropped (ten Pas et al., GPD, IJRR 2017).
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +25,8 @@ from golem.types import Array, LocalizedObject
 
 BETWEEN = 600
 """Points of the object on which hands are fitted."""
+PIXEL = 0.003
+"""Size of a pixel of the outline's image [m]."""
 SCENE = 20000
 """Points of the surroundings that are looked at."""
 
@@ -117,7 +122,7 @@ class Antipodal(OpenLoop):
         normals, smooth = normals_of(cloud)
         usable = np.flatnonzero(smooth)
         if len(usable) < 2:
-            return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0)
+            usable = np.arange(len(cloud))
         a, b = usable[rng.integers(0, len(usable), (2, c.pairs))]
         way = cloud[b] - cloud[a]
         width = np.linalg.norm(way, axis=1)
@@ -130,13 +135,45 @@ class Antipodal(OpenLoop):
         across = np.abs(way @ gripper.approach) < math.sin(c.tilt)
         cone = math.cos(math.atan(c.friction))
         held = np.flatnonzero((cosine > cone) & across)
-        # Grasps near the middle of the object hold its weight best, and are seen on both sides.
         middle = 0.5 * (cloud[a[held]] + cloud[b[held]])
+        way, width = way[held], width[held]
+        quality = (cosine[held] - cone) / (1.0 - cone) * 0.5 + 0.5
+        outline = self._outline_pairs(cloud, gripper, cone)
+        middle, way, width, quality = (
+            np.concatenate(pair) for pair in zip((middle, way, width, quality), outline, strict=True)
+        )
+        # Grasps near the middle of the object hold its weight best, and are seen on both sides.
         size = float(np.linalg.norm(cloud.std(axis=0))) + 1e-6
         off = np.linalg.norm(middle - cloud.mean(axis=0), axis=1) / size
-        quality = (cosine[held] - cone) / (1.0 - cone) * 0.5 + 0.5
         best = np.argsort(-quality * np.exp(-(off**2)), kind="stable")[: c.laid]
-        return middle[best], way[held[best]], width[held[best]], quality[best]
+        return middle[best], way[best], width[best], quality[best]
+
+    def _outline_pairs(
+        self, cloud: Array, gripper: Gripper, cone: float
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return the same of the outline that `cloud` has along the approach, whose walls are taken to be along it."""
+        c = self.config
+        u = np.cross(gripper.approach, (0.0, 0.0, 1.0) if abs(gripper.approach[2]) < 0.7 else (1.0, 0.0, 0.0))
+        u /= np.linalg.norm(u)
+        v = np.cross(gripper.approach, u)
+        spots, normals = outline(cloud @ np.column_stack([u, v]))
+        if len(spots) < 4:
+            return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0)
+        rng = np.random.default_rng(c.seed)
+        a, b = rng.integers(0, len(spots), (2, c.pairs // 4))
+        way = spots[b] - spots[a]
+        width = np.linalg.norm(way, axis=1)
+        fits = (width > 0.003) & (width < gripper.max_gap - 2.0 * c.room)
+        a, b, way, width = a[fits], b[fits], way[fits] / width[fits, None], width[fits]
+        # Outward normals: a pair whose line leaves the outline on the wrong side holds it from within.
+        cosine = np.minimum(-np.einsum("ij,ij->i", normals[a], way), np.einsum("ij,ij->i", normals[b], way))
+        held = np.flatnonzero(cosine > cone)
+        depth = float(np.quantile(cloud @ gripper.approach, 0.3))
+        flat = 0.5 * (spots[a[held]] + spots[b[held]])
+        middle = flat[:, :1] * u + flat[:, 1:] * v + depth * gripper.approach
+        axes = way[held, :1] * u + way[held, 1:] * v
+        quality = (cosine[held] - cone) / (1.0 - cone) * 0.4 + 0.5
+        return middle, axes, width[held], quality
 
     def _hands(self, middles: Array, axes: Array, gripper: Gripper) -> tuple[Array, Array, NDArray[np.intp]]:
         """Return poses (m, 4, 4), how far each leans from the approach (m,) [rad], and the pair (m,) it lies along."""
@@ -194,6 +231,25 @@ class Antipodal(OpenLoop):
                 if len(kept) == c.most:
                     return kept
         return kept
+
+
+def outline(flat: Array) -> tuple[Array, Array]:
+    """Return points (n, 2) on the outer border of a cloud (m, 2) in a plane [m], and their outward normals (n, 2)."""
+    low = flat.min(axis=0) - 4 * PIXEL
+    pixels = np.round((flat - low) / PIXEL).astype(int)
+    image = np.zeros(tuple(pixels.max(axis=0) + 5), np.uint8)
+    image[tuple(pixels.T)] = 1
+    image = cv2.morphologyEx(image, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
+    borders, _ = cv2.findContours(image, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    longest = max(borders, key=len)[:, 0, ::-1].astype(np.float64)
+    if len(longest) < 12:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    smooth = np.mean([np.roll(longest, k, axis=0) for k in range(-2, 3)], axis=0)
+    along = np.roll(smooth, -3, axis=0) - np.roll(smooth, 3, axis=0)
+    normals = np.column_stack([along[:, 1], -along[:, 0]]) / (np.linalg.norm(along, axis=1)[:, None] + 1e-9)
+    # Which way round a border goes tells which side is out.
+    area = float(np.sum(smooth[:, 0] * np.roll(smooth[:, 1], -1) - np.roll(smooth[:, 0], -1) * smooth[:, 1]))
+    return smooth * PIXEL + low, normals if area > 0.0 else -normals
 
 
 def upright(T: Array, yaw: float) -> Array:

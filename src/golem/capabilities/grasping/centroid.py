@@ -26,12 +26,14 @@ class CentroidConfig:
             2 mm while they close from there (parallelogram linkage).
         reach: how far beyond the seen surface the fingertips go when the hand comes across [m]: past the middle of a
             handle of 25 mm.
+        wide: opening to arrive with then [m]: a bar has more room around it than a screw.
     """
 
     depth: float = 0.010
     clearance: float = 0.004
     gap: float = 0.050
     reach: float = 0.020
+    wide: float = 0.090
 
 
 UP: Array = np.array([0.0, 0.0, 1.0])
@@ -88,4 +90,5 @@ class Centroid(OpenLoop):
         down = gripper.approach[2] < -ACROSS
         depth = grasp_depth(target, self.config.depth, self.config.clearance) if down else self.config.reach
         pose = grasp_pose(target.position + depth * gripper.approach, gripper.yaw, -gripper.approach)
-        return [Grasp(pose, self.config.gap, target.detection.score)]
+        gap = self.config.gap if down else self.config.wide
+        return [Grasp(pose, gap, target.detection.score)]

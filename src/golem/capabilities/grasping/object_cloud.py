@@ -13,6 +13,8 @@ PLANE = 0.004
 """Points this near to a plane are on it [m]: depth noise at arm's length."""
 SHARE = 0.25
 """Least share of a sighting that makes a plane."""
+WIDER = 1.4
+"""How much wider a plane is than the thing on it; a thing has flat sides of its own."""
 HYPOTHESES = 64
 """Planes through three points that are tried."""
 TESTED = 800
@@ -36,8 +38,19 @@ def object_points(points: Array, position: Array, seed: int = 0) -> Array:
     if plane is not None:
         normal, offset = plane
         height = float(position @ normal - offset)
-        kept = kept[kept @ normal - offset > np.clip(0.4 * height, 0.5 * PLANE, 2.0 * PLANE)]
+        heights = kept @ normal - offset
+        above = heights > np.clip(0.4 * height, 0.5 * PLANE, 2.0 * PLANE)
+        if _width(kept[np.abs(heights) < PLANE]) > WIDER * _width(kept[above]):
+            kept = kept[above]
     return piece(kept, position)
+
+
+def _width(points: Array) -> float:
+    """Return the standard deviation of points (n, 3) along their second axis [m]."""
+    if len(points) < 3:
+        return 0.0
+    off = points - points.mean(axis=0)
+    return float(np.sqrt(np.linalg.eigvalsh(off.T @ off / len(off))[1]))
 
 
 def support_plane(points: Array, position: Array, seed: int = 0) -> tuple[Array, float] | None:
