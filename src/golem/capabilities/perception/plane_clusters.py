@@ -40,7 +40,7 @@ class PlaneClustersConfig:
         thick: what is nearer than this to a plane is on it at 0.5 m [m]; it grows with the squared distance.
         planes: how many planes are looked for at most.
         share: least share of the points that makes a plane.
-        wide: least standard deviation of a plane's piece along its shorter side [m].
+        wide: least standard deviation of a plane's piece along its shorter side, as a share of its distance.
         hypotheses: planes through three points that are tried for each.
         least: pixels of a thing, counted at the stride.
         handle: bounds of an upright handle's length, width and distance from its door [m].
@@ -54,7 +54,7 @@ class PlaneClustersConfig:
     thick: float = 0.008
     planes: int = 5
     share: float = 0.03
-    wide: float = 0.04
+    wide: float = 0.06
     hypotheses: int = 120
     least: int = 40
     handle: tuple[tuple[float, float], tuple[float, float], tuple[float, float]] = (
@@ -151,7 +151,8 @@ class PlaneClusters:
             offsets = np.einsum("ij,ij->i", a, normals)
             on = np.abs(points[some] @ normals.T - offsets) < thick[some][:, None]
             best = int(on.sum(axis=0).argmax())
-            near = self._wide(left & (np.abs(points @ normals[best] - offsets[best]) < thick), points, valid)
+            on = left & (np.abs(points @ normals[best] - offsets[best]) < thick)
+            near = self._wide(on, points, valid, eye, c.wide)
             if not near.any():
                 continue
             middle = points[near].mean(axis=0)
@@ -160,11 +161,15 @@ class PlaneClusters:
             normal = normal if (eye - middle) @ normal > 0 else -normal
             plane = _Plane(normal, float(middle @ normal))
             planes.append(plane)
-            left &= ~near & ~self._wide(left & (np.abs(plane.heights(points)) < 1.5 * thick), points, valid)
+            # What is cut off from a plane, by a bar before it, is narrow and still of it.
+            on = left & (np.abs(plane.heights(points)) < 1.5 * thick)
+            left &= ~near & ~self._wide(on, points, valid, eye, 0.0)
         return planes, left
 
-    def _wide(self, near: NDArray[np.bool_], points: Array, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return those of the points `near` (n,) whose piece of the image is large and wide."""
+    def _wide(
+        self, near: NDArray[np.bool_], points: Array, valid: NDArray[np.bool_], eye: Array, wide: float
+    ) -> NDArray[np.bool_]:
+        """Return those of the points `near` (n,) whose piece of the image is large, and `wide` for its distance."""
         image = np.zeros(valid.shape, np.uint8)
         image[valid] = near
         count, numbers, stats, _ = cv2.connectedComponentsWithStats(image, connectivity=4)
@@ -175,7 +180,7 @@ class PlaneClusters:
                 piece = points[number == k]
                 piece = piece[:: max(1, len(piece) // 500)]
                 spread = np.linalg.svd(piece - piece.mean(axis=0), compute_uv=False) / np.sqrt(len(piece))
-                kept[k] = spread[1] > self.config.wide
+                kept[k] = spread[1] > wide * np.linalg.norm(piece.mean(axis=0) - eye)
         return kept[number]
 
     def _told(
