@@ -100,7 +100,9 @@ SLOTS: dict[str, Slot] = {
         "golem.capabilities.perception.base:Localizer",
         {
             "clusters": "golem.capabilities.perception.plane_clusters:PlaneClusters",
+            "gemini": "golem.capabilities.perception.gemini:Gemini",
             "onnx": "golem.capabilities.perception.onnx_detector:OnnxDetector",
+            "yolo_world": "golem.capabilities.perception.yolo_world:YoloWorld",
         },
     ),
     "grasp_method": Slot(

@@ -173,8 +173,8 @@ class PlaneClusters:
         image = np.zeros(valid.shape, np.uint8)
         image[valid] = near
         count, numbers, stats, _ = cv2.connectedComponentsWithStats(image, connectivity=4)
-        number = numbers[valid]
-        kept = np.zeros(count, bool)
+        number = np.asarray(numbers)[valid].astype(np.int64)
+        kept: NDArray[np.bool_] = np.zeros(count, bool)
         for k in range(1, count):
             if stats[k, cv2.CC_STAT_AREA] >= self.config.share * len(points):
                 piece = points[number == k]

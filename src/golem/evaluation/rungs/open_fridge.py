@@ -156,7 +156,8 @@ class _FridgeWatch:
         self, running: LockstepRunner, robot: MujocoRobot, oracle: Oracle, side: Side, balances: bool
     ) -> None:
         assert robot.scene.seal is not None
-        self._running, self._robot, self._oracle, self._side = running, robot, oracle, side
+        self._running, self._robot, self._oracle = running, robot, oracle
+        self._side: Side = side
         self._hinge = robot.scene.seal.qpos
         self.recorder = BalanceRecorder(robot) if balances else None
         self._news = News(running.bus, topics.FEEDBACK)

@@ -76,7 +76,7 @@ def draw_kitchen(rng: np.random.Generator, raised: float = 0.0, varied: bool = T
     nominal = FridgeLayout()
     left = bool(rng.random() < 0.5) if varied else False
     sign = -1.0 if left else 1.0
-    draws = rng.uniform(-1.0, 1.0, 9)
+    draws: list[float] = rng.uniform(-1.0, 1.0, 9).tolist()
     fridge = replace(
         nominal, hinge_left=left, handle_y=sign * nominal.handle_y, handle_z=nominal.handle_z + raised
     )
