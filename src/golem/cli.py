@@ -115,21 +115,23 @@ MODEL_COMMANDS = {
 
 
 def _bench(words: list[str]) -> int:
-    """Print figures of performance next to their references; `bench dds`: two processes; `bench arms`: IK, plans."""
+    """Print figures of performance next to their references; `bench arms`, `dds`, `grasp`, `localizer`: more of one."""
     _prepare_graphics()
-    if words[:1] == ["arms"]:
-        from golem.evaluation.speed.arms_bench import ArmsBenchConfig, run_arms_bench
+    if words[:1] and words[0] in BENCHES:
+        return _one_of(words, "bench", "bench", BENCHES)
+    from golem.evaluation.speed.bench import BenchConfig, run_bench
 
-        run_arms_bench(_parse(ArmsBenchConfig, "bench arms", words[1:]))
-    elif words[:1] == ["dds"]:
-        from golem.evaluation.speed.dds_bench import DdsBenchConfig, run_dds_bench
-
-        run_dds_bench(_parse(DdsBenchConfig, "bench dds", words[1:]))
-    else:
-        from golem.evaluation.speed.bench import BenchConfig, run_bench
-
-        run_bench(_parse(BenchConfig, "bench", words))
+    run_bench(_parse(BenchConfig, "bench", words))
     return 0
+
+
+BENCHES = {
+    "arms": ("golem.evaluation.speed.arms_bench", "ArmsBenchConfig", "run_arms_bench"),
+    "dds": ("golem.evaluation.speed.dds_bench", "DdsBenchConfig", "run_dds_bench"),
+    "grasp": ("golem.evaluation.speed.grasp_bench", "GraspBenchConfig", "run_grasp_bench"),
+    "localizer": ("golem.evaluation.speed.localizer_bench", "LocalizerBenchConfig", "run_localizer_bench"),
+}
+"""What is measured on its own."""
 
 
 def _reach(words: list[str]) -> int:

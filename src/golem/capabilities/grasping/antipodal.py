@@ -202,9 +202,9 @@ class Antipodal(OpenLoop):
         between = (np.abs(local[..., 0]) < 0.008) & (local[..., 2] < 0.0) & (local[..., 2] > -0.08)
         between &= np.abs(local[..., 1]) < reach
         held = between.sum(axis=1)
-        low = np.where(between, local[..., 1], np.inf).min(axis=1)
-        high = np.where(between, local[..., 1], -np.inf).max(axis=1)
-        shift = np.where(held > 0, 0.5 * (low + high), 0.0)
+        low = np.where(held > 0, np.where(between, local[..., 1], np.inf).min(axis=1), 0.0)
+        high = np.where(held > 0, np.where(between, local[..., 1], -np.inf).max(axis=1), 0.0)
+        shift = 0.5 * (low + high)
         T = T.copy()
         T[:, :3, 3] += shift[:, None] * T[:, :3, 1]
         gaps = np.where(held > 0, high - low, widths) + 2.0 * self.config.room

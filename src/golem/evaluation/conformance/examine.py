@@ -89,7 +89,7 @@ def candidate(slot: str, use: str) -> Candidate:
         ModuleFault: importing the file raised.
     """
     suite = suite_of(slot)
-    name, options = _choice(use)
+    name, options = choice_of(use)
     options = options or OPTIONS.get((slot, name), {})
     registry.load(slot, name)
     make = functools.partial(_make, suite, slot, name, options)
@@ -100,7 +100,12 @@ def _make(suite: Suite, slot: str, name: str, options: Mapping[str, object]) -> 
     return registry.create(slot, name, options, **suite.context())
 
 
-def _choice(use: str) -> tuple[str, Mapping[str, object]]:
+def choice_of(use: str) -> tuple[str, Mapping[str, object]]:
+    """Return name and options of a module as it is given on the command line.
+
+    Raises:
+        ConfigError: it begins with `{` and is not of the form `{use: NAME, option: value, ...}`.
+    """
     if not use.startswith("{"):
         return use, {}
     value = read_yaml(use, f"'{use}'")
