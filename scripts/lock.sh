@@ -22,11 +22,14 @@ compile pyproject.toml --constraints "$together" --extra record --extra foxglove
 compile pyproject.toml --constraints "$together" --extra report --output-file requirements/report.txt "$@"
 compile pyproject.toml --constraints "$together" --extra hardware --output-file requirements/hardware.txt "$@"
 compile pyproject.toml --constraints "$together" --extra realsense --output-file requirements/realsense.txt "$@"
+compile pyproject.toml --constraints "$together" --extra graspgen --output-file requirements/graspgen.txt "$@"
+compile pyproject.toml --constraints "$together" --extra vision --output-file requirements/vision.txt "$@"
 compile pyproject.toml --constraints "$together" --extra cluster --output-file requirements/cluster.txt "$@"
 compile pyproject.toml --constraints "$together" --extra lidar --output-file requirements/lidar.txt "$@"
 compile pyproject.toml --constraints "$together" --extra physx --output-file requirements/physx.txt "$@"
 compile pyproject.toml --constraints "$together" --extra train --output-file requirements/train.txt "$@"
 compile pyproject.toml --constraints "$together" --extra docs --output-file requirements/docs.txt "$@"
 compile pyproject.toml --constraints "$together" --extra dev --extra pink --extra dds --extra record --extra foxglove \
-    --extra report --extra cluster --extra lidar --extra hardware --extra realsense --extra physx --output-file requirements/dev.txt "$@"
+    --extra report --extra cluster --extra graspgen --extra lidar --extra hardware --extra realsense --extra physx \
+    --output-file requirements/dev.txt "$@"
 echo "uv>=0.13,<0.14" | compile - --output-file requirements/uv.txt "$@"

@@ -99,7 +99,7 @@ MODEL_COMMANDS = {
 
 
 def _bench(words: list[str]) -> int:
-    """Print figures of performance next to their references; `bench arms`, `dds`, `memory`: those of one part."""
+    """Print figures of performance next to their references; `bench arms`, `bench grasp`, ...: those of one part."""
     _prepare_graphics()
     if words and words[0] in BENCHES:
         return _one_of(words, "bench", "bench", BENCHES)
@@ -112,8 +112,11 @@ def _bench(words: list[str]) -> int:
 BENCHES = {
     "arms": ("golem.evaluation.speed.arms_bench", "ArmsBenchConfig", "run_arms_bench"),
     "dds": ("golem.evaluation.speed.dds_bench", "DdsBenchConfig", "run_dds_bench"),
+    "grasp": ("golem.evaluation.speed.grasp_bench", "GraspBenchConfig", "run_grasp_bench"),
+    "localizer": ("golem.evaluation.speed.localizer_bench", "LocalizerBenchConfig", "run_localizer_bench"),
     "memory": ("golem.evaluation.speed.memory_bench", "MemoryBenchConfig", "run_memory_bench"),
 }
+"""What is measured on its own."""
 
 
 def _train(words: list[str]) -> int:

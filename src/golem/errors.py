@@ -35,6 +35,10 @@ class MissingSystemLibrary(GolemError):
     """A shared library of the operating system is absent."""
 
 
+class ServiceUnavailable(GolemError):
+    """A service outside this process that a module asks does not answer, or answers nonsense."""
+
+
 class ModuleFault(GolemError):
     """A module of the stack raised, or returned something its contract forbids.
 
@@ -60,10 +64,11 @@ class ModuleFault(GolemError):
         Args:
             slot: its slot.
             use: its name in the stack file.
-            error: what was raised. A `ConfigError` is about what the user wrote elsewhere, and gets no trace.
+            error: what was raised. A `ConfigError` is about what the user wrote elsewhere, `ServiceUnavailable` about
+                another machine; they get no trace.
             doing: what goes before it in the reason, e.g. `"importing it raised "`.
         """
-        trace = Trace() if isinstance(error, ConfigError) else trace_of(error)
+        trace = Trace() if isinstance(error, ConfigError | ServiceUnavailable) else trace_of(error)
         where = f" ({trace.where})" if trace.where else ""
         return cls(slot, use, f"{doing}{describe(error)}{where}", trace.text)
 

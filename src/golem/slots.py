@@ -99,12 +99,20 @@ SLOTS: dict[str, Slot] = {
     ),
     "localizer": Slot(
         "golem.capabilities.perception.base:Localizer",
-        {"onnx": "golem.capabilities.perception.onnx_detector:OnnxDetector"},
+        {
+            "clusters": "golem.capabilities.perception.plane_clusters:PlaneClusters",
+            "gemini": "golem.capabilities.perception.gemini:Gemini",
+            "onnx": "golem.capabilities.perception.onnx_detector:OnnxDetector",
+            "yolo_world": "golem.capabilities.perception.yolo_world:YoloWorld",
+        },
     ),
     "grasp_method": Slot(
         "golem.capabilities.grasping.base:GraspMethod",
         {
+            "antipodal": "golem.capabilities.grasping.antipodal:Antipodal",
             "centroid": "golem.capabilities.grasping.centroid:Centroid",
+            "graspgen": "golem.capabilities.grasping.graspgen:GraspGen",
+            "reranked": "golem.capabilities.grasping.reranking:Reranking",
             "visual_servo": "golem.capabilities.grasping.visual_servo:VisualServo",
         },
     ),
@@ -148,6 +156,7 @@ SLOTS: dict[str, Slot] = {
             "dock": "golem.skills.dock:Dock",
             "explore": "golem.skills.explore:Explore",
             "navigate": "golem.skills.navigate:Navigate",
+            "open": "golem.skills.open_door:OpenDoor",
             "pick": "golem.skills.pick:Pick",
             "recall": "golem.skills.recall:Recall",
             "remember": "golem.skills.remember:Remember",

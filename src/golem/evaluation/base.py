@@ -30,6 +30,8 @@ RUNGS: dict[str, str] = {
     "stand": "golem.evaluation.rungs.pick_screw:StandRung",
     "tether-calibrated": "golem.evaluation.rungs.calibrated_robot:CalibratedTether",
     "calibration": "golem.evaluation.rungs.calibrated_robot:CalibrationRung",
+    "fridge-tether": "golem.evaluation.rungs.open_fridge:FridgeTether",
+    "fridge-stand": "golem.evaluation.rungs.open_fridge:FridgeStand",
     "push": "golem.evaluation.rungs.push:PushRung",
     "push-ramp": "golem.evaluation.rungs.push_ramp:PushRampRung",
     "push-limit": "golem.evaluation.rungs.push_limit:PushLimit",

@@ -296,7 +296,12 @@ class Context:
         return self.modules.grasp_method()
 
     async def propose(
-        self, method: GraspMethod, target: LocalizedObject, side: Side, yaw: float
+        self,
+        method: GraspMethod,
+        target: LocalizedObject,
+        side: Side,
+        yaw: float,
+        approach: tuple[float, float, float] = (0.0, 0.0, -1.0),
     ) -> list[Grasp]:
         """Return the grasps that `method` proposes for `target`, best first, once it has thought.
 
@@ -305,8 +310,10 @@ class Context:
             target: as the head camera saw it.
             side: of the hand that is to grasp.
             yaw: heading of the gripper's x axis about the vertical that suits the arm best [rad].
+            approach: direction in odom along which the hand is to come, of unit length.
         """
-        scene, gripper = self.scene("head"), Gripper(side, self.arms[side].pose, yaw)
+        gripper = Gripper(side, self.arms[side].pose, yaw, np.array(approach), self.joints, self.T_odom_base)
+        scene = self.scene("head")
         return await self.think(lambda: method.propose(target, scene, gripper), method.latency)
 
     def scene(self, camera: str) -> Array:

@@ -14,6 +14,9 @@ _MIRROR = np.array([1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 _HOME = np.array([-2.2676, -1.0230, -0.0531, 2.8722, -2.1033, -0.2992, 0.9781])
 _READY = np.array([-2.1677, -0.3555, -0.0472, 2.9261, -1.4805, -0.1529, 0.8282])
 
+# Right arm with the hand at (0.45, -0.22, 0.15) in base_link, looking straight ahead, its x axis down.
+_FORWARD = np.array([0.0462, -0.4472, 0.5271, -0.3920, 0.3609, 0.1077, -0.6154])
+
 
 def _both(left: Array, right: Array) -> Array:
     return np.concatenate([[0.0], _MIRROR * left, right])
@@ -24,10 +27,14 @@ POSTURES: dict[str, Array] = {
     "ready": _both(_READY, _READY),
     "ready_left": _both(_READY, _HOME),
     "ready_right": _both(_HOME, _READY),
+    "forward": _both(_FORWARD, _FORWARD),
+    "forward_left": _both(_FORWARD, _HOME),
+    "forward_right": _both(_HOME, _FORWARD),
 }
 """Joints (15,) by name. `home`: grasp frames at (0.36, -+0.44, 0.25) in base_link, outside the head camera's view.
 `ready`: above the work area, at (0.43, -+0.22, 0.20), where margin to the limits and manipulability are best and from
-where the whole area is reached without changing the arm's configuration; one arm or both."""
+where the whole area is reached without changing the arm's configuration; one arm or both. `forward`: before a door or
+a shelf, hands at (0.45, -+0.22, 0.15) that look straight ahead."""
 
 
 def posture(name: str) -> Array:

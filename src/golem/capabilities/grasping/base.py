@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
+
+import numpy as np
 
 from golem.robots.model.magpie_model import MAX_FORCE, MAX_GAP, PAD_HALF_SIZE
 from golem.types import Array, LocalizedObject, Side
@@ -17,7 +19,10 @@ class Gripper:
     Attributes:
         side: which hand.
         T_odom_gripper: (4, 4) where its grasp frame is, by the measured joints and the base estimate.
-        yaw: heading of its x axis about the vertical that suits the arm best [rad].
+        yaw: heading of its x axis about the vertical that suits the arm best [rad]; of a hand that points down.
+        approach: (3,) unit vector in odom along which the task wants the hand to come; straight down by default.
+        q: (15,) joints of torso, left arm, right arm [rad]; None where nobody says.
+        T_odom_base: (4, 4) pose of base_link in odom.
         max_gap: widest opening between the pads [m].
         max_force: greatest force of one finger [N].
         pad_length: of a pad, along the approach axis [m].
@@ -27,6 +32,9 @@ class Gripper:
     side: Side
     T_odom_gripper: Array
     yaw: float
+    approach: Array = field(default_factory=lambda: np.array([0.0, 0.0, -1.0]))
+    q: Array | None = None
+    T_odom_base: Array = field(default_factory=lambda: np.eye(4))
     max_gap: float = MAX_GAP
     max_force: float = MAX_FORCE
     pad_length: float = 2.0 * float(PAD_HALF_SIZE[2])

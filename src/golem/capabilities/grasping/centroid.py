@@ -1,4 +1,4 @@
-"""The paper's `Centroid`: close, top-down, on the centre of the object as the head camera saw it once."""
+"""The paper's `Centroid`: close on the centre of the object as the head camera saw it once, top-down or forward."""
 
 from __future__ import annotations
 
@@ -24,24 +24,32 @@ class CentroidConfig:
             the lower finger of a 50 mm opening is 2 mm below the middle.
         gap: opening to arrive with [m]: room for +-20 mm of error, and the fingertips still advance by less than
             2 mm while they close from there (parallelogram linkage).
+        reach: how far beyond the seen surface the fingertips go when the hand comes across [m]: past the middle of a
+            handle of 25 mm.
+        wide: opening to arrive with then [m]: a bar has more room around it than a screw.
     """
 
     depth: float = 0.010
     clearance: float = 0.004
     gap: float = 0.050
+    reach: float = 0.020
+    wide: float = 0.090
 
 
 UP: Array = np.array([0.0, 0.0, 1.0])
 """(3,) vertical in odom."""
+ACROSS = 0.7
+"""Vertical part of the unit approach below which a hand looks across."""
 
 
 def grasp_pose(position: Array, yaw: float, normal: Array = UP) -> Array:
     """Return the (4, 4) gripper pose at `position` (3,) that looks against `normal`.
 
     The gripper's z (approach) is -`normal` (3,), of unit length; its x axis is as near to the heading `yaw` about the
-    vertical [rad] as that allows.
+    vertical [rad] as that allows. A hand that looks across rather than down has its x axis down: that is how the wrist
+    holds it when the forearm points forward, and its fingers close sideways.
     """
-    x = np.array([math.cos(yaw), math.sin(yaw), 0.0])
+    x = np.array([math.cos(yaw), math.sin(yaw), 0.0]) if abs(normal[2]) > ACROSS else -UP
     x -= (x @ normal) * normal
     x /= np.linalg.norm(x)
     T = np.eye(4)
@@ -63,7 +71,7 @@ def grasp_depth(target: LocalizedObject, depth: float, clearance: float) -> floa
 
 
 class Centroid(OpenLoop):
-    """One grasp, straight down on the object's centre.
+    """One grasp on the object's centre, along the approach that the task wants: straight down, or forward.
 
     Attributes:
         config: its options.
@@ -77,8 +85,10 @@ class Centroid(OpenLoop):
         self.config = config or CentroidConfig()
 
     def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
-        """Return the one top-down grasp; see `GraspMethod`."""
+        """Return the one grasp; see `GraspMethod`."""
         check_finite("the object's position", target.position)
-        depth = grasp_depth(target, self.config.depth, self.config.clearance)
-        position = target.position - (0.0, 0.0, depth)
-        return [Grasp(grasp_pose(position, gripper.yaw), self.config.gap, target.detection.score)]
+        down = gripper.approach[2] < -ACROSS
+        depth = grasp_depth(target, self.config.depth, self.config.clearance) if down else self.config.reach
+        pose = grasp_pose(target.position + depth * gripper.approach, gripper.yaw, -gripper.approach)
+        gap = self.config.gap if down else self.config.wide
+        return [Grasp(pose, gap, target.detection.score)]

@@ -49,6 +49,9 @@ OPTIONS: dict[tuple[str, str], Mapping[str, object]] = {
 }
 """What shipped modules without default options are checked with."""
 UNCHECKED: dict[tuple[str, str], str] = {
+    ("localizer", "gemini"): "it asks a service: golem check localizer gemini, with your key",
+    ("localizer", "yolo_world"): "it needs weights: golem check localizer '{use: yolo_world, weights: FILE}'",
+    ("grasp_method", "graspgen"): "it needs a server: golem check grasp_method '{use: graspgen, host: HOST}'",
     ("robot", "replay"): "it needs a recording: golem check robot '{use: replay, file: BAG}'",
 }
 """Shipped modules that `golem check` leaves out where it is not asked for them, and why."""
@@ -87,7 +90,7 @@ def candidate(slot: str, use: str) -> Candidate:
         ModuleFault: importing the file raised.
     """
     suite = suite_of(slot)
-    name, options = _choice(use)
+    name, options = choice_of(use)
     options = options or OPTIONS.get((slot, name), {})
     registry.load(slot, name)
     make = functools.partial(_make, suite, slot, name, options)
@@ -98,7 +101,12 @@ def _make(suite: Suite, slot: str, name: str, options: Mapping[str, object]) -> 
     return registry.create(slot, name, options, **suite.context())
 
 
-def _choice(use: str) -> tuple[str, Mapping[str, object]]:
+def choice_of(use: str) -> tuple[str, Mapping[str, object]]:
+    """Return name and options of a module as it is given on the command line.
+
+    Raises:
+        ConfigError: it begins with `{` and is not of the form `{use: NAME, option: value, ...}`.
+    """
     if not use.startswith("{"):
         return use, {}
     value = read_yaml(use, f"'{use}'")

@@ -16,15 +16,9 @@ from golem.capabilities.memory.base import Observation
 from golem.capabilities.perception.lift import unproject
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.sensors.cameras import HEAD, T_MUJOCO_OPTICAL
+from golem.robots.worlds.tableware import KINDS
 from golem.types import Array, Detection, LocalizedObject, Mask, RgbdImage
 
-KINDS: dict[str, tuple[float, float]] = {
-    "mug": (0.045, 0.10),
-    "bowl": (0.08, 0.06),
-    "can": (0.034, 0.12),
-    "bottle": (0.035, 0.22),
-}
-"""What may be asked for: radius and height [m]."""
 COUNTER = (0.3, 0.6, 0.45)
 """Half the depth, width and height of a counter [m]."""
 AROUND = 1.7

@@ -29,6 +29,11 @@ PAPER: dict[tuple[str, str], tuple[PaperFigure, ...]] = {
     ),
     ("stand", "centroid"): (PaperFigure("screw, simulation", 27), PaperFigure("screw, real robot", 0)),
     ("stand", "visual_servo"): (PaperFigure("screw, simulation", 30), PaperFigure("screw, real robot", 26)),
+    # Its fridges are RoboCasa's, ours is our own; of GraspGenX there are no weights here.
+    ("fridge-tether", "centroid"): (PaperFigure("fridge, RoboCasa", 30),),
+    ("fridge-tether", "antipodal"): (PaperFigure("fridge, RoboCasa", 19),),
+    ("fridge-stand", "centroid"): (PaperFigure("fridge, RoboCasa", 24),),
+    ("fridge-stand", "antipodal"): (PaperFigure("fridge, RoboCasa", 8),),
     # Its MPC, of which it gives no count, was stopped by the operator; the vendor's policy did not stand still.
     ("push", "almi"): (PaperFigure("positive margin recovered, real robot", 14, 15),),
     ("push-ramp", "almi"): (PaperFigure("positive margin recovered, real robot", 14, 15),),

@@ -144,15 +144,17 @@ def _killed(path: Path, seed: int) -> int:
     words = [sys.executable, "-m", "golem.evaluation.speed.memory_bench", str(path), str(seed)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as writer:
         assert writer.stdout is not None
-        writer.stdout.readline()
+        first = writer.stdout.readline()
         time.sleep(np.random.default_rng(seed).uniform(0.0, 0.05))
         writer.send_signal(signal.SIGKILL)
-        told = [int(line.split()[1]) for line in writer.stdout if line.endswith("\n")]
-    acknowledged = max(told, default=0)
+        lines = [first, *writer.stdout]
+    told = [int(line.split()[1]) for line in lines if line.endswith("\n")]
+    if not told:
+        raise RuntimeError(f"A process that was to write {path} ended before its first look.")
     memory = ObjectMap(ObjectMapConfig(file=str(path)))
-    kept = memory.last
+    kept = 0 if np.isinf(memory.last) else round(memory.last)
     memory.close()
-    return max(0, acknowledged - round(kept))
+    return max(0, max(told) - kept)
 
 
 def _write(path: str, seed: int) -> None:

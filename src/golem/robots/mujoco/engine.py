@@ -91,7 +91,11 @@ class MujocoRobot:
         self._exposure = {
             name: AutoExposure(conditions.light, stream(seed, f"exposure/{name}")) for name in CAMERAS
         }
-        self._mirrors = mirror_geoms(model, conditions) if self.config.layout == "varied" else None
+        self._mirrors = (
+            mirror_geoms(model, conditions)
+            if self.config.world == "pack" and self.config.layout == "varied"
+            else None
+        )
         self._imu_model = ImuModel(self.profile.imu, self._errors.imu, stream(seed, "imu"))
         self._hoist = Hoist(model, hoist)
         self._pushes = Pushes(model)
@@ -184,6 +188,8 @@ class MujocoRobot:
             self._hoist.apply(self.data, sway)
             self._pushes.apply(self.data)
             self.scene.move_people(self.data)
+            if self.scene.seal is not None:
+                self.scene.seal.apply(self.data)
             self._step()
 
     def _step(self) -> None:

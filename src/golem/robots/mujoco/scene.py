@@ -20,7 +20,9 @@ from golem.robots.worlds import furnished, parts, terrain
 from golem.robots.worlds.clutter import add_clutter
 from golem.robots.worlds.conditions import REACH_Y, Conditions, arranged, draw_conditions, draw_fasteners
 from golem.robots.worlds.dressing import dress
+from golem.robots.worlds.fridge import Seal, seal_of
 from golem.robots.worlds.furnished import Person
+from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_kitchen
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
 from golem.robots.worlds.screws import ScrewDraw, draw_screws
@@ -53,6 +55,8 @@ class Scene:
         draws: the loosened screws.
         people: those who walk about.
         conditions: what of the work place differs from the nominal one.
+        kitchen: what stands in a kitchen; None elsewhere.
+        seal: the gasket of its fridge.
     """
 
     model: mujoco.MjModel
@@ -62,6 +66,8 @@ class Scene:
     draws: tuple[ScrewDraw, ...]
     people: tuple[Person, ...] = ()
     conditions: Conditions = Conditions()
+    kitchen: KitchenLayout | None = None
+    seal: Seal | None = None
 
     def move_people(self, data: mujoco.MjData) -> None:
         """Put everybody where they are at the time of `data`."""
@@ -84,8 +90,10 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
     spec = _robot(config)
     draws: list[ScrewDraw] = []
     people: tuple[Person, ...] = ()
+    kitchen: KitchenLayout | None = None
     names = PackNames((), np.zeros((0, 3)), "", ())
-    conditions = draw_conditions(config.layout, config.conditions, stream(seed, "world/conditions"))
+    layout_kind = config.layout if config.world in WITH_PACK else "nominal"
+    conditions = draw_conditions(layout_kind, config.conditions, stream(seed, "world/conditions"))
     nominal, stance = layout, PlanarPose(*config.stance)
     if config.world == "plant":
         people = _add_terrain(spec, config, seed)
@@ -100,6 +108,11 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
         add_clutter(spec, layout, round(conditions.clutter), stream(seed, "world/clutter"))
         dress(spec, conditions, stance)
         _add_onlooker(spec, layout)
+    elif config.world == "kitchen":
+        raised = layout.top_z - PackLayout().top_z
+        kitchen = draw_kitchen(stream(seed, "world/kitchen"), raised, config.layout == "varied")
+        names = PackNames((), np.zeros((0, 3)), "", add_kitchen(spec, kitchen))
+        _add_kitchen_onlooker(spec, kitchen)
     else:
         people = _add_terrain(spec, config, seed)
         _add_companion(spec)
@@ -110,7 +123,9 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
     spec.option.noslip_iterations = config.noslip
     spec.option.timestep = COARSE_STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    return Scene(spec.compile(), names, layout, nominal, tuple(draws), people, conditions)
+    model = spec.compile()
+    seal = None if kitchen is None else seal_of(model, kitchen.fridge)
+    return Scene(model, names, layout, nominal, tuple(draws), people, conditions, kitchen, seal)
 
 
 def _robot(config: MujocoConfig) -> mujoco.MjSpec:
@@ -219,6 +234,15 @@ def _add_onlooker(spec: mujoco.MjSpec, layout: PackLayout) -> None:
     T = layout.pose()
     eye = (T @ (0.95, 0.75 - layout.center_y, 0.70, 1.0))[:3]
     target = (T @ (0.02, -0.15 - layout.center_y, 0.06, 1.0))[:3]
+    _aim(spec.worldbody.add_camera(name=ONLOOKER.name), eye, target)
+
+
+def _add_kitchen_onlooker(spec: mujoco.MjSpec, kitchen: KitchenLayout) -> None:
+    """Add a fixed camera that watches robot, fridge and counter from the counter's side, behind the robot."""
+    fridge = kitchen.fridge
+    side = 1.0 if fridge.handle_y < 0.0 else -1.0
+    eye = np.array([-1.25, 1.35 * side, fridge.handle_z + 0.65])
+    target = np.array([fridge.front - 0.05, 0.05 * side, fridge.handle_z - 0.22])
     _aim(spec.worldbody.add_camera(name=ONLOOKER.name), eye, target)
 
 

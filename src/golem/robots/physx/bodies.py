@@ -65,16 +65,15 @@ def build_bodies(model: mujoco.MjModel, friction: float) -> PhysxBodies:
         friction: sliding friction of the world's surfaces; PhysX takes the mean of a pair's.
 
     Raises:
-        ConfigError: something else moves freely, or a shape is none of PhysX's.
+        ConfigError: something else has joints, or a shape is none of PhysX's.
         MissingExtra: SAPIEN is not installed.
     """
     sapien = load_sapien()
     maker = _Maker(sapien, model, friction)
     root = model.body(BASE_LINK).id
     mine = model.body_rootid == model.body_rootid[root]
-    free = [j for j in range(model.njnt) if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE]
-    if [int(model.jnt_bodyid[j]) for j in free] != [root]:
-        raise ConfigError("PhysX has no screws in bores: its worlds are those without a pack.")
+    if not mine[model.jnt_bodyid].all():
+        raise ConfigError("In PhysX only the robot moves: its worlds are those without a pack or a kitchen.")
     physx = sapien.physx
     config = physx.get_scene_config()
     config.gravity = model.opt.gravity.astype(np.float32)

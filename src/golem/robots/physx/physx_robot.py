@@ -17,6 +17,7 @@ from golem.types import SIDES, Array
 
 FINGER_DRIVE = 20.0, 0.2
 """Stiffness [N m/rad] and damping [N m s/rad] with which a finger's hinge follows its crank, as its rocker has it."""
+WORLDS = ("open", "slope", "rubble", "furnished", "corridor")
 SLIP = 0.05
 """Speed of a joint from which its dry friction is whole [rad/s] [own: without a slope it would chatter]."""
 
@@ -26,7 +27,7 @@ class PhysxConfig(MujocoConfig):
     """Options of the twin in PhysX: those of the MuJoCo twin that it can keep.
 
     Attributes:
-        world: all but `pack`: PhysX has no screws in bores.
+        world: one in which only the robot moves.
     """
 
     world: World = "open"
@@ -45,9 +46,9 @@ class PhysxConfig(MujocoConfig):
         ):
             if given:
                 raise ConfigError(f"The twin in PhysX does not have the option {what}.")
-        if self.world == "pack":
+        if self.world not in WORLDS:
             raise ConfigError(
-                "PhysX has no screws in bores; choose another world: open, slope, rubble, furnished, corridor."
+                f"In PhysX only the robot moves, no screw and no door; choose another world: {', '.join(WORLDS)}."
             )
 
 

@@ -1,0 +1,265 @@
+"""Antipodal grasps: two points of a cloud between which the line lies in both friction cones (Nguyen 1988).
+
+Pairs are drawn from the object's cloud, by its normals, and from its outline as the coming hand sees it: one camera
+shows no more than the front of a thing, and the sides that fingers close on are its outline. Hands are laid along each
+pair with approaches around the wanted one, and those whose fingers or palm would be where the cloud has something are
+dropped (ten Pas et al., GPD, IJRR 2017).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.capabilities.grasping.base import Grasp, Gripper, OpenLoop
+from golem.capabilities.grasping.centroid import ACROSS, UP
+from golem.capabilities.grasping.hand_volume import collides, in_hands
+from golem.capabilities.grasping.object_cloud import MIN_POINTS, normals_of, object_points, spaced, thinned
+from golem.finite import check_finite
+from golem.options import require
+from golem.types import Array, LocalizedObject
+
+BETWEEN = 600
+"""Points of the object on which hands are fitted."""
+PIXEL = 0.003
+"""Size of a pixel of the outline's image [m]."""
+SCENE = 20000
+"""Points of the surroundings that are looked at."""
+
+
+@dataclass(frozen=True)
+class AntipodalConfig:
+    """How grasps are drawn and judged.
+
+    Attributes:
+        friction: coefficient of the pads on the object; its arc tangent is half the angle of the cones.
+        points: points of the object that are used at most.
+        pairs: pairs of points that are drawn.
+        laid: the best pairs along which hands are laid.
+        most: grasps that are returned at most.
+        tilt: how far the approach may lean away from the wanted one [rad].
+        depth: how far beyond the pair the fingertips go [m].
+        room: what the fingers leave on either side when they arrive [m].
+        apart: two grasps nearer than this, and turned by less than `alike`, are one [m].
+        alike: angle between approaches of one grasp [rad].
+        seed: of the draws.
+        latency: declared time of a proposal [s]; `golem bench grasp` measures it.
+    """
+
+    friction: float = 0.6
+    points: int = 2000
+    pairs: int = 20000
+    laid: int = 80
+    most: int = 64
+    tilt: float = 0.6
+    depth: float = 0.015
+    room: float = 0.012
+    apart: float = 0.005
+    alike: float = 0.15
+    seed: int = 0
+    latency: float = 0.06
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ConfigError: one of them cannot be meant.
+        """
+        require(
+            "antipodal ",
+            ("friction", self.friction, 0.0 < self.friction <= 2.0, "from 0 to 2"),
+            ("tilt", self.tilt, 0.0 <= self.tilt <= math.pi / 2, "from 0 to pi / 2 rad"),
+            ("pairs", self.pairs, 1 <= self.pairs <= 1_000_000, "from 1 to 1000000"),
+            ("points", self.points, MIN_POINTS <= self.points <= 20000, f"from {MIN_POINTS} to 20000"),
+        )
+
+
+class Antipodal(OpenLoop):
+    """Grasps on pairs of points that hold by friction, free of what the cloud shows; see `GraspMethod`.
+
+    Attributes:
+        config: its options.
+        latency: declared time of a proposal [s].
+    """
+
+    def __init__(self, config: AntipodalConfig | None = None) -> None:
+        """Take the options."""
+        self.config = config or AntipodalConfig()
+        self.latency = self.config.latency
+
+    def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:
+        """Return grasps, best first; see `GraspMethod`. Where the cloud holds no object there is none."""
+        check_finite("the object's position", target.position)
+        c = self.config
+        cloud = object_points(target.points, target.position, c.seed)
+        if len(cloud) < MIN_POINTS:
+            return []
+        cloud = thinned(cloud, c.points, c.seed)
+        middles, axes, widths, quality = self._pairs(cloud, gripper)
+        if not len(middles):
+            return []
+        T, turned, index = self._hands(middles, axes, gripper)
+        if not len(T):
+            return []
+        T, gaps, held = self._fit(T, widths[index], thinned(cloud, BETWEEN, c.seed))
+        off = np.linalg.norm(T[:, :3, 3] - c.depth * T[:, :3, 2] - cloud.mean(axis=0), axis=1)
+        size = float(np.linalg.norm(cloud.std(axis=0))) + 1e-6
+        score = quality[index] * (1.0 - 0.3 * turned / max(c.tilt, 1e-6)) * np.exp(-((off / size) ** 2))
+        score *= np.minimum(held / 6.0, 1.0)
+        good = np.flatnonzero((gaps <= gripper.max_gap) & (held > 0))
+        order = good[np.argsort(-score[good], kind="stable")]
+        kept = self._distinct(T, gaps, order, self._around(cloud, scene))
+        return [Grasp(T[k].copy(), float(gaps[k]), float(score[k])) for k in kept]
+
+    def _pairs(self, cloud: Array, gripper: Gripper) -> tuple[Array, Array, Array, Array]:
+        """Return middles (n, 3), closing axes (n, 3), widths (n,) and quality (n,) of the best pairs, best first."""
+        c = self.config
+        rng = np.random.default_rng(c.seed)
+        normals, smooth = normals_of(cloud)
+        usable = np.flatnonzero(smooth)
+        if len(usable) < 2:
+            usable = np.arange(len(cloud))
+        a, b = usable[rng.integers(0, len(usable), (2, c.pairs))]
+        way = cloud[b] - cloud[a]
+        width = np.linalg.norm(way, axis=1)
+        fits = (width > 0.003) & (width < gripper.max_gap - 2.0 * c.room)
+        a, b, way, width = a[fits], b[fits], way[fits] / width[fits, None], width[fits]
+        cosine = np.minimum(
+            np.abs(np.einsum("ij,ij->i", normals[a], way)), np.abs(np.einsum("ij,ij->i", normals[b], way))
+        )
+        # A closing axis along the approach lets no hand come.
+        across = np.abs(way @ gripper.approach) < math.sin(c.tilt)
+        cone = math.cos(math.atan(c.friction))
+        held = np.flatnonzero((cosine > cone) & across)
+        middle = 0.5 * (cloud[a[held]] + cloud[b[held]])
+        way, width = way[held], width[held]
+        quality = (cosine[held] - cone) / (1.0 - cone) * 0.5 + 0.5
+        outline = self._outline_pairs(cloud, gripper, cone)
+        middle, way, width, quality = (
+            np.concatenate(pair) for pair in zip((middle, way, width, quality), outline, strict=True)
+        )
+        # Grasps near the middle of the object hold its weight best, and are seen on both sides.
+        size = float(np.linalg.norm(cloud.std(axis=0))) + 1e-6
+        off = np.linalg.norm(middle - cloud.mean(axis=0), axis=1) / size
+        best = np.argsort(-quality * np.exp(-(off**2)), kind="stable")[: c.laid]
+        return middle[best], way[best], width[best], quality[best]
+
+    def _outline_pairs(
+        self, cloud: Array, gripper: Gripper, cone: float
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return the same of the outline that `cloud` has along the approach, whose walls are taken to be along it."""
+        c = self.config
+        u = np.cross(gripper.approach, (0.0, 0.0, 1.0) if abs(gripper.approach[2]) < 0.7 else (1.0, 0.0, 0.0))
+        u /= np.linalg.norm(u)
+        v = np.cross(gripper.approach, u)
+        spots, normals = outline(cloud @ np.column_stack([u, v]))
+        if len(spots) < 4:
+            return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0)
+        rng = np.random.default_rng(c.seed)
+        a, b = rng.integers(0, len(spots), (2, c.pairs // 4))
+        way = spots[b] - spots[a]
+        width = np.linalg.norm(way, axis=1)
+        fits = (width > 0.003) & (width < gripper.max_gap - 2.0 * c.room)
+        a, b, way, width = a[fits], b[fits], way[fits] / width[fits, None], width[fits]
+        # Outward normals: a pair whose line leaves the outline on the wrong side holds it from within.
+        cosine = np.minimum(-np.einsum("ij,ij->i", normals[a], way), np.einsum("ij,ij->i", normals[b], way))
+        held = np.flatnonzero(cosine > cone)
+        depth = float(np.quantile(cloud @ gripper.approach, 0.3))
+        flat = 0.5 * (spots[a[held]] + spots[b[held]])
+        middle = flat[:, :1] * u + flat[:, 1:] * v + depth * gripper.approach
+        axes = way[held, :1] * u + way[held, 1:] * v
+        quality = (cosine[held] - cone) / (1.0 - cone) * 0.4 + 0.5
+        return middle, axes, width[held], quality
+
+    def _hands(self, middles: Array, axes: Array, gripper: Gripper) -> tuple[Array, Array, NDArray[np.intp]]:
+        """Return poses (m, 4, 4), how far each leans from the approach (m,) [rad], and the pair (m,) it lies along."""
+        c, approach = self.config, gripper.approach
+        z = approach - (axes @ approach)[:, None] * axes
+        z /= np.linalg.norm(z, axis=1, keepdims=True)
+        x = np.cross(axes, z)
+        rows, leans, pairs = [], [], []
+        for turn in (0.0, 0.3, -0.3, 0.6, -0.6):
+            z_turned = math.cos(turn) * z + math.sin(turn) * x
+            lean = np.arccos(np.clip(z_turned @ approach, -1.0, 1.0))
+            kept = np.flatnonzero(lean <= c.tilt + 1e-9)
+            T = np.tile(np.eye(4), (len(kept), 1, 1))
+            T[:, :3, 1], T[:, :3, 2] = axes[kept], z_turned[kept]
+            T[:, :3, 0] = np.cross(axes[kept], z_turned[kept])
+            T[:, :3, 3] = middles[kept] + c.depth * z_turned[kept]
+            rows.append(T)
+            leans.append(lean[kept])
+            pairs.append(kept)
+        return upright(np.concatenate(rows), gripper.yaw), np.concatenate(leans), np.concatenate(pairs)
+
+    def _fit(self, T: Array, widths: Array, cloud: Array) -> tuple[Array, Array, Array]:
+        """Return poses centred on what lies between their pads, the openings it takes, and how many points it is."""
+        local = in_hands(T, cloud)
+        reach = 0.5 * widths[:, None] + 0.02
+        between = (np.abs(local[..., 0]) < 0.008) & (local[..., 2] < 0.0) & (local[..., 2] > -0.08)
+        between &= np.abs(local[..., 1]) < reach
+        held = between.sum(axis=1)
+        low = np.where(held > 0, np.where(between, local[..., 1], np.inf).min(axis=1), 0.0)
+        high = np.where(held > 0, np.where(between, local[..., 1], -np.inf).max(axis=1), 0.0)
+        shift = 0.5 * (low + high)
+        T = T.copy()
+        T[:, :3, 3] += shift[:, None] * T[:, :3, 1]
+        gaps = np.where(held > 0, high - low, widths) + 2.0 * self.config.room
+        return T, gaps, held
+
+    def _around(self, cloud: Array, scene: Array) -> Array:
+        """Return the points (n, 3) that a hand at the object may touch: the object, and what is near it."""
+        c = self.config
+        low, high = cloud.min(axis=0) - 0.15, cloud.max(axis=0) + 0.15
+        finite = scene[((scene > low) & (scene < high)).all(axis=1)] if len(scene) else scene
+        return np.concatenate([spaced(cloud), spaced(thinned(finite, SCENE, c.seed))])
+
+    def _distinct(self, T: Array, gaps: Array, order: NDArray[np.intp], around: Array) -> list[int]:
+        """Return the first `most` of `order` that are free of `around` (n, 3) and no copies of a better one."""
+        c = self.config
+        kept: list[int] = []
+        for first in range(0, len(order), c.most):
+            some = order[first : first + c.most]
+            for k in some[~collides(T[some], gaps[some], around)].tolist():
+                away = np.linalg.norm(T[kept, :3, 3] - T[k, :3, 3], axis=1)
+                turned = T[kept, :3, 2] @ T[k, :3, 2]
+                if not ((away < c.apart) & (turned > math.cos(c.alike))).any():
+                    kept.append(k)
+                if len(kept) == c.most:
+                    return kept
+        return kept
+
+
+def outline(flat: Array) -> tuple[Array, Array]:
+    """Return points (n, 2) on the outer border of a cloud (m, 2) in a plane [m], and their outward normals (n, 2)."""
+    low = flat.min(axis=0) - 4 * PIXEL
+    pixels = np.round((flat - low) / PIXEL).astype(int)
+    image = np.zeros(tuple(pixels.max(axis=0) + 5), np.uint8)
+    image[tuple(pixels.T)] = 1
+    image = cv2.morphologyEx(image, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
+    borders, _ = cv2.findContours(image, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    longest = max(borders, key=len)[:, 0, ::-1].astype(np.float64)
+    if len(longest) < 12:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    smooth = np.mean([np.roll(longest, k, axis=0) for k in range(-2, 3)], axis=0)
+    along = np.roll(smooth, -3, axis=0) - np.roll(smooth, 3, axis=0)
+    normals = np.column_stack([along[:, 1], -along[:, 0]]) / (np.linalg.norm(along, axis=1)[:, None] + 1e-9)
+    # Which way round a border goes tells which side is out.
+    area = float(np.sum(smooth[:, 0] * np.roll(smooth[:, 1], -1) - np.roll(smooth[:, 0], -1) * smooth[:, 1]))
+    return smooth * PIXEL + low, normals if area > 0.0 else -normals
+
+
+def upright(T: Array, yaw: float) -> Array:
+    """Return hands (n, 4, 4) turned by half a turn about their approach where that suits the arm; fingers are alike.
+
+    A hand that looks across has its x axis down, one that looks down has it within a right angle of the heading `yaw`
+    [rad]; see `grasp_pose`.
+    """
+    heading = np.array([math.cos(yaw), math.sin(yaw), 0.0])
+    wanted = np.where(np.abs(T[:, 2, 2:3]) < ACROSS, -UP, heading)
+    T = T.copy()
+    T[np.einsum("ni,ni->n", T[:, :3, 0], wanted) < 0.0, :3, :2] *= -1.0
+    return T

@@ -1,0 +1,121 @@
+"""Which points of a sighting are the object: without the plane it stands on or hangs before, and in one piece."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.spatial import KDTree
+
+from golem.types import Array
+
+PLANE = 0.004
+"""Points this near to a plane are on it [m]: depth noise at arm's length."""
+SHARE = 0.25
+"""Least share of a sighting that makes a plane."""
+WIDER = 1.4
+"""How much wider a plane is than the thing on it; a thing has flat sides of its own."""
+HYPOTHESES = 64
+"""Planes through three points that are tried."""
+TESTED = 800
+"""Points that each of them is tried on."""
+CELL = 0.012
+"""Points of neighbouring cells of this size belong to one piece [m]."""
+MIN_POINTS = 20
+"""Fewer points are no object to grasp."""
+
+
+def object_points(points: Array, position: Array, seed: int = 0) -> Array:
+    """Return the (m, 3) points of the object among the (n, 3) `points` of a sighting [m]; m may be 0.
+
+    A plane that holds at least `SHARE` of the points and does not hold the object's `position` (3,) is what it stands
+    on or hangs before (RANSAC): what is on it or behind it goes. Of the rest, the piece nearest to `position` stays.
+    """
+    kept = points[np.isfinite(points).all(axis=1)]
+    if len(kept) < MIN_POINTS:
+        return kept[:0]
+    plane = support_plane(kept, position, seed)
+    if plane is not None:
+        normal, offset = plane
+        height = float(position @ normal - offset)
+        heights = kept @ normal - offset
+        above = heights > np.clip(0.4 * height, 0.5 * PLANE, 2.0 * PLANE)
+        if _width(kept[np.abs(heights) < PLANE]) > WIDER * _width(kept[above]):
+            kept = kept[above]
+    return piece(kept, position)
+
+
+def _width(points: Array) -> float:
+    """Return the standard deviation of points (n, 3) along their second axis [m]."""
+    if len(points) < 3:
+        return 0.0
+    off = points - points.mean(axis=0)
+    return float(np.sqrt(np.linalg.eigvalsh(off.T @ off / len(off))[1]))
+
+
+def support_plane(points: Array, position: Array, seed: int = 0) -> tuple[Array, float] | None:
+    """Return the plane that most points (n, 3) lie on and `position` (3,) does not; None where there is none.
+
+    Returns:
+        its (3,) unit normal, which looks to the side of `position`, and its distance from the origin along it [m].
+    """
+    rng = np.random.default_rng(seed)
+    a, b, c = points[rng.integers(0, len(points), (3, HYPOTHESES))]
+    normals = np.cross(b - a, c - a)
+    size = np.linalg.norm(normals, axis=1)
+    a, normals = a[size > 1e-9], normals[size > 1e-9] / size[size > 1e-9, None]
+    offsets = np.einsum("ij,ij->i", a, normals)
+    off = normals @ position - offsets
+    free = np.abs(off) > 0.75 * PLANE
+    tested = points[rng.permutation(len(points))[:TESTED]]
+    counts = (np.abs(tested @ normals.T - offsets) < PLANE).sum(axis=0) * free
+    if not len(counts) or counts.max() < SHARE * len(tested):
+        return None
+    best = int(counts.argmax())
+    on = points[np.abs(points @ normals[best] - offsets[best]) < PLANE]
+    middle = on.mean(axis=0)
+    normal = np.linalg.svd(on[:: max(1, len(on) // TESTED)] - middle, full_matrices=False)[2][2]
+    offset = float(middle @ normal)
+    return (normal, offset) if position @ normal > offset else (-normal, -offset)
+
+
+def piece(points: Array, position: Array) -> Array:
+    """Return the connected piece of `points` (n, 3) that is nearest to `position` (3,)."""
+    if not len(points):
+        return points
+    cells = np.floor((points - points.min(axis=0)) / CELL).astype(int)
+    taken = np.zeros(cells.max(axis=0) + 1, bool)
+    taken[tuple(cells.T)] = True
+    number = np.zeros(taken.shape, np.int32)
+    ndimage.label(taken, np.ones((3, 3, 3)), output=number)
+    own = number[tuple(cells.T)]
+    nearest = int(((points - position) ** 2).sum(axis=1).argmin())
+    return points[own == own[nearest]]
+
+
+def thinned(points: Array, most: int, seed: int = 0) -> Array:
+    """Return at most `most` of `points` (n, 3), evenly drawn."""
+    if len(points) <= most:
+        return points
+    return points[np.random.default_rng(seed).permutation(len(points))[:most]]
+
+
+def spaced(points: Array, distance: float = 0.006) -> Array:
+    """Return one of `points` (n, 3) per cube of side `distance` [m]."""
+    cubes = np.floor(points / distance).astype(np.int64)
+    _, first = np.unique(cubes @ (1, 1 << 20, 1 << 40), return_index=True)
+    return points[first]
+
+
+def normals_of(points: Array, neighbours: int = 16) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the (n, 3) unit normals of `points` (n, 3), of either sign, and (n,) whether each is on a surface.
+
+    The normal is the direction in which a point's neighbours spread least (principal components, Hoppe et al. 1992);
+    where they spread as much in every direction there is no surface.
+    """
+    k = min(neighbours, len(points))
+    _, index = KDTree(points).query(points, k=k)
+    near = points[np.asarray(index).reshape(len(points), k)]
+    off = near - near.mean(axis=1, keepdims=True)
+    values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", off, off))
+    return vectors[:, :, 0], values[:, 0] < 0.3 * values[:, 1]

@@ -1,0 +1,144 @@
+"""Folders in COCO format: images with labelled boxes, and the average precision of detections against them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.errors import ConfigError
+from golem.types import Array, Detection
+
+
+@dataclass(frozen=True, slots=True)
+class LabelledImage:
+    """One image.
+
+    Attributes:
+        path: its file.
+        labels: (n,) class names of its boxes.
+        boxes: (n, 4) x_min, y_min, x_max, y_max [px].
+    """
+
+    path: Path
+    labels: tuple[str, ...]
+    boxes: Array
+
+    def read(self) -> NDArray[np.uint8]:
+        """Return it as (height, width, 3) RGB.
+
+        Raises:
+            ConfigError: it cannot be read.
+        """
+        image = cv2.imread(str(self.path))
+        if image is None:
+            raise ConfigError(f"The image {self.path} cannot be read.")
+        return np.ascontiguousarray(image[:, :, ::-1], np.uint8)
+
+
+def read_coco(folder: Path) -> list[LabelledImage]:
+    """Return the images of a folder: its one `*.json` in COCO format, with `images`, `annotations`, `categories`.
+
+    Images are looked for beside the JSON file and in `images`. Crowds are left out. Class names are in small letters,
+    with `_` for a space.
+
+    Raises:
+        ConfigError: there is no such file or more than one, or it is no such file, or an image is absent.
+    """
+    files = sorted(folder.expanduser().glob("*.json"))
+    if len(files) != 1:
+        found = ", ".join(file.name for file in files) or "none"
+        raise ConfigError(f"{folder} needs one JSON file of annotations in COCO format; it has {found}.")
+    try:
+        data = json.loads(files[0].read_text(encoding="utf-8"))
+        names = {int(c["id"]): str(c["name"]).lower().replace(" ", "_") for c in data["categories"]}
+        images = {int(image["id"]): str(image["file_name"]) for image in data["images"]}
+        rows: dict[int, list[tuple[str, list[float]]]] = {key: [] for key in images}
+        for one in data["annotations"]:
+            if not one.get("iscrowd"):
+                x, y, w, h = (float(v) for v in one["bbox"])
+                rows[int(one["image_id"])].append((names[int(one["category_id"])], [x, y, x + w, y + h]))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ConfigError(f"{files[0]} is not in COCO format: {type(error).__name__} {error}.") from error
+    return [
+        LabelledImage(
+            _image(files[0].parent, images[key]),
+            tuple(label for label, _ in rows[key]),
+            np.array([box for _, box in rows[key]]).reshape(-1, 4),
+        )
+        for key in sorted(images)
+    ]
+
+
+def _image(folder: Path, name: str) -> Path:
+    for path in (folder / name, folder / "images" / name):
+        if path.is_file():
+            return path
+    raise ConfigError(f"The image {name} is neither in {folder} nor in {folder / 'images'}.")
+
+
+@dataclass(frozen=True, slots=True)
+class LabelScore:
+    """How a detector did on one class.
+
+    Attributes:
+        count: labelled boxes.
+        ap: average precision at the given overlap (all points of the curve).
+        centre: median distance of the centres of matched boxes [px]; nan without any.
+        false: detections that matched nothing, per image.
+    """
+
+    count: int
+    ap: float
+    centre: float
+    false: float
+
+
+def score_label(
+    label: str, images: Sequence[LabelledImage], found: Mapping[int, Sequence[Detection]], overlap: float
+) -> LabelScore:
+    """Return the score of one class.
+
+    Args:
+        label: the class.
+        images: the labelled images.
+        found: detections of each image, by its number.
+        overlap: least share of the union (IoU) that matches.
+    """
+    hits: list[tuple[float, bool]] = []
+    off: list[float] = []
+    count = 0
+    for k, image in enumerate(images):
+        boxes = image.boxes[[name == label for name in image.labels]]
+        count += len(boxes)
+        free = np.ones(len(boxes), bool)
+        own = sorted((d for d in found[k] if d.label == label), key=lambda d: -d.score)
+        for detection in own:
+            shares = np.where(free, _shares(detection.box, boxes), 0.0)
+            best = int(shares.argmax()) if len(boxes) else -1
+            hit = best >= 0 and float(shares[best]) >= overlap
+            hits.append((detection.score, hit))
+            if hit:
+                free[best] = False
+                off.append(float(np.linalg.norm(detection.center - boxes[best].reshape(2, 2).mean(axis=0))))
+    hits.sort(key=lambda one: -one[0])
+    right = np.cumsum([hit for _, hit in hits]) if hits else np.zeros(0)
+    precision = right / np.arange(1, len(right) + 1)
+    recall = right / max(count, 1)
+    # The curve never falls towards lower recall (all-point interpolation, PASCAL VOC 2010).
+    precision = np.maximum.accumulate(precision[::-1])[::-1]
+    ap = float(np.sum(np.diff(np.concatenate([[0.0], recall])) * precision)) if len(right) else 0.0
+    wrong = sum(not hit for _, hit in hits) / max(len(images), 1)
+    return LabelScore(count, ap, float(np.median(off)) if off else float("nan"), wrong)
+
+
+def _shares(box: Array, boxes: Array) -> Array:
+    low, high = np.maximum(box[:2], boxes[:, :2]), np.minimum(box[2:], boxes[:, 2:])
+    shared = np.prod(np.maximum(high - low, 0.0), axis=1)
+    union = float(np.prod(box[2:] - box[:2])) + np.prod(boxes[:, 2:] - boxes[:, :2], axis=1) - shared
+    return shared / np.maximum(union, 1e-9)

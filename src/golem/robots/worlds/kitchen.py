@@ -1,0 +1,245 @@
+"""A kitchen drawn from a seed: a fridge before the robot, a counter beside it, and tableware on the counter.
+
+Ours, built of boxes and turned shapes; nothing of RoboCasa is in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from golem.robots.worlds import hall, parts
+from golem.robots.worlds.fridge import HANDLE, FridgeLayout, add_fridge
+from golem.robots.worlds.pack import PackPart
+from golem.robots.worlds.tableware import COLOURS, KINDS, add_object
+
+FRONTS: tuple[tuple[float, float, float], ...] = (
+    (0.93, 0.92, 0.89), (0.36, 0.45, 0.41), (0.20, 0.28, 0.38), (0.62, 0.46, 0.31), (0.80, 0.82, 0.84),
+)  # fmt: skip
+"""Colours of the cabinets' fronts (r, g, b)."""
+TOPS: tuple[tuple[float, float, float], ...] = (
+    (0.30, 0.30, 0.32), (0.78, 0.75, 0.70), (0.55, 0.40, 0.26), (0.88, 0.88, 0.87),
+)  # fmt: skip
+"""Colours of the counter's top."""
+STEELS: tuple[tuple[float, float, float], ...] = (
+    (0.72, 0.73, 0.75), (0.90, 0.90, 0.90), (0.18, 0.18, 0.20), (0.62, 0.20, 0.18), (0.70, 0.84, 0.80),
+)  # fmt: skip
+"""Colours of the fridge."""
+APART = 0.04
+"""Least distance between two things on the counter [m]."""
+_BOX = mujoco.mjtGeom.mjGEOM_BOX
+_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
+
+
+@dataclass(frozen=True, slots=True)
+class StandingThing:
+    """A thing on the counter: its kind, the body's name, and the middle of its underside in the world [m]."""
+
+    kind: str
+    body: str
+    position: tuple[float, float, float]
+    yaw: float
+    colour: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class KitchenLayout:
+    """One kitchen.
+
+    Attributes:
+        fridge: the fridge.
+        counter_top: height of the counter [m].
+        counter_front: x of its front edge [m].
+        things: what stands on it.
+        front, top, steel: colours of cabinets, counter and fridge.
+    """
+
+    fridge: FridgeLayout
+    counter_top: float
+    counter_front: float
+    things: tuple[StandingThing, ...]
+    front: tuple[float, float, float]
+    top: tuple[float, float, float]
+    steel: tuple[float, float, float]
+
+
+def draw_kitchen(rng: np.random.Generator, raised: float = 0.0, varied: bool = True) -> KitchenLayout:
+    """Return a kitchen.
+
+    Args:
+        rng: the same state gives the same kitchen.
+        raised: how much higher than for a pelvis of 1.10 m the bar and the counter are [m].
+        varied: places, sizes and colours are drawn; else only what stands on the counter.
+    """
+    nominal = FridgeLayout()
+    left = bool(rng.random() < 0.5) if varied else False
+    sign = -1.0 if left else 1.0
+    draws: list[float] = rng.uniform(-1.0, 1.0, 9).tolist()
+    fridge = replace(
+        nominal, hinge_left=left, handle_y=sign * nominal.handle_y, handle_z=nominal.handle_z + raised
+    )
+    if varied:
+        fridge = replace(
+            fridge,
+            front=nominal.front + 0.03 * draws[0],
+            handle_y=sign * (nominal.handle_y + 0.04 * draws[1]),
+            handle_z=nominal.handle_z + raised + 0.04 * draws[2],
+            yaw=0.08 * draws[3],
+            length=nominal.length + 0.08 * draws[4],
+            radius=nominal.radius + 0.0025 * draws[5],
+            standoff=nominal.standoff + 0.01 * draws[6],
+            seal=nominal.seal + 5.0 * draws[7],
+            mass=nominal.mass + 5.0 * draws[8],
+        )
+    picks = rng.integers(0, (len(FRONTS), len(TOPS), len(STEELS))) if varied else np.zeros(3, int)
+    top, edge = 0.94 + raised, 0.44
+    things = _draw_things(rng, top, edge, sign)
+    return KitchenLayout(fridge, top, edge, things, FRONTS[picks[0]], TOPS[picks[1]], STEELS[picks[2]])
+
+
+def _draw_things(rng: np.random.Generator, top: float, edge: float, sign: float) -> tuple[StandingThing, ...]:
+    """Return a mug, a bowl, a can, a bottle and some more on the counter, apart from each other."""
+    kinds = [*KINDS, *(str(kind) for kind in rng.choice(list(KINDS), size=int(rng.integers(0, 4))))]
+    things: list[StandingThing] = []
+    for k, kind in enumerate(kinds):
+        radius = KINDS[kind][0] + (0.03 if kind == "mug" else 0.0)
+        for _ in range(60):
+            x, y = rng.uniform((edge + 0.09, 0.12), (edge + 0.40, 1.25))
+            others = ((t, KINDS[t.kind][0]) for t in things)
+            if all(
+                np.hypot(x - t.position[0], sign * y - t.position[1]) > radius + r + APART for t, r in others
+            ):
+                colour = COLOURS[kind][int(rng.integers(len(COLOURS[kind])))]
+                yaw = float(rng.uniform(-np.pi, np.pi))
+                place = (float(x), float(sign * y), top)
+                things.append(StandingThing(kind, f"{kind}_{k}", place, yaw, colour))
+                break
+    return tuple(things)
+
+
+def add_kitchen(spec: mujoco.MjSpec, layout: KitchenLayout) -> tuple[PackPart, ...]:
+    """Add floor, walls, cabinets, fridge and tableware; return what a detector can be asked for."""
+    _add_materials(spec, layout)
+    sign = 1.0 if layout.fridge.handle_y < 0.0 else -1.0
+    _add_room(spec)
+    room = spec.worldbody.add_body(name="kitchen")
+    _add_counter(room, layout, sign)
+    add_fridge(spec, layout.fridge)
+    found = [_handle(layout.fridge)]
+    for thing in layout.things:
+        geoms = add_object(spec, thing.kind, thing.body, thing.position, thing.yaw, thing.colour)
+        radius, height = KINDS[thing.kind]
+        top = np.array(thing.position) + (0.0, 0.0, height)
+        found.append(PackPart(thing.kind, thing.body, geoms, top, np.array([2 * radius, 2 * radius, height])))
+    return tuple(found)
+
+
+def _handle(fridge: FridgeLayout) -> PackPart:
+    reach = fridge.standoff
+    c, s = float(np.cos(fridge.yaw)), float(np.sin(fridge.yaw))
+    place = np.array([fridge.front - c * reach, fridge.handle_y - s * reach, fridge.handle_z])
+    size = np.array([2 * fridge.radius, 2 * fridge.radius, fridge.length])
+    return PackPart("handle", "fridge_door", (HANDLE,), place, size)
+
+
+def _add_materials(spec: mujoco.MjSpec, layout: KitchenLayout) -> None:
+    hall.add_materials(spec)
+    texture, builtin = mujoco.mjtTexture, mujoco.mjtBuiltin
+    spec.add_texture(
+        name="sky", type=texture.mjTEXTURE_SKYBOX, builtin=builtin.mjBUILTIN_GRADIENT,
+        rgb1=[0.97, 0.97, 0.96], rgb2=[0.80, 0.82, 0.85], width=64, height=64,
+    )  # fmt: skip
+    spec.add_texture(
+        name="tiles", type=texture.mjTEXTURE_2D, builtin=builtin.mjBUILTIN_FLAT, mark=mujoco.mjtMark.mjMARK_EDGE,
+        rgb1=[0.90, 0.92, 0.91], rgb2=[0.90, 0.92, 0.91], markrgb=[0.70, 0.72, 0.72], width=128, height=128,
+    )  # fmt: skip
+    spec.add_texture(
+        name="boards", type=texture.mjTEXTURE_2D, builtin=builtin.mjBUILTIN_CHECKER,
+        mark=mujoco.mjtMark.mjMARK_EDGE, markrgb=[0.38, 0.28, 0.19],
+        rgb1=[0.58, 0.43, 0.29], rgb2=[0.62, 0.47, 0.33], width=256, height=64,
+    )  # fmt: skip
+    for name, repeat in (("tiles", (12, 5)), ("boards", (3, 14))):
+        material = spec.add_material(name=name, specular=0.2, shininess=0.3, texrepeat=list(repeat))
+        material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+    for name, colour, specular, shininess in (
+        ("cabinet", layout.front, 0.15, 0.3),
+        ("counter_top", layout.top, 0.5, 0.6),
+        ("fridge_steel", layout.steel, 0.5, 0.5),
+        ("fridge_bar", (0.80, 0.81, 0.82) if sum(layout.steel) < 1.5 else (0.25, 0.26, 0.28), 0.8, 0.7),
+        ("sink", (0.62, 0.64, 0.66), 0.9, 0.8),
+    ):
+        spec.add_material(name=name, rgba=[*colour, 1.0], specular=specular, shininess=shininess)
+    spec.add_material(name="fridge_glass", rgba=[0.75, 0.85, 0.88, 0.35], specular=0.8, shininess=0.8)
+
+
+def _add_room(spec: mujoco.MjSpec) -> None:
+    world = spec.worldbody
+    world.add_geom(
+        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5.0, 5.0, 0.1], material="boards",
+        contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1,
+        friction=[hall.FLOOR_FRICTION, 0.01, 0.001],
+    )  # fmt: skip
+    for size, pos, material in (
+        ((0.05, 4.0, 1.35), (1.40, 0.0, 1.35), "wall_paint"),
+        ((3.0, 0.05, 1.35), (-1.6, 3.2, 1.35), "wall_paint"),
+        ((3.0, 0.05, 1.35), (-1.6, -3.2, 1.35), "wall_paint"),
+    ):
+        parts.collider(world, _BOX, size, pos)
+        parts.visual(world, _BOX, size, pos, material=material)
+    for x, y, level in ((0.1, 0.7, 0.40), (0.1, -0.9, 0.36), (-1.2, 0.0, 0.28)):
+        world.add_light(
+            pos=[x, y, 2.6], dir=[0.45, -0.3 * y, -1.0], diffuse=[level] * 3, specular=[0.5 * level] * 3,
+            ambient=[0.09] * 3, castshadow=False, cutoff=75, exponent=1.0,
+        )  # fmt: skip
+
+
+def _add_counter(body: mujoco.MjsBody, layout: KitchenLayout, sign: float) -> None:
+    """Add the counter with base and wall cabinets on the far side of the fridge's bar."""
+    top, front = layout.counter_top, layout.counter_front
+    # Clear of the fridge, whose corner turns with it.
+    near, far = 0.06, 2.6
+    back = 1.34
+    y, half = sign * (near + far) / 2, (far - near) / 2
+    x, deep = (front + back) / 2, (back - front) / 2
+    slab = 0.02
+    parts.collider(body, _BOX, (deep, half, slab), (x, y, top - slab), friction=0.7)
+    parts.visual(body, _BOX, (deep, half, slab), (x, y, top - slab), material="counter_top")
+    low = (top - 2 * slab - 0.10) / 2
+    size, pos = (deep - 0.015, half - 0.005, low), (x + 0.015, y, 0.10 + low)
+    parts.collider(body, _BOX, size, pos)
+    parts.visual(body, _BOX, size, pos, material="cabinet")
+    parts.visual(body, _BOX, (deep - 0.05, half, 0.05), (x + 0.05, y, 0.05), material="dark")
+    parts.visual(body, _BOX, (0.012, half, 0.32), (back, y, top + 0.32), material="tiles")
+    width = 2 * half / 4
+    for k in range(4):
+        middle = sign * (near + (k + 0.5) * width)
+        _front(body, (front + 0.012, middle, 0.10 + low), (width / 2 - 0.006, low - 0.008), sign)
+        _front(body, (back - 0.36, middle, top + 0.98), (width / 2 - 0.006, 0.34), sign)
+    upper = (0.175, half, 0.35)
+    parts.collider(body, _BOX, upper, (back - 0.175, y, top + 0.98))
+    parts.visual(body, _BOX, upper, (back - 0.175, y, top + 0.98), material="cabinet")
+    # A sink with a tap, well away from where things stand.
+    at = sign * 1.75
+    parts.visual(body, _BOX, (0.20, 0.26, 0.002), (x, at, top + 0.001), material="sink")
+    parts.visual(body, _BOX, (0.17, 0.23, 0.002), (x, at, top + 0.002), material="dark")
+    parts.visual(body, _CYLINDER, (0.014, 0.13), (x + 0.24, at, top + 0.13), material="sink")
+    parts.visual(body, _CYLINDER, (0.011, 0.09), (x + 0.16, at, top + 0.255), material="sink",
+                 quat=(0.70710678, 0.0, 0.70710678, 0.0))  # fmt: skip
+
+
+def _front(
+    body: mujoco.MjsBody,
+    at: tuple[float, float, float],
+    size: tuple[float, float],
+    sign: float,
+) -> None:
+    """Add a cabinet's front with a frame and a knob, facing the robot."""
+    x, y, z = at
+    half_w, half_h = size
+    parts.visual(body, _BOX, (0.010, half_w, half_h), (x, y, z), material="cabinet")
+    parts.visual(body, _BOX, (0.002, half_w - 0.05, half_h - 0.05), (x - 0.0105, y, z), material="cabinet")
+    knob = (x - 0.022, y - sign * (half_w - 0.04), z + (0.7 * half_h if z < 1.0 else -0.7 * half_h))
+    parts.visual(body, _CYLINDER, (0.010, 0.012), knob, material="steel",
+                 quat=(0.70710678, 0.0, 0.70710678, 0.0))  # fmt: skip

@@ -1,0 +1,173 @@
+"""Mugs, bowls, cans and bottles: what they look like, and collision shapes with the hollows that real ones have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+
+from golem.robots.worlds import parts
+
+KINDS: dict[str, tuple[float, float]] = {
+    "mug": (0.045, 0.10),
+    "bowl": (0.08, 0.06),
+    "can": (0.034, 0.12),
+    "bottle": (0.035, 0.22),
+}
+"""What may be asked for: radius and height [m]."""
+WALL = 0.004
+"""Thickness of a mug's and a bowl's wall [m]."""
+FACETS = 14
+"""Boxes that a round wall is made of."""
+MASSES = {"mug": 0.32, "bowl": 0.35, "can": 0.35, "bottle": 0.52}
+"""Of a mug and a bowl of stoneware, of a full can and a full bottle of water [kg]."""
+COLOURS: dict[str, tuple[tuple[float, float, float], ...]] = {
+    "mug": ((0.82, 0.22, 0.18), (0.93, 0.92, 0.88), (0.12, 0.33, 0.52), (0.95, 0.75, 0.20)),
+    "bowl": ((0.90, 0.88, 0.82), (0.28, 0.48, 0.42), (0.55, 0.36, 0.60)),
+    "can": ((0.75, 0.08, 0.10), (0.10, 0.45, 0.22), (0.85, 0.45, 0.05), (0.10, 0.20, 0.55)),
+    "bottle": ((0.45, 0.68, 0.85), (0.30, 0.60, 0.42), (0.72, 0.78, 0.82)),
+}
+"""What they may look like (r, g, b)."""
+_BOX = mujoco.mjtGeom.mjGEOM_BOX
+_CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
+_CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
+
+
+def add_object(
+    spec: mujoco.MjSpec,
+    kind: str,
+    name: str,
+    position: tuple[float, float, float],
+    yaw: float,
+    colour: tuple[float, float, float],
+    *,
+    loose: bool = True,
+) -> tuple[str, ...]:
+    """Stand an object of `KINDS` somewhere.
+
+    Args:
+        spec: the world to extend; it has the materials `steel` and `dark`.
+        kind: one of `KINDS`.
+        name: of its body, and of its free joint.
+        position: the middle of its underside in the world [m].
+        yaw: heading; that of a mug is where its handle is [rad].
+        colour: r, g, b.
+        loose: whether it can be moved.
+
+    Returns:
+        The names of the geoms that are seen of it.
+    """
+    material = f"{name}_coat"
+    spec.add_material(name=material, rgba=[*colour, 1.0], specular=0.5, shininess=0.6)
+    quat = [float(np.cos(yaw / 2)), 0.0, 0.0, float(np.sin(yaw / 2))]
+    body = spec.worldbody.add_body(name=name, pos=list(position), quat=quat)
+    if loose:
+        body.add_freejoint(name=name)
+    return _BUILDERS[kind](spec, body, name, material)
+
+
+def _mug(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str) -> tuple[str, ...]:
+    radius, height = KINDS["mug"]
+    profile = [
+        (radius * 0.86, 0.0), (radius * 0.97, 0.006), (radius, 0.02), (radius, height - 0.002),
+        (radius - WALL / 2, height), (radius - WALL, height - 0.002), (radius - WALL, 0.012), (0.002, 0.010),
+    ]  # fmt: skip
+    mesh = parts.add_mesh(spec, f"{name}_shell", *parts.lathe(profile, sides=36))
+    parts.visual_mesh(body, mesh, material=material, name=f"{name}_cup")
+    _ring(body, radius - WALL / 2, height, 0.9 * MASSES["mug"])
+    parts.collider(body, _CYLINDER, (radius - WALL, 0.005), (0.0, 0.0, 0.005), mass=0.05 * MASSES["mug"])
+    names = [f"{name}_cup"]
+    # Half a ring of capsules on one side: what a finger goes through.
+    angles = np.linspace(-np.pi / 2, np.pi / 2, 7)
+    arc = np.column_stack(
+        [radius - 0.004 + 0.028 * np.cos(angles), 0 * angles, height / 2 + 0.032 * np.sin(angles)]
+    )
+    for k, (a, b) in enumerate(zip(arc, arc[1:], strict=False)):
+        geom = parts.collider(body, _CAPSULE, (0.0055,), mass=0.05 * MASSES["mug"] / 6)
+        geom.fromto = [*a, *b]
+        seen = parts.visual(body, _CAPSULE, (0.0055,), material=material, name=f"{name}_ear_{k}")
+        seen.fromto = [*a, *b]
+        names.append(f"{name}_ear_{k}")
+    return tuple(names)
+
+
+def _bowl(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str) -> tuple[str, ...]:
+    radius, height = KINDS["bowl"]
+    foot = 0.5 * radius
+    curve = np.linspace(0.0, 1.0, 7)
+    outer = [(foot + (radius - foot) * float(np.sqrt(s)), 0.004 + (height - 0.004) * float(s)) for s in curve]
+    inner = [(r - WALL, max(z + 0.002, 0.008)) for r, z in reversed(outer)]
+    mesh = parts.add_mesh(
+        spec, f"{name}_shell", *parts.lathe([(foot, 0.0), *outer, *inner, (0.002, 0.008)], sides=40)
+    )
+    parts.visual_mesh(body, mesh, material=material, name=f"{name}_shape")
+    parts.collider(body, _CYLINDER, (foot, 0.005), (0.0, 0.0, 0.005), mass=0.3 * MASSES["bowl"])
+    lean = float(np.arctan2(radius - foot, height))
+    length = float(np.hypot(radius - foot, height)) / 2
+    middle = (radius + foot) / 2
+    for k in range(FACETS):
+        turn = 2 * np.pi * k / FACETS
+        size = (WALL / 2, np.pi * radius / FACETS, length)
+        pos = (middle * np.cos(turn), middle * np.sin(turn), height / 2)
+        parts.collider(body, _BOX, size, pos, quat=_turned(turn, lean), mass=0.7 * MASSES["bowl"] / FACETS)
+    return (f"{name}_shape",)
+
+
+def _can(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str) -> tuple[str, ...]:
+    radius, height = KINDS["can"]
+    coat = [(radius, 0.008), (radius, height - 0.010)]
+    lid = [(radius - 0.007, height), (radius - 0.005, height - 0.0008), (radius, height - 0.010)][::-1]
+    for part, profile, look in (
+        ("coat", coat, material),
+        ("lid", lid, "steel"),
+        ("foot", [(radius - 0.006, 0.0), (radius, 0.008)], "steel"),
+    ):
+        mesh = parts.add_mesh(spec, f"{name}_{part}_mesh", *parts.lathe(profile, sides=32))
+        parts.visual_mesh(body, mesh, material=look, name=f"{name}_{part}")
+    parts.collider(body, _CYLINDER, (radius, height / 2), (0.0, 0.0, height / 2), mass=MASSES["can"])
+    return f"{name}_coat", f"{name}_lid", f"{name}_foot"
+
+
+def _bottle(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str) -> tuple[str, ...]:
+    radius, height = KINDS["bottle"]
+    profile = [
+        (radius * 0.9, 0.0), (radius, 0.006), (radius, 0.055), (radius - 0.002, 0.06), (radius, 0.065),
+        (radius, 0.62 * height), (0.016, 0.86 * height), (0.014, 0.90 * height),
+    ]  # fmt: skip
+    mesh = parts.add_mesh(spec, f"{name}_shell", *parts.lathe(profile, sides=32))
+    parts.visual_mesh(body, mesh, material=material, name=f"{name}_shape")
+    parts.visual(body, _CYLINDER, (0.0155, 0.05 * height), (0, 0, 0.95 * height), material="label_white",
+                 name=f"{name}_cap")  # fmt: skip
+    parts.visual(body, _CYLINDER, (radius + 0.0005, 0.026), (0, 0, 0.096), material="label_white",
+                 name=f"{name}_label")  # fmt: skip
+    parts.collider(
+        body, _CYLINDER, (radius, 0.32 * height), (0, 0, 0.32 * height), mass=0.9 * MASSES["bottle"]
+    )
+    neck = (0.0155, 0.16 * height)
+    parts.collider(body, _CYLINDER, neck, (0, 0, 0.84 * height), mass=0.1 * MASSES["bottle"])
+    return f"{name}_shape", f"{name}_cap", f"{name}_label"
+
+
+def _ring(body: mujoco.MjsBody, radius: float, height: float, mass: float) -> None:
+    """Add an upright wall of boxes around the z axis."""
+    for k in range(FACETS):
+        turn = 2 * np.pi * k / FACETS
+        size = (WALL / 2, np.pi * radius / FACETS, height / 2)
+        pos = (radius * np.cos(turn), radius * np.sin(turn), height / 2)
+        parts.collider(body, _BOX, size, pos, quat=_turned(turn, 0.0), mass=mass / FACETS)
+
+
+def _turned(turn: float, lean: float) -> tuple[float, float, float, float]:
+    """Return the quaternion of a turn about z after a lean outwards about y [rad]."""
+    a, b = np.cos(turn / 2), np.sin(turn / 2)
+    c, d = np.cos(lean / 2), np.sin(lean / 2)
+    return float(a * c), float(-b * d), float(a * d), float(b * c)
+
+
+_BUILDERS: dict[str, Callable[[mujoco.MjSpec, mujoco.MjsBody, str, str], tuple[str, ...]]] = {
+    "mug": _mug,
+    "bowl": _bowl,
+    "can": _can,
+    "bottle": _bottle,
+}
