@@ -17,8 +17,7 @@ BROKEN = {
     "command": (["ladr"], "Did you mean 'ladder'?"),
     "rung": (
         ["ladder", "--rung", "teter"],
-        "valid: base-estimation, calibration, faults, gate-limits, memory, mpc-rate, navigate, navigate-line, "
-        "odometry, push, ",
+        "walk-twist. Did you mean 'tether'?",
     ),
     "method": (["ladder", "--method", "centriod"], "Did you mean 'centroid'?"),
     "method file": (["ladder", "--method", "x.py:Mine"], "does not exist"),
@@ -31,7 +30,7 @@ BROKEN = {
     "slot": (["ladder", "--use", "upperbody=diff_ik"], "Did you mean 'upper_body'?"),
     "implementation": (["ladder", "--use", "upper_body=difik"], "Did you mean 'diff_ik'?"),
     "use": (["ladder", "--use", "upper_body"], "slot=implementation"),
-    "stack": (["run", "nowhere"], "one of: hall, stand, tether"),
+    "stack": (["run", "nowhere"], "hall, stand, tether"),
     "run seed": (["run", "--seed", "-1"], "The seed is -1; it must be 0 or more"),
     "bench seed": (["bench", "--seed", "-1"], "--seed is -1; it must be 0 or more"),
     "run profile": (["run", "--profile", "feild"], "Did you mean 'field'?"),

@@ -258,19 +258,7 @@ def test_a_stack_file_lists_skills_and_their_options() -> None:
         "gentle": Choice("pick", {"force": 4}),
         "mine": Choice("my.py:Mine"),
     }
-    assert list(stack.all_skills) == [
-        "calibrate",
-        "dock",
-        "explore",
-        "navigate",
-        "pick",
-        "recall",
-        "remember",
-        "stand",
-        "walk",
-        "gentle",
-        "mine",
-    ]
+    assert list(stack.all_skills) == [*registry.names("skill"), "gentle", "mine"]
     assert Stack().all_skills["pick"] == Choice("pick")
 
 

@@ -85,9 +85,11 @@ def options_of(cls: type[Any], supplied: tuple[str, ...] = (), default: Any = No
         supplied: parameters that are no options.
         default: an instance of the dataclass whose values are the defaults; None takes those of the class.
     """
-    texts = _sections(cls.__doc__) | (
-        {} if dataclasses.is_dataclass(cls) else _sections(cls.__init__.__doc__)
-    )
+    texts: dict[str, str] = {}
+    for one in reversed(cls.__mro__):
+        texts |= _sections(one.__doc__)
+    if not dataclasses.is_dataclass(cls):
+        texts |= _sections(cls.__init__.__doc__)
     hints = typing.get_type_hints(cls if dataclasses.is_dataclass(cls) else cls.__init__)
     for name, value in _defaults(cls, default).items():
         if name in supplied:

@@ -43,7 +43,7 @@ class Attempt:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class ChosenTarget:
     """What a pick goes for.
 
     Attributes:
@@ -81,7 +81,7 @@ class TargetChoice:
         """Take workspace and comfort from `config`."""
         self._config = config
 
-    async def look(self, context: Context, goal: PickGoal) -> Choice:
+    async def look(self, context: Context, goal: PickGoal) -> ChosenTarget:
         """Look with the head camera: the reachable objects and the container.
 
         Where something is missing, the torso turns to either side for another look. The hand comes first that reaches
@@ -115,7 +115,7 @@ class TargetChoice:
         chosen = sorted(view.attempts, key=order)[: self._config.candidates]
         text = f"{len(view.attempts)} {goal.label}s in reach."
         context.say("detect", text, target=chosen[0].target.position.tolist())
-        return Choice(chosen, view.container, np.array([o.position for o in view.objects]))
+        return ChosenTarget(chosen, view.container, np.array([o.position for o in view.objects]))
 
     async def _look_around(self, context: Context, goal: PickGoal, view: _View) -> _View:
         """Turn the torso to either side until nothing is missing, and back; the arms come along."""
