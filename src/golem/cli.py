@@ -82,7 +82,11 @@ def _ladder(words: list[str]) -> int:
 
 
 def _faults(words: list[str]) -> int:
-    """Try every fault against the safety layer: the rung `faults` of the ladder, with its options."""
+    """Try every fault against the safety layer: the rung `faults`, with its options; --live: real processes."""
+    if "--live" in words:
+        from golem.evaluation.faults.live_faults import LiveFaultsConfig, run_live_faults
+
+        return 0 if run_live_faults(_parse(LiveFaultsConfig, "faults", words)) else FAILED
     return _ladder(["--rung", "faults", *words])
 
 

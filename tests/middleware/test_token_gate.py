@@ -73,14 +73,14 @@ def test_nobody_else_gets_through(gate: TokenGate, path: str, header: str) -> No
     assert answer.startswith("HTTP/1.1 403") and "hello" not in answer
 
 
-def test_garbage_and_silence_end_the_connection(gate: TokenGate) -> None:
+def test_garbage_ends_the_connection_and_nothing_else(gate: TokenGate) -> None:
     with socket.create_connection(("127.0.0.1", gate.port), 5.0) as connection:
-        connection.sendall(b"\x00\xff" * 10_000)
-        connection.shutdown(socket.SHUT_WR)
         try:
-            assert connection.recv(64).startswith(b"HTTP/1.1 403")
-        except ConnectionResetError:  # it had not read all of it
-            pass
+            connection.sendall(b"\x00\xff" * 10_000)
+            answer = connection.recv(64)
+        except OSError:  # it was ended before all of it was sent
+            answer = b""
+    assert answer == b"" or answer.startswith(b"HTTP/1.1 403")
     assert ask(gate, f"/?token={gate.token}").endswith("hello")
 
 

@@ -31,3 +31,8 @@ def test_names_are_short_where_that_tells_them_apart() -> None:
     assert short_names(["policy:almi_open:../w/net.pt"]) == {
         "policy:almi_open:../w/net.pt": "policy:almi_open:net.pt"
     }
+
+
+def test_a_table_without_rows_is_its_head() -> None:
+    table = TextTable("", ("a", "b"), ())
+    assert table.figures == (False, False) and table.markdown() == "| a | b |\n|---|---|"

@@ -158,3 +158,22 @@ def test_moving_away_from_a_limit_is_no_braking_fault(
 )
 def test_a_status_says_why_in_one_line(reason: Reason | None, detail: str, why: str) -> None:
     assert GateStatus(0.0, GateState.STOP1, reason, detail).why == why
+
+
+@pytest.mark.parametrize(
+    ("beside", "samples", "stands"),
+    [(None, 3, True), (4, 3, True), (12, 3, False), (4, 25, False)],
+)
+def test_an_arm_that_is_too_fast_leaves_legs_sound_that_are_wrong_for_a_moment(
+    beside: int | None, samples: int, stands: bool, state_at: Callable[..., LowState]
+) -> None:
+    """Joint 4 is an ankle, which may be too fast for 25 samples; joint 12 is the torso's."""
+    limits, counters, fault = SafetyLimits.from_profile(), Counters(), None
+    dq = np.zeros(27)
+    if beside is not None:
+        dq[beside] = 1.1 * limits.velocity[beside]
+    for k in range(samples):
+        if k >= samples - limits.samples:
+            dq[16] = 1.1 * limits.velocity[16]
+        counters, fault = examine(replace(state_at(0.0), dq=dq), limits, counters)
+    assert fault is not None and fault.reason is Reason.VELOCITY and fault.stands is stands

@@ -25,6 +25,8 @@ from golem.skills.walk import WalkGoal
 from golem.stack import load_stack
 from golem.types import TICK, LowCommand, LowState
 
+GRAVITY = 9.81
+"""[m/s^2]"""
 SHOVE = 0.2
 """How long a shove lasts [s]."""
 EVERY = 4.0
@@ -78,6 +80,10 @@ class MarginWatch:
         self._add("orientation against rate [rad]", math.hypot(*now.turn))
         self._add("torque missing [ms]", 1e3 * float(now.dead.max()))
         self._add("numbers repeated [ms]", 1e3 * (now.tick - min(now.since)))
+        if now.force is not None:
+            size = math.hypot(*now.force)
+            self._add("mean specific force below gravity [m/s^2]", GRAVITY - size)
+            self._add("mean specific force above gravity [m/s^2]", size - GRAVITY)
         if now.force is not None and now.tick - now.restless >= GRAVITY_TIME:
             self._add("gravity off the orientation's up at rest [rad]", _gravity(state, now.force))
 
@@ -91,6 +97,8 @@ ROWS: dict[str, float] = {
     "orientation against rate [rad]": _L.imu_drift,
     "jump of a joint in a tick [rad]": _L.jump,
     "gravity off the orientation's up at rest [rad]": _L.gravity_angle,
+    "mean specific force below gravity [m/s^2]": GRAVITY - _L.gravity_moving[0],
+    "mean specific force above gravity [m/s^2]": _L.gravity_moving[1] - GRAVITY,
     "torque missing [ms]": 1e3 * _L.dead_time,
     "numbers repeated [ms]": 1e3 * _L.frozen,
 }

@@ -27,7 +27,9 @@ class TextTable:
 
     @property
     def figures(self) -> tuple[bool, ...]:
-        """Whether each column is of figures only, which are set flush right."""
+        """Whether each column is of figures only, which are set flush right; without rows none is."""
+        if not self.rows:
+            return (False,) * len(self.columns)
         return tuple(
             all(_FIGURE.fullmatch(cell) for cell in column) for column in zip(*self.rows, strict=True)
         )

@@ -92,7 +92,8 @@ class SafetyLimits:
             margins in docs/reference/safety.md; so for the other numbers of plausibility].
         drift_lag: delay between a joint's position and its speed that is no fault [s].
         imu_drift: how far the IMU's orientation may leave its integrated rate [rad].
-        gravity: bounds of the mean specific force over half a second [m/s^2].
+        gravity: bounds of the mean specific force over half a second [m/s^2], for a robot that hardly moves.
+        gravity_moving: the same for one that moves.
         gravity_angle: angle between mean specific force and the orientation's up for a robot that hardly moves [rad].
         dead_share, dead_load: a motor whose torque is below this share of the one asked for, where that is above this
             share of `torque`, for `dead_time` [s] does not follow.
@@ -139,6 +140,7 @@ class SafetyLimits:
     drift_lag: float = 0.010
     imu_drift: float = 0.120
     gravity: tuple[float, float] = (4.0, 20.0)
+    gravity_moving: tuple[float, float] = (3.0, 30.0)
     gravity_angle: float = 0.35
     dead_share: float = 0.1
     dead_load: float = 0.10

@@ -102,9 +102,12 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
     beyond = np.maximum(rest - limits.state_upper, limits.state_lower - rest)
     ratio = speed / limits.velocity
     n, legs = limits.samples, limits.leg_samples
-    # What legs and torso have no part in leaves them able to stand.
-    bad = quick | beyond_range | (outside > 0.0) | (load > limits.torque)
-    stands = not (tilted or bad[STANDING].any())
+    # What legs and torso have no part in leaves them able to stand; a leg may be wrong for a while, as in every step.
+    bad = quick | beyond_range | (outside > 0.0)
+    gross = max(float(ratio[LEGS].max()), float(outside[LEGS].max())) > limits.gross
+    lasting = max(new.leg_position, new.leg_velocity, new.leg_braking) >= legs
+    overloaded = bool((load > limits.torque)[STANDING].any())
+    stands = not (tilted or gross or lasting or overloaded or bad[UPPER.start])
     if new.position >= n or new.leg_position >= legs or outside.max() > limits.gross:
         return new, Fault(Reason.POSITION, _worst(outside, lambda i: f"at {q[i]:.3f} rad"), stands)
     if fast and (new.velocity >= n or new.leg_velocity >= legs or ratio.max() > limits.gross):

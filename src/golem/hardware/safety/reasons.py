@@ -87,7 +87,8 @@ REASONS: dict[Reason, ReasonText] = {
     ),
     Reason.IMU_IMPLAUSIBLE: ReasonText(
         309,
-        f"Orientation and rate differ by {_L.imu_drift:g} rad, or at rest gravity is {_L.gravity_angle:g} rad off.",
+        f"Orientation and rate differ by {_L.imu_drift:g} rad, at rest gravity is {_L.gravity_angle:g} rad off, "
+        f"or the mean specific force is outside {_L.gravity_moving[0]:g} to {_L.gravity_moving[1]:g} m/s^2.",
         "The gyro has an offset or the IMU is loose: let it start at rest.",
     ),
     Reason.POSITION: ReasonText(

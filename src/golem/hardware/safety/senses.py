@@ -229,12 +229,15 @@ def _imu(m: SensesMemory, state: LowState, limits: SafetyLimits) -> Fault | None
     if apart > limits.imu_drift:
         return Fault(Reason.IMU_IMPLAUSIBLE, f"orientation and rate differ by {apart:.2f} rad")
     force = m.force
-    if force is None or m.tick - m.restless < GRAVITY_TIME:
+    if force is None:
         return None
     size = math.hypot(*force)
-    low, high = limits.gravity
+    calm = m.tick - m.restless >= GRAVITY_TIME
+    low, high = limits.gravity if calm else limits.gravity_moving
     if not low <= size <= high:
         return Fault(Reason.IMU_IMPLAUSIBLE, f"specific force of {size:.1f} m/s^2")
+    if not calm:
+        return None
     angle = math.acos(max(-1.0, min(1.0, sum(map(_times, _up(state.imu.quat), force)) / size)))
     if angle > limits.gravity_angle:
         return Fault(Reason.IMU_IMPLAUSIBLE, f"gravity is {math.degrees(angle):.0f} degrees off its up")

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from golem.errors import GolemError
-from golem.hardware.safety.base import GateInputs
+from golem.hardware.safety.base import STANDING, GateInputs
 from golem.hardware.safety.gate import Gate
 from golem.hardware.safety.memory import GateMemory, GateResult
 from golem.interfaces.payloads import GateState
@@ -58,7 +58,7 @@ class StandingGate:
         standing = None
         if before.mode is GateState.STOP2 and self._legs is not None and inputs.state is not None:
             try:
-                standing = self._legs.step(inputs.state, self.gate.limits.damping)
+                standing = self._legs.step(_believed(inputs.state), self.gate.limits.damping)
             except GolemError:
                 standing = None  # the gate then damps
         if self._make is not None:
@@ -67,5 +67,12 @@ class StandingGate:
         if result.state is GateState.STOP2 and before.mode is not GateState.STOP2:
             self.prepare()
             assert self._legs is not None and result.memory.state is not None
-            self._legs.start(result.memory.state)
+            self._legs.start(_believed(result.memory.state))
         return result
+
+
+def _believed(state: LowState) -> LowState:
+    """Return `state` with arms that do not move: they damp, and it may be their speeds that are false."""
+    dq = state.dq.copy()
+    dq[STANDING.stop :] = 0.0
+    return LowState(state.t, state.q, dq, state.tau, state.imu)

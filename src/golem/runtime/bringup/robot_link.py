@@ -49,6 +49,7 @@ class RobotLink:
         damaged: states that could not be read.
         gate: newest verdict of the safety gate; None before the first.
         payload: the newest state as it came.
+        stopped_at: when the gate was first heard to have stopped, by our clock [s]; None since it was set so.
     """
 
     def __init__(self, participant: CycloneParticipant, node: RosNode, dds: DdsConfig) -> None:
@@ -62,6 +63,7 @@ class RobotLink:
         self.damaged = 0
         self.gate: GateStatus | None = None
         self.payload: bytes = b""
+        self.stopped_at: float | None = None
         self._switcher: MotionSwitcherClient | None = None
         self._commands: RoleEndpoints | None = None
         self._clients: dict[str, Client] = {}
@@ -199,3 +201,5 @@ class RobotLink:
 
     def _verdict(self, message: Any) -> None:
         self.gate = to_gate_status(message)
+        if self.gate.stopped and self.stopped_at is None:
+            self.stopped_at = time.monotonic()
