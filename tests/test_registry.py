@@ -196,7 +196,7 @@ def test_an_installed_package_registers_names(tmp_path: Path, monkeypatch: pytes
     assert "sucker" not in sys.modules
     assert type(registry.create("grasp_method", "suction", {})).__module__ == "sucker"
     assert registry.names("grasp_method") == (*SLOTS["grasp_method"].shipped, "suction")
-    with pytest.raises(ConfigError, match="centroid, suction, visual_servo. Did you mean 'suction'"):
+    with pytest.raises(ConfigError, match="reranked, suction, visual_servo. Did you mean 'suction'"):
         registry.load("grasp_method", "sucton")
     assert "suction" not in registry.names("lower_body")
 

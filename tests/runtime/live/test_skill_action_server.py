@@ -361,7 +361,7 @@ def test_the_skills_and_their_goals_are_on_a_latched_topic(mine: Callable[[str],
     message = listed.latest()
     assert message is not None
     specs = read_list(message)
-    assert list(specs) == ["dock", "explore", "navigate", "pick", "stand", "walk", "count", "asleep"]
+    assert list(specs) == ["dock", "explore", "navigate", "open", "pick", "stand", "walk", "count", "asleep"]
     assert specs["count"].summary == "Count, and do what no skill should"
     assert specs["count"].goal["properties"]["to"] == {"type": "integer", "description": "the last number."}
     assert specs["walk"].goal == schema_of(WalkGoal)
@@ -373,7 +373,7 @@ def test_the_skills_and_their_goals_are_on_a_latched_topic(mine: Callable[[str],
         (
             "cuont",
             "{}",
-            "Unknown skill 'cuont'; valid: asleep, count, dock, explore, navigate, pick, stand, walk. Did you",
+            "Unknown skill 'cuont'; valid: asleep, count, dock, explore, navigate, open, pick, stand, walk. Did you",
         ),
         ("", "", "Unknown skill ''"),
         ("count", "", "'to' has no default"),
