@@ -17,7 +17,7 @@ BROKEN = {
     "command": (["ladr"], "Did you mean 'ladder'?"),
     "rung": (
         ["ladder", "--rung", "teter"],
-        "valid: base-estimation, faults, fridge-stand, fridge-tether, gate-limits, memory, mpc-rate, navigate, navigate-line, odometry, push, ",
+        "valid: base-estimation, faults, fridge-stand, fridge-tether, gate-limits, memory, mpc-rate, navigate, ",
     ),
     "method": (["ladder", "--method", "centriod"], "Did you mean 'centroid'?"),
     "method file": (["ladder", "--method", "x.py:Mine"], "does not exist"),
