@@ -23,7 +23,6 @@ compile pyproject.toml --constraints "$together" --extra report --output-file re
 compile pyproject.toml --constraints "$together" --extra hardware --output-file requirements/hardware.txt "$@"
 compile pyproject.toml --constraints "$together" --extra realsense --output-file requirements/realsense.txt "$@"
 compile pyproject.toml --constraints "$together" --extra graspgen --output-file requirements/graspgen.txt "$@"
-compile pyproject.toml --constraints "$together" --extra vision --output-file requirements/vision.txt "$@"
 compile pyproject.toml --constraints "$together" --extra cluster --output-file requirements/cluster.txt "$@"
 compile pyproject.toml --constraints "$together" --extra lidar --output-file requirements/lidar.txt "$@"
 compile pyproject.toml --constraints "$together" --extra physx --output-file requirements/physx.txt "$@"

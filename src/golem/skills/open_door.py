@@ -76,6 +76,7 @@ class OpenConfig:
         force: of each finger [N].
         close_timeout: time the fingers may take [s].
         attempts: how many of the proposed grasps are tried to be reached.
+        arrive_gap: least opening to arrive with [m].
         look_again: whether the palm camera corrects the grasp from before the handle; without, all is open loop.
         trust: how far from where the head camera has the handle the palm camera may see it [m].
         height: of the grasp above base_link, where the handle is as long [m].
@@ -96,6 +97,7 @@ class OpenConfig:
     force: float = 16.0
     close_timeout: float = 2.5
     attempts: int = 8
+    arrive_gap: float = 0.095
     look_again: bool = True
     trust: float = 0.10
     height: float = 0.14
@@ -248,7 +250,8 @@ class OpenDoor:
         refused: PlanRefused | None = None
         for grasp in grasps[: self._config.attempts]:
             T = grasp.T_odom_gripper
-            context.hands[side].open(grasp.gap)
+            # Wide open, so that its fingers are not in the palm camera's way.
+            context.hands[side].open(max(grasp.gap, self._config.arrive_gap))
             context.say("approach", "Bringing the hand before the handle.", target=T[:3, 3].tolist())
             then = [Then(side, T, self._config.reach_speed, APPROACH)]
             try:

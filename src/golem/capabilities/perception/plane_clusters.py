@@ -82,8 +82,11 @@ class PlaneClusters:
 
     Attributes:
         config: its options.
+        classes: the labels that it knows.
         latency: declared time per frame [s].
     """
+
+    classes = LABELS
 
     def __init__(self, config: PlaneClustersConfig | None = None) -> None:
         """Take the options."""
