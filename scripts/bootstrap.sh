@@ -75,7 +75,7 @@ python=$(find_python)
 export UV_PYTHON_DOWNLOADS=never UV_NO_PROGRESS=1
 locks=()
 for group in "$@"; do
-    [ -f "requirements/$group.txt" ] || die "no lock requirements/$group.txt; groups: $(cd requirements \&\& echo *.txt | sed 's/\.txt//g')"
+    [ -f "requirements/$group.txt" ] || die "no lock requirements/$group.txt; groups: $(cd requirements && echo *.txt | sed 's/\.txt//g')"
     stamp="$venv/.golem-$group"
     sum=$(cat "requirements/$group.txt" pyproject.toml | cksum)
     if [ ! -x "$venv/bin/golem" ] || [ "$sum" != "$(cat "$stamp" 2> /dev/null)" ]; then
