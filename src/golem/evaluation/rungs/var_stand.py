@@ -202,7 +202,7 @@ class _Trial:
             nonlocal since
             watch()
             said = news.read()
-            if said is not None and said.skill == "dock":
+            if said is not None and (said.skill == "dock" or said.stage == "detect"):
                 since = running.executor.t
 
         result = running.execute("disassemble", goal, watch=look)
