@@ -45,6 +45,7 @@ class PickConfig:
             for z, which reaches 0.10 m deeper. `planned` asks the map of reach instead.
         yaw: heading of the gripper's x axis when it points down [rad], right arm; mirrored for the left.
         container_radius: objects nearer than this to the container's middle lie in it and are left there [m].
+        sure: score from which on a container counts whose shape does not show.
         comfort: x, y in base_link around which the arm works best [m]; the nearest object is taken first.
         attempts: how often a method that looks again may try to grasp and pull one object.
         candidates: how many objects it may try.
@@ -81,6 +82,7 @@ class PickConfig:
     workspace: tuple[float, float, float, float, float, float] = (0.30, 0.60, -0.30, 0.10, -0.15, 0.60)
     yaw: float = -1.5707963267948966
     container_radius: float = 0.15
+    sure: float = 0.3
     comfort: tuple[float, float] = (0.45, -0.12)
     attempts: int = 2
     candidates: int = 8

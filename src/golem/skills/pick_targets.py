@@ -154,10 +154,15 @@ class TargetChoice:
     def _added(self, context: Context, goal: PickGoal, view: _View, sightings: Detections) -> _View:
         """Return what is known after one more picture."""
         container, objects = view.container, list(view.objects)
-        containers = [o for o in sightings.objects if o.label == goal.container]
-        if containers:
-            best = max(containers, key=lambda o: o.detection.score)
-            container = Container.of(best, self._config.container_radius)
+        containers = [
+            Container.of(o, self._config.container_radius)
+            for o in sightings.objects
+            if o.label == goal.container
+        ]
+        believed = [
+            c for c in containers if c.box is not None or c.sighting.detection.score >= self._config.sure
+        ]
+        container = max(believed, key=lambda c: c.sighting.detection.score, default=container)
         for new in (o for o in sightings.objects if o.label == goal.label):
             if all(np.linalg.norm(new.position - known.position) > SAME for known in objects):
                 objects.append(new)
