@@ -49,6 +49,7 @@ class PickConfig:
         comfort: x, y in base_link around which the arm works best [m]; the nearest object is taken first.
         attempts: how often a method that looks again may try to grasp and pull one object.
         candidates: how many objects it may try.
+        few: where fewer are seen that a hand can take, the torso turns for another look.
         slack: how far beside the reach of a hand the head camera may see what is tried all the same [m]; it is off by
             that much.
         proud: height above the ground around it [m] from which on an object comes before lower ones: as the head camera
@@ -86,6 +87,7 @@ class PickConfig:
     comfort: tuple[float, float] = (0.45, -0.12)
     attempts: int = 2
     candidates: int = 8
+    few: int = 3
     slack: float = 0.04
     proud: float = 0.0115
     turn: float = 0.35
