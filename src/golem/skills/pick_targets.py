@@ -43,7 +43,7 @@ class Attempt:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class PickChoice:
     """What a pick goes for.
 
     Attributes:
@@ -81,7 +81,7 @@ class TargetChoice:
         """Take workspace and comfort from `config`."""
         self._config = config
 
-    async def look(self, context: Context, goal: PickGoal) -> Choice:
+    async def look(self, context: Context, goal: PickGoal) -> PickChoice:
         """Look with the head camera: the reachable objects and the container.
 
         Where something is missing, or few objects are seen, the torso turns to either side for another look. The hand
@@ -116,7 +116,7 @@ class TargetChoice:
         chosen = sorted(view.attempts, key=order)[: self._config.candidates]
         text = f"{len(view.attempts)} {goal.label}s in reach."
         context.say("detect", text, target=chosen[0].target.position.tolist())
-        return Choice(chosen, view.container, np.array([o.position for o in view.objects]))
+        return PickChoice(chosen, view.container, np.array([o.position for o in view.objects]))
 
     async def _look_around(self, context: Context, goal: PickGoal, view: _View) -> _View:
         """Turn the torso to either side until enough is seen, and back; the arms come along."""
