@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from golem.demo import Demo, DemoConfig, DemoResult, run_demo
+from golem.demo import SHOWN, Demo, DemoConfig, DemoResult, run_demo, work_place
 from golem.errors import ConfigError, GolemError, OutputError
 from golem.evaluation.report.demo_page import PickRecord, balance_figures, balance_section, demo_page
 from golem.provenance import commit
@@ -32,7 +32,11 @@ def test_a_display_is_noticed(variable: str, monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.parametrize(
     ("options", "words"),
-    [({"screws": 0}, "from 1 on"), ({"screws": 99}, "1 to 4"), ({"profile": "dream"}, "ideal")],
+    [
+        ({"screws": 0}, "from 1 on"),
+        ({"screws": 99, "layout": "nominal"}, "1 to 4"),
+        ({"profile": "dream"}, "ideal"),
+    ],
 )
 def test_wrong_options_are_answered_in_one_sentence(
     options: dict[str, object], words: str, tmp_path: Path
@@ -47,6 +51,19 @@ def test_a_world_without_screws_is_named(tmp_path: Path) -> None:
     mine.write_text("robot: {use: mujoco, support: ground, world: open}\nestimator: random_walk_kf\n")
     with pytest.raises(ConfigError, match="no screws; give one with 'world: pack'"):
         run_demo(DemoConfig(stack=str(mine), headless=True, out=tmp_path / "demo"))
+
+
+def test_the_work_place_is_the_seeds_own() -> None:
+    stack = work_place(DemoConfig(stack="tether"))
+    built = [build(stack, seed)[1] for seed in (1, 2)]
+    places = []
+    for robot in built:
+        assert isinstance(robot, MujocoRobot)
+        places.append((robot.scene.layout.near_edge, robot.scene.layout.tray_xy))
+        assert len(robot.scene.names.screws) >= 2 and robot.scene.conditions.light == SHOWN["light"]
+        robot.close()
+    assert places[0] != places[1]
+    assert work_place(DemoConfig(stack="tether", layout="nominal")) == load_stack("tether", profile="bench")
 
 
 def page_of(result: DemoResult) -> str:
@@ -66,7 +83,7 @@ def upright() -> Iterator[tuple[LockstepRunner, MujocoRobot]]:
 def test_the_push_at_the_end_is_survived_and_reported(
     upright: tuple[LockstepRunner, MujocoRobot], tmp_path: Path
 ) -> None:
-    demo = Demo(DemoConfig(headless=True, out=tmp_path), *upright)
+    demo = Demo(DemoConfig(seed=0, headless=True, out=tmp_path), *upright)
     executor = upright[0].executor
     executor.run(executor.t + 0.1, lambda: demo.tick() is not None)
     demo.push(demo.tick)

@@ -280,7 +280,7 @@ def run_demo(config: DemoConfig) -> DemoResult:
     _prepare(config.out)
     seed = secrets.randbelow(1_000_000) if config.seed is None else config.seed
     config = replace(config, seed=seed)
-    running, built = build(_work_place(config), seed)
+    running, built = build(work_place(config), seed)
     with ExitStack() as stack:
         stack.callback(built.close)
         robot = shown(running, built)
@@ -308,7 +308,7 @@ def run_demo(config: DemoConfig) -> DemoResult:
         return _shown(config, demo, running, view)
 
 
-def _work_place(config: DemoConfig) -> Stack:
+def work_place(config: DemoConfig) -> Stack:
     """Return the stack, with its pack as the seed draws it."""
     stack = load_stack(config.stack, profile=config.profile)
     world = stack.choice("robot").options.get("world", "pack")

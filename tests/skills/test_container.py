@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.skills.container import shift_of, wall_between
+from golem.capabilities.perception.open_box import OpenBox
+from golem.skills.container import Container, shift_of, wall_between
+from golem.types import Array, Detection, LocalizedObject
 
 ROW = np.array([[0.43, y, -0.03] for y in (-0.2, -0.1, 0.0)])
 
@@ -39,3 +41,44 @@ def test_a_hand_outside_has_a_wall_before_it(x: float, wall: float | None) -> No
 
 def test_a_hand_in_the_middle_asks_for_no_way() -> None:
     assert wall_between(np.zeros((50, 3)), np.zeros(3), np.zeros(3), -0.04) is None
+
+
+BOX = OpenBox(np.array([0.5, -0.3]), 0.3, np.array([0.18, 0.24]), 0.058, 0.016)
+
+
+def view(seed: int, screw: bool = False, share: float = 1.0) -> Array:
+    """Return (n, 3) what a camera shows of the floor of the box, off by 1.5 mm, with a screw on it or without."""
+    rng = np.random.default_rng(seed)
+    flat = rng.uniform(-0.12, 0.12, (int(20000 * share), 2))
+    flat = flat[flat[:, 0] < 0.12 - 0.24 * (1.0 - share)]
+    z = 0.016 + 0.010 * (screw & (np.abs(flat[:, 0] + 0.02) < 0.012) & (np.abs(flat[:, 1] - 0.01) < 0.012))
+    return np.column_stack([flat + BOX.center, z + rng.normal(0.0, 0.0015, len(flat))])
+
+
+@pytest.fixture
+def tray() -> Container:
+    detection = Detection("tray", 0.9, np.zeros(4), np.zeros(2))
+    return Container(LocalizedObject(detection, 0.0, np.array([*BOX.center, 0.016]), view(0)), BOX, 0.15)
+
+
+def test_a_screw_that_was_dropped_rises_from_the_floor(tray: Container) -> None:
+    assert tray.gained(view(1, screw=True)) is True
+    assert tray.gained(view(1)) is False
+    higher = view(1) + (0.0, 0.0, 0.02)
+    assert tray.gained(higher) is False, "the whole view is off"
+
+
+def test_what_is_not_in_view_is_not_known(tray: Container) -> None:
+    assert tray.gained(view(1, share=0.4)) is None
+    assert Container(tray.sighting, None, 0.15).gained(view(1)) is None
+
+
+def test_the_first_place_is_the_middle_as_the_localizer_tells_it(tray: Container) -> None:
+    places = tray.places(0.04)
+    np.testing.assert_array_equal(places[0], tray.sighting.position)
+    assert len(places) > 5 and len(Container(tray.sighting, None, 0.15).places(0.04)) == 1
+
+
+def test_what_lies_inside_is_told_from_what_lies_beside(tray: Container) -> None:
+    near = np.array([[0.5, -0.3, 0.03], [0.5, -0.12, 0.03], [0.66, -0.3, 0.03]])
+    assert tray.holds(near).tolist() == [True, False, False]

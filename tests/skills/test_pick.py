@@ -323,6 +323,24 @@ def test_a_screw_lost_on_the_way(full: Any) -> None:
     assert_safe(full)
 
 
+def test_it_looks_afterwards_whether_the_screw_is_there(full: Any, thing: Any) -> None:
+    def seen() -> list[LocalizedObject]:
+        dropped = "place" in full.stages and not full.holds
+        where = TRAY if dropped else SCREW
+        return [thing("screw", where + HEAD_ERROR, full.t), thing("tray", TRAY + HEAD_ERROR, full.t)]
+
+    full.objects["head"] = seen
+    result = picked(full)
+    assert result.success and "is seen there" in result.reason
+    assert (result.value.in_tray, result.value.bore_empty) == ("yes", "yes")
+
+
+def test_a_bore_that_still_looks_taken_is_reported(full: Any) -> None:
+    result = picked(full)
+    assert result.success and "still looks taken" in result.reason
+    assert (result.value.in_tray, result.value.bore_empty) == ("unknown", "no")
+
+
 @pytest.mark.parametrize("share", np.linspace(0.0, 0.99, 12))
 def test_a_pick_can_be_cancelled_at_any_time(share: float, world: Any, thing: Any) -> None:
     stocked(world, thing)

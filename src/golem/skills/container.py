@@ -53,8 +53,7 @@ class Container:
         """Return (n,) which of the points (n, 3) in odom lie in it, seen from above."""
         if self.box is not None:
             return self.box.contains(points, -BRIM)
-        away = points[:, :2] - self.sighting.position[:2]
-        return np.linalg.norm(away, axis=1) < self.radius
+        return np.linalg.norm(points[:, :2] - self.sighting.position[:2], axis=1) < self.radius
 
     def gained(self, points: Array) -> bool | None:
         """Return whether something lies in it that was not there when it was sighted; None where that is not in view.
@@ -72,11 +71,12 @@ class Container:
         return bool(raised.sum() >= SPOTS)
 
     def places(self, margin: float) -> Array:
-        """Return (n, 3) places on its floor in odom, `margin` [m] inside its rim and apart, the middle first."""
-        if self.box is None:
-            return self.sighting.position[None]
-        chosen: list[Array] = []
-        for place in self.box.places(margin):
+        """Return (n, 3) places on its floor in odom, `margin` [m] inside its rim and apart.
+
+        The first is the middle as the localizer tells it: of a box that the view cuts off, the shape has another one.
+        """
+        chosen = [self.sighting.position]
+        for place in () if self.box is None else self.box.places(margin):
             if all(np.linalg.norm(place - one) > APART for one in chosen):
                 chosen.append(place)
         return np.array(chosen)

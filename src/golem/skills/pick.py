@@ -12,9 +12,10 @@ from golem.skills.context import Context
 from golem.skills.force_guard import ForceGuard
 from golem.skills.pick_config import PickConfig, PickGoal
 from golem.skills.pick_place import look_after, place
-from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight, outcome_of, slipped
+from golem.skills.pick_pull import pull
+from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight, outcome_of
 from golem.skills.pick_targets import Attempt, TargetChoice
-from golem.skills.poses import lifted, retracted
+from golem.skills.poses import lifted
 from golem.skills.travel import LineTravel, PlannedTravel, Travel
 from golem.types import Side
 
@@ -146,7 +147,7 @@ class Pick:
                 else:
                     await self._servo(context, attempt, law)
                 timings["detect_to_grasp"] = context.t - timings["start"]
-                await self._extract(context, attempt)
+                await pull(context, self._config, self._travel, attempt, self._heights)
                 return
             except StageFailed as failure:
                 if law is None or count == self._config.attempts or outcome_of(failure) is PickOutcome.TIGHT:
@@ -229,36 +230,6 @@ class Pick:
         if not status.holding:
             text = f"The fingers hold nothing (gap {status.gap * 1e3:.0f} mm)."
             raise PickFailed(PickOutcome.NOTHING_THERE, "grasp", "grasp_method", text)
-
-    async def _extract(self, context: Context, attempt: Attempt) -> None:
-        """Pull straight out against the approach direction, then lift; the grip must hold."""
-        arm, hand = context.arms[attempt.side], context.hands[attempt.side]
-        # Off centre, one finger leans on its stop and the other pushes the object against its bore.
-        centred = arm.commanded.copy()
-        centred[:3, 3] += hand.status.offset * centred[:3, 1]
-        await arm.move(centred, self._config.pull_speed)
-        context.say("extract", "Pulling straight out.")
-        guard = ForceGuard(
-            context, attempt.side, -arm.commanded[:3, 2], self._config.guard_force, self._config.guard_length
-        )
-        await self._travel.line(
-            attempt.side,
-            retracted(arm.commanded, self._config.pull),
-            self._config.pull_speed,
-            "extract",
-            stop=lambda: guard() or not hand.status.holding,
-        )
-        if guard.stuck:
-            text = f"The {attempt.label} does not move at {guard.largest:.0f} N."
-            raise PickFailed(slipped(self._heights), "extract", "grasp_method", text)
-        await arm.move(
-            lifted(arm.commanded, self._config.clearance - self._config.pull),
-            self._config.travel_speed,
-            stop=lambda: not hand.status.holding,
-        )
-        if not hand.status.holding:
-            text = f"The {attempt.label} slipped out of the fingers."
-            raise PickFailed(slipped(self._heights), "extract", "grasp_method", text)
 
     async def _back_off(self, context: Context, side: Side) -> None:
         """Go straight up, away from what was not taken, with the fingers open."""

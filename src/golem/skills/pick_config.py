@@ -45,9 +45,11 @@ class PickConfig:
             for z, which reaches 0.10 m deeper. `planned` asks the map of reach instead.
         yaw: heading of the gripper's x axis when it points down [rad], right arm; mirrored for the left.
         container_radius: objects nearer than this to the container's middle lie in it and are left there [m].
+        sure: score from which on a container counts whose shape does not show.
         comfort: x, y in base_link around which the arm works best [m]; the nearest object is taken first.
         attempts: how often a method that looks again may try to grasp and pull one object.
         candidates: how many objects it may try.
+        few: where fewer are seen that a hand can take, the torso turns for another look.
         slack: how far beside the reach of a hand the head camera may see what is tried all the same [m]; it is off by
             that much.
         proud: height above the ground around it [m] from which on an object comes before lower ones: as the head camera
@@ -81,9 +83,11 @@ class PickConfig:
     workspace: tuple[float, float, float, float, float, float] = (0.30, 0.60, -0.30, 0.10, -0.15, 0.60)
     yaw: float = -1.5707963267948966
     container_radius: float = 0.15
+    sure: float = 0.3
     comfort: tuple[float, float] = (0.45, -0.12)
     attempts: int = 2
     candidates: int = 8
+    few: int = 3
     slack: float = 0.04
     proud: float = 0.0115
     turn: float = 0.35

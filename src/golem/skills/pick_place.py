@@ -12,7 +12,7 @@ from golem.skills.context import Context
 from golem.skills.hand_reach import HandReach
 from golem.skills.pick_config import PickConfig
 from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight, Tried
-from golem.skills.pick_targets import Attempt, ChosenTarget, positions
+from golem.skills.pick_targets import Attempt, PickChoice, positions
 from golem.skills.travel import Travel
 from golem.types import Array
 
@@ -29,7 +29,7 @@ NEAR = 0.12
 
 
 async def place(
-    context: Context, config: PickConfig, travel: Travel, attempt: Attempt, tried: Tried, choice: ChosenTarget
+    context: Context, config: PickConfig, travel: Travel, attempt: Attempt, tried: Tried, choice: PickChoice
 ) -> None:
     """Carry what a hand holds over the container and let go.
 
@@ -92,7 +92,7 @@ async def _wall(context: Context, attempt: Attempt, middle: Array) -> float | No
 
 
 async def look_after(
-    context: Context, config: PickConfig, attempt: Attempt, choice: ChosenTarget, report: PickReport
+    context: Context, config: PickConfig, attempt: Attempt, choice: PickChoice, report: PickReport
 ) -> None:
     """Look with the head camera at container and bore, and write into the report what it saw.
 

@@ -43,7 +43,7 @@ class Attempt:
 
 
 @dataclass(frozen=True, slots=True)
-class ChosenTarget:
+class PickChoice:
     """What a pick goes for.
 
     Attributes:
@@ -81,19 +81,20 @@ class TargetChoice:
         """Take workspace and comfort from `config`."""
         self._config = config
 
-    async def look(self, context: Context, goal: PickGoal) -> ChosenTarget:
+    async def look(self, context: Context, goal: PickGoal) -> PickChoice:
         """Look with the head camera: the reachable objects and the container.
 
-        Where something is missing, the torso turns to either side for another look. The hand comes first that reaches
-        most of the container; then objects that stand proud, and of them the most comfortable ones.
+        Where something is missing, or few objects are seen, the torso turns to either side for another look. The hand
+        comes first that reaches most of the container; then objects that stand proud, and of them the most comfortable
+        ones.
 
         Raises:
             PickFailed: something is missing, or out of reach, or the container is full.
         """
         context.say("detect", f"Looking for a {goal.label} and a {goal.container}.")
         view = await self._see(context, goal, _View())
-        unseen = view.problem is not None and view.problem.outcome is not PickOutcome.FAILED
-        if unseen and self._config.turn > 0.0:
+        blind = view.problem is not None and view.problem.outcome is PickOutcome.FAILED
+        if not blind and not self._enough(view) and self._config.turn > 0.0:
             view = await self._look_around(context, goal, view)
         if view.problem is not None:
             raise view.problem
@@ -115,23 +116,27 @@ class TargetChoice:
         chosen = sorted(view.attempts, key=order)[: self._config.candidates]
         text = f"{len(view.attempts)} {goal.label}s in reach."
         context.say("detect", text, target=chosen[0].target.position.tolist())
-        return ChosenTarget(chosen, view.container, np.array([o.position for o in view.objects]))
+        return PickChoice(chosen, view.container, np.array([o.position for o in view.objects]))
 
     async def _look_around(self, context: Context, goal: PickGoal, view: _View) -> _View:
-        """Turn the torso to either side until nothing is missing, and back; the arms come along."""
+        """Turn the torso to either side until enough is seen, and back; the arms come along."""
         motion, ahead = PlannedMotion(context), context.commanded_joints.copy()
-        context.say("detect", f"{view.problem} Looking around.")
+        context.say("detect", f"{view.problem or f'Few {goal.label}s are seen.'} Looking around.")
         for turn in (self._config.turn, -self._config.turn):
             turned = ahead.copy()
             turned[TORSO] += turn
             with suppress(PlanRefused):
                 await motion.to_joints(turned, (), self._config.travel_speed)
                 view = await self._see(context, goal, view)
-            if view.problem is None:
+            if self._enough(view):
                 break
         with suppress(PlanRefused):
             await motion.to_joints(ahead, (), self._config.travel_speed)
         return view
+
+    def _enough(self, view: _View) -> bool:
+        """Return whether nothing is missing, and not so few objects are seen that others may have been overlooked."""
+        return view.problem is None and len(view.attempts) >= self._config.few
 
     async def _see(self, context: Context, goal: PickGoal, before: _View) -> _View:
         """Look until nothing is missing, adding to what is known from the view `before`."""
@@ -154,10 +159,15 @@ class TargetChoice:
     def _added(self, context: Context, goal: PickGoal, view: _View, sightings: Detections) -> _View:
         """Return what is known after one more picture."""
         container, objects = view.container, list(view.objects)
-        containers = [o for o in sightings.objects if o.label == goal.container]
-        if containers:
-            best = max(containers, key=lambda o: o.detection.score)
-            container = Container.of(best, self._config.container_radius)
+        containers = [
+            Container.of(o, self._config.container_radius)
+            for o in sightings.objects
+            if o.label == goal.container
+        ]
+        believed = [
+            c for c in containers if c.box is not None or c.sighting.detection.score >= self._config.sure
+        ]
+        container = max(believed, key=lambda c: c.sighting.detection.score, default=container)
         for new in (o for o in sightings.objects if o.label == goal.label):
             if all(np.linalg.norm(new.position - known.position) > SAME for known in objects):
                 objects.append(new)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.collision.obstacles import cloud_grid
-from golem.capabilities.collision.scene_cloud import ROBOT_MARGIN, cleared, scene_world
+from golem.capabilities.collision.obstacles import World, cloud_grid
+from golem.capabilities.collision.scene_cloud import ROBOT_MARGIN, cleared, displaced, scene_world
 from golem.types import Array
 
 NONE = np.zeros((0, 4))
@@ -45,3 +45,14 @@ def test_cells_that_are_cleared_leave_the_others_as_they_were() -> None:
     np.testing.assert_array_equal(grid.cells >= 0, only.cells >= 0)
     np.testing.assert_array_equal(grid.steps, only.steps)
     assert cleared(only, np.array([[0.5, 0.0, 0.0, 0.1]]), 0.0) is only
+
+
+def test_a_displaced_world_is_elsewhere_by_that_much() -> None:
+    points = np.random.default_rng(0).uniform(-0.01, 0.01, (200, 3)) + (0.5, 0.0, 0.0)
+    world = scene_world(points, np.zeros((0, 4)))
+    by = np.array([0.05, -0.02, 0.03])
+    ball = np.array([[0.55, 0.0, 0.0, 0.01]])
+    moved = displaced(world, by)
+    before, after = world.distance(ball)[0], moved.distance(ball + np.append(by, 0.0))[0]
+    np.testing.assert_allclose(before, after, atol=1e-9)
+    assert displaced(World(), by).cloud is None

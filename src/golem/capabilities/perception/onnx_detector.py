@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -27,12 +27,14 @@ class OnnxDetectorConfig:
     Attributes:
         weights: an ONNX file written by `golem.training.detector`; the shipped one if absent.
         threshold: smallest score of a detection.
+        doubtful: the same by class, where a user can tell by the shape whether to believe it; lower ones only.
         latency: declared time per frame [s]; docs/explanation/detector.md has the measured one.
         lift: how depth is read.
     """
 
     weights: str | None = None
     threshold: float = 0.3
+    doubtful: Mapping[str, float] = field(default_factory=lambda: {"tray": 0.12})
     latency: float = 0.03
     lift: LiftConfig = field(default_factory=LiftConfig)
 
@@ -88,7 +90,12 @@ class OnnxDetector:
             raise unknown_name("label", label, self.classes)
         x = normalise(image, self._mean, self._std, self._multiple)
         maps = np.asarray(self._session.run(["maps"], {"image": x})[0])[0]
-        return find_peaks(maps, self.classes, wanted, self.config.threshold, (image.shape[1], image.shape[0]))
+        size = image.shape[1], image.shape[0]
+        doubtful = {label: least for label, least in self.config.doubtful.items() if label in wanted}
+        found = find_peaks(maps, self.classes, wanted - set(doubtful), self.config.threshold, size)
+        for label, least in doubtful.items():
+            found += find_peaks(maps, self.classes, {label}, least, size)
+        return sorted(found, key=lambda d: -d.score)
 
     def locate(self, frame: RgbdImage, labels: Sequence[str]) -> list[LocalizedObject]:
         """Return what is seen of `labels`; see `Localizer`."""

@@ -1,0 +1,72 @@
+"""A hand that pulls at what is tight, or stands on something, is told by the torques of its arm."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from golem.capabilities.arms.arm_kinematics import UpperKinematics
+from golem.capabilities.arms.base import ARM_COLUMNS
+from golem.capabilities.arms.hand_force import HandForce
+from golem.capabilities.arms.postures import POSTURES
+from golem.interfaces import topics
+from golem.skills.force_guard import TICKS, ForceGuard
+from golem.types import NUM_JOINTS, SIDES, UPPER, Array, Imu, LowState, Side
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def torques(side: Side, force: Array) -> Array:
+    """Return (15,) what the motors do at `ready` while the hand exerts `force` (3,) in base_link [N]."""
+    arm, q = UpperKinematics(), POSTURES["ready"]
+    tau = pin.computeGeneralizedGravity(arm.model, arm.data, q).copy()
+    arm.update(q)
+    local = np.concatenate([arm.placement(side).rotation.T @ force, np.zeros(3)])
+    tau[ARM_COLUMNS[side]] += arm.jacobian(side)[:, ARM_COLUMNS[side]].T @ local
+    return tau
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_force_of_a_hand_is_found_in_the_torques(side: Side) -> None:
+    force = np.array([3.0, -2.0, 12.0])
+    np.testing.assert_allclose(HandForce()(side, POSTURES["ready"], torques(side, force)), force, atol=1e-6)
+
+
+def feel(world: Any, force: float) -> None:
+    """Let the motors of the right arm report that the hand pulls upwards."""
+    q, tau = np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
+    q[UPPER], tau[UPPER] = POSTURES["ready"], torques("right", force * UP)
+    imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))
+    world.bus.publish(topics.LOW_STATE, LowState(world.t, q, np.zeros(NUM_JOINTS), tau, imu), world.t)
+    world.step()
+
+
+def test_a_force_that_lasts_is_noticed_and_a_jerk_is_not(world: Any) -> None:
+    feel(world, 5.0)
+    guard = ForceGuard(world.context, "right", UP, force=10.0, length=0.015)
+    for force in (14.0, 25.0, 25.0, 14.0):  # 5 N were there before: 9, 20, 20, 9
+        feel(world, force)
+        assert not guard()
+    for _ in range(TICKS):
+        feel(world, 17.0)
+        stuck = guard()
+    assert stuck and guard.stuck and guard.largest == pytest.approx(20.0, abs=0.1)
+
+
+def test_beyond_its_length_nothing_is_asked(world: Any) -> None:
+    feel(world, 0.0)
+    guard = ForceGuard(world.context, "right", UP, force=10.0, length=0.015)
+    T = world.context.arms["right"].pose
+    T[2, 3] += 0.02
+    world.context.arms["right"].stays_at(T)
+    for _ in range(2 * TICKS):
+        feel(world, 30.0)
+        assert not guard()
+
+
+def test_motors_that_do_not_report_feel_nothing(world: Any) -> None:
+    guard = ForceGuard(world.context, "right", UP, force=1.0)
+    assert not guard() and guard.largest == 0.0
