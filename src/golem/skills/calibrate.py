@@ -60,6 +60,7 @@ class CalibrateGoal:
             "",
             ("number of views per hand", self.views, 6 <= self.views <= 60, "6 to 60"),
             ("time to settle", self.settle, 0.0 <= self.settle <= 5.0, "0 to 5 s"),
+            ("seed", self.seed, self.seed >= 0, "not negative"),
         )
 
 

@@ -312,7 +312,9 @@ class Context:
             yaw: heading of the gripper's x axis about the vertical that suits the arm best [rad].
             approach: direction in odom along which the hand is to come, of unit length.
         """
-        gripper = Gripper(side, self.arms[side].pose, yaw, np.array(approach), self.joints, self.T_odom_base)
+        state = self.bus.latest(topics.LOW_STATE)
+        q = None if state is None else state.q[UPPER]
+        gripper = Gripper(side, self.arms[side].pose, yaw, np.array(approach), q, self.T_odom_base)
         scene = self.scene("head")
         return await self.think(lambda: method.propose(target, scene, gripper), method.latency)
 

@@ -218,6 +218,8 @@ def test_every_field_of_every_goal_at_its_edges(crowd: Crowd, action: str) -> No
 def test_every_field_of_every_goal_in_json_at_its_edges(crowd: Crowd) -> None:
     walk = {"x": 1.0}
     sound = {
+        "calibrate": {"file": ""},
+        "disassemble": {},
         "open": {},
         "pick": {},
         "walk": walk,
