@@ -152,7 +152,10 @@ FAULTS: tuple[LiveFault, ...] = (
     ),
     LiveFault("a stranger writes /lowcmd", lambda r: r.write("/lowcmd", _damping), WRITERS),
     LiveFault(
-        "a stranger writes /safety/lowcmd_in", lambda r: r.write("/safety/lowcmd_in", _damping), WRITERS
+        "a stranger writes /safety/lowcmd_in",
+        lambda r: r.write("/safety/lowcmd_in", _damping),
+        # What comes first decides: the stranger's first command, which has no stamp, or that there is a stranger.
+        WRITERS | {Reason.COMMAND_UNSTAMPED},
     ),
     LiveFault(
         "random bytes as /lowstate",
