@@ -22,15 +22,15 @@ mallinfo2 = ctypes.CDLL("libc.so.6").mallinfo2
 mallinfo2.restype = Info
 del_me = np.ones(2_000_000, np.uint8)
 del del_me
-before = mallinfo2().hblkhd
-images = [np.ones(900_000, np.uint8) for _ in range(8)]
-# By bytes, since the interpreter may free a small mapped block of its own meanwhile.
-print(round((mallinfo2().hblkhd - before) / 900_000))
+before = mallinfo2().hblks
+images = [np.ones(900_000, np.uint8) for _ in range(20)]
+print(mallinfo2().hblks - before)
 """
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc's heap is set")
-@pytest.mark.parametrize(("how", "count"), [("mapped", 8), ("as it is", 0)])
-def test_an_image_is_mapped_by_itself(how: str, count: int) -> None:
+@pytest.mark.parametrize(("how", "count"), [("mapped", range(18, 21)), ("as it is", range(1))])
+def test_an_image_is_mapped_by_itself(how: str, count: range) -> None:
+    """But for one or two that fill holes which the imports have left in the heap."""
     done = subprocess.run([sys.executable, "-c", MAPPED, how], capture_output=True, text=True, check=True)
-    assert int(done.stdout) == count
+    assert int(done.stdout) in count

@@ -12,7 +12,7 @@ _M_MMAP_THRESHOLD = -3
 
 
 def map_large_blocks() -> None:
-    """Have each block of `LARGE` or more mapped by itself, and given back when it is freed; glibc only.
+    """Have blocks of `LARGE` or more mapped each by itself, unless a hole fits, and given back when freed; glibc only.
 
     Without this glibc raises the bound to the largest block that was freed so far, up to 32 MB. Images then lie
     between small objects, whose holes stay: the stack process grew by 4 to 10 MB a pick.
