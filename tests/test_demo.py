@@ -54,7 +54,7 @@ def test_a_world_without_screws_is_named(tmp_path: Path) -> None:
 
 
 def test_the_work_place_is_the_seeds_own() -> None:
-    stack = work_place(DemoConfig(stack="tether"))
+    stack = work_place(DemoConfig(stack="tether", layout="varied"))
     built = [build(stack, seed)[1] for seed in (1, 2)]
     places = []
     for robot in built:
@@ -63,7 +63,7 @@ def test_the_work_place_is_the_seeds_own() -> None:
         assert len(robot.scene.names.screws) >= 2 and robot.scene.conditions.light == SHOWN["light"]
         robot.close()
     assert places[0] != places[1]
-    assert work_place(DemoConfig(stack="tether", layout="nominal")) == load_stack("tether", profile="bench")
+    assert work_place(DemoConfig(stack="tether")) == load_stack("tether", profile="bench")
 
 
 def page_of(result: DemoResult) -> str:
