@@ -15,9 +15,9 @@ import numpy as np
 from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.episode import HANGS, READY, episode_seed, lost
+from golem.evaluation.episodes.episode import episode_seed, lost
 from golem.evaluation.episodes.oracle import Oracle
-from golem.evaluation.rungs.pick_screw import ABORTED, RELEASED, SLOT, balance
+from golem.evaluation.rungs.pick_screw import ABORTED, SLOT, balance, let_go
 from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.provenance import stack_facts
@@ -82,12 +82,9 @@ class FridgeRung(Rung[FridgeOptions]):
             self.onlooker(running, robot)
         oracle = Oracle(robot)
         try:
-            if self.balances:
-                running.executor.run(READY, lambda: not robot.on_gantry)
-                if robot.on_gantry:
-                    legs = f"lower_body: {stack.choice('lower_body').use}"
-                    return TrialOutcome(False, HANGS.stage, legs, HANGS.detail)
-                running.executor.run(running.executor.t + RELEASED)
+            hangs = let_go(running, robot) if self.balances else None
+            if hangs is not None:
+                return hangs
             side: Side = "left" if robot.scene.kitchen.fridge.handle_y > 0.0 else "right"
             watch = _FridgeWatch(running, robot, oracle, side, self.balances)
             result = running.execute("open", OpenGoal(), watch=watch)

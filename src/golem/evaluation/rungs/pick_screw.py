@@ -31,7 +31,7 @@ from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.worlds.conditions import LayoutKind
-from golem.runtime.lockstep import build
+from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import FAULT, SkillResult
 from golem.skills.pick_config import PickGoal
 from golem.skills.pick_report import PickReport
@@ -63,6 +63,16 @@ class PickOptions:
     like and what lies about."""
     sweep: str = ""
     """A condition whose values are tried one by one: NAME=FROM..TO, NAME=FROM..TO:COUNT or NAME=VALUE,VALUE."""
+
+
+def let_go(running: LockstepRunner, robot: MujocoRobot) -> TrialOutcome | None:
+    """Wait until a robot stands without its band, and for a while more; return the outcome of one that stays in it."""
+    running.executor.run(READY, lambda: not robot.on_gantry)
+    if robot.on_gantry:
+        legs = f"lower_body: {running.stack.choice('lower_body').use}"
+        return TrialOutcome(False, HANGS.stage, legs, HANGS.detail)
+    running.executor.run(running.executor.t + RELEASED)
+    return None
 
 
 class PickRung(Rung[PickOptions]):
@@ -113,13 +123,9 @@ class PickRung(Rung[PickOptions]):
             self.onlooker(running, robot)
         oracle = Oracle(robot)
         try:
-            if self.balances:
-                running.executor.run(READY, lambda: not robot.on_gantry)
-                if robot.on_gantry:
-                    return TrialOutcome(
-                        False, HANGS.stage, f"lower_body: {stack.choice('lower_body').use}", HANGS.detail
-                    )
-                running.executor.run(running.executor.t + RELEASED)
+            hangs = let_go(running, robot) if self.balances else None
+            if hangs is not None:
+                return hangs
             before = oracle.fasteners()
             feasible = doable(before, oracle.drop_places())
             touches = PickTouches(robot, before, oracle.T_world_odom)

@@ -11,7 +11,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 from rich.console import Console
-from rich.table import Table
 
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.diff_ik import DiffIK
@@ -23,7 +22,7 @@ from golem.capabilities.collision.mesh_oracle import link_tree
 from golem.capabilities.collision.pack_robot import our_robot
 from golem.capabilities.collision.sphere_robot import SphereRobot, load_spheres
 from golem.errors import ConfigError, MissingExtra
-from golem.evaluation.speed.bench import Figure, figure, ik_figure, timed
+from golem.evaluation.speed.bench import Figure, figure, ik_figure, print_figures, timed
 from golem.evaluation.speed.plan_bench import planning_table
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import UPPER, Array
@@ -98,11 +97,8 @@ def run_arms_bench(config: ArmsBenchConfig) -> list[Figure]:
     except MissingExtra as error:
         Console().print(f"pink_ik left out: {error}")
     missed, false = int((truth & ~found).sum()), int((found & ~truth).sum())
-    table = Table("figure", "median", "p99", "unit", "reference", title="GOLEM, CPU time of one thread")
-    for f in figures:
-        table.add_row(f.name, f"{f.median:.3g}", f"{f.p99:.3g}", f.unit, f.reference)
+    print_figures(figures)
     console = Console()
-    console.print(table)
     ratio = mesh_times.mean() / single.mean(), mesh_times.mean() / each.mean()
     console.print(
         f"{robot.count} spheres; means: {ratio[0]:.0f} times faster than meshes single, {ratio[1]:.0f} in a batch.\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -80,13 +80,20 @@ def run_bench(config: BenchConfig) -> list[Figure]:
         *_navigation(config),
         *_robot(config),
     ]
-    table = Table("figure", "median", "p99", "unit", "reference", title="GOLEM, CPU time of one thread")
-    for f in figures:
-        table.add_row(f.name, f"{f.median:.3g}", f"{f.p99:.3g}", f.unit, f.reference)
-    Console().print(table)
+    print_figures(figures)
     if config.json:
         print(json.dumps([asdict(f) for f in figures]))
     return figures
+
+
+def print_figures(
+    figures: Sequence[Figure], title: str = "GOLEM, CPU time of one thread", reference: str = "reference"
+) -> None:
+    """Print a table of figures under a title; `reference` is the head of what they are compared with."""
+    table = Table("figure", "median", "p99", "unit", reference, title=title)
+    for f in figures:
+        table.add_row(f.name, f"{f.median:.3g}", f"{f.p99:.3g}", f.unit, f.reference)
+    Console().print(table)
 
 
 def timed(step: Callable[[int], object], n: int) -> Array:

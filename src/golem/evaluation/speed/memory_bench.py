@@ -13,14 +13,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from golem.capabilities.memory.base import Observation
 from golem.capabilities.memory.object_map import ObjectMap, ObjectMapConfig
 from golem.capabilities.memory.words import SYNONYMS
 from golem.errors import ConfigError
-from golem.evaluation.speed.bench import Figure, figure, timed
+from golem.evaluation.speed.bench import Figure, figure, print_figures, timed
 from golem.robots.sensors.cameras import HEAD
 from golem.types import Array, Detection, LocalizedObject, RgbdImage
 
@@ -88,10 +86,7 @@ def run_memory_bench(config: MemoryBenchConfig) -> list[Figure]:
         figures = _scale(config, Path(folder) / "memory.sqlite")
         lost = sum(_killed(Path(folder) / f"{k}.sqlite", config.seed + k) for k in range(config.kills))
     figures.append(Figure(f"kill -9 while writing, {config.kills} times: lost looks", lost, lost, "", "0"))
-    table = Table("figure", "median", "p99", "unit", "wanted", title="object_map with a file")
-    for f in figures:
-        table.add_row(f.name, f"{f.median:.3g}", f"{f.p99:.3g}", f.unit, f.reference)
-    Console().print(table)
+    print_figures(figures, "object_map with a file", "wanted")
     if config.json:
         print(json.dumps([asdict(f) for f in figures]))
     return figures

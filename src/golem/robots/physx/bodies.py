@@ -113,6 +113,8 @@ class _Maker:
     def __init__(self, sapien: Any, model: mujoco.MjModel, friction: float) -> None:
         self._sapien, self._physx, self._model = sapien, sapien.physx, model
         self._world = self._physx.PhysxMaterial(friction, friction, 0.0)
+        self._places = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, self._places)
 
     def pose(self, pos: Array, quat: Array) -> Any:
         return self._sapien.Pose(np.asarray(pos, np.float32), np.asarray(quat, np.float32))
@@ -167,9 +169,7 @@ class _Maker:
         entity = self._sapien.Entity()
         entity.add_component(component)
         entity.name = self._model.body(body).name
-        data = mujoco.MjData(self._model)
-        mujoco.mj_kinematics(self._model, data)
-        entity.pose = self.pose(data.xpos[body], data.xquat[body])
+        entity.pose = self.pose(self._places.xpos[body], self._places.xquat[body])
         return entity
 
     def _shapes(self, component: Any, body: int, foreign: bool) -> bool:
