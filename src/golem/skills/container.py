@@ -22,12 +22,6 @@ APART = 0.03
 """Distance between two places that are tried [m]."""
 SURE = 0.02
 """Up to here a difference along a row is no mistaken neighbour [m]; screws stand 9 cm apart."""
-BESIDE = 0.02
-"""Half width of the way on which a wall is looked for, and how far behind the hand it begins [m]."""
-WALL = (0.025, 0.060)
-"""How high above the floor a wall shows [m]: things lie lower, and the fingers are higher."""
-LEAST = 15
-"""Points that make a wall."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,27 +98,3 @@ def shift_of(seen: Array, expected: Array, others: Array) -> Array:
     direction = away[k] / distance[k]
     along = float(shift @ direction)
     return shift - along * direction if abs(along) > SURE else shift
-
-
-def wall_between(cloud: Array, hand: Array, middle: Array, level: float) -> float | None:
-    """Return how far from a hand the last wall is on its way to the middle of a container [m]; None without a wall.
-
-    A hand that is inside an open box has none before it.
-
-    Args:
-        cloud: (n, 3) what the palm camera shows, in odom [m].
-        hand: (3,) where the hand is.
-        middle: (3,) the middle of the container, as far as it is known.
-        level: height of its floor [m].
-    """
-    way = middle[:2] - hand[:2]
-    length = float(np.linalg.norm(way))
-    if length < 1e-3:
-        return None
-    direction = way / length
-    offset = cloud[:, :2] - hand[:2]
-    along, across = offset @ direction, offset @ (-direction[1], direction[0])
-    above = cloud[:, 2] - level
-    wall = (along > -BESIDE) & (along < length) & (np.abs(across) < BESIDE)
-    wall &= (above > WALL[0]) & (above < WALL[1])
-    return float(np.quantile(along[wall], 0.95)) if wall.sum() >= LEAST else None

@@ -7,7 +7,7 @@ import numpy as np
 from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.interfaces.payloads import GripState
 from golem.skills.base import StageFailed
-from golem.skills.container import shift_of, wall_between
+from golem.skills.container import shift_of
 from golem.skills.context import Context
 from golem.skills.hand_reach import HandReach
 from golem.skills.pick_config import PickConfig
@@ -18,10 +18,6 @@ from golem.types import Array
 
 DROPS = 6
 """Places in the container that are tried."""
-INSIDE = 0.035
-"""How far behind a wall the hand goes [m]."""
-PALM_TIMEOUT = 0.5
-"""Time that the palm camera may take for a picture [s]."""
 SAME = 0.035
 """Two looks of the head camera at one object differ by less [m]; screws stand 9 cm apart."""
 NEAR = 0.12
@@ -71,24 +67,6 @@ async def place(
         raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", text)
     hand.open(config.release_gap)
     await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
-
-
-def _above(T: Array, place: Array, config: PickConfig) -> Array:
-    """Return pose `T` (4, 4) moved to where the hand lets go above a place (3,) in odom [m]."""
-    moved = T.copy()
-    moved[:3, 3] = place + (0.0, 0.0, config.drop_height)
-    return moved
-
-
-async def _wall(context: Context, attempt: Attempt, middle: Array) -> float | None:
-    """Return where the palm camera sees a wall between the hand and the container's middle; see `wall_between`."""
-    camera = f"{attempt.side}_hand"
-    with context.watch(camera, attempt.container) as eye:
-        if await eye.look(PALM_TIMEOUT) is None:
-            return None
-    return wall_between(
-        context.scene(camera), context.arms[attempt.side].pose[:3, 3], middle, float(middle[2])
-    )
 
 
 async def look_after(

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from golem.capabilities.arms.base import TargetError
-from golem.capabilities.arms.line import Chain, Line
+from golem.capabilities.arms.line import Line
 from golem.errors import ConfigError
 from golem.types import Array
 
@@ -70,27 +70,8 @@ def test_no_way_takes_no_time() -> None:
     np.testing.assert_array_equal(line.pose(0.0), np.eye(4))
 
 
-def test_a_chain_stops_at_every_waypoint() -> None:
-    ways = [
-        pose(np.array(p, float), np.zeros(3)) for p in [(0, 0, 0), (0.2, 0, 0), (0.2, 0, 0.1), (0.2, 0, 0.1)]
-    ]
-    chain = Chain(ways, v_max=0.2)
-    elapsed = 0.0
-    for line, way in zip(chain.lines, ways[1:], strict=True):
-        elapsed += line.duration
-        np.testing.assert_allclose(chain.pose(elapsed), way, atol=1e-12)
-    assert chain.duration == pytest.approx(elapsed)
-    np.testing.assert_array_equal(chain.pose(0.0), ways[0])
-    np.testing.assert_array_equal(chain.pose(chain.duration + 5.0), ways[-1])
-    times = np.linspace(0.0, chain.duration, 1001)
-    path = np.array([chain.pose(t)[:3, 3] for t in times])
-    assert np.linalg.norm(np.diff(path, axis=0), axis=1).max() <= 0.2 * times[1] * (1 + 1e-6)
-
-
 def test_wrong_input_is_refused() -> None:
     with pytest.raises(ConfigError, match="positive"):
         Line(np.eye(4), np.eye(4), v_max=0.0)
     with pytest.raises(TargetError, match="goal of the line"):
         Line(np.eye(4), np.full((4, 4), np.nan))
-    with pytest.raises(ConfigError, match="two waypoints"):
-        Chain([np.eye(4)])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pinocchio as pin
 
@@ -91,37 +89,3 @@ class Line:
         T[:3, 3] += s * self._travel
         T[:3, :3] = T[:3, :3] @ pin.exp3(s * self._turn)
         return T
-
-
-class Chain:
-    """Lines one after the other through waypoints, stopping at each.
-
-    Attributes:
-        duration: time from the first to the last waypoint [s].
-        lines: the lines, one fewer than waypoints.
-    """
-
-    def __init__(
-        self, waypoints: Sequence[Array], v_max: float = 0.25, w_max: float = 1.0, a_max: float = 1.0
-    ) -> None:
-        """Plan the lines.
-
-        Args:
-            waypoints: at least two (4, 4) poses of the moved frame in one common frame.
-            v_max: speed limit of every line [m/s].
-            w_max: rate of turn limit of every line [rad/s].
-            a_max: acceleration limit of every line [m/s^2].
-
-        Raises:
-            ConfigError: fewer than two waypoints.
-        """
-        if len(waypoints) < 2:
-            raise ConfigError("A chain of lines needs at least two waypoints.")
-        self.lines = [Line(a, b, v_max, w_max, a_max) for a, b in zip(waypoints, waypoints[1:], strict=False)]
-        self._ends = np.cumsum([line.duration for line in self.lines])
-        self.duration = float(self._ends[-1])
-
-    def pose(self, t: float) -> Array:
-        """Return the (4, 4) pose at `t` [s] after the start."""
-        i = min(int(np.searchsorted(self._ends, t, side="right")), len(self.lines) - 1)
-        return self.lines[i].pose(t - (self._ends[i] - self.lines[i].duration))

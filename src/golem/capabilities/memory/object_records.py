@@ -58,10 +58,6 @@ class ObjectRecords:
         """(n,) view of the numbers of the rows."""
         return self._numbers[: len(self._labels)]
 
-    def label_at(self, row: int) -> str:
-        """Return the label of the object in a row."""
-        return self._labels[row]
-
     def rows(self, label: str) -> NDArray[np.intp]:
         """Return the rows of all objects with this label, in the order of their numbers."""
         return np.array([self._row[number] for number in self._by_label.get(label, ())], np.intp)

@@ -80,7 +80,6 @@ FIXED: tuple[Edge, ...] = (
 
 _T_PARENT_CHILD = np.array([h.T_parent_child for h in HINGES])
 _AXIS = np.array([skew(h.axis) for h in HINGES])
-_AXIS_TWICE = _AXIS @ _AXIS
 
 
 def angles(q: Array, fingers: tuple[Array, Array]) -> Array:

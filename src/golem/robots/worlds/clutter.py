@@ -15,7 +15,6 @@ ATTEMPTS = 30
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 _CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
-_LYING = (0.70710678, 0.70710678, 0.0, 0.0)
 
 
 def add_clutter(spec: mujoco.MjSpec, layout: PackLayout, count: int, rng: np.random.Generator) -> int:
