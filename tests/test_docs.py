@@ -244,3 +244,15 @@ def test_the_table_of_slots_is_complete() -> None:
     )
     shown = {slot: tuple(re.findall(r"`(\w+)`", names)) for slot, names in rows}
     assert shown == {slot: registry.names(slot) for slot in SLOTS}
+
+
+def test_the_readme_names_every_module() -> None:
+    rows = re.findall(
+        r"^\| `(\w+)` \| (`.*?) \|", (DOCS.parent / "README.md").read_text(encoding="utf-8"), re.M
+    )
+    shown = {
+        slot: set(re.findall(r"`(\w+)`", re.sub(r"\(.*?\)", "", names)))
+        for slot, names in rows
+        if slot in SLOTS
+    }
+    assert shown == {slot: set(registry.names(slot)) for slot in SLOTS}
