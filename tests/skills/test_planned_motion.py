@@ -15,11 +15,15 @@ from golem.capabilities.arms.solve import downward
 from golem.capabilities.collision.obstacles import Obstacle, World
 from golem.capabilities.memory.object_map import ObjectMap
 from golem.capabilities.planning.base import PlanRefused, Refusal
+from golem.capabilities.planning.escape import apart
+from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
+from golem.capabilities.planning.plan_kernel import ITSELF
 from golem.capabilities.planning.rrt_connect import RrtConnect
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, GateStatus
 from golem.middleware.bus import Bus
 from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.table import JOINT_NAMES
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import UpperBodyNode
 from golem.skills.base import REFUSED, SkillResult
@@ -31,14 +35,17 @@ from golem.types import NUM_JOINTS, UPPER, Array, BaseEstimate, Imu, LowState
 PERIOD = 0.01
 DONE = SkillResult(True, "done", None, "There.")
 OVER: Array = downward(0.45, -0.12, 0.10, -0.5 * np.pi)
+ROLL, PITCH = (
+    JOINT_NAMES[UPPER].index(f"right_{joint}_joint") for joint in ("shoulder_roll", "shoulder_pitch")
+)
 STILL = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
 
 
 class Rig:
-    """Arms that are always where they were sent, under an open gate."""
+    """Arms that are always where they were sent, but for joints that something stops, under an open gate."""
 
     def __init__(self, planner: RrtConnect) -> None:
-        self.bus, self.t, self.q = Bus(), 0.0, posture("home")
+        self.bus, self.t, self.q, self.stops = Bus(), 0.0, posture("home"), np.full(15, np.inf)
         self.node = UpperBodyNode(self.bus, DiffIK(), ContractCheck("upper_body", "diff_ik"))
         modules = Modules(lambda: pytest.fail(), lambda name: pytest.fail(), lambda: planner, ObjectMap())
         self.context = Context(self.bus, Kinematics(), PERIOD, modules)
@@ -47,7 +54,7 @@ class Rig:
     def step(self) -> None:
         self.t += PERIOD
         q = np.zeros(NUM_JOINTS)
-        q[UPPER] = self.q
+        q[UPPER] = np.minimum(self.q, self.stops)
         zero = np.zeros(NUM_JOINTS)
         self.bus.publish(topics.BASE, BaseEstimate(self.t, np.eye(4)), self.t)
         self.bus.publish(topics.LOW_STATE, LowState(self.t, q, zero, zero, STILL), self.t)
@@ -143,6 +150,50 @@ def test_what_cannot_be_is_refused_and_nothing_moves(
     assert refusals[0].refusal is refusal
     assert re.search(words, str(refusals[0]))
     np.testing.assert_array_equal(rig.q, before)
+
+
+def test_an_arm_that_is_held_off_gives_in_and_goes_on(rig: Rig) -> None:
+    home = rig.q.copy()
+    pressed = home.copy()
+    pressed[PITCH] += 0.15
+    rig.stops[PITCH] = home[PITCH] + 0.02
+
+    async def press_and_return(context: Context) -> SkillResult:
+        await context.follow(np.array([0.5]), pressed[None])
+        await PlannedMotion(context).to_joints(home, ["right"], 0.25)
+        return DONE
+
+    assert rig.run(press_and_return(rig.context)).result == DONE
+    np.testing.assert_allclose(rig.q, home, atol=1e-6)
+
+
+def test_arms_that_touch_the_robot_come_off_and_go_on(rig: Rig) -> None:
+    home = rig.q.copy()
+    space = JointSpace(PlanningRobot(), home)
+    touching = home.copy()
+    while space.verdict(touching) == 0:
+        touching[ROLL] += 0.01
+    assert space.verdict(touching) == ITSELF
+    touching[ROLL] += 0.02
+    way: list[Array] = []
+
+    async def touch_and_return(context: Context) -> SkillResult:
+        await context.follow(np.array([2.0]), touching[None])
+        way.append((await PlannedMotion(context).to_joints(home, ["right"], 0.25)).q)
+        return DONE
+
+    assert rig.run(touch_and_return(rig.context)).result == DONE
+    np.testing.assert_allclose(rig.q, home, atol=1e-6)
+    assert (space.verdicts(way[0]) == 0).all()
+
+
+def test_links_deep_in_each_other_are_not_brought_apart(rig: Rig) -> None:
+    robot = PlanningRobot()
+    crossed = rig.q.copy()
+    crossed[ROLL] += 1.2
+    space = JointSpace(robot, crossed)
+    assert space.verdict(crossed) == ITSELF
+    assert apart(space, robot.model(), crossed) is None
 
 
 def test_a_refusal_that_a_skill_lets_through_is_its_result(rig: Rig) -> None:

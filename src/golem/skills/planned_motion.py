@@ -14,8 +14,9 @@ from golem.capabilities.arms.line_check import LineChecker
 from golem.capabilities.collision.obstacles import World
 from golem.capabilities.collision.scene_cloud import cleared, displaced, scene_world
 from golem.capabilities.planning.base import Held, Plan, PlanRefused, PlanRequest, Refusal
+from golem.capabilities.planning.escape import apart
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
-from golem.capabilities.planning.plan_kernel import WORLD
+from golem.capabilities.planning.plan_kernel import ITSELF, WORLD
 from golem.capabilities.planning.rules import Rule
 from golem.skills.context import Context
 from golem.types import SIDES, Array, Side
@@ -29,8 +30,12 @@ FARTHEST = 2.0
 other limits than those that the work area was chosen for."""
 TOUCHING = 0.015
 """What the cloud shows this near to the robot, where it stands already, is not in its way [m]."""
-
-
+GIVEN = 0.05
+"""An arm whose joints stay farther than this from where they were sent is held off by something [rad]."""
+SETTLE = 0.5
+"""Time that arms get to come to where they were sent [s]."""
+YIELD = 0.3
+"""Time in which an arm gives in to what holds it off, and comes off what it touches [s]."""
 STRAIGHT = (0.001, np.deg2rad(0.5))
 """How far a hand may leave a line, and its approach axis turn away from it [m, rad]."""
 
@@ -105,11 +110,11 @@ class PlannedMotion:
             near: distance of a hand from its pose that will do [m].
 
         Raises:
-            PlanRefused: there is no such way; nothing has moved.
+            PlanRefused: there is no such way; the arms are where they were, or a little off what they touched.
             StageFailed: the motors do not report, or the safety gate stays shut.
         """
         context = self._context
-        q, world = self._start(held)
+        q, world = await self._start(held)
         T = np.linalg.inv(context.T_odom_base)
         in_base: dict[Side, Array] = {side: T @ pose for side, pose in targets.items()}
         lines = [replace(one, T_odom_gripper=T @ one.T_odom_gripper) for one in then]
@@ -127,7 +132,7 @@ class PlannedMotion:
 
         The arms of `sides` move, with the torso; an arm that is not among them stays.
         """
-        q, world = self._start()
+        q, world = await self._start()
         columns = [0, *(j for side in sides for j in range(*ARM_COLUMNS[side].indices(len(q))))]
         wanted = q.copy()
         wanted[columns] = goal[columns]
@@ -135,14 +140,31 @@ class PlannedMotion:
         await self._follow(plan, sides)
         return plan
 
-    def _start(self, held: Sequence[Held] = ()) -> tuple[Array, World]:
-        """Return the joints to plan from, and the world without what the robot would touch there: it is there."""
-        q = np.clip(self._context.commanded_joints, self._robot.lower, self._robot.upper)
-        world = self.world
-        if world.cloud is not None and JointSpace(self._robot, q, world, held=held).verdict(q) == WORLD:
+    async def _start(self, held: Sequence[Held] = ()) -> tuple[Array, World]:
+        """Return the joints to plan from, and the world without what the robot would touch there: it is there.
+
+        Arms that something holds off give in to it first, and arms that touch the robot come off it.
+        """
+        context, lower, upper = self._context, self._robot.lower, self._robot.upper
+
+        def arrived() -> bool:
+            return bool(np.abs(context.joints - context.commanded_joints).max() < GIVEN)
+
+        if not await context.until(arrived, SETTLE):
+            await self._yield(np.clip(context.joints, lower, upper))
+        q, world = np.clip(context.commanded_joints, lower, upper), self.world
+        space = JointSpace(self._robot, q, world, held=held)
+        if space.verdict(q) == ITSELF and (off := apart(space, self._robot.model(held), q)) is not None:
+            await self._yield(off)
+            q = off
+        if world.cloud is not None and space.verdict(q) == WORLD:
             balls = self._robot.model(held).placed(np.ascontiguousarray(q))
             world = World(world.obstacles, cleared(world.cloud, balls, TOUCHING))
         return q, world
+
+    async def _yield(self, q: Array) -> None:
+        """Bring torso and arms straight to the joints `q` (15,) [rad] nearby."""
+        await self._context.follow(np.array([YIELD]), q[None])
 
     async def _planned(self, request: Callable[[], PlanRequest]) -> Plan:
         """Return the plan for `request()`; a planner on a thread of its own is told when the skill is cancelled."""
