@@ -15,7 +15,7 @@ from golem.capabilities.arms.solve import downward
 from golem.capabilities.collision.obstacles import Obstacle, World
 from golem.capabilities.memory.object_map import ObjectMap
 from golem.capabilities.planning.base import PlanRefused, Refusal
-from golem.capabilities.planning.escape import apart
+from golem.capabilities.planning.escape import FARTHEST, apart
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.plan_kernel import ITSELF
 from golem.capabilities.planning.rrt_connect import RrtConnect
@@ -30,6 +30,7 @@ from golem.skills.base import REFUSED, SkillResult
 from golem.skills.context import Context, Modules
 from golem.skills.planned_motion import PlannedMotion, Then
 from golem.skills.runner import SkillRun
+from golem.skills.travel import LineTravel, PlannedTravel
 from golem.types import NUM_JOINTS, UPPER, Array, BaseEstimate, Imu, LowState
 
 PERIOD = 0.01
@@ -44,8 +45,9 @@ STILL = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.8
 class Rig:
     """Arms that are always where they were sent, but for joints that something stops, under an open gate."""
 
-    def __init__(self, planner: RrtConnect) -> None:
-        self.bus, self.t, self.q, self.stops = Bus(), 0.0, posture("home"), np.full(15, np.inf)
+    def __init__(self, planner: RrtConnect, q: Array | None = None) -> None:
+        self.bus, self.t, self.stops = Bus(), 0.0, np.full(15, np.inf)
+        self.q = posture("home") if q is None else q
         self.node = UpperBodyNode(self.bus, DiffIK(), ContractCheck("upper_body", "diff_ik"))
         modules = Modules(lambda: pytest.fail(), lambda name: pytest.fail(), lambda: planner, ObjectMap())
         self.context = Context(self.bus, Kinematics(), PERIOD, modules)
@@ -187,13 +189,30 @@ def test_arms_that_touch_the_robot_come_off_and_go_on(rig: Rig) -> None:
     assert (space.verdicts(way[0]) == 0).all()
 
 
-def test_links_deep_in_each_other_are_not_brought_apart(rig: Rig) -> None:
-    robot = PlanningRobot()
-    crossed = rig.q.copy()
-    crossed[ROLL] += 1.2
-    space = JointSpace(robot, crossed)
-    assert space.verdict(crossed) == ITSELF
-    assert apart(space, robot.model(), crossed) is None
+def test_arms_that_hang_are_raised_before_the_work_begins(planner: RrtConnect) -> None:
+    home, left = posture("home"), np.array([0.06, 0.03, 0.30, 1.56, 2.10, -0.26, -0.69])
+    rig = Rig(planner, np.array([0.0, *left, *(left * (1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0))]))
+    assert JointSpace(PlanningRobot(), rig.q).verdict(rig.q) == ITSELF
+
+    async def begin(context: Context) -> SkillResult:
+        await PlannedTravel(context, LineTravel(context, 0.1, 0.002), 0.002).begin(0.25)
+        return DONE
+
+    assert rig.run(begin(rig.context)).result == DONE
+    np.testing.assert_allclose(rig.q, home, atol=1e-6)
+
+
+def test_what_comes_apart_is_free_and_near_and_not_everything_does() -> None:
+    robot, rng = PlanningRobot(), np.random.default_rng(0)
+    space = JointSpace(robot, posture("home"))
+    drawn = rng.uniform(robot.lower, robot.upper, (200, 15))
+    found = [apart(space, robot.model(), q) for q in drawn]
+    for q, off in zip(drawn, found, strict=True):
+        if off is not None:
+            assert space.verdict(off) == 0 and np.abs(off - q).max() <= FARTHEST
+    touching = [off for q, off in zip(drawn, found, strict=True) if space.verdict(q) == ITSELF]
+    apart_count = sum(off is not None for off in touching)
+    assert 0.1 < apart_count / len(touching) < 0.9
 
 
 def test_a_refusal_that_a_skill_lets_through_is_its_result(rig: Rig) -> None:

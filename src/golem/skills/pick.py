@@ -61,6 +61,7 @@ class Pick:
         reason = f"The {goal.label} was dropped in the {goal.container}."
         result = SkillResult(True, "done", None, reason, timings)
         try:
+            await self._travel.begin(self._config.travel_speed)
             choice = await TargetChoice(self._config).look(context, goal)
             self._travel.look([attempt.target.position for attempt in choice.attempts])
             attempt = await self._take_one(context, choice.attempts, timings, tried)

@@ -34,8 +34,8 @@ GIVEN = 0.05
 """An arm whose joints stay farther than this from where they were sent is held off by something [rad]."""
 SETTLE = 0.5
 """Time that arms get to come to where they were sent [s]."""
-YIELD = 0.3
-"""Time in which an arm gives in to what holds it off, and comes off what it touches [s]."""
+YIELD = 0.5
+"""Speed of a joint that gives in to what holds it off, or brings a link off what it touches [rad/s]."""
 STRAIGHT = (0.001, np.deg2rad(0.5))
 """How far a hand may leave a line, and its approach axis turn away from it [m, rad]."""
 
@@ -164,7 +164,8 @@ class PlannedMotion:
 
     async def _yield(self, q: Array) -> None:
         """Bring torso and arms straight to the joints `q` (15,) [rad] nearby."""
-        await self._context.follow(np.array([YIELD]), q[None])
+        way = float(np.abs(q - self._context.commanded_joints).max())
+        await self._context.follow(np.array([max(0.1, way / YIELD)]), q[None])
 
     async def _planned(self, request: Callable[[], PlanRequest]) -> Plan:
         """Return the plan for `request()`; a planner on a thread of its own is told when the skill is cancelled."""

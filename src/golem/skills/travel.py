@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from golem.capabilities.arms.postures import posture
 from golem.capabilities.planning.base import Held, PlanRefused, Refusal
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
@@ -20,6 +21,8 @@ APPROACH = (0.010, np.deg2rad(3.0))
 corrects it."""
 OVER = 0.015
 """How far from its place above an object or a container a hand may arrive [m]: it does not grasp there."""
+HANGING = 1.5
+"""Arms a joint of which is farther than this from home do not begin their work there [rad]."""
 PULL = (0.003, np.deg2rad(1.5))
 """The same of a hand that pulls; sway and encoders off by 0.03 rad do as much."""
 ARM_BLAMED = (Refusal.UNREACHABLE, Refusal.OFF_LINE)
@@ -31,6 +34,14 @@ def _never() -> bool:
 
 class Travel(Protocol):
     """Moves hands; every pose is that of a grasp frame in odom, (4, 4)."""
+
+    async def begin(self, speed: float) -> None:
+        """Bring arms that hang to where work begins: they are where hands return to.
+
+        Raises:
+            StageFailed: there is no way.
+        """
+        ...
 
     def look(self, targets: Sequence[Array]) -> None:
         """Take the world from what the head camera shows now; `targets` (3,) in odom are what is to be gone to."""
@@ -85,6 +96,9 @@ class LineTravel:
         self._context, self._height, self._tolerance = context, height, tolerance
         self._homes = {side: context.arms[side].pose for side in SIDES}
 
+    async def begin(self, speed: float) -> None:
+        """Stay: lines begin anywhere."""
+
     def look(self, targets: Sequence[Array]) -> None:
         """Look at nothing."""
 
@@ -135,6 +149,22 @@ class PlannedTravel:
         self._context, self._lines, self._tolerance = context, lines, tolerance
         self._motion = PlannedMotion(context)
         self._home = context.commanded_joints.copy()
+
+    async def begin(self, speed: float) -> None:
+        """Bring arms that are far from home there, both at once; see `Travel`.
+
+        From arms that hang, as those of a robot do that was just switched on, each way over the work area is long,
+        and the hands touch the thighs.
+        """
+        home = posture("home")
+        if np.abs(self._home - home)[1:].max() < HANGING:
+            return
+        self._context.say("begin", "Raising the arms.")
+        try:
+            await self._motion.to_joints(home, SIDES, speed)
+        except PlanRefused as refusal:
+            raise failed("begin", refusal) from refusal
+        self._home = home
 
     def look(self, targets: Sequence[Array]) -> None:
         """Take the head camera's cloud for the world; see `Travel`."""

@@ -14,8 +14,8 @@ ROOM = 0.002
 PAIRS = 8
 """Pairs of links that are brought apart at a time."""
 ROUNDS = 40
-FARTHEST = 0.15
-"""How far a joint may turn [rad]: links that are deeper in each other than that are not merely touching."""
+FARTHEST = 0.3
+"""How far a joint may turn [rad]: more than hands that lean on the thighs need."""
 
 
 def apart(space: JointSpace, model: CollisionModel, q: Array) -> Array | None:

@@ -29,6 +29,7 @@ class MujocoConfig:
             of uneven height all around. The floor is flat for a metre around the start in each. `furnished`: a hall
             with walls, shelves, pillars, gantry and packs, drawn from the seed; `plant`: that hall with the pack to
             work on; `corridor`: two bare walls; `kitchen`: a fridge and a counter with tableware before the robot.
+        arms: where they are when the world begins: at home, or hanging as they do while the motors are limp.
         stance: where the robot should stand before the pack: x, y [m] and yaw [rad] from where it begins.
         layout: `nominal`: pack and tray stand where `PackLayout` says, under a robot in the hoist; under one that
             stands they are lowered with it. `varied`: places, light, finishes and clutter are drawn from the seed; of
@@ -57,6 +58,7 @@ class MujocoConfig:
 
     support: Support = "hoist"
     world: World = "pack"
+    arms: Literal["home", "hanging"] = "home"
     stance: tuple[float, float, float] = (0.0, 0.0, 0.0)
     layout: LayoutKind = "nominal"
     conditions: dict[str, float | str] = field(default_factory=dict[str, "float | str"])

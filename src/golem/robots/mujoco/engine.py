@@ -32,7 +32,7 @@ from golem.robots.sensors.profiles import load_profile, sample_episode
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds.dressing import mirror_geoms
 from golem.robots.worlds.layout import PackLayout
-from golem.types import LEGS, SIDES, Array, HandCommand, HandState, Imu, LowCommand, Side
+from golem.types import LEGS, SIDES, UPPER, Array, HandCommand, HandState, Imu, LowCommand, Side
 
 START_GAP = 0.060
 """Opening of the hands at the start of an episode [m]."""
@@ -59,7 +59,7 @@ class MujocoRobot:
         Args:
             profile: realism profile.
             seed: draws screws, terrain, calibration errors, noise and sway.
-            posture: (27,) true joint positions to start from [rad].
+            posture: (27,) true joint positions to start from [rad]; arms that hang start as they hang.
             config: options.
 
         Raises:
@@ -122,7 +122,7 @@ class MujocoRobot:
         self._base, self._torso = model.joint("base"), model.joint("torso_joint")
         base = self._base.qposadr[0]
         self.data.qpos[base : base + 3] = (0.0, 0.0, hoist.height)
-        self._motors.place(self.data, posture)
+        self._motors.place(self.data, posture if self.config.arms == "home" else _hanging(posture))
         for hand in self._hands.values():
             hand.reset(self.data, START_GAP)
         self.scene.move_people(self.data)
@@ -265,6 +265,14 @@ class MujocoRobot:
             return True
         gaps = self.data.xpos[self._fingers, None] - self.data.xpos[None, self._screws]
         return bool((gaps * gaps).sum(axis=2).min() < self.config.near**2)
+
+
+def _hanging(posture: Array) -> Array:
+    """Return `posture` (27,) with torso and arms as they hang [rad]: where damped motors let them sag to in 5 s."""
+    left = np.array([0.06, 0.03, 0.30, 1.56, 2.10, -0.26, -0.69])
+    out = posture.copy()
+    out[UPPER] = [0.0, *left, *(left * (1.0, -1.0, -1.0, 1.0, -1.0, 1.0, -1.0))]
+    return out
 
 
 def standing_height(posture: Array) -> float:
