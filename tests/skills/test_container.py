@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -30,13 +32,18 @@ def test_a_single_object_has_no_neighbour() -> None:
 
 BOX = OpenBox(np.array([0.5, -0.3]), 0.3, np.array([0.18, 0.24]), 0.058, 0.016)
 
+AXES = np.array([[np.cos(BOX.yaw), -np.sin(BOX.yaw)], [np.sin(BOX.yaw), np.cos(BOX.yaw)]])
+
 
 def view(seed: int, screw: bool = False, share: float = 1.0) -> Array:
-    """Return (n, 3) what a camera shows of the floor of the box, off by 1.5 mm, with a screw on it or without."""
+    """Return (n, 3) what a camera shows of the box, off by 1.5 mm, with a screw on its floor or without."""
     rng = np.random.default_rng(seed)
     flat = rng.uniform(-0.12, 0.12, (int(20000 * share), 2))
     flat = flat[flat[:, 0] < 0.12 - 0.24 * (1.0 - share)]
-    z = 0.016 + 0.010 * (screw & (np.abs(flat[:, 0] + 0.02) < 0.012) & (np.abs(flat[:, 1] - 0.01) < 0.012))
+    inside = (np.abs(flat @ AXES) < 0.5 * BOX.size - 0.004).all(axis=1)
+    z = np.where(inside, 0.016, 0.056) + 0.010 * (
+        screw & (np.abs(flat[:, 0] + 0.02) < 0.012) & (np.abs(flat[:, 1] - 0.01) < 0.012)
+    )
     return np.column_stack([flat + BOX.center, z + rng.normal(0.0, 0.0015, len(flat))])
 
 
@@ -51,6 +58,13 @@ def test_a_screw_that_was_dropped_rises_from_the_floor(tray: Container) -> None:
     assert tray.gained(view(1)) is False
     higher = view(1) + (0.0, 0.0, 0.02)
     assert tray.gained(higher) is False, "the whole view is off"
+
+
+@pytest.mark.parametrize("off", [(0.008, 0.0, 0.0), (-0.006, 0.006, 0.0), (0.0, -0.012, 0.0)])
+def test_a_wall_that_seems_to_have_moved_is_nothing_new(tray: Container, off: tuple[float, ...]) -> None:
+    too_large = replace(tray, box=replace(BOX, size=BOX.size + 0.04))
+    assert too_large.gained(view(1) + off) is False
+    assert too_large.gained(view(1, screw=True) + off) is True
 
 
 def test_what_is_not_in_view_is_not_known(tray: Container) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 
 from golem.capabilities.perception.open_box import OpenBox, fit_open_box
 from golem.types import Array, LocalizedObject
@@ -18,6 +19,8 @@ RISE = 0.004
 """What is higher than before by this is new [m]: a screw lies 10 mm high, and the noise of a cell is 1 mm."""
 SPOTS = 3
 """Cells that have to be higher."""
+SHIFT = 2
+"""Cells by which the second look may be off sideways."""
 APART = 0.03
 """Distance between two places that are tried [m]."""
 SURE = 0.02
@@ -57,11 +60,15 @@ class Container:
         """
         if self.box is None or not len(points):
             return None
-        change = self.box.heights(points) - self.box.heights(self.sighting.points)
+        now, before = self.box.heights(points), self.box.heights(self.sighting.points, SHIFT)
+        change = now - before[SHIFT:-SHIFT, SHIFT:-SHIFT]
         known = np.isfinite(change)
         if known.mean() < KNOWN:
             return None
-        raised = known & (change - np.median(change[known]) > RISE)
+        # The robot sways: what was there may show a little beside it now, and the walls reach higher than a screw.
+        around = maximum_filter(np.where(np.isfinite(before), before, -np.inf), 2 * SHIFT + 1)
+        highest = around[SHIFT:-SHIFT, SHIFT:-SHIFT]
+        raised = known & (now - np.median(change[known]) - highest > RISE)
         return bool(raised.sum() >= SPOTS)
 
     def places(self, margin: float) -> Array:

@@ -58,13 +58,14 @@ class OpenBox:
         turned = np.abs((points[:, :2] - self.center) @ _axes(self.yaw))
         return np.all(turned <= 0.5 * self.size - margin, axis=1)
 
-    def heights(self, points: Array) -> Array:
+    def heights(self, points: Array, beyond: int = 0) -> Array:
         """Return (nx, ny) mean heights of what lies inside, on a grid of `GRID`, `EDGE_ROOM` inside the rim [m].
 
         Args:
             points: (n, 3) of one or more views in odom [m]; cells with fewer than `LEAST` of them are NaN.
+            beyond: cells by which the grid is larger, on each side.
         """
-        halves = np.maximum(0.5 * self.size - EDGE_ROOM, GRID)
+        halves = np.maximum(0.5 * self.size - EDGE_ROOM, GRID) + beyond * GRID
         turned = (points[:, :2] - self.center) @ _axes(self.yaw)
         shape = np.ceil(2.0 * halves / GRID).astype(int)
         index = np.floor((turned + halves) / GRID).astype(int)
