@@ -26,11 +26,12 @@ from golem.evaluation.episodes.pick_watch import PickWatch
 from golem.evaluation.episodes.pull import straightness
 from golem.evaluation.harness.sweep import read_sweep
 from golem.evaluation.metrics.text_table import TextTable
+from golem.evaluation.report.condition_plot import condition_plot
 from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
-from golem.robots.worlds.conditions import LayoutKind
+from golem.robots.worlds.conditions import Conditions, LayoutKind, draw_conditions, world_stream
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import FAULT, SkillResult
 from golem.skills.pick_config import PickGoal
@@ -63,6 +64,11 @@ class PickOptions:
     like and what lies about."""
     sweep: str = ""
     """A condition whose values are tried one by one: NAME=FROM..TO, NAME=FROM..TO:COUNT or NAME=VALUE,VALUE."""
+
+
+def conditions_of(layout: LayoutKind, spec: TrialSpec) -> Conditions:
+    """Return the conditions of a trial's work place."""
+    return draw_conditions(layout, spec.case, world_stream(episode_seed(spec.seed, spec.index)))
 
 
 def let_go(running: LockstepRunner, robot: MujocoRobot) -> TrialOutcome | None:
@@ -147,6 +153,17 @@ class PickRung(Rung[PickOptions]):
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
         """Return what the robot said at the end, against what was possible; see `Rung`."""
         return verdict_tables({method: [outcome for _, outcome in rows] for method, rows in outcomes.items()})
+
+    def plot(self, outcomes: Outcomes, figure: Any) -> str | None:
+        """Draw success by condition where the places vary; see `Rung`."""
+        if self.options.layout == "nominal" or self.options.sweep:
+            return None
+        placed = {
+            method: [(conditions_of(self.options.layout, spec), outcome.success) for spec, outcome in rows]
+            for method, rows in outcomes.items()
+        }
+        condition_plot(placed, figure)
+        return "Success by condition [%]"
 
     @property
     def _goal(self) -> PickGoal:

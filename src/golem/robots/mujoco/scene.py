@@ -18,7 +18,14 @@ from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds import furnished, parts, terrain
 from golem.robots.worlds.clutter import add_clutter
-from golem.robots.worlds.conditions import REACH_Y, Conditions, arranged, draw_conditions, draw_fasteners
+from golem.robots.worlds.conditions import (
+    REACH_Y,
+    Conditions,
+    arranged,
+    draw_conditions,
+    draw_fasteners,
+    world_stream,
+)
 from golem.robots.worlds.dressing import dress
 from golem.robots.worlds.fridge import Seal, seal_of
 from golem.robots.worlds.furnished import Person
@@ -93,7 +100,7 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
     kitchen: KitchenLayout | None = None
     names = PackNames((), np.zeros((0, 3)), "", ())
     layout_kind = config.layout if config.world in WITH_PACK else "nominal"
-    conditions = draw_conditions(layout_kind, config.conditions, stream(seed, "world/conditions"))
+    conditions = draw_conditions(layout_kind, config.conditions, world_stream(seed))
     nominal, stance = layout, PlanarPose(*config.stance)
     if config.world == "plant":
         people = _add_terrain(spec, config, seed)

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from golem.errors import ConfigError, unknown_name
+from golem.robots.sensors.streams import stream
 from golem.robots.worlds.layout import PackLayout
 from golem.types import SIDES, Side
 
@@ -149,6 +150,11 @@ def check_condition(name: str, value: object) -> Value:
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise ConfigError(f"The condition {name} is a number from {low:g} to {high:g}, not {value!r}.")
     return float(value)
+
+
+def world_stream(seed: int) -> np.random.Generator:
+    """Return what the conditions of the work place of episode `seed` are drawn from."""
+    return stream(seed, "world/conditions")
 
 
 def draw_conditions(kind: LayoutKind, given: Mapping[str, Value], rng: np.random.Generator) -> Conditions:
