@@ -117,18 +117,28 @@ class Pick:
                     await self._travel.home(attempt.side, self._config.travel_speed)
 
     async def _approach(self, context: Context, attempt: Attempt) -> Grasp:
-        """Bring the open hand over the object."""
-        yaw = self._config.heading(attempt.side)
-        grasps = await context.propose(self._method, attempt.target, attempt.side, yaw)
-        if not grasps:
-            raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {attempt.label}.")
-        grasp = grasps[0]
-        target, count = grasp.T_odom_gripper[:3, 3].tolist(), len(self._report.tried)
+        """Bring the open hand over the object, turned as it can be."""
+        yaw, refused = self._config.heading(attempt.side), list[StageFailed]()
+        for turn in self._config.turns:
+            grasps = await context.propose(self._method, attempt.target, attempt.side, yaw + turn)
+            if not grasps:
+                text = f"No grasp was proposed for the {attempt.label}."
+                raise StageFailed("approach", "grasp_method", text)
+            try:
+                await self._over(context, attempt, grasps[0])
+            except StageFailed as failure:
+                refused.append(failure)
+            else:
+                return grasps[0]
+        raise refused[0]
+
+    async def _over(self, context: Context, attempt: Attempt, grasp: Grasp) -> None:
+        """Bring the open hand above a grasp."""
+        T = grasp.T_odom_gripper
+        target, count = T[:3, 3].tolist(), len(self._report.tried)
         context.say("approach", "Bringing the hand over it.", target=target, side=attempt.side, attempt=count)
         context.hands[attempt.side].open(grasp.gap)
-        T = grasp.T_odom_gripper
         await self._travel.over(attempt.side, lifted(T, self._config.clearance), T, self._config.travel_speed)
-        return grasp
 
     async def _take(
         self,

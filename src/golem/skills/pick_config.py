@@ -44,6 +44,7 @@ class PickConfig:
             right arm (y is mirrored for the left). The paper's box (x <= 0.60, |y| <= 0.45, -0.05 <= z <= 0.60) but
             for z, which reaches 0.10 m deeper. `planned` asks the map of reach instead.
         yaw: heading of the gripper's x axis when it points down [rad], right arm; mirrored for the left.
+        turns: turns from that heading that are tried in order, where the hand cannot come as before [rad].
         container_radius: objects nearer than this to the container's middle lie in it and are left there [m].
         sure: score from which on a container counts whose shape does not show.
         comfort: x, y in base_link around which the arm works best [m]; the nearest object is taken first.
@@ -82,6 +83,7 @@ class PickConfig:
 
     workspace: tuple[float, float, float, float, float, float] = (0.30, 0.60, -0.30, 0.10, -0.15, 0.60)
     yaw: float = -1.5707963267948966
+    turns: tuple[float, ...] = (0.0, 0.4, -0.4)
     container_radius: float = 0.15
     sure: float = 0.3
     comfort: tuple[float, float] = (0.45, -0.12)

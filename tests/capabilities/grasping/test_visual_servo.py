@@ -185,6 +185,25 @@ def test_a_target_lost_on_the_way_is_found_again() -> None:
     assert chase.run(12.0).status is ServoStatus.CONVERGED
 
 
+def test_what_is_lost_between_the_fingers_is_grasped_from_memory() -> None:
+    grasp = SCREW[2] - VisualServoConfig().centroid.depth
+    chase = Chase(lambda t: steady(t) if chase.gripper[2] > grasp + 0.004 else [])
+    assert chase.run(10.0).status is ServoStatus.CONVERGED
+    assert np.linalg.norm((chase.gripper - SCREW)[:2]) < ServoLawConfig().tolerance
+
+
+def test_what_is_lost_farther_away_is_not() -> None:
+    chase = Chase(lambda t: steady(t) if chase.gripper[2] > SCREW[2] + 0.02 else [])
+    assert chase.run(20.0).status is ServoStatus.LOST
+
+
+def test_a_neighbour_is_not_taken_for_what_was_lost() -> None:
+    neighbour = [thing(SCREW + (0.0, 0.093, 0.0))]
+    chase = Chase(lambda t: steady(t) if t < 0.6 else [] if t < 1.9 else neighbour)
+    assert chase.run(20.0).status is ServoStatus.LOST
+    assert np.abs(chase.steps[-1].target - SCREW).max() < 0.001
+
+
 def test_a_hand_that_cannot_move_stalls() -> None:
     chase = Chase(steady, blocked=True)
     assert chase.run(20.0).status is ServoStatus.STALLED

@@ -36,7 +36,12 @@ class ServoLawConfig:
         tolerance: lateral error within which the fingers close [m].
         height_tolerance: error of height within which the fingers close [m].
         dwell: frames in a row within both tolerances before the fingers close.
+        blind_after: time without a sighting after which a hand within both tolerances closes on what it remembers [s]:
+            fingers and their shadow hide what is between them.
+        blind_from: how near to the grasp the last sighting has to have been for that [m].
         lost_after: time without a sighting until the hand backs off [s].
+        again_radius: how far from where it was the object may be when it is seen again [m]: less than half of the pitch
+            of the screws.
         retreat: how far it backs off to see more [m].
         retreats: how often it may do so.
         loose_height: by label, height of the top above the ground from which on an object is loose [m]; the heads of
@@ -58,7 +63,10 @@ class ServoLawConfig:
     tolerance: float = 0.003
     height_tolerance: float = 0.0025
     dwell: int = 3
+    blind_after: float = 0.3
+    blind_from: float = 0.012
     lost_after: float = 1.0
+    again_radius: float = 0.04
     retreat: float = 0.05
     retreats: int = 2
     loose_height: Mapping[str, float] = field(default_factory=lambda: {"screw": 0.0085})
@@ -94,6 +102,7 @@ class CentroidServo:
         self._t = t
         self._seen_at = t
         self._sightings = 0
+        self._found, self._seen_from = False, np.inf
         self._retreats = 0
         self._inside = 0
         self._lift = 0.0
@@ -120,17 +129,17 @@ class CentroidServo:
         offset = T_odom_gripper[:3, 3] - grasp
         height = float(offset @ self._normal)
         lateral = float(np.linalg.norm(offset - height * self._normal))
-        confirmed = self._sightings >= c.confirm
+        error = lateral + abs(height)
+        confirmed, sigma = self._sightings >= c.confirm, float(np.sqrt(self._variance.max()))
         if status is ServoStatus.TRACKING and confirmed:
-            if lateral > c.tolerance or abs(height) > c.height_tolerance:
-                self._inside = 0
-            elif seen:
-                self._inside += 1
-            if self._inside >= c.dwell:
+            self._found, there = True, lateral <= c.tolerance and abs(height) <= c.height_tolerance
+            self._inside = self._inside + seen if there else 0
+            self._seen_from = error if seen else self._seen_from
+            blind = there and t - self._seen_at > c.blind_after and self._seen_from < c.blind_from
+            if blind or self._inside >= c.dwell:
                 status = ServoStatus.CONVERGED
             if self._is_tight():
                 status = ServoStatus.TIGHT
-            error = lateral + abs(height)
             if error < self._best - c.progress:
                 self._best, self._best_at = error, t
             elif t - self._best_at > c.stall_after and status is ServoStatus.TRACKING:
@@ -141,7 +150,7 @@ class CentroidServo:
         funnel = float(np.clip(c.slope * (lateral - c.tolerance), 0.0, c.standoff))
         above = funnel if confirmed else c.standoff + self._lift
         goal = grasp_pose(grasp + above * self._normal, self._yaw, self._normal)
-        return ServoStep(goal, self._x.copy(), float(np.sqrt(self._variance.max())), status)
+        return ServoStep(goal, self._x.copy(), sigma, status)
 
     def _update(self, t: float, sightings: list[LocalizedObject], T_odom_gripper: Array) -> bool:
         """Fuse the sighting that belongs to the target; return whether there is one in this frame."""
@@ -152,13 +161,14 @@ class CentroidServo:
         noise = np.array([c.sigma_lateral**2, c.sigma_lateral**2, c.sigma_depth**2])
         if self._sightings == 0:
             # The head camera may be off by more than the pitch of the screws: take what is under the hand, and of that
-            # what does not look tight.
-            boresight = T_odom_gripper[:2, 3]
-            away = {id(s): float(np.hypot(*(s.position[:2] - boresight))) for s in candidates}
-            near = [s for s in candidates if away[id(s)] <= c.first_radius]
+            # what does not look tight. What was lost meanwhile is where it was; its neighbours are others.
+            again = self._found
+            middle, radius = (self._x, c.again_radius) if again else (T_odom_gripper[:3, 3], c.first_radius)
+            away = {id(s): float(np.hypot(*(s.position - middle)[:2])) for s in candidates}
+            near = [s for s in candidates if away[id(s)] <= radius]
             if not near:
                 return False
-            nearest = min(near, key=lambda s: (self._looks_tight(s), away[id(s)]))
+            nearest = min(near, key=lambda s: (not again and self._looks_tight(s), away[id(s)]))
             self._x, self._variance = nearest.position.copy(), noise
             self._depth = self._wanted_depth(nearest)
         else:
