@@ -19,8 +19,10 @@ RISE = 0.004
 """What is higher than before by this is new [m]: a screw lies 10 mm high, and the noise of a cell is 1 mm."""
 SPOTS = 3
 """Cells that have to be higher."""
-SHIFT = 2
+SHIFT = 1
 """Cells by which the second look may be off sideways."""
+TALL = 0.02
+"""What stands higher than this above the floor is wall [m]."""
 APART = 0.03
 """Distance between two places that are tried [m]."""
 SURE = 0.02
@@ -65,10 +67,10 @@ class Container:
         known = np.isfinite(change)
         if known.mean() < KNOWN:
             return None
-        # The robot sways: what was there may show a little beside it now, and the walls reach higher than a screw.
-        around = maximum_filter(np.where(np.isfinite(before), before, -np.inf), 2 * SHIFT + 1)
-        highest = around[SHIFT:-SHIFT, SHIFT:-SHIFT]
-        raised = known & (now - np.median(change[known]) - highest > RISE)
+        raised = known & (change - np.median(change[known]) > RISE)
+        # The robot sways: a wall may show a little beside where it was. Nothing dropped is as high.
+        walls = np.nan_to_num(before, nan=-np.inf) - np.nanmedian(before) > TALL
+        raised &= ~maximum_filter(walls, 2 * SHIFT + 1)[SHIFT:-SHIFT, SHIFT:-SHIFT]
         return bool(raised.sum() >= SPOTS)
 
     def places(self, margin: float) -> Array:

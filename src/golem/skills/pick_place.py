@@ -13,6 +13,7 @@ from golem.skills.hand_reach import HandReach
 from golem.skills.pick_config import PickConfig
 from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight, Tried
 from golem.skills.pick_targets import Attempt, PickChoice, positions
+from golem.skills.poses import turned
 from golem.skills.travel import Travel
 from golem.types import Array
 
@@ -46,10 +47,12 @@ async def place(
     travel.displace(shift)
     spots = container.places(config.drop_margin) + shift
     goals: list[Array] = []
-    for spot in HandReach(context, config).drop_order(attempt.side, spots, DROPS):
-        T = arm.commanded.copy()
-        T[:3, 3] = spot + (0.0, 0.0, config.drop_height)
-        goals.append(T)
+    spots = HandReach(context, config).drop_order(attempt.side, spots, DROPS)
+    for turn in config.turns:
+        for spot in spots:
+            T = turned(arm.commanded, turn)
+            T[:3, 3] = spot + (0.0, 0.0, config.drop_height)
+            goals.append(T)
     context.say(
         "place", f"Carrying it to the {attempt.container}.", target=container.sighting.position.tolist()
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from golem.types import Array
 
 
@@ -22,3 +24,11 @@ def at_height(T: Array, z: float) -> Array:
     raised = T.copy()
     raised[2, 3] = z
     return raised
+
+
+def turned(T: Array, angle: float) -> Array:
+    """Return a copy of pose `T` (4, 4) turned by `angle` [rad] about the vertical, where it is."""
+    c, s = np.cos(angle), np.sin(angle)
+    out = T.copy()
+    out[:3, :3] = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ T[:3, :3]
+    return out
