@@ -101,7 +101,12 @@ async def look_after(
     taken = report.tried[-1]
     stood = choice.seen[~inside]
     around = stood[np.hypot(stood[:, 0] - taken.x, stood[:, 1] - taken.y) < NEAR]
-    now = np.concatenate(frames)
     if len(around):
-        gone = [not len(now) or np.linalg.norm(now - one, axis=1).min() > SAME for one in around]
-        report.bore_empty = (Sight.YES if any(gone) else Sight.NO).value
+        # In single frames a bore looks like a screw, or a screw is overlooked.
+        shown = [sum(_shows(points, one) for points in frames) for one in around]
+        report.bore_empty = (Sight.YES if 2 * min(shown) < len(frames) else Sight.NO).value
+
+
+def _shows(points: Array, one: Array) -> bool:
+    """Return whether an object (3,) is among those (n, 3) of a frame."""
+    return bool((np.linalg.norm(points - one, axis=1) < SAME).any())
