@@ -31,8 +31,10 @@ from golem.training.legs.export_policy import TRAINED, command_of, export, load_
 from golem.training.legs.learning_curve import draw_curves
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
-from golem.training.legs.train_legs import Adversary, TrainLegsConfig, _Run, train
+from golem.training.legs.train_legs import EXPORTED_PUSH, Adversary, TrainLegsConfig, _Run, train
 from golem.training.legs.training_model import STANCE
+
+QUARTERS = TASKS["stand"].quarters
 
 
 def small(
@@ -295,6 +297,18 @@ def test_pushes_go_straight_more_often_than_not_whichever_way_the_robot_looks() 
     assert abs((np.abs(ahead) < np.sin(0.3)).mean() - left - right) < 0.05
     assert abs((ahead < -np.cos(0.3)).mean() - back) < 0.05
     assert abs((ahead > np.cos(0.3)).mean() - front) < 0.05
+
+
+def test_a_robot_that_was_pushed_is_known_as_such_until_its_episode_is_over() -> None:
+    pushes, facing = RandomPushes(2, 50.0, QUARTERS, np.random.default_rng(0)), np.tile(np.eye(2), (2, 1, 1))
+    pushes.reset(np.arange(2), 1.0, np.array([False, True]))
+    assert np.isinf(pushes.since).all()
+    pushes.once(np.array([[100.0, 0.0], [0.0, 0.0]]), 0.2, start=0.1)
+    for _ in range(50):
+        pushes.step(1.0, facing, 0.02)
+    assert pushes.since[0] == pytest.approx(0.9, abs=0.03) and np.isinf(pushes.since[1])
+    pushes.reset(np.arange(2), 1.0, np.ones(2, dtype=bool))
+    assert np.isinf(pushes.since).all()
 
 
 def test_pushes_have_the_impulse_they_were_drawn_with_at_most() -> None:

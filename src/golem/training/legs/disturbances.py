@@ -37,7 +37,8 @@ class Difficulty:
         speed: share of `TOP_SPEED`.
         push: share of the largest impulse.
         payload: share of the largest payload.
-        strictness: share of the price of fast legs that is paid by who has nothing left to lose; see `Rewards`.
+        strictness: share of the price of fast legs and dragging feet that is paid by who has nothing left to lose; see
+            `Rewards`.
     """
 
     amplitude: float = 0.2

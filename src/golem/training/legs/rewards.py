@@ -40,8 +40,8 @@ class RewardWeights:
         alive: not fallen.
         contact: feet on the ground in their stance, and off it in the middle two thirds of their swing. With 0.4, and
             0.4 of `slip`, the robot dragged the trailing foot, with 100 to 200 N on it, when it walked sideways.
-        dragged: feet on the ground in the middle two thirds of their swing. It is paid in full where the sum is
-            negative, too: else nothing is lost by a robot that keeps both feet down after a push.
+        dragged: feet on the ground in the middle two thirds of their swing. It is paid where the sum is negative, too,
+            as `fast`: else a robot that keeps both feet down after a push loses nothing by it.
         placement: in the second half of a swing, the foot above where the capture point says that it belongs,
             exp(-error^2 / 0.12^2), after a push; see `placement`.
         swing_height: error of the height of a swinging sole [m^2].
@@ -175,7 +175,7 @@ class Rewards:
             misplaced: (n,) distance of the feet from where they belong [m].
             landing: (n, 2) distance of each foot from where it belongs when it lands [m].
             recovers: (n,) whether a push was so recent that the command need not be followed.
-            strictness: share of the price of `fast` that is paid where the sum is negative, 0 to 1.
+            strictness: share of the price of `fast` and `dragged` that is paid where the sum is negative, 0 to 1.
             dt: the period [s].
         """
         w = self._weights
@@ -247,7 +247,7 @@ class Rewards:
         }
         self._speed = speed.copy()
         weighted = {name: getattr(w, name) * value for name, value in terms.items()}
-        always = strictness * weighted["fast"] + weighted["dragged"]
+        always = strictness * (weighted["fast"] + weighted["dragged"])
         total = np.asarray(sum(weighted.values()), dtype=np.float64) - always
         return (np.maximum(total, 0.0) + always) * dt, {
             name: float(v[np.isfinite(v)].mean()) for name, v in weighted.items()
