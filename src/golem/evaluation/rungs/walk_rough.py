@@ -86,10 +86,10 @@ class WalkRough(LegRung[WalkRoughOptions]):
         start = episode.t
         motion.twist = lambda t: AHEAD
         episode.run(SECONDS)
-        motion.twist = None
+        motion.twist, end = None, episode.t
         episode.run(STOP)
         if episode.loss is not None:
             return judged(spec.method, episode.loss, {})
-        path = episode.recorder.trace().window(start).base
+        path = episode.recorder.trace().window(start, end).base
         climbed, moved = np.ptp(path[:, 2]), np.hypot(*(path[-1] - path[0])[:2])
         return judged(spec.method, None, {"distance": float(moved), "climbed": float(climbed)})
