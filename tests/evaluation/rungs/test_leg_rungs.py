@@ -124,12 +124,12 @@ def test_a_robot_endures() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("ground", "climbed"),
-    [("slope", 0.05), ("slope-8", 0.1), ("rubble", 0.0), ("step-5", 0.04), ("slippery", 0.0)],
+    [("slope", 0.05), ("slope-8", 0.1), ("rubble", -0.02), ("rubble-5", -0.02), ("load-5", -0.02)],
 )
 def test_rough_ground_is_walked_over(ground: str, climbed: float) -> None:
     series = run("walk-rough", "almi", profile="bench", latency=0.02, ground=[ground]).series
     # In 10 s they come 3.84 to 3.92 m far of the 4 m that they are told.
-    assert 2.4 - 2 * 0.16 < series["distance"] < 2.5 and climbed < series["climbed"] < 0.3
+    assert 2.4 - 2 * 0.16 < series["distance"] < 2.4 and climbed < series["climbed"] < 0.3
 
 
 def test_every_ground_is_another_twin_and_an_unknown_one_is_refused() -> None:

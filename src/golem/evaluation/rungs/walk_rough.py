@@ -91,5 +91,5 @@ class WalkRough(LegRung[WalkRoughOptions]):
         if episode.loss is not None:
             return judged(spec.method, episode.loss, {})
         path = episode.recorder.trace().window(start, end).base
-        climbed, moved = np.ptp(path[:, 2]), np.hypot(*(path[-1] - path[0])[:2])
+        climbed, moved = path[-1, 2] - path[0, 2], np.hypot(*(path[-1] - path[0])[:2])
         return judged(spec.method, None, {"distance": float(moved), "climbed": float(climbed)})
