@@ -114,6 +114,17 @@ def test_the_gates_share_is_split_into_stops_and_clipping() -> None:
     assert cost.rows == (("mine", "standing", "10", "30", "40", "10"),)
 
 
+def test_the_plot_has_a_line_of_circles_for_every_gait() -> None:
+    figure = pytest.importorskip("matplotlib.figure", reason="the extra report is not installed").Figure()
+    options = PushLimitOptions(terms=("stack", "own"), phase=("standing", "walking"), walk=("0.3", "0.6"))
+    assert PushLimit(options).plot({"mine": level(0, "front", 10.0)}, figure)
+    titles = [axes.get_title() for axes in figure.axes]
+    assert titles == [
+        f"{gait}, {t}" for gait in ("standing", "walking at 0.3", "walking at 0.6") for t in ("stack", "own")
+    ]
+    assert {axes.get_gridspec().get_geometry() for axes in figure.axes} == {(3, 2)}
+
+
 def test_a_gate_that_may_not_stop_lets_a_robot_fall() -> None:
     (found,) = run([case("front", 120.0, terms="unstopped")])
     assert found.stage == "fall"

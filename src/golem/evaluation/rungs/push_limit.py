@@ -177,11 +177,14 @@ class PushLimit(PushedRung[PushLimitOptions]):
         return found, cost
 
     def plot(self, outcomes: Outcomes, figure: Any) -> str | None:
-        """Draw the largest push survived over its direction, ahead at the top; a plot per terms and phase."""
+        """Draw the largest push survived over its direction, ahead at the top; a plot per terms and gait."""
         o = self.options
-        cells, short = [(terms, gait) for terms in o.terms for gait in self.gaits], short_names(outcomes)
+        cells, short = [(terms, gait) for gait in self.gaits for terms in o.terms], short_names(outcomes)
+        rows = len(self.gaits) if len(o.terms) > 1 else 1
         angles = np.radians([45.0 * DIRECTIONS.index(direction) for direction in o.direction])
-        plots = figure.subplots(1, len(cells), subplot_kw={"projection": "polar"}, squeeze=False)[0]
+        shape = rows, len(cells) // rows
+        figure.set_figheight(rows * figure.get_figheight())
+        plots = figure.subplots(*shape, subplot_kw={"projection": "polar"}, squeeze=False).ravel()
         for axes, (terms, gait) in zip(plots, cells, strict=True):
             for i, (method, trials) in enumerate(outcomes.items()):
                 best = [limit(_of(trials, terms, gait, d))[0] for d in o.direction]
