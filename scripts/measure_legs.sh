@@ -23,6 +23,8 @@ public=()
 # Standing, and walking: side by side with others.
 shoves() { rung push-limit --phase standing --first 40 --method almi "${peers[@]}" "${public[@]}"; }
 own_terms() { rung push-limit --terms own --phase standing walking --first 40 --method almi wbc "${public[@]}"; }
+gate_share() { rung push-limit --terms stack unstopped ungated own --phase walking --walk 0.3 0.6 0.3,0,0.4 --first 40 \
+    --method almi "${public[@]}"; }
 rods() { rung push-limit --kind rod --phase standing --first 150 --last 150; }
 quiet() { rung stand-quiet; }
 arms() { rung stand-arms -n 100; }
@@ -34,8 +36,7 @@ tracking() { rung walk-twist; }
 stopping() { rung walk-stop -n 200; }
 line() { rung navigate-line; }
 endurance() { rung walk-endurance -n 120; }
-slope() { rung walk-slope; }
-rubble() { rung walk-rubble; }
+rough() { rung walk-rough; }
 plans() { JOBS=1 rung mpc-rate; }
 # On another plant.
 box_feet() { rung push-limit --phase standing --first 60 --robot feet=box cone=elliptic; }
@@ -46,7 +47,7 @@ tether() { rung tether -n 100; }
 stand() { rung stand -n 100; }
 mcnemar() { "$GOLEM" compare "$OUT/tether" "$OUT/stand"; }
 
-ALL=(shoves own_terms rods quiet tracking stopping push_rung ramp slope rubble swings line arms endurance stand tether
+ALL=(shoves own_terms rods quiet tracking stopping push_rung ramp rough swings gate_share line arms endurance stand tether
     mcnemar box_feet vendor_model plans estimators)
 [ $# -gt 0 ] || set -- "${ALL[@]}"
 mkdir -p "$OUT"

@@ -148,7 +148,7 @@ def test_the_legs_of_write_a_module_stand_by_its_estimator(tmp_path: Path) -> No
     file, mine = tmp_path / "my_legs.py", tmp_path / "my_estimator.py"
     file.write_text(legs)
     mine.write_text(estimator)
-    case = {"terms": "stack", "phase": "standing", "direction": "front", "level": 5.0}
+    case = {"terms": "stack", "phase": "standing", "walk": "0", "direction": "front", "level": 5.0}
     use = {"estimator": f"{mine}:Smooth"}
     trial = TrialSpec("push-limit", f"{file}:Stiff", "ideal", seed=0, index=0, overrides=use, case=case)
     assert PushLimit().run(trial, None).success

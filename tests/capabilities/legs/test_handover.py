@@ -32,10 +32,11 @@ class Robot:
         walk: dict[str, object] | None = None,
         stand: dict[str, object] | None = None,
         trim: float = 0.0,  # the plant stands still
+        shoved: float | None = None,
     ) -> None:
         walker = HandoverPart(RECORDER, {"target": 1.0} | (walk or {}))
         stander = HandoverPart(RECORDER, {"target": 0.0} | (stand or {}))
-        self.legs = Handover(HandoverConfig(walker, stander))
+        self.legs = Handover(HandoverConfig(walker, stander, shoved=shoved))
         self.layer = Locomotion(self.legs, LocomotionConfig(trim=VelocityIntegratorConfig(gain=trim)))
         self.state, self.base = crouching(), still()
         self.layer.reset(self.state)
@@ -107,6 +108,46 @@ def test_targets_do_not_jump_however_soon_the_other_controller_is_wanted_again(s
     assert max(robot.targets) > 0.9
     assert robot.targets[-1] == 0.0
     assert np.abs(np.diff(robot.targets)).max() <= 1.0 / BLEND + 1e-9
+
+
+def turned(base: BaseEstimate, yaw: float, velocity: tuple[float, float]) -> BaseEstimate:
+    T = base.T_odom_base.copy()
+    T[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+    return replace(base, T_odom_base=T, velocity=np.array([*velocity, 0.0]))
+
+
+def test_a_robot_that_is_shoved_while_it_walks_is_caught_at_once_and_walks_on_when_it_is_in_place() -> None:
+    robot = Robot(shoved=0.5)
+    robot.run(0.5)
+    robot.run(2.0, Twist(0.4))
+    robot.base = turned(robot.base, 0.5 * np.pi, (0.0, 0.8))  # ahead: it looks along y of odom
+    robot.run(0.5, Twist(0.4))
+    assert robot.legs.walking
+    robot.base = turned(robot.base, 0.5 * np.pi, (0.6, 0.4))
+    robot.run(DT, Twist(0.4))
+    assert not robot.legs.walking and robot.stand.resets == 2
+    robot.run(0.5, Twist(0.4))
+    assert robot.targets[-1] == 0.0 and robot.stand.motions[-1].twist == Twist()
+    steps = np.abs(np.diff(robot.targets[-round(0.5 / DT) - 1 :]))
+    assert steps.max() < 1.0 / BLEND * 10.0
+    robot.base = still()
+    robot.run(1.0, Twist(0.4))
+    assert robot.legs.walking and robot.walk.motions[-1].twist == Twist(0.4)
+
+
+def test_nobody_is_caught_who_stands_whose_velocity_is_not_known_or_who_is_not_to_be() -> None:
+    for shoved, stale, caught in ((0.5, False, True), (0.5, True, False), (None, False, False)):
+        robot = Robot(shoved=shoved)
+        robot.run(0.5)
+        robot.base = turned(still(), 0.0, (0.0, 0.9))
+        robot.run(0.5)
+        assert robot.stand.resets == 1
+        robot.base = still()
+        robot.run(2.0)
+        robot.run(2.0, Twist(0.4))
+        robot.base = replace(turned(still(), 0.0, (0.4, 0.9)), stale=stale)
+        robot.run(0.2, Twist(0.4))
+        assert robot.legs.walking != caught
 
 
 def rotating(state: LowState) -> LowState:

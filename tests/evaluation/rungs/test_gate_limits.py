@@ -40,7 +40,7 @@ def test_an_unknown_limit_is_answered_with_the_known_ones() -> None:
 
 
 def run(lift: str, level: float) -> TrialOutcome:
-    case = {"lift": lift, "phase": "standing", "direction": "front", "level": level}
+    case = {"lift": lift, "phase": "standing", "walk": "0", "direction": "front", "level": level}
     return GateLimits().run(TrialSpec("gate-limits", STIFF, "ideal", 0, 0, case=case), None)
 
 
@@ -56,7 +56,7 @@ def test_the_table_counts_and_names_what_ended_the_others() -> None:
         "nothing": (TrialOutcome(True, "done"), TrialOutcome(False, "safety", detail=why)),
         "stops": (TrialOutcome(True, "done"), TrialOutcome(False, "fall", detail="The robot fell at 9.9 s.")),
     }
-    case = {"phase": "standing", "direction": "left", "level": 30.0}
+    case = {"phase": "standing", "walk": "0", "direction": "left", "level": 30.0}
     trials = [
         (TrialSpec("gate-limits", "almi", "bench", 0, i, case={"lift": lift, **case}), outcome)
         for lift, outcomes in ends.items()

@@ -31,7 +31,8 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def run(rung: str, method: str, index: int = 0, profile: str = "ideal", **options: Any) -> TrialOutcome:
     made = make_rung(RUNGS[rung], options)
-    return made.run(TrialSpec(rung, method, profile, 0, index), None)
+    case = made.cases(lambda case: None)[0]
+    return made.run(TrialSpec(rung, method, profile, 0, index, case=case), None)
 
 
 def shipped(rung: str, index: int = 0, profile: str = "bench") -> TrialOutcome:
@@ -121,11 +122,21 @@ def test_a_robot_endures() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("rung", "climbed"), [("walk-slope", 0.05), ("walk-rubble", -0.02)])
-def test_rough_ground_is_walked_over(rung: str, climbed: float) -> None:
-    series = shipped(rung).series
+@pytest.mark.parametrize(
+    ("ground", "climbed"),
+    [("slope", 0.05), ("slope-8", 0.1), ("rubble", -0.02), ("rubble-5", -0.02), ("load-5", -0.02)],
+)
+def test_rough_ground_is_walked_over(ground: str, climbed: float) -> None:
+    series = run("walk-rough", "almi", profile="bench", latency=0.02, ground=[ground]).series
     # In 10 s they come 3.84 to 3.92 m far of the 4 m that they are told.
-    assert 2.4 - 2 * 0.16 < series["distance"] < 2.4 and climbed < series["climbed"] < 0.2
+    assert 2.4 - 2 * 0.16 < series["distance"] < 2.4 and climbed < series["climbed"] < 0.3
+
+
+def test_every_ground_is_another_twin_and_an_unknown_one_is_refused() -> None:
+    facts = make_rung(RUNGS["walk-rough"]).config("almi", "bench", {})
+    assert list(facts) == list(walk_rough.GROUNDS) and len({str(f) for f in facts.values()}) == len(facts)
+    with pytest.raises(ConfigError, match="Unknown ground 'ice'.*slippery"):
+        make_rung(RUNGS["walk-rough"], {"ground": ["ice"]})
 
 
 @pytest.mark.slow

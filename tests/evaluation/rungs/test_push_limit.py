@@ -69,7 +69,8 @@ def spec(case: Case, method: str = f"{METHODS}:Stiff", index: int = 0) -> TrialS
 
 
 def case(direction: str = "front", level: float = 5.0, phase: str = "standing", terms: str = "stack") -> Case:
-    return {"terms": terms, "phase": phase, "direction": direction, "level": level}
+    walk = "0" if phase == "standing" else "0.3"
+    return {"terms": terms, "phase": phase, "walk": walk, "direction": direction, "level": level}
 
 
 def level(n_lost: int, direction: str, size: float) -> list[tuple[TrialSpec, TrialOutcome]]:
@@ -87,9 +88,46 @@ def test_the_table_says_what_was_survived_and_what_was_not_found() -> None:
     (table,) = PushLimit(options).tables({"mine": trials})
     assert table.rows == (
         ("mine", "stack", "standing", "10", ">= 20", "10"),
-        ("mine", "stack", "left_swing", "does not walk", "does not walk", "does not walk"),
+        ("mine", "stack", "left swing at 0.3", "does not walk", "does not walk", "does not walk"),
     )
     assert "20 trials" in table.title and "lost with 2 of 20" in table.note
+
+
+def test_every_walk_has_rows_of_its_own_and_standing_has_one() -> None:
+    rung = PushLimit(PushLimitOptions(phase=("standing", "walking"), walk=("0.3", "0.6,0,0.4")))
+    assert {(c["phase"], c["walk"]) for c in rung.cases(lambda case: None)} == {
+        ("standing", "0"), ("walking", "0.3"), ("walking", "0.6,0,0.4")
+    }  # fmt: skip
+
+
+def test_the_gates_share_is_split_into_stops_and_clipping() -> None:
+    limits = {"stack": 40.0, "unstopped": 50.0, "ungated": 80.0, "own": 90.0}
+    trials = [
+        (spec(case("front", size, terms=terms), index=i), WON if size <= limit else lost())
+        for terms, limit in limits.items()
+        for size in (limit, limit + 10.0)
+        for i in range(2)
+    ]
+    options = PushLimitOptions(terms=tuple(limits), direction=("front",), phase=("standing",))  # pyright: ignore[reportArgumentType]
+    found, cost = PushLimit(options).tables({"mine": trials})
+    assert [row[1:4] for row in found.rows] == [(t, "standing", f"{v:g}") for t, v in limits.items()]
+    assert cost.rows == (("mine", "standing", "10", "30", "40", "10"),)
+
+
+def test_the_plot_has_a_line_of_circles_for_every_gait() -> None:
+    figure = pytest.importorskip("matplotlib.figure", reason="the extra report is not installed").Figure()
+    options = PushLimitOptions(terms=("stack", "own"), phase=("standing", "walking"), walk=("0.3", "0.6"))
+    assert PushLimit(options).plot({"mine": level(0, "front", 10.0)}, figure)
+    titles = [axes.get_title() for axes in figure.axes]
+    assert titles == [
+        f"{gait}, {t}" for gait in ("standing", "walking at 0.3", "walking at 0.6") for t in ("stack", "own")
+    ]
+    assert {axes.get_gridspec().get_geometry() for axes in figure.axes} == {(3, 2)}
+
+
+def test_a_gate_that_may_not_stop_lets_a_robot_fall() -> None:
+    (found,) = run([case("front", 120.0, terms="unstopped")])
+    assert found.stage == "fall"
 
 
 def run(cases: Sequence[Case], method: str = "Stiff", **options: Any) -> list[TrialOutcome]:
@@ -139,6 +177,9 @@ def test_ours_walks_as_told_and_takes_a_shove_in_mid_step_on_its_own_terms() -> 
         ({"direction": ("left", "left")}, "--direction"),
         ({"direction": ("north",)}, "direction 'north'"),
         ({"phase": ()}, "--phase"),
+        ({"walk": ("0.3", "0")}, "--walk '0'.*--phase standing"),
+        ({"walk": ("0.3,0.1",)}, "--walk '0.3,0.1'"),
+        ({"walk": ("fast",)}, "--walk 'fast'"),
     ],
 )
 def test_options_that_cannot_be_meant_are_refused(change: dict[str, Any], word: str) -> None:

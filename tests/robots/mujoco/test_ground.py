@@ -230,6 +230,7 @@ def test_a_file_that_is_no_such_robot_is_refused(tmp_path: Path) -> None:
         ({"feet": "cube"}, "box, spheres"),
         ({"slope": 1.2}, "slope"),
         ({"rubble": -0.1}, "rubble"),
+        ({"step": 0.2}, "step"),
         ({"friction": 0.0}, "friction"),
         ({"latency": -0.1}, "latency"),
     ],

@@ -40,6 +40,12 @@ def rubble(height: float, seed: int = 0) -> Ground:
     return Ground(spec)
 
 
+def step(height: float) -> Ground:
+    spec = mujoco.MjSpec()
+    terrain.add_step(spec, height)
+    return Ground(spec)
+
+
 def start_area() -> Array:
     return np.random.default_rng(0).uniform(-0.99, 0.99, (40, 2))
 
@@ -50,6 +56,12 @@ def test_the_open_hall_is_flat_and_has_nothing_in_it() -> None:
     ground = Ground(spec)
     assert (ground.model.geom_contype > 0).sum() == 1
     assert ground.height(6.5, 3.0) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_step_goes_up_and_down_again_as_high_as_told() -> None:
+    ground, end = step(0.05), terrain.FLAT + terrain.PLATFORM[0]
+    for x, z in ((0.99, 0.0), (1.01, 0.05), (end - 0.01, 0.05), (end + 0.01, 0.0)):
+        assert ground.height(x, 0.3) == pytest.approx(z, abs=1e-6)
 
 
 @pytest.mark.parametrize("angle", [np.radians(3.0), np.radians(5.0), np.radians(10.0)])

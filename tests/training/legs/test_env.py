@@ -16,6 +16,7 @@ from golem.training.legs.batch_world import WorldConfig
 from golem.training.legs.disturbances import Difficulty
 from golem.training.legs.env import PERIOD, TASKS, EnvConfig, LegsEnv
 from golem.training.legs.export_policy import load_actor
+from golem.training.legs.placement import landing_errors
 from golem.training.legs.rewards import RewardWeights
 from golem.training.legs.training_model import KP, STANCE
 
@@ -89,9 +90,45 @@ def test_the_speed_that_stops_a_robot_has_its_price_where_nothing_is_left_to_los
     idle = np.zeros((2, 12))
     above = 16.0 - 0.7 * SafetyLimits.from_profile().velocity[3]
     for strictness in (0.0, 0.5, 1.0):
-        known = (idle, idle, still[:, :2], np.full(2, 0.5))
+        known = (idle, idle, still[:, :2], np.full(2, 0.5), np.zeros((2, 2)), np.zeros(2, dtype=bool))
         reward, _ = env._rewards(truth, still, env.gait, *known, strictness, PERIOD)
         np.testing.assert_allclose(reward, [0.0, strictness * RewardWeights().fast * above * PERIOD])
+
+
+def test_who_was_pushed_need_not_follow_the_command_and_pays_for_feet_that_drag() -> None:
+    env = LegsEnv(2, EnvConfig(), 0, 1)
+    truth, ahead, idle = env.world.truth, np.tile([0.4, 0.0, 0.0], (2, 1)), np.zeros((2, 12))
+    truth.force[:] = 300.0
+    env.gait.stepping[:] = True
+    env.gait.phase[:] = 0.775  # the left leg is in the middle of its swing
+    known = (idle, idle, np.zeros((2, 2)), np.zeros(2), np.zeros((2, 2)), np.array([True, False]))
+    reward, terms = env._rewards(truth, ahead, env.gait, *known, 1.0, PERIOD)
+    dragged = RewardWeights().dragged
+    assert reward[0] > reward[1] and terms["dragged"] == 0.5 * dragged
+    truth.R[:, 2] = [0.9, 0.0, np.sqrt(1.0 - 0.81)]  # about to fall: nothing else is left to lose
+    truth.velocity[:] = 9.0
+    for strictness in (0.0, 1.0):
+        reward, _ = env._rewards(truth, ahead, env.gait, *known, strictness, PERIOD)
+        np.testing.assert_allclose(reward, 0.5 * dragged * strictness * PERIOD)
+
+
+def test_a_robot_that_walks_lands_its_feet_where_the_capture_point_says() -> None:
+    actor = load_actor(SHIPPED / "almi_walk.onnx")
+    env = LegsEnv(8, TASKS["walk"], 0, 1)
+    env.difficulty = Difficulty(amplitude=0.0, speed=0.0, push=0.0)
+    env.restart(np.arange(8))
+    env.command(np.array([0.4, 0.0, 0.0]))
+    landing, lifted = list[float](), list[float]()
+    for k in range(150):
+        with torch.no_grad():
+            action = actor(torch.from_numpy(env.observe()[0]).float()).double().numpy()
+        env.step(action, NOBODY, np.zeros((0, 15)))
+        swing = (env.gait.phases - env.gait.config.stance) / (1.0 - env.gait.config.stance)
+        error = landing_errors(env.world.truth, env.twist, env.gait)
+        if k > 75:
+            landing.extend(error[swing > 0.9])
+            lifted.extend(error[(swing > 0.0) & (swing < 0.1)])
+    assert np.mean(landing) < 0.06 < 0.1 < np.mean(lifted)
 
 
 def test_a_run_that_goes_on_meets_other_draws_and_the_same_ones_each_time() -> None:

@@ -21,7 +21,6 @@ from golem.robots.model.leg_kinematics import leg_poses
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, read_checkpoint, read_curve
 from golem.training.legs.disturbances import (
     GENTLE,
-    QUARTERS,
     STRAIGHT,
     Difficulty,
     RandomPushes,
@@ -32,8 +31,10 @@ from golem.training.legs.export_policy import TRAINED, command_of, export, load_
 from golem.training.legs.learning_curve import draw_curves
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
-from golem.training.legs.train_legs import Adversary, TrainLegsConfig, _Run, train
+from golem.training.legs.train_legs import EXPORTED_PUSH, Adversary, TrainLegsConfig, _Run, train
 from golem.training.legs.training_model import STANCE
+
+QUARTERS = TASKS["stand"].quarters
 
 
 def small(
@@ -127,7 +128,8 @@ def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(
     ):
         assert torch.equal(mine, exported)
     assert run.steps == 0 and float(run.legs.actor.log_std.exp().detach().mean()) == pytest.approx(0.45)
-    assert run.env.difficulty.push == run.env.difficulty.strictness == run.env.difficulty.amplitude == 1.0
+    assert run.env.difficulty.strictness == run.env.difficulty.amplitude == 1.0
+    assert run.env.difficulty.push == EXPORTED_PUSH
     before = [w.detach().clone() for w in run.legs.critic.parameters()]
     run.update()  # it has no critic yet: at first the critic learns alone
     for mine, exported in zip(run.legs.actor.parameters(), load_actor(network).parameters(), strict=True):
@@ -265,7 +267,7 @@ def test_bounds_of_the_difficulty_hold_for_the_adversary() -> None:
 def test_a_calm_episode_has_no_push_and_slow_arms() -> None:
     rng, everyone = np.random.default_rng(0), np.arange(40)
     calm = everyone % 2 == 0
-    pushes, motion = RandomPushes(40, 50.0, rng), UpperBodyMotion(40, rng)
+    pushes, motion = RandomPushes(40, 50.0, QUARTERS, rng), UpperBodyMotion(40, rng)
     pushes.reset(everyone, 1.0, calm)
     motion.reset(everyone, 1.0, calm)
     hard = Difficulty(amplitude=1.0, speed=1.0, push=1.0)
@@ -282,7 +284,7 @@ def test_a_calm_episode_has_no_push_and_slow_arms() -> None:
 
 
 def test_pushes_go_straight_more_often_than_not_whichever_way_the_robot_looks() -> None:
-    pushes = RandomPushes(2000, 50.0, np.random.default_rng(0))
+    pushes = RandomPushes(2000, 50.0, QUARTERS, np.random.default_rng(0))
     facing = np.tile([[0.0, -1.0], [1.0, 0.0]], (2000, 1, 1))  # along the world's y
     pushes.reset(np.arange(2000), 1.0, np.zeros(2000, dtype=bool))
     ahead = np.zeros(2000)
@@ -297,8 +299,20 @@ def test_pushes_go_straight_more_often_than_not_whichever_way_the_robot_looks() 
     assert abs((ahead > np.cos(0.3)).mean() - front) < 0.05
 
 
+def test_a_robot_that_was_pushed_is_known_as_such_until_its_episode_is_over() -> None:
+    pushes, facing = RandomPushes(2, 50.0, QUARTERS, np.random.default_rng(0)), np.tile(np.eye(2), (2, 1, 1))
+    pushes.reset(np.arange(2), 1.0, np.array([False, True]))
+    assert np.isinf(pushes.since).all()
+    pushes.once(np.array([[100.0, 0.0], [0.0, 0.0]]), 0.2, start=0.1)
+    for _ in range(50):
+        pushes.step(1.0, facing, 0.02)
+    assert pushes.since[0] == pytest.approx(0.9, abs=0.03) and np.isinf(pushes.since[1])
+    pushes.reset(np.arange(2), 1.0, np.ones(2, dtype=bool))
+    assert np.isinf(pushes.since).all()
+
+
 def test_pushes_have_the_impulse_they_were_drawn_with_at_most() -> None:
-    pushes = RandomPushes(200, 50.0, np.random.default_rng(0))
+    pushes = RandomPushes(200, 50.0, QUARTERS, np.random.default_rng(0))
     facing = np.tile([[0.0, -1.0], [1.0, 0.0]], (200, 1, 1))
     pushes.reset(np.arange(200), 1.0, np.zeros(200, dtype=bool))
     impulse, largest = np.zeros((200, 2)), np.zeros(200)

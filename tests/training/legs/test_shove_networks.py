@@ -26,7 +26,7 @@ def test_every_robot_that_is_shoved_too_hard_is_lost_and_counted_once(tmp_path: 
 
 
 def test_a_push_that_is_ordered_comes_once_and_no_other() -> None:
-    pushes = RandomPushes(2, 50.0, np.random.default_rng(0))
+    pushes = RandomPushes(2, 50.0, (0.25, 0.25, 0.25, 0.25), np.random.default_rng(0))
     pushes.reset(np.arange(2), 1.0, np.zeros(2, dtype=bool))
     pushes.once(np.array([[100.0, 0.0], [0.0, -200.0]]), 0.2, start=0.5)
     facing = np.tile(np.eye(2), (2, 1, 1))

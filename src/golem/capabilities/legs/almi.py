@@ -14,6 +14,10 @@ from golem.errors import ConfigError
 WALK, STAND = "almi_walk", "almi_stand"
 """Their descriptions and networks in `SHIPPED`; `golem train legs` writes them."""
 
+SHOVED = 0.55
+"""Deviation from the twist beyond which a robot that walks is caught [m/s] [own: without a shove it is up to 0.45 at
+the corners of the envelope; a shove of 40 N s makes 0.6]."""
+
 
 @dataclass(frozen=True, slots=True)
 class AlmiConfig:
@@ -28,7 +32,7 @@ class AlmiConfig:
 
 
 class Almi(Handover):
-    """Walks as told with one shipped network, stands and takes pushes with the other; see `Handover`, `Policy`."""
+    """Walks as told with one shipped network, stands and takes shoves with the other; see `Handover`, `Policy`."""
 
     def __init__(self, config: AlmiConfig | None = None) -> None:
         """Load the shipped descriptions and their networks.
@@ -42,4 +46,4 @@ class Almi(Handover):
                 raise ConfigError(f"This installation has no trained legs ({SHIPPED / name}.yaml is absent).")
         walk = HandoverPart("policy", {"file": WALK, "network": config.walk})
         stand = HandoverPart("policy", {"file": STAND, "network": config.stand})
-        super().__init__(HandoverConfig(walk, stand))
+        super().__init__(HandoverConfig(walk, stand, shoved=SHOVED))

@@ -10,8 +10,8 @@ class CommandBlender:
     """Mixes the commands of the controller that was in charge with those of the one that is, for a while."""
 
     def __init__(self, duration: float) -> None:
-        """Take `duration` [s] from one controller to the next."""
-        self._duration = duration
+        """Take `duration` [s] from one controller to the next, unless `begin` says otherwise."""
+        self._usual = self._duration = duration
         self.reset()
 
     def reset(self) -> None:
@@ -23,9 +23,10 @@ class CommandBlender:
         """Whether commands are being mixed."""
         return self._old is not None
 
-    def begin(self, old: LegCommand | None) -> None:
+    def begin(self, old: LegCommand | None, duration: float | None = None) -> None:
         """Lead over from the command `old` to those of another controller; None lets them pass as they are."""
         self._old, self._elapsed = old, 0.0
+        self._duration = self._usual if duration is None else duration
 
     def step(self, command: LegCommand, dt: float, old: LegCommand | None = None) -> LegCommand:
         """Return what the legs are told `dt` [s] after the previous tick instead of `command`.

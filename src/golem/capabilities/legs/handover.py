@@ -4,6 +4,9 @@ The legs change hands while the robot stays in place and is healthy, and the tar
 because each controller has its own posture and gains. Meanwhile both balance the robot. A controller that has to start
 first, such as the vendor's, gets the legs once it has started. Until then the robot stands: the standing controller
 steps to keep its balance, not because a twist was commanded that it cannot follow.
+
+A robot that is shoved while it walks may be caught by the standing controller, which steps wherever the balance asks
+for, not where the command points. Once it is in place again, it walks on.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from golem import registry
+from golem.capabilities.legs.balance_errors import heading_frame
 from golem.capabilities.legs.base import Envelope, LocomotionCommand, LowerBody, Starting, follows
 from golem.capabilities.legs.command_blender import CommandBlender
 from golem.capabilities.legs.gait import GaitConfig
@@ -53,6 +57,9 @@ class HandoverConfig:
         blend: time over which targets and gains go from one controller's to the other's [s] [own: over 0.3 s, from a
             command that stayed as it was, the shipped legs rocked when they stopped, and a light foot turned by 10
             degrees].
+        shoved: deviation of the base's horizontal velocity from the twist beyond which the standing controller catches
+            a robot that walks [m/s]; None never does.
+        catch: time over which the targets go over then [s] [own].
     """
 
     walk: HandoverPart
@@ -63,6 +70,8 @@ class HandoverConfig:
     speed: float = 0.2
     calm: float = 0.1
     blend: float = 0.8
+    shoved: float | None = None
+    catch: float = 0.1
 
 
 class Handover:
@@ -112,6 +121,8 @@ class Handover:
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Run the controller in charge, after a change of hands where one is due; see `LowerBody.step`."""
         self._healthy = self._healthy + dt if self._is_healthy(state, base) else 0.0
+        if self._is_shoved(base, motion):
+            self._catch(state)
         # Another controller failed while it walked: the walking one ends that, if it is ready.
         found = self._last is None and motion.stepping and not self._is_in_place(base)
         may_change = found or (self._is_calm(dt) and not self._blend.active)
@@ -136,6 +147,13 @@ class Handover:
         self._last = self._blend.step(command, dt, old)
         return self._last
 
+    def _catch(self, state: LowState) -> None:
+        """Give the legs to the standing controller in the middle of a step."""
+        self._stand.reset(state)
+        self._leaving = self._active
+        self._take_over(self._stand)
+        self._blend.begin(self._last, self.config.catch)
+
     def _take_over(self, controller: RateDivider) -> None:
         self._active = controller
         gait = controller.controller.gait
@@ -148,6 +166,14 @@ class Handover:
         self._healthy = 0.0
         self._last: LegCommand | None = None
         self._blend.reset()
+
+    def _is_shoved(self, base: BaseEstimate, motion: LocomotionCommand) -> bool:
+        """Return whether the robot walks, and far from as it was told."""
+        bound = self.config.shoved
+        if bound is None or not self.walking or self._blend.active or self._last is None or base.stale:
+            return False
+        velocity = heading_frame(base.T_odom_base[:3, :3]).T @ base.velocity[:2]
+        return math.hypot(velocity[0] - motion.twist.vx, velocity[1] - motion.twist.vy) > bound
 
     def _is_calm(self, dt: float) -> bool:
         """Return whether the robot has been healthy for long enough."""

@@ -13,7 +13,7 @@ from golem.errors import unknown_name
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, episode_seed
 from golem.evaluation.metrics.text_table import TextTable, short_names
-from golem.evaluation.rungs.pushed_rung import PushedOptions, PushedRung
+from golem.evaluation.rungs.pushed_rung import PushedOptions, PushedRung, gait_name
 from golem.hardware.safety.base import SafetyLimits
 from golem.types import NUM_JOINTS
 
@@ -86,16 +86,16 @@ class GateLimits(PushedRung[GateLimitsOptions]):
         """Return every push, under every gate."""
         o = self.options
         return [
-            {"lift": lift, "phase": phase, "direction": direction, "level": level}
+            {"lift": lift, "phase": phase, "walk": walk, "direction": direction, "level": level}
             for lift in o.lift
-            for phase in o.phase
+            for phase, walk in self.gaits
             for direction in o.direction
             for level in o.level
         ]
 
     def together(self, spec: TrialSpec) -> Hashable:
         """Return what trials share that have one past: all but level and direction."""
-        return spec.method, spec.index, spec.case["lift"], spec.case["phase"]
+        return spec.method, spec.index, spec.case["lift"], spec.case["phase"], spec.case["walk"]
 
     def episode(self, spec: TrialSpec) -> Episode:
         """Return the robot of a trial, under the gate of its case."""
@@ -107,14 +107,21 @@ class GateLimits(PushedRung[GateLimitsOptions]):
         """Return how many pushes were survived under each gate, and what ended the others."""
         rows, short = list[tuple[str, ...]](), short_names(outcomes)
         for method, trials in outcomes.items():
-            for phase in self.options.phase:
+            for gait in self.gaits:
                 for level in self.options.level:
                     for lift in self.options.lift:
-                        want = {"lift": lift, "phase": phase, "level": level}
+                        want = {"lift": lift, "phase": gait[0], "walk": gait[1], "level": level}
                         mine = [o for s, o in trials if want.items() <= s.case.items()]
                         won = sum(outcome.success for outcome in mine)
                         rows.append(
-                            (short[method], phase, f"{level:g}", lift, f"{won} of {len(mine)}", _ends(mine))
+                            (
+                                short[method],
+                                gait_name(gait),
+                                f"{level:g}",
+                                lift,
+                                f"{won} of {len(mine)}",
+                                _ends(mine),
+                            )
                         )
         return (
             TextTable(

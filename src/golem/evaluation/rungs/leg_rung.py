@@ -65,9 +65,16 @@ class LegRung(Rung[O]):
         """Run one trial with a robot that hangs in its band and can walk where it has to; `run` closes it."""
         raise NotImplementedError
 
-    def stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
-        """Return the standing stack with a lower body on the plant."""
-        plant = {"latency": self.options.latency, **robot_options(self.options.robot), **self.twin}
+    def stack(
+        self,
+        method: str,
+        profile: str,
+        overrides: Mapping[str, str],
+        twin: Mapping[str, object] | None = None,
+    ) -> Stack:
+        """Return the standing stack with a lower body on the plant; `twin` stands for the rung's own options of it."""
+        own = self.twin if twin is None else twin
+        plant = {"latency": self.options.latency, **robot_options(self.options.robot), **own}
         return legs_stack(method, profile, overrides, plant)
 
     def episode(self, spec: TrialSpec) -> Episode:

@@ -12,15 +12,21 @@ import numpy as np
 
 from golem.errors import ConfigError
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
+from golem.evaluation.episodes.episode import Episode, episode_seed
 from golem.evaluation.episodes.plain_episode import PlainEpisode, own_legs
 from golem.evaluation.harness.arguments import robot_options
 from golem.evaluation.metrics.text_table import TextTable, short_names
 from golem.evaluation.report.svg_figure import method_colour
+from golem.evaluation.rungs.gate_limits import NOTHING, lifted
 from golem.evaluation.rungs.leg_rung import NO_WALKER, can_walk
-from golem.evaluation.rungs.pushed_rung import PushedOptions, PushedRung
+from golem.evaluation.rungs.pushed_rung import Gait, PushedOptions, PushedRung, gait_name
+from golem.hardware.safety.base import SafetyLimits
 from golem.robots.mujoco.shoves import DIRECTIONS
 
-Terms = Literal["stack", "own"]
+Terms = Literal["stack", "unstopped", "ungated", "own"]
+LIFTED: dict[str, str] = {"stack": NOTHING, "unstopped": "stops", "ungated": "stops+bounds"}
+"""What is lifted of the gate on each of the stack's terms; see `gate_limits.lifted`."""
+Trial = tuple[TrialSpec, TrialOutcome]
 SURVIVED = 0.95
 """Share of the trials of a level that has to be survived."""
 
@@ -30,7 +36,8 @@ class PushLimitOptions(PushedOptions):
     """The search. Levels ascend until one is lost; where the first level is lost they descend instead."""
 
     terms: tuple[Terms, ...] = ("stack",)
-    """stack: with gate, estimator, latency and working arms. own: the robot alone in plain MuJoCo, the true state."""
+    """stack: with gate, estimator, latency and working arms. unstopped: its gate clips commands, but never stops the
+    robot. ungated: it does neither. own: the robot alone in plain MuJoCo, the true state."""
     first: float = 10.0
     """First level."""
     step: float = 10.0
@@ -68,15 +75,21 @@ class PushLimit(PushedRung[PushLimitOptions]):
         return [
             case
             for terms in self.options.terms
-            for phase in self.options.phase
+            for gait in self.gaits
             for direction in self.options.direction
-            for case in self._levels(results, terms, phase, direction)
+            for case in self._levels(results, terms, gait, direction)
         ]
 
-    def _levels(self, results: Results, terms: str, phase: str, direction: str) -> Iterator[Case]:
+    def _levels(self, results: Results, terms: str, gait: Gait, direction: str) -> Iterator[Case]:
         level: float | None = self.options.first
         while level is not None:
-            case: Case = {"terms": terms, "phase": phase, "direction": direction, "level": level}
+            case: Case = {
+                "terms": terms,
+                "phase": gait[0],
+                "walk": gait[1],
+                "direction": direction,
+                "level": level,
+            }
             yield case
             found = results(case)
             if found is None:
@@ -101,7 +114,13 @@ class PushLimit(PushedRung[PushLimitOptions]):
 
     def together(self, spec: TrialSpec) -> Hashable:
         """Return what trials share that have one past: all but level and direction."""
-        return spec.method, spec.index, spec.case["terms"], spec.case["phase"]
+        return spec.method, spec.index, spec.case["terms"], spec.case["phase"], spec.case["walk"]
+
+    def episode(self, spec: TrialSpec) -> Episode:
+        """Return the robot of a trial on the stack's terms, under the gate of its case."""
+        stack = self.stack(spec.method, spec.profile, spec.overrides)
+        limits = lifted(SafetyLimits.from_profile(stack.limits), LIFTED[str(spec.case["terms"])])
+        return Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, limits)
 
     def pushed(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
         """Push one robot, on the terms of its case; see `PushedRung`."""
@@ -113,42 +132,62 @@ class PushLimit(PushedRung[PushLimitOptions]):
         return self.from_moment(specs, plain, can_walk(plain.envelope), self.moment(spec).reach_plainly)
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
-        """Return the largest push survived, a row per method, terms and phase."""
-        o, kind = self.options, self.options.kind
+        """Return the largest push survived, a row per method, terms and gait; and what the gate costs of it."""
+        o, unit = self.options, "N s" if self.options.kind == "shove" else "N"
         what = (
             "shove of 0.2 s on the torso [N s]"
-            if kind == "shove"
+            if o.kind == "shove"
             else "half-sine push of 1 s at the pelvis [N]"
         )
         n = len({spec.index for trials in outcomes.values() for spec, _ in trials})
-        rows, short = list[tuple[str, ...]](), short_names(outcomes)
+        rows, costs, short = list[tuple[str, ...]](), list[tuple[str, ...]](), short_names(outcomes)
         for method, trials in outcomes.items():
-            for terms in o.terms:
-                for phase in o.phase:
-                    mine = [t for t in trials if (t[0].case["terms"], t[0].case["phase"]) == (terms, phase)]
-                    cells = [limit([t for t in mine if t[0].case["direction"] == d]) for d in o.direction]
+            for gait in self.gaits:
+                means = dict[str, float]()
+                for terms in o.terms:
+                    cells = [limit(_of(trials, terms, gait, d)) for d in o.direction]
                     lowest = min(cells, key=lambda cell: cell[0])[1]
-                    rows.append((short[method], terms, phase, *(text for _, text in cells), lowest))
+                    texts = (text for _, text in cells)
+                    rows.append((short[method], terms, gait_name(gait), *texts, lowest))
+                    means[terms] = float(np.mean([level for level, _ in cells]))
+                costs.append((short[method], gait_name(gait), *shares(means)))
         directions = (d.replace("_", " ") for d in o.direction)
-        return (
-            TextTable(
-                f"Largest {what} survived in at least {100 * SURVIVED:.0f} % of {n} trials",
-                ("lower body", "terms", "phase", *directions, "min"),
-                tuple(rows),
-                f"A level is lost with {allowed(n) + 1} of {n} trials; >=: the highest one tried was not lost.",
-            ),
+        found = TextTable(
+            f"Largest {what} survived in at least {100 * SURVIVED:.0f} % of {n} trials",
+            ("lower body", "terms", "phase", *directions, "min"),
+            tuple(rows),
+            f"A level is lost with {allowed(n) + 1} of {n} trials; >=: the highest one tried was not lost.",
         )
+        if len(o.terms) == 1:
+            return (found,)
+        cost = TextTable(
+            f"What the gate and the rest of the stack cost of it, mean of {len(o.direction)} directions [{unit}]",
+            (
+                "lower body",
+                "phase",
+                "the gate stops",
+                "the gate clips",
+                "gate, both",
+                "the rest of the stack",
+            ),
+            tuple(costs),
+            "stops: unstopped - stack; clips: ungated - unstopped; rest (hands, arms, estimator, latency, profile): "
+            "own - ungated. Empty where one of the two terms was not asked for.",
+        )
+        return found, cost
 
     def plot(self, outcomes: Outcomes, figure: Any) -> str | None:
-        """Draw the largest push survived over its direction, ahead at the top; a plot per terms and phase."""
+        """Draw the largest push survived over its direction, ahead at the top; a plot per terms and gait."""
         o = self.options
-        cells, short = [(terms, phase) for terms in o.terms for phase in o.phase], short_names(outcomes)
+        cells, short = [(terms, gait) for gait in self.gaits for terms in o.terms], short_names(outcomes)
+        rows = len(self.gaits) if len(o.terms) > 1 else 1
         angles = np.radians([45.0 * DIRECTIONS.index(direction) for direction in o.direction])
-        plots = figure.subplots(1, len(cells), subplot_kw={"projection": "polar"}, squeeze=False)[0]
-        for axes, (terms, phase) in zip(plots, cells, strict=True):
+        shape = rows, len(cells) // rows
+        figure.set_figheight(rows * figure.get_figheight())
+        plots = figure.subplots(*shape, subplot_kw={"projection": "polar"}, squeeze=False).ravel()
+        for axes, (terms, gait) in zip(plots, cells, strict=True):
             for i, (method, trials) in enumerate(outcomes.items()):
-                mine = [t for t in trials if (t[0].case["terms"], t[0].case["phase"]) == (terms, phase)]
-                best = [limit([t for t in mine if t[0].case["direction"] == d])[0] for d in o.direction]
+                best = [limit(_of(trials, terms, gait, d))[0] for d in o.direction]
                 closed = np.append(angles, angles[:1]), [*best, best[0]]
                 axes.plot(
                     *closed,
@@ -158,10 +197,21 @@ class PushLimit(PushedRung[PushLimitOptions]):
                     label=short[method] if axes is plots[0] else None,
                 )
                 axes.fill(*closed, color=method_colour(i), alpha=0.12)
-            axes.set(theta_offset=np.pi / 2, title=f"{phase.replace('_', ' ')}, {terms}")
+            axes.set(theta_offset=np.pi / 2, title=f"{gait_name(gait)}, {terms}")
             axes.set_xticks(np.radians(45.0 * np.arange(8)), [d.replace("_", " ") for d in DIRECTIONS])
         figure.legend(loc="outside lower center", ncols=3)
         return f"Largest push survived, by direction [{'N s' if o.kind == 'shove' else 'N'}]"
+
+
+def _of(trials: Sequence[Trial], terms: str, gait: Gait, direction: str) -> Sequence[Trial]:
+    want = {"terms": terms, "phase": gait[0], "walk": gait[1], "direction": direction}
+    return [trial for trial in trials if want.items() <= trial[0].case.items()]
+
+
+def shares(means: Mapping[str, float]) -> tuple[str, ...]:
+    """Return what stops, clipping, both, and the rest of the stack cost, by the mean limit on each of the terms."""
+    pairs = (("unstopped", "stack"), ("ungated", "unstopped"), ("ungated", "stack"), ("own", "ungated"))
+    return tuple(f"{means[a] - means[b]:.0f}" if {a, b} <= means.keys() else "" for a, b in pairs)
 
 
 def allowed(n: int) -> int:
@@ -174,7 +224,7 @@ def survived(losses: Sequence[str | None]) -> bool:
     return sum(loss is not None for loss in losses) <= allowed(len(losses))
 
 
-def limit(trials: Sequence[tuple[TrialSpec, TrialOutcome]]) -> tuple[float, str]:
+def limit(trials: Sequence[Trial]) -> tuple[float, str]:
     """Return the largest level survived in one direction, and how it is written; 0 where none was."""
     levels: dict[float, list[str | None]] = {}
     for spec, outcome in trials:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -23,6 +24,34 @@ PATIENCE = 4.0
 """Time after the push that has to be survived [s]."""
 QUIET = 0.5
 """Time of quiet standing after which nothing more can happen [s]."""
+STILL = "0"
+"""The walk of a robot that stands."""
+Gait = tuple[Phase, str]
+"""A phase, and the twist of its walk as the options write it; `STILL` of a robot that stands."""
+
+
+def walk_twist(word: str) -> Twist:
+    """Return the twist that `word` of `--walk` means, e.g. `0.3` or `0.3,0,0.4`.
+
+    Raises:
+        ConfigError: it is no twist, or that of a robot that stands.
+    """
+    try:
+        numbers = [float(number) for number in word.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 3) or not all(map(math.isfinite, numbers)) or not any(numbers):
+        raise ConfigError(
+            f"--walk '{word}' is neither a speed ahead, e.g. 0.3, nor vx,vy,wz, e.g. 0.3,0,0.4, other than zero; "
+            "a robot that stands is --phase standing."
+        )
+    return Twist(*numbers)
+
+
+def gait_name(gait: Gait) -> str:
+    """Return how tables call a gait, e.g. `left swing at 0.3`."""
+    phase, walk = gait
+    return phase if phase == "standing" else f"{phase.replace('_', ' ')} at {walk}"
 
 
 @dataclass(frozen=True)
@@ -35,8 +64,8 @@ class PushedOptions(PlantOptions):
     """When the push comes: standing, walking at any moment, or walking while that foot is in the air."""
     direction: tuple[str, ...] = DIRECTIONS
     """Where the push drives the robot."""
-    walk: tuple[float, float, float] = (0.3, 0.0, 0.0)
-    """vx, vy [m/s] and wz [rad/s] of the phases of walking."""
+    walk: tuple[str, ...] = ("0.3",)
+    """Twists of the phases of walking, each as vx or vx,vy,wz [m/s, m/s, rad/s], e.g. 0.3 0.6 0.3,0,0.4."""
 
 
 O = TypeVar("O", bound=PushedOptions)  # noqa: E741 - the options
@@ -55,7 +84,9 @@ class PushedRung(LegRung[O]):
         for name in self.options.direction:
             if name not in DIRECTIONS:
                 raise unknown_name("direction", name, DIRECTIONS)
-        self._each("phase", "direction")
+        self._each("phase", "direction", "walk")
+        for word in self.options.walk:
+            walk_twist(word)
 
     def _each(self, *options: str) -> None:
         """Check options that name several things.
@@ -67,6 +98,12 @@ class PushedRung(LegRung[O]):
             names = getattr(self.options, option)
             if not names or len(set(names)) < len(names):
                 raise ConfigError(f"--{option} names nothing, or one of them twice.")
+
+    @property
+    def gaits(self) -> Sequence[Gait]:
+        """What the robot does when it is pushed: each phase, those of walking at each twist."""
+        o = self.options
+        return [(p, walk) for p in o.phase for walk in ((STILL,) if p == "standing" else o.walk)]
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
@@ -88,7 +125,8 @@ class PushedRung(LegRung[O]):
     def moment(self, spec: TrialSpec) -> Moment:
         """Return when the push of a trial comes."""
         phase: Phase = spec.case["phase"]  # type: ignore[assignment] - checked when the options were read
-        return Moment.of(spec, phase, Twist(*self.options.walk))
+        twist = Twist() if phase == "standing" else walk_twist(str(spec.case["walk"]))
+        return Moment.of(spec, phase, twist)
 
     def from_moment(
         self,

@@ -13,7 +13,7 @@ from golem.robots.mujoco.hoist import HoistConfig
 from golem.robots.worlds.conditions import LayoutKind, check_condition
 
 Support = Literal["hoist", "ground"]
-World = Literal["pack", "plant", "open", "slope", "rubble", "furnished", "corridor", "kitchen"]
+World = Literal["pack", "plant", "open", "slope", "step", "rubble", "furnished", "corridor", "kitchen"]
 WITH_PACK = ("pack", "plant")
 """Worlds with a pack to work on."""
 
@@ -25,10 +25,11 @@ class MujocoConfig:
     Attributes:
         support: `hoist`: it hangs, its feet clear of the floor. `ground`: it stands, and the hoist's spring keeps it
             upright until it is released.
-        world: `pack`: the hall with the battery pack; `open`: the empty hall; `slope`: a ramp ahead; `rubble`: tiles
-            of uneven height all around. The floor is flat for a metre around the start in each. `furnished`: a hall
-            with walls, shelves, pillars, gantry and packs, drawn from the seed; `plant`: that hall with the pack to
-            work on; `corridor`: two bare walls; `kitchen`: a fridge and a counter with tableware before the robot.
+        world: `pack`: the hall with the battery pack; `open`: the empty hall; `slope`: a ramp ahead; `step`: a
+            platform ahead; `rubble`: tiles of uneven height all around. The floor is flat for a metre around the start
+            in each. `furnished`: a hall with walls, shelves, pillars, gantry and packs, drawn from the seed; `plant`:
+            that hall with the pack to work on; `corridor`: two bare walls; `kitchen`: a fridge and a counter with
+            tableware before the robot.
         arms: where they are when the world begins: at home, or hanging as they do while the motors are limp.
         stance: where the robot should stand before the pack: x, y [m] and yaw [rad] from where it begins.
         layout: `nominal`: pack and tray stand where `PackLayout` says, under a robot in the hoist; under one that
@@ -41,6 +42,7 @@ class MujocoConfig:
         torque_profile: torque limits of the simulated motors (see `robots.model.limits`).
         near: distance of a finger from a screw below which physics runs at the fine step [m].
         slope: inclination of the ramp [rad].
+        step: height of the platform [m].
         rubble: height of the highest tile [m]; the others are drawn from 0 to it.
         people: how many people walk about in the furnished hall or the plant.
         obstacles: how many walls and obstacles stand in the lane of the furnished hall or the plant; a way is left.
@@ -67,6 +69,7 @@ class MujocoConfig:
     torque_profile: str = "urdf"
     near: float = 0.12
     slope: float = math.radians(5.0)
+    step: float = 0.05
     rubble: float = 0.03
     people: int = 0
     obstacles: int = 0
@@ -88,6 +91,7 @@ class MujocoConfig:
         """
         for name, value, minimum, maximum in (
             ("slope", self.slope, 0.0, 0.5),
+            ("step", self.step, 0.0, 0.1),
             ("rubble", self.rubble, 0.0, 0.2),
             ("people", self.people, 0, 20),
             ("obstacles", self.obstacles, 0, 12),

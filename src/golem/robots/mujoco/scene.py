@@ -229,6 +229,8 @@ def _add_terrain(spec: mujoco.MjSpec, config: MujocoConfig, seed: int) -> tuple[
         furnished.add_corridor(spec)
     elif config.world == "slope":
         terrain.add_slope(spec, config.slope)
+    elif config.world == "step":
+        terrain.add_step(spec, config.step)
     elif config.world == "rubble":
         terrain.add_rubble(spec, config.rubble, stream(seed, "world/rubble"))
     else:

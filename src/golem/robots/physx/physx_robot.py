@@ -17,7 +17,7 @@ from golem.types import SIDES, Array
 
 FINGER_DRIVE = 20.0, 0.2
 """Stiffness [N m/rad] and damping [N m s/rad] with which a finger's hinge follows its crank, as its rocker has it."""
-WORLDS = ("open", "slope", "rubble", "furnished", "corridor")
+WORLDS = ("open", "slope", "step", "rubble", "furnished", "corridor")
 SLIP = 0.05
 """Speed of a joint from which its dry friction is whole [rad/s] [own: without a slope it would chatter]."""
 

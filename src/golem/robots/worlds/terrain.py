@@ -1,4 +1,4 @@
-"""Grounds to stand and walk on: the empty hall, a ramp, a field of uneven tiles."""
+"""Grounds to stand and walk on: the empty hall, a ramp, a step, a field of uneven tiles."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ HALL = 10.0
 """Half side of the hall [m]: room for six metres straight ahead."""
 RAMP = (3.0, 1.5, 4.0)
 """Length of the ramp's slope and of the platform behind it, and its width [m]; then it goes down again."""
+PLATFORM = (1.5, 4.0)
+"""Length and width of what the step leads up to [m]; then it goes down again."""
 TILE = 0.3
 """Side of a tile [m]: a foot of 0.26 m rarely has one for itself."""
 FIELD = 4.0
@@ -50,6 +52,20 @@ def add_slope(spec: mujoco.MjSpec, angle: float) -> None:
             body, (length / 2, width / 2, half), (x - turn * s * half, 0.0, rise / 2 - c * half), quat=quat
         )
     _block(body, (level / 2, width / 2, half), (run + level / 2, 0.0, rise - half))
+
+
+def add_step(spec: mujoco.MjSpec, height: float) -> None:
+    """Add a hall with a platform across the way of a robot that walks ahead: a step up, and one down.
+
+    Args:
+        spec: the world to extend.
+        height: of the platform [m].
+    """
+    add_open(spec)
+    length, width = PLATFORM
+    body = spec.worldbody.add_body(name="terrain")
+    size = (length / 2, width / 2, _THICK / 2)
+    _block(body, size, (FLAT + length / 2, 0.0, height - _THICK / 2))
 
 
 def add_rubble(spec: mujoco.MjSpec, height: float, rng: np.random.Generator) -> None:

@@ -93,6 +93,7 @@ def shove(
     n: Annotated[int, arg(aliases=("-n",))] = 20,
     seed: int = 0,
     threads: int = 2,
+    speed: float = 0.0,
 ) -> None:
     """Shove robots in the training's own world, eight directions: which of two networks stands more, in seconds.
 
@@ -102,12 +103,17 @@ def shove(
         n: robots per direction.
         seed: of the robots.
         threads: of the physics.
+        speed: at which the robots walk ahead [m/s]; 0 stands.
     """
     from golem.training.legs.shove_networks import shove_all
 
-    rows = shove_all(network, impulse, n, seed, threads)
+    rows = shove_all(network, impulse, n, seed, threads, speed)
     table = Table(
-        "direction", "survived", "stopped by the gate", "fell", title=f"{impulse:g} N s, n = {n} each"
+        "direction",
+        "survived",
+        "stopped by the gate",
+        "fell",
+        title=f"{impulse:g} N s at {speed:g} m/s, n = {n} each",
     )
     for row in rows:
         table.add_row(row.direction.replace("_", " "), str(row.survived), str(row.stopped), str(row.fell))

@@ -22,9 +22,8 @@ GENTLE = 0.3
 STRAIGHT = 0.7
 """Share of the pushes straight ahead, back or to a side. Each wants steps of its own kind: to a side the legs are in
 each other's way, behind the feet are short, and with few pushes ahead the robot fell forward first."""
-QUARTERS = (0.2, 0.2, 0.4, 0.2)
-"""Shares of the straight pushes ahead, to the left, back and to the right. With a quarter each, legs that had stood
-20 of 20 shoves of 80 N s backward stood 14."""
+Quarters = tuple[float, float, float, float]
+"""Shares of the straight pushes ahead, to the left, back and to the right."""
 TOP_SPEED = 2.5
 """Speed of a target at full difficulty [rad/s]; the safety gate lets 3 pass."""
 
@@ -38,7 +37,8 @@ class Difficulty:
         speed: share of `TOP_SPEED`.
         push: share of the largest impulse.
         payload: share of the largest payload.
-        strictness: share of the price of fast legs that is paid by who has nothing left to lose; see `Rewards`.
+        strictness: share of the price of fast legs and dragging feet that is paid by who has nothing left to lose; see
+            `Rewards`.
     """
 
     amplitude: float = 0.2
@@ -115,11 +115,13 @@ class RandomPushes:
     Attributes:
         force: (n, 3) present force [N], world.
         on_torso: (n,) whether it acts on the torso, else on the pelvis.
+        since: (n,) time since the newest push began [s]; infinite before the first.
     """
 
-    def __init__(self, n: int, largest: float, rng: np.random.Generator) -> None:
-        """Push with impulses up to `largest` [N s]."""
-        self._largest, self._rng = largest, rng
+    def __init__(self, n: int, largest: float, quarters: Quarters, rng: np.random.Generator) -> None:
+        """Push with impulses up to `largest` [N s], the straight ones in shares of `quarters`."""
+        self._largest, self._quarters, self._rng = largest, quarters, rng
+        self.since: Array = np.full(n, np.inf)
         self.force: Array = np.zeros((n, 3))
         self.on_torso: NDArray[np.bool_] = np.ones(n, dtype=bool)
         self._peak: Array = np.zeros((n, 2))
@@ -133,10 +135,11 @@ class RandomPushes:
         """Leave the robots `where` alone for a while, and those that are `calm` (m,) for the whole episode."""
         self._calm[where] = calm
         self._t[where] = 0.0
+        self.since[where] = np.inf
         self._draw(where, difficulty)
 
-    def once(self, force: Array, duration: float, start: float) -> None:
-        """Push each robot's torso once, with `force` (n, 2) in its heading frame [N], `start` [s] from now."""
+    def once(self, force: Array, duration: float, start: float | Array) -> None:
+        """Push each robot's torso once, `force` (n, 2) in its heading frame [N], `start` [s] from now, or (n,)."""
         self._calm[:], self._slow[:], self.on_torso[:] = True, False, True
         self._peak[:], self._duration[:], self._start[:] = force, duration, self._t + start
 
@@ -155,7 +158,9 @@ class RandomPushes:
             self._draw(over, difficulty)
         share = (self._t - self._start) / self._duration
         profile = np.where(self._slow, np.sin(np.pi * np.clip(share, 0.0, 1.0)), 1.0)
-        profile = profile * ((share >= 0.0) & (share <= 1.0))
+        pushed = (share >= 0.0) & (share <= 1.0)
+        profile = profile * pushed
+        self.since = np.where(pushed & self._peak.any(axis=1), self._t - self._start, self.since + dt)
         self.force[:, :2] = np.einsum("nij,nj->ni", facing, self._peak) * profile[:, None]
 
     def _draw(self, where: NDArray[np.intp], difficulty: float) -> None:
@@ -165,7 +170,7 @@ class RandomPushes:
         # Mostly near the edge of what the robot is known to take: easy pushes teach little.
         impulse = self._largest * difficulty * np.sqrt(rng.random(m))
         force = impulse / duration * np.where(slow, 0.5 * np.pi, 1.0) * ~self._calm[where]
-        straight = 0.5 * np.pi * rng.choice(4, size=m, p=QUARTERS) + rng.uniform(-0.3, 0.3, m)
+        straight = 0.5 * np.pi * rng.choice(4, size=m, p=self._quarters) + rng.uniform(-0.3, 0.3, m)
         angle = np.where(rng.random(m) < STRAIGHT, straight, rng.uniform(-np.pi, np.pi, m))
         self._peak[where] = force[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
         self._duration[where] = duration

@@ -16,7 +16,8 @@ from golem.capabilities.legs.swing import swing_offset
 from golem.hardware.safety.base import SafetyLimits
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.training.legs.batch_world import BatchWorld, Rows, WorldConfig
-from golem.training.legs.disturbances import Difficulty, RandomPushes, UpperBodyMotion
+from golem.training.legs.disturbances import Difficulty, Quarters, RandomPushes, UpperBodyMotion
+from golem.training.legs.placement import landing_errors
 from golem.training.legs.rewards import Rewards, RewardWeights
 from golem.training.legs.training_model import FEET_APART, KD, KP, STANCE, STEP
 from golem.types import LEGS, Array
@@ -57,6 +58,8 @@ class EnvConfig:
         calm: share of the episodes without pushes and with slow arms: who is always disturbed learns neither to walk as
             told nor to stand quietly.
         impulse: largest push at full difficulty [N s].
+        quarters: shares of the straight pushes ahead, to the left, back and to the right.
+        recovery: time after the beginning of a push in which the command need not be followed [s].
         fall: what a fall costs beside the rewards it forgoes, which are worth as much: without, the less noise there
             was the better the robot stood and the more often it fell.
         gait: clock and gate.
@@ -74,7 +77,9 @@ class EnvConfig:
     action_scale: float = 0.25
     swing: float = 0.28
     calm: float = 0.4
-    impulse: float = 45.0
+    impulse: float = 90.0
+    quarters: Quarters = (0.2, 0.3, 0.2, 0.3)
+    recovery: float = 1.2
     fall: float = 5.0
     gait: GaitConfig = field(default_factory=lambda: GaitConfig(period=0.64))
     world: WorldConfig = field(default_factory=WorldConfig)
@@ -88,15 +93,18 @@ TASKS: dict[Task, EnvConfig] = {
         standing=1.0,
         calm=0.3,
         impulse=100.0,
+        quarters=(0.2, 0.2, 0.4, 0.2),
+        recovery=0.0,
         world=WorldConfig(delay=4),
-        weights=RewardWeights(feet=-4.0, toes=0.0),
+        weights=RewardWeights(feet=-4.0, toes=0.0, dragged=0.0),
     ),
 }
 """A network for each. One for both learned neither well: shoves of 90 N s teach a robot that walks to shuffle, and one
 that is praised for standing to the millimetre, or has learned to walk, is slow to step. Who only stands steps after a
 push, to wherever that is good: it pays less for where its feet are. Its delays go further, because legs of high gain
 sway at 2 Hz from some delay on: of four networks trained to 30 ms two moved at 20 mm/s there, left alone, and those two
-swayed by 7 mm in the twin at 22 ms."""
+swayed by 7 mm in the twin at 22 ms. Its pushes are twice as often back: with a quarter each, legs that had stood 20 of
+20 shoves of 80 N s backward stood 14. A walking robot is weakest to its sides."""
 
 
 @dataclass
@@ -136,7 +144,7 @@ class LegsEnv:
         self.layout = ObservationLayout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
         self.gait = Gait(config.gait, (n,))
         self.upper = UpperBodyMotion(n, self._rng)
-        self._pushes = RandomPushes(n, config.impulse, self._rng)
+        self._pushes = RandomPushes(n, config.impulse, config.quarters, self._rng)
         self._limits = SafetyLimits.from_profile()
         self._rewards = Rewards(n, config.weights, config.gait, self._limits)
         self.twist: Array = np.zeros((n, 3))
@@ -152,6 +160,11 @@ class LegsEnv:
     def walking(self) -> NDArray[np.bool_]:
         """(n,) which robots are commanded to move."""
         return np.asarray(np.abs(self.twist).max(axis=1) > 1e-6)
+
+    @property
+    def recovers(self) -> NDArray[np.bool_]:
+        """(n,) which robots were pushed so recently that they need not follow the command."""
+        return self._pushes.since < self.config.recovery
 
     def reseed(self, seed: tuple[int, ...]) -> None:
         """Begin with other draws, as if `seed` had been given at the start."""
@@ -180,7 +193,11 @@ class LegsEnv:
         self.twist[where] = 0.0
         self._command(where)
 
-    def shove(self, force: Array, duration: float, start: float) -> None:
+    def command(self, twist: Array) -> None:
+        """Command `twist` (3,) [m/s, m/s, rad/s] to every robot for the rest of its episode."""
+        self._goal[:], self._left[:] = twist, np.inf
+
+    def shove(self, force: Array, duration: float, start: float | Array) -> None:
         """Push each robot once and never again; see `RandomPushes.once`."""
         self._pushes.once(force, duration, start)
 
@@ -215,6 +232,7 @@ class LegsEnv:
             self.upper.target - sensed.q[:, 12:],
             self._rewards.tracked_error(self.twist),
             self.gait.stepping[:, None],
+            self.recovers[:, None],
         ]
         return self.layout.observe(signals), np.concatenate(known, axis=1)
 
@@ -248,6 +266,8 @@ class LegsEnv:
             self._action,
             self._capture,
             self._misplaced,
+            landing_errors(truth, self.twist, self.gait),
+            self.recovers,
             self.difficulty.strictness,
             dt,
         )

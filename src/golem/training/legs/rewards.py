@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from golem.capabilities.legs.balance_errors import GRAVITY
 from golem.capabilities.legs.gait import Gait, GaitConfig
@@ -39,6 +40,10 @@ class RewardWeights:
         alive: not fallen.
         contact: feet on the ground in their stance, and off it in the middle two thirds of their swing. With 0.4, and
             0.4 of `slip`, the robot dragged the trailing foot, with 100 to 200 N on it, when it walked sideways.
+        dragged: feet on the ground in the middle two thirds of their swing. It is paid where the sum is negative, too,
+            as `fast`: else a robot that keeps both feet down after a push loses nothing by it.
+        placement: in the second half of a swing, the foot above where the capture point says that it belongs,
+            exp(-error^2 / 0.12^2), after a push; see `placement`.
         swing_height: error of the height of a swinging sole [m^2].
         flat: tilt of the soles to the ground, 1 - cos. A foot that lands on an edge slaps down faster than the gate
             allows, and one that rolls over its heel under load misleads the odometry: when that was not punished, the
@@ -79,6 +84,8 @@ class RewardWeights:
     angular_now: float = 0.3
     alive: float = 0.5
     contact: float = 1.0
+    dragged: float = -1.5
+    placement: float = 1.5
     swing_height: float = -60.0
     flat: float = -50.0
     upright: float = -20.0
@@ -117,6 +124,9 @@ class Rewards:
     negative all the time, and so legs that had learned with nothing else stepped as fast as they could: 123 of 125 lost
     shoves were stops by the gate. There `fast` has its price, too, once the robot has learned to step: with that price
     from the start it never stepped sideways.
+
+    For a while after a push the command need not be followed: its rewards are paid in full, whatever the velocity. So
+    the sum stays positive while the robot recovers, and how it moves its feet counts then as well.
     """
 
     def __init__(self, n: int, weights: RewardWeights, gait: GaitConfig, limits: SafetyLimits) -> None:
@@ -148,6 +158,8 @@ class Rewards:
         last: Array,
         capture: Array,
         misplaced: Array,
+        landing: Array,
+        recovers: NDArray[np.bool_],
         strictness: float,
         dt: float,
     ) -> tuple[Array, dict[str, float]]:
@@ -161,7 +173,9 @@ class Rewards:
             last: (n, 12) of the one before.
             capture: (n, 2) capture point from the middle of the feet, heading frame [m].
             misplaced: (n,) distance of the feet from where they belong [m].
-            strictness: share of the price of `fast` that is paid where the sum is negative, 0 to 1.
+            landing: (n, 2) distance of each foot from where it belongs when it lands [m].
+            recovers: (n,) whether a push was so recent that the command need not be followed.
+            strictness: share of the price of `fast` and `dragged` that is paid where the sum is negative, 0 to 1.
             dt: the period [s].
         """
         w = self._weights
@@ -169,14 +183,17 @@ class Rewards:
         share = dt / (self._share + dt)
         self._mean += (now - self._mean) * share
         self._ahead += (capture - twist[:, :2] * _PENDULUM - self._ahead) * share
-        mean = np.square(self._mean - twist)
-        error = np.square(now - twist)
+        obeys = ~recovers[:, None]
+        mean = np.square(self._mean - twist) * obeys
+        error = np.square(now - twist) * obeys
         phase, stepping = gait.phases, gait.stepping
         stance = ~stepping[:, None] | (phase < gait.config.stance)
         speed_of_feet = np.hypot(twist[:, 0], twist[:, 1]) + 0.5 * FEET_APART[1] * np.abs(twist[:, 2])
         step = 0.5 * gait.config.period * speed_of_feet
         loaded = truth.force > 5.0
-        lifted = rise(swing_share(phase, gait.config.stance))
+        swing = swing_share(phase, gait.config.stance)
+        lifted = rise(swing)
+        near = np.exp(-np.square(landing / 0.12)) * (~stance & (swing > 0.5))
         high = CLEARANCE * lifted - truth.clearance
         legs, speed = truth.q[:, LEGS], truth.dq[:, LEGS]
         torque = np.square(truth.torque[:, LEGS])
@@ -196,6 +213,8 @@ class Rewards:
             "angular_now": np.exp(-error[:, 2] / 0.25),
             "alive": np.ones(len(twist)),
             "contact": np.where(stance, loaded, ~loaded | (lifted < 0.25)).mean(axis=1),
+            "dragged": (~stance & loaded & (lifted >= 0.25)).mean(axis=1),
+            "placement": near.sum(axis=1) * recovers,
             "swing_height": (np.square(high) * ~stance).sum(axis=1),
             "flat": (1.0 - truth.sole_up).sum(axis=1),
             "upright": lean,
@@ -228,7 +247,7 @@ class Rewards:
         }
         self._speed = speed.copy()
         weighted = {name: getattr(w, name) * value for name, value in terms.items()}
-        always = strictness * weighted["fast"]
+        always = strictness * (weighted["fast"] + weighted["dragged"])
         total = np.asarray(sum(weighted.values()), dtype=np.float64) - always
         return (np.maximum(total, 0.0) + always) * dt, {
             name: float(v[np.isfinite(v)].mean()) for name, v in weighted.items()

@@ -18,7 +18,7 @@ from golem.training.legs.env import PERIOD, TASKS, LegsEnv
 from golem.training.legs.export_policy import load_actor
 
 SETTLE, PATIENCE = 2.0, 3.0
-"""Time of standing before the shove, and time after its begin [s]; both have to be survived."""
+"""Time of standing or walking before the shove, and time after its begin [s]; both have to be survived."""
 NO_ROBOT = np.arange(0)
 
 
@@ -37,8 +37,10 @@ class Shoved:
     fell: int
 
 
-def shove_all(network: Path, impulse: float, n: int, seed: int, threads: int) -> list[Shoved]:
-    """Shove `n` standing robots in each direction once, arms at rest, without exploration.
+def shove_all(
+    network: Path, impulse: float, n: int, seed: int, threads: int, speed: float = 0.0
+) -> list[Shoved]:
+    """Shove `n` robots in each direction once, arms at rest, without exploration.
 
     Args:
         network: checkpoint of a training run, or an exported network.
@@ -46,6 +48,8 @@ def shove_all(network: Path, impulse: float, n: int, seed: int, threads: int) ->
         n: robots per direction.
         seed: of the robots.
         threads: of the physics.
+        speed: at which the robots walk ahead in the world of the walking task, shoved at any moment of their gait; 0
+            stands in that of the standing task [m/s].
 
     Raises:
         ConfigError: it is neither, or a number is not positive.
@@ -56,13 +60,17 @@ def shove_all(network: Path, impulse: float, n: int, seed: int, threads: int) ->
         )
     torch.set_num_threads(1)
     actor = load_actor(network)
-    env = LegsEnv(n * len(DIRECTIONS), TASKS["stand"], seed, threads)
+    task = TASKS["walk" if speed else "stand"]
+    env = LegsEnv(n * len(DIRECTIONS), task, seed, threads)
     env.difficulty.amplitude = env.difficulty.speed = env.difficulty.payload = 0.0
     env.restart(np.arange(env.n))
     angle = np.repeat(np.arange(len(DIRECTIONS)) * np.pi / 4.0, n)
-    env.shove(impulse / SHOVE_TIME * np.stack([np.cos(angle), np.sin(angle)], axis=1), SHOVE_TIME, SETTLE)
+    env.command(np.array([speed, 0.0, 0.0]))
+    moment = np.tile(np.linspace(0.0, task.gait.period if speed else 0.0, n, endpoint=False), len(DIRECTIONS))
+    force = impulse / SHOVE_TIME * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    env.shove(force, SHOVE_TIME, SETTLE + moment)
     stopped, fell = np.zeros(env.n, dtype=bool), np.zeros(env.n, dtype=bool)
-    for _ in range(round((SETTLE + PATIENCE) / PERIOD)):
+    for _ in range(round((SETTLE + moment.max() + PATIENCE) / PERIOD)):
         seen = torch.from_numpy(env.observe()[0]).float()
         with torch.no_grad():
             step = env.step(actor(seen).double().numpy(), NO_ROBOT, np.zeros((0, 15)))

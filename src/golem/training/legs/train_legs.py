@@ -27,6 +27,10 @@ from golem.types import Array
 Adversary = Literal["none", "motions", "learned"]
 VALUES_FIRST = 5e5
 """Steps in which a critic that begins from nothing learns what an exported network is worth: 40 updates [own]."""
+EXPORTED_PUSH = 0.5
+"""Share of the largest push with which the training of an exported network begins: what it has met before."""
+EXPORTED_RAMP = (5e5, 4e6)
+"""Steps between which its pushes grow to their full range."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +46,8 @@ class TrainLegsConfig:
         threads: of the physics; they change nothing of the result.
         start: what this run begins with, exploring with `noise`: networks and steps of another run's checkpoint, or a
             network that was exported. A run from an exported network counts its steps from none, is at full difficulty
-            at once, learned adversary included, and changes the network after `VALUES_FIRST` steps only: until then it
-            has no critic worth the name.
+            at once, learned adversary included, but for pushes, which grow from `EXPORTED_PUSH`, and changes the
+            network after `VALUES_FIRST` steps only: until then it has no critic worth the name.
         adversary: who works against the legs through the upper body: `none` (it rests at home, ready or straight, its
             hands empty), `motions` (the curriculum of motions and payloads), or `learned` (that, and a policy that
             moves half of the robots once `learned_from` steps are done).
@@ -257,7 +261,10 @@ class _Run:
     def _harden(self) -> None:
         """Set the difficulty of the disturbances by the steps that were done."""
         config, difficulty = self.config, self.env.difficulty
-        difficulty.push = float(np.interp(self._progress, config.push_ramp, (0.05, 1.0)))
+        if self._exported:
+            difficulty.push = float(np.interp(self.steps, EXPORTED_RAMP, (EXPORTED_PUSH, 1.0)))
+        else:
+            difficulty.push = float(np.interp(self._progress, config.push_ramp, (0.05, 1.0)))
         difficulty.strictness = float(np.interp(self._progress, config.strict_ramp, (0.0, 1.0)))
         motion = float(np.interp(self._progress, config.motion_ramp, (0.05, 1.0)))
         motion = 0.0 if config.adversary == "none" else motion
