@@ -13,6 +13,7 @@ from golem.interfaces import topics
 from golem.interfaces.nav_payloads import MapFile, MapPlace, OccupancyGrid
 from golem.middleware.bus import News
 from golem.skills.explore import Explore, ExploreGoal
+from golem.skills.kept_file import KeptFileConfig
 from golem.types import PlanarPose
 
 ORIGIN = PlanarPose(0.0, 0.0, 0.0)
@@ -48,9 +49,9 @@ class Explorer(Ground):
 
 def test_it_sees_the_whole_room_and_comes_home(tmp_path: Path) -> None:
     robot = Explorer()
-    goal = ExploreGoal(save=str(tmp_path / "hall"))
-    result = outcome(robot.run(Explore().run(robot.context, goal), 120.0))
-    assert result.success and "hall.yaml" in result.reason
+    skill = Explore(KeptFileConfig(str(tmp_path)))
+    result = outcome(robot.run(skill.run(robot.context, ExploreGoal(save="hall")), 120.0))
+    assert result.success and str(tmp_path / "hall.yaml") in result.reason
     inside = robot.seen[1:-1, 1:-1]
     assert (inside >= 0).mean() > 0.95
     assert abs(robot.pose.x) < 0.05 and abs(robot.pose.y) < 0.05
