@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from tests.capabilities.navigation.rooms import room
 from tests.skills.test_walk import Ground, outcome
 
@@ -14,7 +15,7 @@ from golem.interfaces.nav_payloads import MapFile, MapPlace, OccupancyGrid
 from golem.middleware.bus import News
 from golem.skills.explore import Explore, ExploreGoal
 from golem.skills.kept_file import KeptFileConfig
-from golem.types import PlanarPose
+from golem.types import PlanarPose, Twist
 
 ORIGIN = PlanarPose(0.0, 0.0, 0.0)
 
@@ -63,6 +64,24 @@ def test_a_map_that_cannot_be_kept_is_said() -> None:
     result = outcome(robot.run(Explore().run(robot.context, ExploreGoal(most=0, save="x")), 60.0))
     assert (result.success, result.stage, result.slot) == (False, "save", "mapper")
     assert "cannot be written" in result.reason
+
+
+@pytest.mark.parametrize("at", [0.05, 4.0, 12.0])
+def test_cancelled_at_any_stage_it_stands_and_stays(at: float) -> None:
+    robot = Explorer()
+    run = robot.run(Explore().run(robot.context, ExploreGoal()), at)
+    assert run.result is None
+    run.cancel()
+    for _ in range(20):
+        robot._advance()
+        run.step()
+        robot.node.step(robot.context.t)
+    place = robot.pose
+    assert run.result is not None and run.result.stage == "cancelled"
+    for _ in range(50):
+        robot._advance()
+        robot.node.step(robot.context.t)
+    assert robot.twist == Twist() and robot.pose == place
 
 
 def test_without_a_map_it_does_not_begin() -> None:

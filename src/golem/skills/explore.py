@@ -91,6 +91,7 @@ class Explore:
                 f"The legs, '{context.legs.status.controller}', do not walk; choose others, such as almi."
             )
         if not await context.until(lambda: context.mapped, FIRST_MAP):
+            context.legs.check_located()
             raise StageFailed("locate", "mapper", f"There is no map after {FIRST_MAP:g} s.")
         home, given_up, visited = self._here(context), list[PlanarPose](), 0
         while visited < goal.most and context.t - start < goal.timeout:
