@@ -292,9 +292,9 @@ class Lio(Ignores):
         if len(track) < 2:
             return np.zeros((0, 3))
         # Those that are none are left out first: a sensor that loses every second one would lose all that are used.
-        finite = np.isfinite(scan.points).all(axis=1) & np.isfinite(scan.offsets)
-        points = scan.points[finite][:: self.config.stride].astype(np.float64)
-        offsets = scan.offsets[finite][:: self.config.stride].astype(np.float64)
+        used = np.flatnonzero(np.isfinite(scan.points).all(axis=1) & np.isfinite(scan.offsets))
+        used = used[:: self.config.stride]
+        points, offsets = scan.points[used].astype(np.float64), scan.offsets[used].astype(np.float64)
         config, T_base_lidar = self.config, lidar_in_base(self._waist)
         good = of_the_world(points, T_base_lidar, config.blind, config.body)
         t, R, p, v, rate = (np.array(column) for column in zip(*track, strict=True))
