@@ -296,7 +296,7 @@ class Lio(Ignores):
         used = used[:: self.config.stride]
         points, offsets = scan.points[used].astype(np.float64), scan.offsets[used].astype(np.float64)
         config, T_base_lidar = self.config, lidar_in_base(self._waist)
-        good = of_the_world(points, T_base_lidar, config.blind, config.body)
+        good = np.flatnonzero(of_the_world(points, T_base_lidar, config.blind, config.body))
         t, R, p, v, rate = (np.array(column) for column in zip(*track, strict=True))
         # The rate of an interval is that of the sample at its end.
         rate = np.concatenate([rate[1:], rate[-1:]])
