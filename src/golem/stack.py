@@ -168,6 +168,11 @@ class Stack:
         old = self.choice(key)
         return self.with_choice(key, Choice(old.use, {**old.options, **options}))
 
+    def with_skill(self, name: str, **options: object) -> Stack:
+        """Return a copy in which some options of the skill called `name` are others."""
+        old = self.all_skills.get(name, Choice(name))
+        return replace(self, skills={**self.skills, name: Choice(old.use, {**old.options, **options})})
+
     def with_part(self, name: str, **options: object) -> Stack:
         """Return a copy in which a part, a key of `golem.slots.PARTS`, has some other options.
 

@@ -11,7 +11,8 @@ from golem.capabilities.odometry.base import NO_COVARIANCE, Ignores, OdometryEst
 from golem.errors import ModuleFault
 from golem.interfaces import topics
 from golem.interfaces.lidar import ExternalOdometry, LegOdometry, LidarImu, LidarScan
-from golem.middleware.bus import Bus
+from golem.interfaces.payloads import OdometrySilence
+from golem.middleware.bus import Bus, News
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.lockstep import build
 from golem.runtime.odometry_node import LidarNode, OdometryNode
@@ -95,6 +96,18 @@ def test_it_publishes_every_10_ms_what_the_module_says_and_nothing_while_that_is
     assert bus.count(topics.ODOMETRY) == 5
     newest = bus.latest(topics.ODOMETRY)
     assert newest is not None and newest.t == pytest.approx(0.09)
+
+
+def test_it_says_why_it_is_silent_once_and_when_it_no_longer_is(bus: Bus) -> None:
+    odometry, said = Listens(), News(bus, topics.ODOMETRY_SILENCE)
+    node = OdometryNode(bus, odometry, ContractCheck("odometry", "listens"))
+    node.step(0.0)
+    assert said.read() == OdometrySilence(0.0, "It was told so.")
+    node.step(0.01)
+    assert said.read() is None
+    odometry.says = estimate(0.02)
+    node.step(0.02)
+    assert said.read() == OdometrySilence(0.02, "")
 
 
 def test_a_wrong_answer_is_the_modules_fault(bus: Bus) -> None:

@@ -29,8 +29,8 @@ def test_more_views_get_more_time() -> None:
 def test_a_robot_finds_its_errors_and_uses_them(tmp_path: Path) -> None:
     file = tmp_path / "calibration.json"
     stack = load_stack("tether", profile="field").with_options("robot", tags=True, world="open")
-    running, robot = build(stack, 1)
-    result = running.execute("calibrate", {"file": str(file), "views": 12})
+    running, robot = build(stack.with_skill("calibrate", folder=str(tmp_path)), 1)
+    result = running.execute("calibrate", {"file": file.name, "views": 12})
     assert result.success, result.reason
     found, ahead = read_calibration(file), np.array([0.0, 0.0, 1.0, 1.0])
     before, after = (
@@ -46,8 +46,8 @@ def test_a_robot_finds_its_errors_and_uses_them(tmp_path: Path) -> None:
 @pytest.mark.timeout(900)
 def test_a_robot_without_tags_says_so(tmp_path: Path) -> None:
     stack = load_stack("tether", profile="bench").with_options("robot", world="open")
-    running, robot = build(stack, 0)
-    result = running.execute("calibrate", {"file": str(tmp_path / "none.json"), "views": 6})
+    running, robot = build(stack.with_skill("calibrate", folder=str(tmp_path)), 0)
+    result = running.execute("calibrate", {"file": "none.json", "views": 6})
     assert not result.success and "tags were seen in 0 postures" in result.reason
     assert not (tmp_path / "none.json").exists()
     robot.close()

@@ -67,6 +67,24 @@ def test_cancelled_on_its_way_it_stands() -> None:
     assert run.result is not None and robot.twist == Twist()
 
 
+@pytest.mark.parametrize("at", [0.05, 0.8, 2.0, 9.0])
+def test_cancelled_at_any_stage_it_stands_and_stays(at: float) -> None:
+    robot = Before(PlanarPose(0.0, -0.4, 0.0))
+    run = robot.run(Dock().run(robot.context, DockGoal()), at)
+    assert run.result is None
+    run.cancel()
+    for _ in range(100):
+        robot._advance()
+        run.step()
+        robot.node.step(robot.context.t)
+    place = robot.pose
+    assert run.result is not None and run.result.stage == "cancelled"
+    for _ in range(50):
+        robot._advance()
+        robot.node.step(robot.context.t)
+    assert robot.twist == Twist() and robot.pose == place
+
+
 def test_wrong_goals_are_refused() -> None:
     with pytest.raises(ConfigError, match="standoff"):
         DockGoal(standoff=0.1)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from tests.capabilities.navigation.rooms import room
 from tests.skills.test_walk import Ground, outcome
 
@@ -13,7 +14,8 @@ from golem.interfaces import topics
 from golem.interfaces.nav_payloads import MapFile, MapPlace, OccupancyGrid
 from golem.middleware.bus import News
 from golem.skills.explore import Explore, ExploreGoal
-from golem.types import PlanarPose
+from golem.skills.kept_file import KeptFileConfig
+from golem.types import PlanarPose, Twist
 
 ORIGIN = PlanarPose(0.0, 0.0, 0.0)
 
@@ -48,9 +50,9 @@ class Explorer(Ground):
 
 def test_it_sees_the_whole_room_and_comes_home(tmp_path: Path) -> None:
     robot = Explorer()
-    goal = ExploreGoal(save=str(tmp_path / "hall"))
-    result = outcome(robot.run(Explore().run(robot.context, goal), 120.0))
-    assert result.success and "hall.yaml" in result.reason
+    skill = Explore(KeptFileConfig(str(tmp_path)))
+    result = outcome(robot.run(skill.run(robot.context, ExploreGoal(save="hall")), 120.0))
+    assert result.success and str(tmp_path / "hall.yaml") in result.reason
     inside = robot.seen[1:-1, 1:-1]
     assert (inside >= 0).mean() > 0.95
     assert abs(robot.pose.x) < 0.05 and abs(robot.pose.y) < 0.05
@@ -62,6 +64,24 @@ def test_a_map_that_cannot_be_kept_is_said() -> None:
     result = outcome(robot.run(Explore().run(robot.context, ExploreGoal(most=0, save="x")), 60.0))
     assert (result.success, result.stage, result.slot) == (False, "save", "mapper")
     assert "cannot be written" in result.reason
+
+
+@pytest.mark.parametrize("at", [0.05, 4.0, 12.0])
+def test_cancelled_at_any_stage_it_stands_and_stays(at: float) -> None:
+    robot = Explorer()
+    run = robot.run(Explore().run(robot.context, ExploreGoal()), at)
+    assert run.result is None
+    run.cancel()
+    for _ in range(20):
+        robot._advance()
+        run.step()
+        robot.node.step(robot.context.t)
+    place = robot.pose
+    assert run.result is not None and run.result.stage == "cancelled"
+    for _ in range(50):
+        robot._advance()
+        robot.node.step(robot.context.t)
+    assert robot.twist == Twist() and robot.pose == place
 
 
 def test_without_a_map_it_does_not_begin() -> None:

@@ -12,7 +12,7 @@ from tests.skills.test_walk import Ground, outcome
 from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.interfaces.nav_payloads import MapPlace, OccupancyGrid
-from golem.interfaces.payloads import Odometry
+from golem.interfaces.payloads import Odometry, OdometrySilence
 from golem.skills.navigate import FIRST_MAP, Navigate, NavigateGoal
 from golem.types import PlanarPose, Twist
 
@@ -87,6 +87,27 @@ def test_an_odometry_that_falls_silent_stops_the_robot_and_is_named(at: float) -
     result = outcome(ground.run(Navigate().run(ground.context, NavigateGoal(4.0, frame="odom"))))
     assert (result.success, result.slot) == (False, "odometry")
     assert "silent" in result.reason and ground.twist == Twist()
+
+
+def test_why_the_odometry_is_silent_stands_in_the_result() -> None:
+    ground = Mapped(offset=0.0, silent=1.0)
+    run = ground.run(Navigate().run(ground.context, NavigateGoal(4.0, frame="odom")), 1.2)
+    ground.bus.publish(topics.ODOMETRY_SILENCE, OdometrySilence(1.2, "No scan fits."), 1.2)
+    while run.result is None:
+        ground._advance()
+        run.step()
+        ground.node.step(ground.context.t)
+    assert run.result.reason.endswith("s: No scan fits.") and ground.twist == Twist()
+
+
+@pytest.mark.parametrize("frame", ["map", "odom", "base_link"])
+def test_an_odometry_that_never_speaks_is_named_and_nothing_moves(frame: str) -> None:
+    ground = Ground()
+    ground.bus.publish(topics.ODOMETRY_SILENCE, OdometrySilence(0.0, "It waits for the IMU."), 0.0)
+    goal = NavigateGoal(1.0, frame=frame)  # pyright: ignore[reportArgumentType]
+    result = outcome(ground.run(Navigate().run(ground.context, goal)))
+    assert (result.success, result.stage, result.slot) == (False, "locate", "odometry")
+    assert result.reason.endswith("where the robot is: It waits for the IMU.") and ground.pose == ORIGIN
 
 
 @pytest.mark.parametrize("at", [0.05, 1.0, 6.0])

@@ -181,6 +181,19 @@ class Odometry:
 
 
 @dataclass(frozen=True, slots=True)
+class OdometrySilence:
+    """That whatever locates the robot does not know where it is.
+
+    Attributes:
+        t: since when [s].
+        why: one sentence; empty once it knows again.
+    """
+
+    t: float
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
 class Exposure:
     """What a camera saw, before anybody says from where: a `RgbdImage` without its pose.
 

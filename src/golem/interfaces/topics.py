@@ -34,6 +34,7 @@ from golem.interfaces.payloads import (
     LegStatus,
     ModuleFaultMsg,
     Odometry,
+    OdometrySilence,
 )
 from golem.middleware.bus import Topic
 from golem.middleware.wire.api import ApiRequest, Response, request_topic, response_topic
@@ -79,6 +80,8 @@ LEG_STATUS = Topic("legs/status", LegStatus)
 """From the base layer of the lower body."""
 ODOMETRY = Topic("odometry", Odometry)
 """From whatever locates the robot better than its base estimate; a stack without it never sends any."""
+ODOMETRY_SILENCE = Topic("odometry/silence", OdometrySilence)
+"""From the same, whenever it has another reason to be silent, or none any more."""
 LIDAR_SCAN = Topic("lidar/scan", LidarScan)
 """At 10 Hz, from the LiDAR while somebody listens; a robot without one never sends any."""
 LIDAR_IMU = Topic("lidar/imu", LidarImu)

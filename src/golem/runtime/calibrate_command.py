@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import closing
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from tyro.conf import Positional
@@ -43,9 +44,11 @@ def run_calibrate(config: CalibrateConfig) -> bool:
     stack = load_stack(config.stack, profile=config.profile).with_options("robot", tags=True)
     # What is looked for is not to be corrected by what was found before.
     stack = stack.with_part("calibration", file=None)
+    file = Path(config.file)
+    stack = stack.with_skill("calibrate", folder=str(file.parent))
     running, robot = build(stack, config.seed)
     with closing(robot):
-        result = running.execute("calibrate", {"file": config.file, "views": config.views})
+        result = running.execute("calibrate", {"file": file.name, "views": config.views})
     print(result.reason)
     if not result.success:
         return False

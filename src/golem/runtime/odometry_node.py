@@ -9,7 +9,7 @@ import numpy as np
 from golem.capabilities.odometry.base import LidarOdometry, OdometryEstimate
 from golem.interfaces import topics
 from golem.interfaces.lidar import LegOdometry
-from golem.interfaces.payloads import Odometry
+from golem.interfaces.payloads import Odometry, OdometrySilence
 from golem.middleware.bus import Bus, News
 from golem.robots.base import HasLidar
 from golem.robots.model.imu_mount import TORSO, sensed_base_rate
@@ -32,6 +32,7 @@ class OdometryNode:
         self._scan = News(bus, topics.LIDAR_SCAN)
         self._external = News(bus, topics.EXTERNAL_ODOMETRY)
         self._next = 0.0
+        self._why = ""
 
     def step(self, t: float) -> None:
         """Pass on what is new, and publish the pose that is due."""
@@ -53,6 +54,10 @@ class OdometryNode:
             T_lidar = self._contract.array("T_base_lidar", estimate.T_base_lidar, 4, 4)
             known = estimate.covariance if np.isfinite(estimate.covariance).all() else None
             self._bus.publish(topics.ODOMETRY, Odometry(float(estimate.t), T, T_lidar, known), t)
+        why = odometry.why if estimate is None else ""
+        if why != self._why:
+            self._why = why
+            self._bus.publish(topics.ODOMETRY_SILENCE, OdometrySilence(t, why), t)
 
     def _add_legs(self, t: float) -> None:
         state, base = self._bus.latest(topics.LOW_STATE), self._bus.latest(topics.BASE)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -18,8 +17,10 @@ from golem.interfaces import topics
 from golem.options import require
 from golem.robots.model.spatial import skew, transform
 from golem.robots.model.tag_cuff import cuff_tags
+from golem.robots.sensors.calibration_file import read_calibration
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
+from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file
 from golem.skills.planned_motion import PlannedMotion
 from golem.types import SIDES, CameraInfo, Side
 
@@ -39,7 +40,7 @@ class CalibrateGoal:
     """What to calibrate by.
 
     Attributes:
-        file: where the calibration is written; empty writes none.
+        file: plain name of the file of the calibration; empty writes none. The folder is an option of the skill.
         views: postures per hand.
         settle: time the arm gets to come to rest in each [s].
         seed: of the postures.
@@ -62,6 +63,7 @@ class CalibrateGoal:
             ("time to settle", self.settle, 0.0 <= self.settle <= 5.0, "0 to 5 s"),
             ("seed", self.seed, self.seed >= 0, "not negative"),
         )
+        check_file_name(self.file, ".json")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +96,10 @@ class Calibrate:
     Goal = CalibrateGoal
     Result = CalibrateReport
 
+    def __init__(self, config: KeptFileConfig | None = None) -> None:
+        """Keep calibrations in the folder of `config`."""
+        self.config = config or KeptFileConfig()
+
     def timeout(self, goal: CalibrateGoal) -> float:
         """Return the time it may take [s]; see `Skill`."""
         return 60.0 + 2 * goal.views * (8.0 + goal.settle)
@@ -101,6 +107,7 @@ class Calibrate:
     async def run(self, context: Context, goal: CalibrateGoal) -> SkillResult:
         """Calibrate; see `Skill`."""
         start = context.t
+        file = kept_file(self.config.folder, goal.file, read_calibration) if goal.file else None
         views, info = await self._views(context, goal)
         if info is None:
             raise StageFailed("look", "robot", "The head camera sends no images.")
@@ -117,8 +124,8 @@ class Calibrate:
             float(np.abs(found.joint_offset).max()),
             float(found.joint_sigma.max()),
         )
-        if goal.file:
-            found.save(Path(goal.file))
+        if file is not None:
+            found.save(file)
         text = (
             f"{report.views} views, {report.residual:.2f} px left; the head camera sits "
             f"{report.camera * 1e3:.0f} mm (+- {report.camera_sigma * 1e3:.1f}) from where the model has it, at 1 m"

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
+from golem.capabilities.mapping.map_file import CLOUD, load_map
 from golem.capabilities.navigation.frontiers import frontiers
 from golem.errors import ConfigError
 from golem.interfaces import topics
@@ -13,6 +15,7 @@ from golem.middleware.bus import News
 from golem.options import require
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
+from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file
 from golem.skills.navigate import FIRST_MAP
 from golem.skills.pose_goal import FIRST_REPORT, MARGIN, MAX_TIMEOUT, go_to
 from golem.types import PlanarPose, Twist
@@ -33,7 +36,7 @@ class ExploreGoal:
 
     Attributes:
         most: frontiers that are visited at most.
-        save: file for the map, without ending; empty for none.
+        save: plain name of the map's files, without ending; empty for none. The folder is an option of the skill.
         timeout: time after which the robot goes home [s].
     """
 
@@ -52,6 +55,7 @@ class ExploreGoal:
             ("most", self.most, self.most >= 0, "not negative"),
             ("timeout", self.timeout, 0.0 < self.timeout <= MAX_TIMEOUT, "a time of at most an hour"),
         )
+        check_file_name(self.save)
 
 
 class Explore:
@@ -61,6 +65,10 @@ class Explore:
     """
 
     Goal = ExploreGoal
+
+    def __init__(self, config: KeptFileConfig | None = None) -> None:
+        """Keep maps in the folder of `config`."""
+        self.config = config or KeptFileConfig()
 
     def timeout(self, goal: ExploreGoal) -> float:
         """Return the time it may take [s]; see `Skill`."""
@@ -76,13 +84,14 @@ class Explore:
             return SkillResult(False, failure.stage, failure.slot, str(failure))
 
     async def _explore(self, context: Context, goal: ExploreGoal) -> SkillResult:
-        start = context.t
+        start, path = context.t, self._file(goal.save) if goal.save else None
         await context.until(lambda: context.legs.reporting, FIRST_REPORT)
         if context.legs.status.speed == 0.0:
             raise ConfigError(
                 f"The legs, '{context.legs.status.controller}', do not walk; choose others, such as almi."
             )
         if not await context.until(lambda: context.mapped, FIRST_MAP):
+            context.legs.check_located()
             raise StageFailed("locate", "mapper", f"There is no map after {FIRST_MAP:g} s.")
         home, given_up, visited = self._here(context), list[PlanarPose](), 0
         while visited < goal.most and context.t - start < goal.timeout:
@@ -100,10 +109,20 @@ class Explore:
             await context.sleep(LOOK)
         context.say("home", f"{visited} frontiers seen; going home.")
         result = await go_to(context, home, "map", 2.0 * LEG, "home")
-        saved = await self._save(context, goal.save) if goal.save else ""
+        saved = await self._save(context, path) if path else ""
         text = f"{visited} frontiers seen in {context.t - start:.0f} s. {result.reason}{saved}"
         context.say("done", text)
         return SkillResult(True, "done", None, text, {"explore": context.t - start})
+
+    def _file(self, name: str) -> Path:
+        """Return the path of a map without its ending, before the robot sets out for it.
+
+        Raises:
+            ConfigError: something else has the name of one of its files.
+        """
+        for ending in (".pgm", CLOUD):
+            kept_file(self.config.folder, f"{name}{ending}", _of_a_map)
+        return kept_file(self.config.folder, f"{name}.yaml", load_map).with_suffix("")
 
     def _here(self, context: Context) -> PlanarPose:
         """Return where the robot is on the map."""
@@ -120,10 +139,10 @@ class Explore:
                 return frontier.pose
         return None
 
-    async def _save(self, context: Context, path: str) -> str:
+    async def _save(self, context: Context, path: Path) -> str:
         """Keep the map, and return a sentence about it."""
         news = News(context.bus, topics.MAP_SAVED)
-        context.publish(topics.MAP_SAVE, MapFile(path))
+        context.publish(topics.MAP_SAVE, MapFile(str(path)))
         found: list[MapFile] = []
 
         def answered() -> bool:
@@ -136,3 +155,12 @@ class Explore:
         if found[0].problem:
             raise StageFailed("save", "mapper", found[0].problem)
         return f" The map is in {path}.yaml."
+
+
+def _of_a_map(file: Path) -> None:
+    """Check that an image, or the voxels, belong to a map.
+
+    Raises:
+        ConfigError: they do not.
+    """
+    load_map(file.with_suffix(".yaml"))

@@ -53,8 +53,26 @@ class LegsInterface:
         odometry = self._context.bus.latest(topics.ODOMETRY)
         if odometry is not None and self._context.t - odometry.t > ODOMETRY_TIMEOUT:
             age = self._context.t - odometry.t
-            raise StageFailed("walk", "odometry", f"The odometry has been silent for {age:.1f} s.")
+            why = self.silence or "Its sensors have fallen silent."
+            raise StageFailed("walk", "odometry", f"The odometry has been silent for {age:.1f} s: {why}")
         return self._context.T_odom_base if odometry is None else odometry.T_odom_base
+
+    @property
+    def silence(self) -> str:
+        """Why the odometry does not know where the robot is, as a sentence; empty where it knows, or there is none."""
+        silence = self._context.bus.latest(topics.ODOMETRY_SILENCE)
+        return "" if silence is None else silence.why
+
+    def check_located(self) -> None:
+        """Check that an odometry that this stack has knows where the robot is.
+
+        Raises:
+            StageFailed: it does not.
+        """
+        if self.silence:
+            raise StageFailed(
+                "locate", "odometry", f"The odometry does not know where the robot is: {self.silence}"
+            )
 
     @property
     def doubt(self) -> str:

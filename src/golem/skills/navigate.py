@@ -76,6 +76,7 @@ class Navigate:
         await context.until(lambda: context.legs.reporting, FIRST_REPORT)
         target = PlanarPose(goal.x, goal.y, goal.yaw)
         if not await context.until(lambda: context.mapped, FIRST_MAP):
+            context.legs.check_located()
             if goal.frame == "map":
                 raise StageFailed(
                     "locate",

@@ -76,8 +76,9 @@ def test_a_broken_map_is_refused_in_a_sentence(what: str, tmp_path: Path) -> Non
     (tmp_path / "m.pgm").write_bytes(b"P5\n2 1\n255\n" + bytes([0, 254]))
     (tmp_path / "empty.pgm").write_bytes(b"")
     (tmp_path / "m.yaml").write_text(BROKEN[what])
-    with pytest.raises(ConfigError, match="map"):
+    with pytest.raises(ConfigError, match="map") as refusal:
         load_map(tmp_path / "m.yaml")
+    assert "\n" not in str(refusal.value) and len(str(refusal.value)) < 400
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 nonsense", b"\x00" * 50])

@@ -57,6 +57,13 @@ def test_a_goal_that_cannot_be_reached_is_given_up_with_the_reason(
     assert step.twist == Twist()
 
 
+def test_for_a_goal_outside_the_map_it_neither_waits_nor_moves() -> None:
+    robot = ExactRobot(CostmapAstar(), room())
+    step = robot.walk(PlanarPose(40.0, 0.0, 0.0), 60.0)
+    assert step.failure == "The goal (40.00, 0.00) is outside the map."
+    assert len(robot.steps) < 60 and all(step.twist == Twist() for step in robot.steps)
+
+
 def test_what_is_not_in_the_map_is_gone_around() -> None:
     box = (2.6, 3.0, -0.6, 0.4)
     robot = ExactRobot(CostmapAstar(), room(box))

@@ -168,10 +168,11 @@ def test_bad_measurements_are_left_out() -> None:
     assert after is not None and np.array_equal(before.T_odom_base, after.T_odom_base)
 
 
-def test_points_that_are_not_finite_are_left_out() -> None:
+@pytest.mark.parametrize("every", [7, 4])
+def test_points_that_are_not_finite_are_left_out(every: int) -> None:
     def spoil(scan: LidarScan) -> LidarScan:
         points = scan.points.copy()
-        points[::7] = np.nan
+        points[::every] = np.nan
         return replace(scan, points=points)
 
     assert abs(off(run(Lio(), 4.0, change=spoil)[-1])) < 0.02

@@ -10,7 +10,7 @@ import pytest
 from golem.capabilities.odometry.base import OdometryEstimate
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
-from golem.evaluation.episodes.odometry_judge import PoseTrack, ate, end_error, nees
+from golem.evaluation.episodes.odometry_judge import PoseTrack, ate, end_error, nees, range_and_bearing
 from golem.evaluation.harness.ladder import LadderConfig, run_ladder
 from golem.evaluation.rungs.odometry import CONDITIONS, OdometryOptions, OdometryRung
 from golem.robots.model.spatial import rotation_rpy, transform
@@ -44,6 +44,18 @@ def test_errors_are_the_ones_that_were_made() -> None:
     off = track(offset, turn=0.7)
     assert end_error(off) == pytest.approx((0.0, 0.03, 0.0), abs=1e-9)
     assert 0.005 < ate(off) < 0.02
+
+
+def test_a_wrong_scale_and_a_wrong_direction_are_told_apart() -> None:
+    exact = track(np.zeros((200, 3)), turn=0.7)
+    assert range_and_bearing(exact) == pytest.approx((0.0, 0.0), abs=1e-9)
+    far = float(np.linalg.norm(exact.true[-1, :2, 3]))
+    exact.T[:, :3, 3] *= 1.01
+    assert range_and_bearing(exact) == pytest.approx((0.01 * far, 0.0), abs=1e-9)
+    exact.T[:] = transform(np.zeros(3), rotation_rpy(0.0, 0.0, 0.02)) @ exact.T
+    assert range_and_bearing(exact) == pytest.approx((0.01 * far, 0.02), abs=1e-9)
+    exact.T[-1] = exact.true[-1] = np.eye(4)
+    assert range_and_bearing(exact) is None
 
 
 @pytest.mark.parametrize("sigma", [0.02, 0.1])

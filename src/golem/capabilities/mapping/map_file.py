@@ -17,7 +17,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from golem.errors import ConfigError, OutputError
+from golem.errors import ConfigError, OutputError, shorten
 from golem.types import Array, PlanarPose
 
 OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
@@ -89,8 +89,11 @@ def load_map(path: Path) -> StoredMap:
     file = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")
     try:
         facts = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f"The map '{file}' cannot be read: {error}.") from error
+    except OSError as error:
+        raise ConfigError(f"The map '{file}' cannot be read: {error.strerror}.") from error
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        why = " ".join(str(error).split())
+        raise ConfigError(f"The map '{file}' cannot be read, it is no YAML: {shorten(why)}") from error
     if not isinstance(facts, dict) or not isinstance(facts.get("image"), str):
         raise ConfigError(
             f"'{file}' is no map: a YAML file of map_server names an image, resolution and origin."

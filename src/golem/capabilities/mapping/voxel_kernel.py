@@ -55,41 +55,52 @@ def clear(
     The two voxels before a point are left as they are: a ray that grazes a wall shall not clear it.
     """
     rows, columns, layers = voxels.shape
-    position, step = np.empty(3, np.int64), np.empty(3, np.int64)
-    t_next, t_step = np.empty(3), np.empty(3)
+    # Three scalars in place of an array each: these stay in registers.
+    x, y, z = origin[0], origin[1], origin[2]
+    begin_x, begin_y, begin_z = (
+        (x - corner[0]) / resolution,
+        (y - corner[1]) / resolution,
+        (z - corner[2]) / resolution,
+    )
     for i in range(len(points)):
-        length = 0.0
-        for a in range(3):
-            length += (points[i, a] - origin[a]) ** 2
-        length = math.sqrt(length)
+        along_x, along_y, along_z = points[i, 0] - x, points[i, 1] - y, points[i, 2] - z
+        length = math.sqrt(along_x**2 + along_y**2 + along_z**2)
         if not length > resolution:
             continue
-        for a in range(3):
-            along = (points[i, a] - origin[a]) / length
-            x = (origin[a] - corner[a]) / resolution
-            position[a] = int(math.floor(x))
-            step[a] = 1 if along > 0.0 else -1
-            if abs(along) < 1e-9:
-                t_next[a] = t_step[a] = np.inf
-            else:
-                t_step[a] = abs(resolution / along)
-                border = position[a] + (1 if along > 0.0 else 0)
-                t_next[a] = (border - x) * resolution / along
+        c, step_c, next_x, stride_x = _axis(begin_x, along_x / length, resolution)
+        r, step_r, next_y, stride_y = _axis(begin_y, along_y / length, resolution)
+        k, step_k, next_z, stride_z = _axis(begin_z, along_z / length, resolution)
         end = length - 2.0 * resolution
         t = 0.0
         while t < end:
-            c, r, k = position[0], position[1], position[2]
             if 0 <= r < rows and 0 <= c < columns and 0 <= k < layers and stamps[r, c, k] != number:
                 stamps[r, c, k] = number
                 voxels[r, c, k] = max(voxels[r, c, k] - MISS, LEAST)
-            a = 0
-            if t_next[1] < t_next[a]:
-                a = 1
-            if t_next[2] < t_next[a]:
-                a = 2
-            t = t_next[a]
-            t_next[a] += t_step[a]
-            position[a] += step[a]
+            t = min(next_x, next_y)
+            if next_z < t:
+                t = next_z
+                next_z += stride_z
+                k += step_k
+            elif next_y < next_x:
+                next_y += stride_y
+                r += step_r
+            else:
+                next_x += stride_x
+                c += step_c
+
+
+@njit(cache=True, nogil=True)
+def _axis(begin: float, along: float, resolution: float) -> tuple[int, int, float, float]:
+    """Return where a ray begins on one axis, its step, the way to the next border, and from border to border [m].
+
+    `begin` is in voxels, `along` the ray's direction cosine.
+    """
+    position = int(math.floor(begin))
+    step = 1 if along > 0.0 else -1
+    if abs(along) < 1e-9:
+        return position, step, np.inf, np.inf
+    border = position + (1 if along > 0.0 else 0)
+    return position, step, (border - begin) * resolution / along, abs(resolution / along)
 
 
 @njit(cache=True, nogil=True)

@@ -16,7 +16,7 @@ from golem.capabilities.navigation.costmap import Costmap, CostmapConfig
 from golem.capabilities.navigation.footprint import HOME
 from golem.capabilities.navigation.goto import GoTo, GoToConfig
 from golem.capabilities.navigation.local_controller import LocalController, LocalControllerConfig
-from golem.capabilities.navigation.route import find_way, way_cost
+from golem.capabilities.navigation.route import NoWay, find_way, way_cost
 from golem.capabilities.navigation.surroundings import Surroundings
 from golem.capabilities.navigation.way import Way
 from golem.finite import check_finite
@@ -117,7 +117,7 @@ class CostmapAstar:
         """Pursue `goal`; see `Navigator`."""
         self._goal = goal
         self._way: Way | None = None
-        self._why = ""
+        self._why, self._final = "", False
         self._twist = ZERO
         self._near = False
         self._recovering = False
@@ -208,10 +208,10 @@ class CostmapAstar:
         if costmap is None:
             return
         found = find_way(costmap, self._pose, self._goal, self._footprint, self.config.beta)
-        if isinstance(found, str):
-            self._way, self._why = None, found
+        if isinstance(found, NoWay):
+            self._way, self._why, self._final = None, found.why, found.final
         elif self._way is None or self._better(costmap, found, self._way):
-            self._way, self._why = found, ""
+            self._way, self._why, self._final = found, "", False
 
     def _better(self, costmap: Costmap, new: Way, old: Way) -> bool:
         """Return whether a new way is worth leaving the old one: of two that cost the same one is gone to its end."""
@@ -252,6 +252,8 @@ class CostmapAstar:
         self._why = why
         self._blocked += dt
         if self._blocked > self.config.patience:
+            if self._final:
+                return NavStep.failed(why, left)
             if self._rounds >= self.config.rounds:
                 return NavStep.failed(f"{why} It gave up after {self._rounds} recoveries.", left)
             self._rounds += 1

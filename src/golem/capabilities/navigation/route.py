@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,10 +14,23 @@ from golem.capabilities.navigation.way import Way
 from golem.types import Array, PlanarPose
 
 
+@dataclass(frozen=True, slots=True)
+class NoWay:
+    """That there is no way.
+
+    Attributes:
+        why: one sentence.
+        final: whether it is so however long the robot waits and wherever it backs up to.
+    """
+
+    why: str
+    final: bool = False
+
+
 def find_way(
     costmap: Costmap, start: PlanarPose, goal: PlanarPose, footprint: Footprint, beta: float
-) -> Way | str:
-    """Return the cheapest way, or one sentence why there is none.
+) -> Way | NoWay:
+    """Return the cheapest way, or why there is none.
 
     Near the start and the goal the footprint decides, not the distance at which ways keep from obstacles: the robot
     stands there as it does, and may stand close to something beside or behind it.
@@ -23,13 +38,13 @@ def find_way(
     places = np.array([[start.x, start.y], [goal.x, goal.y]])
     row, column, inside = costmap.cells(places)
     if not inside[1]:
-        return f"The goal ({goal.x:.2f}, {goal.y:.2f}) is outside the map."
+        return NoWay(f"The goal ({goal.x:.2f}, {goal.y:.2f}) is outside the map.", final=True)
     if not inside[0]:
-        return f"The robot, at ({start.x:.2f}, {start.y:.2f}), is outside the map."
+        return NoWay(f"The robot, at ({start.x:.2f}, {start.y:.2f}), is outside the map.", final=True)
     hit = costmap.free_at(footprint.at(goal)) <= 0.5 * costmap.resolution
     if hit.any():
         at = footprint.at(goal)[int(hit.argmax())]
-        return (
+        return NoWay(
             f"The goal ({goal.x:.2f}, {goal.y:.2f}) is inside an obstacle: there the robot would touch something at "
             f"({at[0]:.2f}, {at[1]:.2f})."
         )
@@ -39,7 +54,9 @@ def find_way(
         _open(cost, cell, footprint.reach / costmap.resolution)
     found = astar(cost, cells[0], cells[1], beta, INSCRIBED)
     if found is None:
-        return f"There is no way to ({goal.x:.2f}, {goal.y:.2f}) on the map: it is walled in, or the gaps are narrow."
+        return NoWay(
+            f"There is no way to ({goal.x:.2f}, {goal.y:.2f}) on the map: it is walled in, or the gaps are narrow."
+        )
     points = costmap.places(found[0])
     points[0], points[-1] = places
     return Way(points)

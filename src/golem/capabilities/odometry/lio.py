@@ -291,10 +291,12 @@ class Lio(Ignores):
         """Return (n, 3) the points of a scan that are not the robot's, in the frame of the IMU at its end [m]."""
         if len(track) < 2:
             return np.zeros((0, 3))
-        points = scan.points[:: self.config.stride].astype(np.float64)
-        offsets = scan.offsets[:: self.config.stride].astype(np.float64)
+        # Those that are none are left out first: a sensor that loses every second one would lose all that are used.
+        used = np.flatnonzero(np.isfinite(scan.points).all(axis=1) & np.isfinite(scan.offsets))
+        used = used[:: self.config.stride]
+        points, offsets = scan.points[used].astype(np.float64), scan.offsets[used].astype(np.float64)
         config, T_base_lidar = self.config, lidar_in_base(self._waist)
-        good = of_the_world(points, T_base_lidar, config.blind, config.body) & np.isfinite(offsets)
+        good = np.flatnonzero(of_the_world(points, T_base_lidar, config.blind, config.body))
         t, R, p, v, rate = (np.array(column) for column in zip(*track, strict=True))
         # The rate of an interval is that of the sample at its end.
         rate = np.concatenate([rate[1:], rate[-1:]])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
 
@@ -72,6 +73,18 @@ def end_error(track: PoseTrack) -> tuple[float, float, float]:
     off = track.T[-1, :3, 3] - track.true[-1, :3, 3]
     own, true = (PlanarPose.of(T[-1]) for T in (track.T, track.true))
     return float(np.hypot(off[0], off[1])), float(off[2]), math.remainder(own.yaw - true.yaw, math.tau)
+
+
+def range_and_bearing(track: PoseTrack) -> tuple[float, float] | None:
+    """Return how much too far from its beginning an anchored track ends [m], and in a direction how much off [rad].
+
+    How far it is needs no direction ahead; the other error says how well that of base_link was known at the beginning.
+    None for a walk that ends where it began, whose end has no direction.
+    """
+    own, true = (complex(*T[-1, :2, 3]) for T in (track.T, track.true))
+    if abs(true) < 1.0 or not own:
+        return None
+    return abs(own) - abs(true), cmath.phase(own / true)
 
 
 def nees(track: PoseTrack, since: float) -> tuple[float, float] | None:

@@ -93,6 +93,8 @@ METRICS: dict[str, Metric] = {
     "ate": Metric("trajectory off the true one, RMS after alignment", "cm", 1e2),
     "end_error": Metric("place on the floor off at the end", "cm", 1e2),
     "end_height": Metric("height off at the end", "cm", 1e2),
+    "end_range": Metric("end too far from the beginning", "cm", 1e2),
+    "end_bearing": Metric("direction from beginning to end off", "deg", _DEG),
     "end_heading": Metric("heading off at the end", "deg", _DEG),
     "frames_lost": Metric("scans after which it was silent"),
     "nees_place": Metric("squared error of the place over its covariance"),

@@ -148,10 +148,11 @@ def calibrate(stack: Stack, seed: int, views: int, keep: str = "") -> Calibratio
     kept = Path(keep) / f"{stack.profile}-{views}-{seed}.json" if keep else None
     if kept is not None and kept.is_file():
         return read_calibration(kept)
-    running, robot = build(stack, seed)
-    with closing(robot), tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder:
         file = kept or Path(folder) / "calibration.json"
-        result = running.execute(SKILL, {"file": str(file), "views": views})
+        running, robot = build(stack.with_skill(SKILL, folder=str(file.parent)), seed)
+        with closing(robot):
+            result = running.execute(SKILL, {"file": file.name, "views": views})
         return read_calibration(file) if result.success else result
 
 

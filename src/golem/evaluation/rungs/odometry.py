@@ -17,7 +17,7 @@ from golem.capabilities.odometry.base import LidarOdometry, OdometryEstimate
 from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import legs_stack
 from golem.evaluation.episodes.lidar_walk import START, LidarWalk, Route, record_walk
-from golem.evaluation.episodes.odometry_judge import PoseTrack, ate, end_error, nees
+from golem.evaluation.episodes.odometry_judge import PoseTrack, ate, end_error, nees, range_and_bearing
 from golem.interfaces.lidar import LegOdometry, LidarImu, LidarScan
 from golem.provenance import stack_facts
 from golem.runtime.contract_check import ContractCheck
@@ -241,6 +241,9 @@ def judge(spec: TrialSpec, walk: LidarWalk, found: Followed) -> TrialOutcome:
         "drift": end / max(walk.distance, 1e-9),
         "frames_lost": float(found.silent),
     }
+    split = range_and_bearing(track)
+    if split is not None:
+        series["end_range"], series["end_bearing"] = split
     honest = nees(track, START)
     if honest is not None:
         series["nees_place"], series["nees_heading"] = honest
