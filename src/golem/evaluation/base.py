@@ -32,6 +32,8 @@ RUNGS: dict[str, str] = {
     "calibration": "golem.evaluation.rungs.calibrated_robot:CalibrationRung",
     "fridge-tether": "golem.evaluation.rungs.open_fridge:FridgeTether",
     "fridge-stand": "golem.evaluation.rungs.open_fridge:FridgeStand",
+    "counter-tether": "golem.evaluation.rungs.counter:CounterTether",
+    "counter-stand": "golem.evaluation.rungs.counter:CounterStand",
     "push": "golem.evaluation.rungs.push:PushRung",
     "push-ramp": "golem.evaluation.rungs.push_ramp:PushRampRung",
     "push-limit": "golem.evaluation.rungs.push_limit:PushLimit",
