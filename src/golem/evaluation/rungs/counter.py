@@ -37,10 +37,12 @@ from golem.types import Array, Side
 
 SETTLE = 1.0
 """Robot time that what was set down gets to come to rest [s]."""
-AREA = ((0.44, 0.52), (-0.30, 0.30))
+AREA = ((0.44, 0.54), (-0.38, 0.38))
 """x and y bounds in base_link of the places that are asked for [m]: both hands get there."""
 FREE = 0.17
-"""Least distance of such a place from what stands on the counter [m]."""
+"""Distance of such a place from other things that is enough [m]."""
+ELSEWHERE = 0.12
+"""Least distance of it from where the thing stood [m]."""
 ACROSS = 0.06
 """How far beyond the middle of the robot a hand is asked to go [m]."""
 
@@ -215,10 +217,10 @@ def draw_errand(
     own: Side = "left" if chosen.position[1] > 0.0 else "right"
     hand: Side = "left" if spec.case.get("hand", own) == "left" else "right"
     mirror = 1.0 if hand == "left" else -1.0
-    others = np.array([thing.position[:2] for thing in things])
-    free = [s for s in spots if mirror * s[1] > -ACROSS and _apart(s, others)]
-    return None if not free else (chosen.kind, hand, (float(free[0][0]), float(free[0][1])))
-
-
-def _apart(spot: Array, others: Array) -> bool:
-    return bool(np.linalg.norm(others - spot, axis=1).min() > FREE)
+    others = np.array([thing.position[:2] for thing in things if thing is not chosen]).reshape(-1, 2)
+    spots = spots[mirror * spots[:, 1] > -ACROSS]
+    room = np.linalg.norm(spots[:, None] - others, axis=2).min(axis=1, initial=np.inf)
+    room[np.linalg.norm(spots - chosen.position[:2], axis=1) < ELSEWHERE] = 0.0
+    # Any free place; of a counter without one the place with the most room.
+    spot = spots[int(np.argmax(np.minimum(room, FREE)))]
+    return chosen.kind, hand, (float(spot[0]), float(spot[1]))
