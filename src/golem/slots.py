@@ -155,6 +155,7 @@ SLOTS: dict[str, Slot] = {
             "disassemble": "golem.skills.disassemble:Disassemble",
             "dock": "golem.skills.dock:Dock",
             "explore": "golem.skills.explore:Explore",
+            "fetch": "golem.skills.fetch:Fetch",
             "navigate": "golem.skills.navigate:Navigate",
             "open": "golem.skills.open_door:OpenDoor",
             "pick": "golem.skills.pick:Pick",

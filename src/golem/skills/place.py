@@ -33,6 +33,8 @@ IN_HAND = 0.16
 """Radius around a hand within which the head camera shows what it holds [m]."""
 PROUD = 0.025
 """Height above a surface from which on something stands there [m]: the head camera is not sure of less."""
+STRAIGHT = (0.02, 0.1)
+"""How far a hand that carries may leave its line, and turn [m, rad]."""
 TILT = 0.4
 """How far what is held may lean on the way [rad]."""
 
@@ -199,11 +201,18 @@ class Place:
         held = Held(side, _column(arm.pose, below, goal.above))
         at = np.array([spot[0], spot[1], spot[2] + below + c.hover])
         context.say("carry", "Carrying it there.", target=at.tolist(), side=side)
+        goals = [self._turned(arm.commanded, turn, at) for turn in TURNS]
+        for T in goals:
+            # Straight there and down, as long as the arm can: planned ways of a hand are long ways for a thing.
+            try:
+                await motion.line(side, at_height(T, max(T[2, 3], arm.commanded[2, 3])), c.travel_speed,
+                                  tolerance=STRAIGHT, avoid=True)  # fmt: skip
+                await motion.line(side, T, c.travel_speed, tolerance=STRAIGHT)
+                return
+            except PlanRefused:
+                continue
         refused: PlanRefused | None = None
-        for turn in TURNS:
-            T = np.eye(4)
-            T[:3, :3] = Rotation.from_euler("z", turn).as_matrix() @ arm.commanded[:3, :3]
-            T[:3, 3] = at
+        for T in goals:
             then = [Then(side, lifted(T, -c.hover), c.lower_speed, APPROACH)]
             try:
                 await motion.to({side: T}, c.travel_speed, then, self._upright(context, side), [held], OVER)
@@ -212,6 +221,14 @@ class Place:
                 refused = refused or refusal
         assert refused is not None
         raise failed("carry", refused) from refused
+
+    @staticmethod
+    def _turned(T: Array, turn: float, at: Array) -> Array:
+        """Return pose `T` (4, 4) at `at` (3,), turned by `turn` about the vertical [rad]."""
+        moved = T.copy()
+        moved[:3, :3] = Rotation.from_euler("z", turn).as_matrix() @ T[:3, :3]
+        moved[:3, 3] = at
+        return moved
 
     def _upright(self, context: Context, side: Side) -> list[Rule]:
         """Return the rule that what is held does not lean: a hand that came from above goes on looking down."""

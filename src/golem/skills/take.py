@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from golem.capabilities.arms.postures import posture
+from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.grasping.base import Grasp, GraspMethod
+from golem.capabilities.grasping.centroid import grasp_pose
 from golem.capabilities.grasping.object_cloud import spaced
 from golem.capabilities.planning.base import PlanRefused
 from golem.errors import ConfigError
@@ -30,6 +32,10 @@ SPARED = 0.07
 """Radius around points of the thing within which nothing is in the hand's way [m]."""
 EVERY = 0.06
 """Distance of those points [m]."""
+NEAR = 0.03
+"""How far from where the palm camera is to look from a hand may arrive [m]."""
+COMFORT: Array = np.array([0.45, -0.15, 0.0])
+"""Where the right hand works best, in base_link [m]; its height does not count."""
 TOP, FORWARD = "top", "forward"
 
 
@@ -66,7 +72,8 @@ class TakeConfig:
     """Distances, speeds and forces.
 
     Attributes:
-        before: distance from the thing, along the approach, at which the hand arrives and looks again [m].
+        before: distance from the grasp, along the approach, from which the hand goes straight to it [m].
+        watch: distance of the fingertips from the thing when the palm camera looks at it [m].
         lean: how far a forward approach leans down [rad]: level with a low counter the forearm does not reach.
         look_again: whether the palm camera corrects what the head camera saw; without, all is open loop.
         trust: how far from where the head camera has it the palm camera may see it [m].
@@ -83,13 +90,14 @@ class TakeConfig:
     """
 
     before: float = 0.12
+    watch: float = 0.12
     lean: float = 0.5
     look_again: bool = True
-    trust: float = 0.12
+    trust: float = 0.15
     attempts: int = 6
     travel_speed: float = 0.25
     reach_speed: float = 0.08
-    force: float = 12.0
+    force: float = 14.0
     close_timeout: float = 2.5
     lift: float = 0.12
     turn: float = 0.45
@@ -226,36 +234,59 @@ class Take:
 
         c, way = self._config, self._way(context, target, kind)
         yaw = 0.5 * math.pi if side == "left" else -0.5 * math.pi
-        name = f"{'ready' if kind == TOP else 'forward'}_{side}"
-        grasps = await context.propose(method, target, side, yaw, way)
-        if not grasps:
-            raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {target.label}.")
         self._report.side, self._report.approach = side, kind
         context.say("approach", f"Bringing the {side} hand before the {target.label}, {kind}.", side=side)
         context.hands[side].open(MAX_GAP)
+        scene = context.scene("head")
         try:
+            name = f"{'ready' if kind == TOP else 'forward'}_{side}"
             await motion.to_joints(posture(name), [side], c.travel_speed)
+            if c.look_again:
+                T = self._watching(context, target, side, np.array(way), yaw)
+                await motion.to({side: T}, c.travel_speed, near=NEAR)
+                palm = await palm_view(context, side, target.label, c.look_timeout)
+                target, scene = self._corrected(context, motion, target, palm)
         except PlanRefused as refusal:
             raise failed("approach", refusal) from refusal
+        grasps = await context.propose(method, target, side, yaw, way, scene)
+        if not grasps:
+            raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {target.label}.")
         grasp = await self._reach_before(motion, side, grasps)
-        if not c.look_again:
-            self._measure(context.scene("head"), target, grasp)
-            return grasp
-        palm = await palm_view(context, side, target.label, c.look_timeout)
-        seen = seen_again(palm, target, c.trust)
+        self._measure(scene, target, grasp)
+        return grasp
+
+    def _watching(
+        self, context: Context, target: LocalizedObject, side: Side, way: Array, yaw: float
+    ) -> Array:
+        """Return the (4, 4) pose in odom from which the palm camera shows the thing, wherever it is about there.
+
+        A hand that looks down stays within its reach: the head camera may show the thing a little beyond it.
+        """
+        points = target.points if len(target.points) else target.position[None]
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        if way[2] > -0.9:
+            return grasp_pose(middle - self._config.watch * way, yaw, -way)
+        middle[2] = points[:, 2].max() + self._config.watch
+        T = context.T_odom_base
+        local = T[:3, :3].T @ (middle - T[:3, 3])
+        mirror = np.array([1.0, 1.0 if side == "right" else -1.0, 1.0])
+        best, reach = COMFORT * mirror + (0.0, 0.0, local[2]), load_map()
+        shares = np.linspace(0.0, 1.0, 11)
+        there = next((s for s in shares if reach.serves(side, local + s * (best - local))), 1.0)
+        return grasp_pose(T[:3, :3] @ (local + there * (best - local)) + T[:3, 3], yaw, -way)
+
+    def _corrected(
+        self, context: Context, motion: PlannedMotion, target: LocalizedObject, palm: Array
+    ) -> tuple[LocalizedObject, Array]:
+        """Return the thing and what is around it as the palm camera shows it, or as it was where that shows nothing."""
+        seen = seen_again(palm, target, self._config.trust)
         if seen is None:
             context.say("approach", f"The palm camera does not show the {target.label}.")
-            self._measure(context.scene("head"), target, grasp)
-            return grasp
+            return target, context.scene("head")
         off = np.median(seen.points, axis=0) - np.median(target.points, axis=0)
         motion.displace(np.append(off[:2], 0.0))
-        again = await context.propose(method, seen, side, yaw, way, palm)
         context.say("approach", f"It is {1e3 * math.hypot(*off[:2]):.0f} mm from where it seemed.")
-        if not again:
-            raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {target.label}.")
-        grasp = await self._reach_before(motion, side, again)
-        self._measure(palm, seen, grasp)
-        return grasp
+        return seen, palm
 
     def _way(self, context: Context, target: LocalizedObject, kind: str) -> tuple[float, float, float]:
         """Return the direction in odom along which the hand is to come."""

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from golem.capabilities.grasping.object_cloud import MIN_POINTS, object_points
+from golem.capabilities.grasping.object_cloud import MIN_POINTS, piece
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
-from golem.types import Array, Detection, LocalizedObject, Side
+from golem.types import Array, LocalizedObject, Side
 
 LAYER = 0.006
 """Thickness of the layer of points that a surface is [m]: the noise of a head camera at arm's length."""
@@ -17,6 +17,8 @@ ABOUT = 0.16
 """Radius around a thing within which the surface is that it stands on [m]."""
 TIPS = 0.004
 """Points of a palm camera that are less beyond the fingertips are the fingers' own [m]."""
+PROUD = 0.012
+"""Height above a surface from which on points are of what stands on it [m]."""
 FRAMES = 3
 """Frames of a palm camera that are waited for, so that it shows the hand at rest."""
 
@@ -88,10 +90,12 @@ def seen_again(points: Array, target: LocalizedObject, trust: float) -> Localize
     around = points[np.linalg.norm(points[:, :2] - middle[:2], axis=1) < trust + 0.10]
     if len(around) < MIN_POINTS:
         return None
-    cloud = object_points(around, middle)
+    level = surface_below(around, middle)
+    if level is not None:
+        around = around[around[:, 2] > level + PROUD]
+    cloud = piece(around, middle)
     if len(cloud) < MIN_POINTS or np.hypot(*(np.median(cloud, axis=0) - middle)[:2]) > trust:
         return None
     centre = np.median(cloud, axis=0)
     nearest = cloud[((cloud - centre) ** 2).sum(axis=1).argmin()].copy()
-    detection: Detection = target.detection
-    return replace(target, detection=detection, position=nearest, points=cloud, mask=None)
+    return replace(target, position=nearest, points=cloud, mask=None)

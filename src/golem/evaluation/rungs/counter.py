@@ -33,7 +33,7 @@ from golem.skills.place import PlaceGoal
 from golem.skills.take import TakeGoal, TakeReport
 from golem.slots import KEYS
 from golem.stack import Stack, load_stack
-from golem.types import Array, Side
+from golem.types import Side
 
 SETTLE = 1.0
 """Robot time that what was set down gets to come to rest [s]."""

@@ -129,7 +129,9 @@ def draw_counter(rng: np.random.Generator, raised: float = 0.0, varied: bool = T
     top, edge = 0.96 + raised + 0.04 * draws[0], 0.35 + 0.02 * draws[1]
     kinds = [str(kind) for kind in rng.permutation(list(KINDS))]
     area = Area((edge + 0.09, edge + 0.25), (-0.42, 0.42), LEAST_APART)
-    things = _draw_things(rng, kinds, top, area, 1.0)
+    # Where one finds no room, all are put elsewhere.
+    drawn = (_draw_things(rng, kinds, top, area, 1.0) for _ in range(40))
+    things = next(some for some in drawn if len(some) == len(kinds))
     nominal = FridgeLayout()
     fridge = replace(nominal, handle_y=-1.10, handle_z=nominal.handle_z + raised)
     colours = FRONTS[picks[0]], TOPS[picks[1]], STEELS[picks[2]]
