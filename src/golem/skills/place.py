@@ -33,6 +33,10 @@ IN_HAND = 0.16
 """Radius around a hand within which the head camera shows what it holds [m]."""
 PROUD = 0.025
 """Height above a surface from which on something stands there [m]: the head camera is not sure of less."""
+IN_WAY = 0.12
+"""Distance from the straight way within which things are in it [m]: both are a few centimetres wide."""
+ROOM = 0.03
+"""Height above such things at which what is held passes [m]."""
 STRAIGHT = (0.02, 0.1)
 """How far a hand that carries may leave its line, and turn [m, rad]."""
 TILT = 0.4
@@ -90,7 +94,7 @@ class PlaceConfig:
         timeout: time after which it is given up [s].
     """
 
-    hover: float = 0.06
+    hover: float = 0.10
     lower: float = 0.05
     travel_speed: float = 0.20
     lower_speed: float = 0.04
@@ -201,13 +205,14 @@ class Place:
         held = Held(side, _column(arm.pose, below, goal.above))
         at = np.array([spot[0], spot[1], spot[2] + below + c.hover])
         context.say("carry", "Carrying it there.", target=at.tolist(), side=side)
+        over = self._tallest(context, arm.pose[:3, 3], at) + below + ROOM
         goals = [self._turned(arm.commanded, turn, at) for turn in TURNS]
         for T in goals:
             # Straight there and down, as long as the arm can: planned ways of a hand are long ways for a thing.
             try:
-                await motion.line(side, at_height(T, max(T[2, 3], arm.commanded[2, 3])), c.travel_speed,
-                                  tolerance=STRAIGHT, avoid=True)  # fmt: skip
-                await motion.line(side, T, c.travel_speed, tolerance=STRAIGHT)
+                up = at_height(arm.commanded, max(T[2, 3], arm.commanded[2, 3], over))
+                for stop in (up, at_height(T, up[2, 3]), T):
+                    await motion.line(side, stop, c.travel_speed, tolerance=STRAIGHT)
                 return
             except PlanRefused:
                 continue
@@ -221,6 +226,17 @@ class Place:
                 refused = refused or refusal
         assert refused is not None
         raise failed("carry", refused) from refused
+
+    @staticmethod
+    def _tallest(context: Context, here: Array, there: Array) -> float:
+        """Return the height of the tallest thing on the straight way between two places (3,), in odom [m]."""
+        scene = context.scene("head")
+        scene = scene[np.linalg.norm(scene - here, axis=1) > IN_HAND]
+        way = (there - here)[:2]
+        share = np.clip((scene[:, :2] - here[:2]) @ way / max(float(way @ way), 1e-6), 0.0, 1.0)
+        off = np.linalg.norm(scene[:, :2] - here[:2] - share[:, None] * way, axis=1)
+        near = scene[(off < IN_WAY) & (scene[:, 2] < here[2] + 0.2)]
+        return float(np.quantile(near[:, 2], 0.995)) if len(near) else -np.inf
 
     @staticmethod
     def _turned(T: Array, turn: float, at: Array) -> Array:

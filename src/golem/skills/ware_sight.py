@@ -19,6 +19,8 @@ TIPS = 0.004
 """Points of a palm camera that are less beyond the fingertips are the fingers' own [m]."""
 PROUD = 0.012
 """Height above a surface from which on points are of what stands on it [m]."""
+STRAY = 8
+"""Pieces that are too small to be a thing, and are passed over."""
 FRAMES = 3
 """Frames of a palm camera that are waited for, so that it shows the hand at rest."""
 
@@ -93,7 +95,12 @@ def seen_again(points: Array, target: LocalizedObject, trust: float) -> Localize
     level = surface_below(around, middle)
     if level is not None:
         around = around[around[:, 2] > level + PROUD]
-    cloud = piece(around, middle)
+    cloud = around[:0]
+    for _ in range(STRAY):
+        cloud = piece(around, middle)
+        if len(cloud) >= MIN_POINTS or not len(cloud):
+            break
+        around = around[(np.abs(around[:, None] - cloud).sum(axis=2) > 0.0).all(axis=1)]
     if len(cloud) < MIN_POINTS or np.hypot(*(np.median(cloud, axis=0) - middle)[:2]) > trust:
         return None
     centre = np.median(cloud, axis=0)

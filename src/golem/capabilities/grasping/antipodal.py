@@ -37,6 +37,8 @@ RIMS = 24
 """Pairs across a rim along which hands are laid at most."""
 DEEPER = 0.015
 """How much further than elsewhere the fingertips go on both sides of a rim [m]: what hangs on it turns the less."""
+ROUND = 0.03
+"""Greatest half width for which a thing that is seen across is taken to be round [m]: half of the hand's."""
 SCENE = 20000
 """Points of the surroundings that are looked at."""
 
@@ -109,10 +111,10 @@ class Antipodal(OpenLoop):
         if len(cloud) < MIN_POINTS:
             return []
         cloud = thinned(cloud, c.points, c.seed)
-        middles, axes, widths, quality = self._pairs(cloud, gripper)
+        middles, axes, widths, quality, rims = self._pairs(cloud, gripper)
         if not len(middles):
             return []
-        T, turned, index = self._hands(middles, axes, gripper)
+        T, turned, index = self._hands(middles, axes, gripper, rims)
         if not len(T):
             return []
         T, gaps, held = self._fit(T, widths[index], thinned(cloud, BETWEEN, c.seed))
@@ -125,8 +127,11 @@ class Antipodal(OpenLoop):
         kept = self._distinct(T, gaps, order, self._around(cloud, scene))
         return [Grasp(T[k].copy(), float(gaps[k]), float(score[k])) for k in kept]
 
-    def _pairs(self, cloud: Array, gripper: Gripper) -> tuple[Array, Array, Array, Array]:
-        """Return middles (n, 3), closing axes (n, 3), widths (n,) and quality (n,) of the best pairs, best first."""
+    def _pairs(self, cloud: Array, gripper: Gripper) -> tuple[Array, Array, Array, Array, int]:
+        """Return middles (n, 3), closing axes (n, 3), widths (n,) and quality (n,) of the best pairs, best first.
+
+        The last of them, as many as the last number says, lie across a rim.
+        """
         c = self.config
         rng = np.random.default_rng(c.seed)
         normals, smooth = normals_of(cloud)
@@ -158,12 +163,15 @@ class Antipodal(OpenLoop):
         best = np.argsort(-quality * np.exp(-(off**2)), kind="stable")[: c.laid]
         drawn, rim = (middle[best], way[best], width[best], quality[best]), self._rim_pairs(cloud, gripper)
         middle, way, width, quality = (np.concatenate(pair) for pair in zip(drawn, rim, strict=True))
-        return middle, way, width, quality
+        return middle, way, width, quality, len(rim[0])
 
     def _outline_pairs(
         self, cloud: Array, gripper: Gripper, cone: float
     ) -> tuple[Array, Array, Array, Array]:
-        """Return the same of the outline that `cloud` has along the approach, whose walls are taken to be along it."""
+        """Return the same of the outline that `cloud` has along the approach, whose walls are taken to be along it.
+
+        Seen across it is more likely round: there they are half of the width behind what is seen.
+        """
         c, (u, v) = self.config, _across(gripper.approach)
         spots, normals = outline(cloud @ np.column_stack([u, v]))
         if len(spots) < 4:
@@ -179,7 +187,10 @@ class Antipodal(OpenLoop):
         held = np.flatnonzero(cosine > cone)
         depth = float(np.quantile(cloud @ gripper.approach, 0.3))
         flat = 0.5 * (spots[a[held]] + spots[b[held]])
-        middle = flat[:, :1] * u + flat[:, 1:] * v + depth * gripper.approach
+        behind = (
+            np.minimum(0.5 * width[held], ROUND) if gripper.approach[2] > -ACROSS else np.zeros(len(held))
+        )
+        middle = flat[:, :1] * u + flat[:, 1:] * v + (depth + behind)[:, None] * gripper.approach
         axes = way[held, :1] * u + way[held, 1:] * v
         quality = (cosine[held] - cone) / (1.0 - cone) * 0.4 + 0.5
         return middle, axes, width[held], quality
@@ -205,8 +216,13 @@ class Antipodal(OpenLoop):
         axes = (way[thin, :1] * u + way[thin, 1:] * v) / width[:, None]
         return middle, axes, width, np.full(len(thin), 0.7)
 
-    def _hands(self, middles: Array, axes: Array, gripper: Gripper) -> tuple[Array, Array, NDArray[np.intp]]:
-        """Return poses (m, 4, 4), how far each leans from the approach (m,) [rad], and the pair (m,) it lies along."""
+    def _hands(
+        self, middles: Array, axes: Array, gripper: Gripper, rims: int
+    ) -> tuple[Array, Array, NDArray[np.intp]]:
+        """Return poses (m, 4, 4), how far each leans from the approach (m,) [rad], and the pair (m,) it lies along.
+
+        A hand on one of the last `rims` pairs does not lean: the finger that leans over a bowl tips it.
+        """
         c, approach = self.config, gripper.approach
         z = approach - (axes @ approach)[:, None] * axes
         z /= np.linalg.norm(z, axis=1, keepdims=True)
@@ -216,6 +232,7 @@ class Antipodal(OpenLoop):
             z_turned = math.cos(turn) * z + math.sin(turn) * x
             lean = np.arccos(np.clip(z_turned @ approach, -1.0, 1.0))
             kept = np.flatnonzero(lean <= c.tilt + 1e-9)
+            kept = kept[kept < len(middles) - rims] if turn else kept
             T = np.tile(np.eye(4), (len(kept), 1, 1))
             T[:, :3, 1], T[:, :3, 2] = axes[kept], z_turned[kept]
             T[:, :3, 0] = np.cross(axes[kept], z_turned[kept])

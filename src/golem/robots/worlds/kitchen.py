@@ -30,8 +30,8 @@ STEELS: tuple[tuple[float, float, float], ...] = (
 """Colours of the fridge."""
 APART = 0.04
 """Least distance between two things on the counter [m]."""
-LEAST_APART = 0.13
-"""The same of things before the robot [m]: a hand of 13 cm comes between them."""
+LEAST_APART = 0.10
+"""The same of things before the robot [m]: an open finger comes between them."""
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
@@ -128,7 +128,7 @@ def draw_counter(rng: np.random.Generator, raised: float = 0.0, varied: bool = T
     picks = rng.integers(0, (len(FRONTS), len(TOPS), len(STEELS))) if varied else np.zeros(3, int)
     top, edge = 0.96 + raised + 0.04 * draws[0], 0.35 + 0.02 * draws[1]
     kinds = [str(kind) for kind in rng.permutation(list(KINDS))]
-    area = Area((edge + 0.09, edge + 0.25), (-0.42, 0.42), LEAST_APART)
+    area = Area((edge + 0.09, edge + 0.22), (-0.38, 0.38), LEAST_APART)
     # Where one finds no room, all are put elsewhere.
     drawn = (_draw_things(rng, kinds, top, area, 1.0) for _ in range(40))
     things = next(some for some in drawn if len(some) == len(kinds))
