@@ -35,6 +35,10 @@ THIN = 0.020
 """Widest rim [m], as the layer's image shows it."""
 RIMS = 24
 """Pairs across a rim along which hands are laid at most."""
+DEEP = 0.025
+"""How much deeper than need be the fingertips go where that is free [m]: what is held by its edge turns and slips."""
+SHALLOW = 0.8
+"""What a grasp that goes no deeper counts, of one that does."""
 DEEPER = 0.015
 """How much further than elsewhere the fingertips go on both sides of a rim [m]: what hangs on it turns the less."""
 ROUND = 0.03
@@ -114,14 +118,15 @@ class Antipodal(OpenLoop):
         middles, axes, widths, quality, rims = self._pairs(cloud, gripper)
         if not len(middles):
             return []
-        T, turned, index = self._hands(middles, axes, gripper, rims)
+        T, turned, index, deep = self._hands(middles, axes, gripper, rims)
         if not len(T):
             return []
         T, gaps, held = self._fit(T, widths[index], thinned(cloud, BETWEEN, c.seed))
-        off = np.linalg.norm(T[:, :3, 3] - c.depth * T[:, :3, 2] - cloud.mean(axis=0), axis=1)
+        off = T[:, :3, 3] - cloud.mean(axis=0)
+        off = np.linalg.norm(off - (off @ gripper.approach)[:, None] * gripper.approach, axis=1)
         size = float(np.linalg.norm(cloud.std(axis=0))) + 1e-6
         score = quality[index] * (1.0 - 0.3 * turned / max(c.tilt, 1e-6)) * np.exp(-((off / size) ** 2))
-        score *= np.minimum(held / 6.0, 1.0)
+        score *= np.minimum(held / 6.0, 1.0) * np.where(deep, 1.0, SHALLOW)
         good = np.flatnonzero((gaps <= gripper.max_gap) & (held > 0))
         order = good[np.argsort(-score[good], kind="stable")]
         kept = self._distinct(T, gaps, order, self._around(cloud, scene))
@@ -218,8 +223,8 @@ class Antipodal(OpenLoop):
 
     def _hands(
         self, middles: Array, axes: Array, gripper: Gripper, rims: int
-    ) -> tuple[Array, Array, NDArray[np.intp]]:
-        """Return poses (m, 4, 4), how far each leans from the approach (m,) [rad], and the pair (m,) it lies along.
+    ) -> tuple[Array, Array, NDArray[np.intp], NDArray[np.bool_]]:
+        """Return poses (m, 4, 4), how far each leans (m,) [rad], its pair (m,), and (m,) whether it goes `DEEP`.
 
         A hand on one of the last `rims` pairs does not lean: the finger that leans over a bowl tips it.
         """
@@ -227,8 +232,8 @@ class Antipodal(OpenLoop):
         z = approach - (axes @ approach)[:, None] * axes
         z /= np.linalg.norm(z, axis=1, keepdims=True)
         x = np.cross(axes, z)
-        rows, leans, pairs = [], [], []
-        for turn in (0.0, 0.3, -0.3, 0.6, -0.6):
+        rows, leans, pairs, deep = [], [], [], []
+        for turn, extra in ((0.0, DEEP), (0.0, 0.0), (0.3, 0.0), (-0.3, 0.0), (0.6, 0.0), (-0.6, 0.0)):
             z_turned = math.cos(turn) * z + math.sin(turn) * x
             lean = np.arccos(np.clip(z_turned @ approach, -1.0, 1.0))
             kept = np.flatnonzero(lean <= c.tilt + 1e-9)
@@ -236,11 +241,13 @@ class Antipodal(OpenLoop):
             T = np.tile(np.eye(4), (len(kept), 1, 1))
             T[:, :3, 1], T[:, :3, 2] = axes[kept], z_turned[kept]
             T[:, :3, 0] = np.cross(axes[kept], z_turned[kept])
-            T[:, :3, 3] = middles[kept] + c.depth * z_turned[kept]
+            T[:, :3, 3] = middles[kept] + (c.depth + extra) * z_turned[kept]
             rows.append(T)
             leans.append(lean[kept])
             pairs.append(kept)
-        return upright(np.concatenate(rows), gripper.yaw), np.concatenate(leans), np.concatenate(pairs)
+            deep.append(np.full(len(kept), extra > 0.0))
+        hands = upright(np.concatenate(rows), gripper.yaw)
+        return hands, np.concatenate(leans), np.concatenate(pairs), np.concatenate(deep)
 
     def _fit(self, T: Array, widths: Array, cloud: Array) -> tuple[Array, Array, Array]:
         """Return poses centred on what lies between their pads, the openings it takes, and how many points it is."""

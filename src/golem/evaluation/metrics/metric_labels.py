@@ -41,6 +41,7 @@ METRICS: dict[str, Metric] = {
     "door_angle_error": Metric("door angle as the skill has it, less the true one", "deg", _DEG),
     "set_down_error": Metric("thing set down off its place", "mm", 1e3),
     "others_moved": Metric("another thing moved, at most", "mm", 1e3),
+    "places_looked": Metric("remembered places that were gone to"),
     "was_lifted": Metric("thing was lifted"),
     "peak_force": Metric("peak force", "N"),
     "peak_lean": Metric("peak lean (pitch)", "deg", _DEG),
