@@ -97,7 +97,7 @@ class TakeConfig:
     attempts: int = 6
     travel_speed: float = 0.25
     reach_speed: float = 0.08
-    force: float = 14.0
+    force: float = 16.0
     close_timeout: float = 2.5
     lift: float = 0.12
     turn: float = 0.45
