@@ -302,21 +302,23 @@ class Context:
         side: Side,
         yaw: float,
         approach: tuple[float, float, float] = (0.0, 0.0, -1.0),
+        scene: Array | None = None,
     ) -> list[Grasp]:
         """Return the grasps that `method` proposes for `target`, best first, once it has thought.
 
         Args:
             method: from `grasp_method`.
-            target: as the head camera saw it.
+            target: as a camera saw it.
             side: of the hand that is to grasp.
             yaw: heading of the gripper's x axis about the vertical that suits the arm best [rad].
             approach: direction in odom along which the hand is to come, of unit length.
+            scene: (n, 3) points in odom of what is around [m]; by default what the head camera shows.
         """
         state = self.bus.latest(topics.LOW_STATE)
         q = None if state is None else state.q[UPPER]
         gripper = Gripper(side, self.arms[side].pose, yaw, np.array(approach), q, self.T_odom_base)
-        scene = self.scene("head")
-        return await self.think(lambda: method.propose(target, scene, gripper), method.latency)
+        around = self.scene("head") if scene is None else scene
+        return await self.think(lambda: method.propose(target, around, gripper), method.latency)
 
     def scene(self, camera: str) -> Array:
         """Return the (n, 3) points in odom that the newest frame of `camera` shows [m]; n is 0 before the first."""

@@ -1,7 +1,8 @@
 """Antipodal grasps: two points of a cloud between which the line lies in both friction cones (Nguyen 1988).
 
 Pairs are drawn from the object's cloud, by its normals, and from its outline as the coming hand sees it: one camera
-shows no more than the front of a thing, and the sides that fingers close on are its outline. Hands are laid along each
+shows no more than the front of a thing, and the sides that fingers close on are its outline. Others lie across a rim:
+that is how a bowl that is wider than the hand is taken. Hands are laid along each
 pair with approaches around the wanted one, and those whose fingers or palm would be where the cloud has something are
 dropped (ten Pas et al., GPD, IJRR 2017).
 """
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from golem.capabilities.grasping.base import Grasp, Gripper, OpenLoop
 from golem.capabilities.grasping.centroid import ACROSS, UP
@@ -27,6 +29,20 @@ BETWEEN = 600
 """Points of the object on which hands are fitted."""
 PIXEL = 0.003
 """Size of a pixel of the outline's image [m]."""
+RIM = 0.018
+"""Thickness of the layer nearest to the hand that is a rim, if it is thin [m]; a wrong tilt of the camera leans it."""
+THIN = 0.020
+"""Widest rim [m], as the layer's image shows it."""
+RIMS = 24
+"""Pairs across a rim along which hands are laid at most."""
+DEEP = 0.025
+"""How much deeper than need be the fingertips go where that is free [m]: what is held by its edge turns and slips."""
+SHALLOW = 0.8
+"""What a grasp that goes no deeper counts, of one that does."""
+DEEPER = 0.015
+"""How much further than elsewhere the fingertips go on both sides of a rim [m]: what hangs on it turns the less."""
+ROUND = 0.03
+"""Greatest half width for which a thing that is seen across is taken to be round [m]: half of the hand's."""
 SCENE = 20000
 """Points of the surroundings that are looked at."""
 
@@ -99,24 +115,28 @@ class Antipodal(OpenLoop):
         if len(cloud) < MIN_POINTS:
             return []
         cloud = thinned(cloud, c.points, c.seed)
-        middles, axes, widths, quality = self._pairs(cloud, gripper)
+        middles, axes, widths, quality, rims = self._pairs(cloud, gripper)
         if not len(middles):
             return []
-        T, turned, index = self._hands(middles, axes, gripper)
+        T, turned, index, deep = self._hands(middles, axes, gripper, rims)
         if not len(T):
             return []
         T, gaps, held = self._fit(T, widths[index], thinned(cloud, BETWEEN, c.seed))
-        off = np.linalg.norm(T[:, :3, 3] - c.depth * T[:, :3, 2] - cloud.mean(axis=0), axis=1)
+        off = T[:, :3, 3] - cloud.mean(axis=0)
+        off = np.linalg.norm(off - (off @ gripper.approach)[:, None] * gripper.approach, axis=1)
         size = float(np.linalg.norm(cloud.std(axis=0))) + 1e-6
         score = quality[index] * (1.0 - 0.3 * turned / max(c.tilt, 1e-6)) * np.exp(-((off / size) ** 2))
-        score *= np.minimum(held / 6.0, 1.0)
+        score *= np.minimum(held / 6.0, 1.0) * np.where(deep, 1.0, SHALLOW)
         good = np.flatnonzero((gaps <= gripper.max_gap) & (held > 0))
         order = good[np.argsort(-score[good], kind="stable")]
         kept = self._distinct(T, gaps, order, self._around(cloud, scene))
         return [Grasp(T[k].copy(), float(gaps[k]), float(score[k])) for k in kept]
 
-    def _pairs(self, cloud: Array, gripper: Gripper) -> tuple[Array, Array, Array, Array]:
-        """Return middles (n, 3), closing axes (n, 3), widths (n,) and quality (n,) of the best pairs, best first."""
+    def _pairs(self, cloud: Array, gripper: Gripper) -> tuple[Array, Array, Array, Array, int]:
+        """Return middles (n, 3), closing axes (n, 3), widths (n,) and quality (n,) of the best pairs, best first.
+
+        The last of them, as many as the last number says, lie across a rim.
+        """
         c = self.config
         rng = np.random.default_rng(c.seed)
         normals, smooth = normals_of(cloud)
@@ -146,16 +166,18 @@ class Antipodal(OpenLoop):
         size = float(np.linalg.norm(cloud.std(axis=0))) + 1e-6
         off = np.linalg.norm(middle - cloud.mean(axis=0), axis=1) / size
         best = np.argsort(-quality * np.exp(-(off**2)), kind="stable")[: c.laid]
-        return middle[best], way[best], width[best], quality[best]
+        drawn, rim = (middle[best], way[best], width[best], quality[best]), self._rim_pairs(cloud, gripper)
+        middle, way, width, quality = (np.concatenate(pair) for pair in zip(drawn, rim, strict=True))
+        return middle, way, width, quality, len(rim[0])
 
     def _outline_pairs(
         self, cloud: Array, gripper: Gripper, cone: float
     ) -> tuple[Array, Array, Array, Array]:
-        """Return the same of the outline that `cloud` has along the approach, whose walls are taken to be along it."""
-        c = self.config
-        u = np.cross(gripper.approach, (0.0, 0.0, 1.0) if abs(gripper.approach[2]) < 0.7 else (1.0, 0.0, 0.0))
-        u /= np.linalg.norm(u)
-        v = np.cross(gripper.approach, u)
+        """Return the same of the outline that `cloud` has along the approach, whose walls are taken to be along it.
+
+        Seen across it is more likely round: there they are half of the width behind what is seen.
+        """
+        c, (u, v) = self.config, _across(gripper.approach)
         spots, normals = outline(cloud @ np.column_stack([u, v]))
         if len(spots) < 4:
             return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0)
@@ -170,30 +192,62 @@ class Antipodal(OpenLoop):
         held = np.flatnonzero(cosine > cone)
         depth = float(np.quantile(cloud @ gripper.approach, 0.3))
         flat = 0.5 * (spots[a[held]] + spots[b[held]])
-        middle = flat[:, :1] * u + flat[:, 1:] * v + depth * gripper.approach
+        behind = (
+            np.minimum(0.5 * width[held], ROUND) if gripper.approach[2] > -ACROSS else np.zeros(len(held))
+        )
+        middle = flat[:, :1] * u + flat[:, 1:] * v + (depth + behind)[:, None] * gripper.approach
         axes = way[held, :1] * u + way[held, 1:] * v
         quality = (cosine[held] - cone) / (1.0 - cone) * 0.4 + 0.5
         return middle, axes, width[held], quality
 
-    def _hands(self, middles: Array, axes: Array, gripper: Gripper) -> tuple[Array, Array, NDArray[np.intp]]:
-        """Return poses (m, 4, 4), how far each leans from the approach (m,) [rad], and the pair (m,) it lies along."""
+    def _rim_pairs(self, cloud: Array, gripper: Gripper) -> tuple[Array, Array, Array, Array]:
+        """Return the same of pairs across the rim of a hollow thing: its nearest layer, where that is thin."""
+        u, v = _across(gripper.approach)
+        along = cloud @ gripper.approach
+        first = float(np.quantile(along, 0.01))
+        spots, normals = borders(cloud[along < first + RIM] @ np.column_stack([u, v]))
+        pairs = (
+            KDTree(spots).query_pairs(THIN, output_type="ndarray") if len(spots) else np.zeros((0, 2), int)
+        )
+        a, b = pairs[:, 0], pairs[:, 1]
+        way = spots[b] - spots[a]
+        width = np.linalg.norm(way, axis=1)
+        cosine = np.minimum(-np.einsum("ij,ij->i", normals[a], way), np.einsum("ij,ij->i", normals[b], way))
+        thin = np.flatnonzero((width > PIXEL) & (cosine > 0.9 * width))
+        thin = thin[np.linspace(0, len(thin) - 1, min(RIMS, len(thin))).astype(int)]
+        a, b, width = a[thin], b[thin], width[thin]
+        flat = 0.5 * (spots[a] + spots[b])
+        middle = flat[:, :1] * u + flat[:, 1:] * v + (first + DEEPER) * gripper.approach
+        axes = (way[thin, :1] * u + way[thin, 1:] * v) / width[:, None]
+        return middle, axes, width, np.full(len(thin), 0.7)
+
+    def _hands(
+        self, middles: Array, axes: Array, gripper: Gripper, rims: int
+    ) -> tuple[Array, Array, NDArray[np.intp], NDArray[np.bool_]]:
+        """Return poses (m, 4, 4), how far each leans (m,) [rad], its pair (m,), and (m,) whether it goes `DEEP`.
+
+        A hand on one of the last `rims` pairs does not lean: the finger that leans over a bowl tips it.
+        """
         c, approach = self.config, gripper.approach
         z = approach - (axes @ approach)[:, None] * axes
         z /= np.linalg.norm(z, axis=1, keepdims=True)
         x = np.cross(axes, z)
-        rows, leans, pairs = [], [], []
-        for turn in (0.0, 0.3, -0.3, 0.6, -0.6):
+        rows, leans, pairs, deep = [], [], [], []
+        for turn, extra in ((0.0, DEEP), (0.0, 0.0), (0.3, 0.0), (-0.3, 0.0), (0.6, 0.0), (-0.6, 0.0)):
             z_turned = math.cos(turn) * z + math.sin(turn) * x
             lean = np.arccos(np.clip(z_turned @ approach, -1.0, 1.0))
             kept = np.flatnonzero(lean <= c.tilt + 1e-9)
+            kept = kept[kept < len(middles) - rims] if turn else kept
             T = np.tile(np.eye(4), (len(kept), 1, 1))
             T[:, :3, 1], T[:, :3, 2] = axes[kept], z_turned[kept]
             T[:, :3, 0] = np.cross(axes[kept], z_turned[kept])
-            T[:, :3, 3] = middles[kept] + c.depth * z_turned[kept]
+            T[:, :3, 3] = middles[kept] + (c.depth + extra) * z_turned[kept]
             rows.append(T)
             leans.append(lean[kept])
             pairs.append(kept)
-        return upright(np.concatenate(rows), gripper.yaw), np.concatenate(leans), np.concatenate(pairs)
+            deep.append(np.full(len(kept), extra > 0.0))
+        hands = upright(np.concatenate(rows), gripper.yaw)
+        return hands, np.concatenate(leans), np.concatenate(pairs), np.concatenate(deep)
 
     def _fit(self, T: Array, widths: Array, cloud: Array) -> tuple[Array, Array, Array]:
         """Return poses centred on what lies between their pads, the openings it takes, and how many points it is."""
@@ -233,23 +287,52 @@ class Antipodal(OpenLoop):
         return kept
 
 
+def _across(approach: Array) -> tuple[Array, Array]:
+    """Return two (3,) unit vectors across `approach` (3,) and each other."""
+    u = np.cross(approach, (0.0, 0.0, 1.0) if abs(approach[2]) < 0.7 else (1.0, 0.0, 0.0))
+    u /= np.linalg.norm(u)
+    return u, np.cross(approach, u)
+
+
 def outline(flat: Array) -> tuple[Array, Array]:
     """Return points (n, 2) on the outer border of a cloud (m, 2) in a plane [m], and their outward normals (n, 2)."""
+    found = _borders(flat, cv2.RETR_EXTERNAL, 5)
+    return max(found, key=lambda one: len(one[0])) if found else (np.zeros((0, 2)), np.zeros((0, 2)))
+
+
+def borders(flat: Array) -> tuple[Array, Array]:
+    """Return the same of all borders of all pieces of a cloud, those of holes, too."""
+    found = _borders(flat, cv2.RETR_CCOMP, 3) if len(flat) else []
+    spots, normals = (
+        [np.zeros((0, 2)), *(one[0] for one in found)],
+        [np.zeros((0, 2)), *(one[1] for one in found)],
+    )
+    return np.concatenate(spots), np.concatenate(normals)
+
+
+def _borders(flat: Array, which: int, closing: int) -> list[tuple[Array, Array]]:
+    """Return points (n, 2) and outward normals (n, 2) of each border that OpenCV's mode `which` finds."""
     low = flat.min(axis=0) - 4 * PIXEL
     pixels = np.round((flat - low) / PIXEL).astype(int)
     image = np.zeros(tuple(pixels.max(axis=0) + 5), np.uint8)
     image[tuple(pixels.T)] = 1
-    image = cv2.morphologyEx(image, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
-    borders, _ = cv2.findContours(image, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    longest = max(borders, key=len)[:, 0, ::-1].astype(np.float64)
-    if len(longest) < 12:
-        return np.zeros((0, 2)), np.zeros((0, 2))
-    smooth = np.mean([np.roll(longest, k, axis=0) for k in range(-2, 3)], axis=0)
+    image = cv2.morphologyEx(image, cv2.MORPH_CLOSE, np.ones((closing, closing), np.uint8))
+    rings, levels = cv2.findContours(image, which, cv2.CHAIN_APPROX_NONE)
+    return [
+        _smoothed(ring[:, 0, ::-1].astype(np.float64), low, hole=which == cv2.RETR_CCOMP and level[3] >= 0)
+        for ring, level in zip(rings, levels[0], strict=True)
+        if len(ring) >= 12
+    ]
+
+
+def _smoothed(ring: Array, low: Array, *, hole: bool) -> tuple[Array, Array]:
+    """Return a border (n, 2) in pixels as points [m], and their normals (n, 2), away from what it is the border of."""
+    smooth = np.mean([np.roll(ring, k, axis=0) for k in range(-2, 3)], axis=0)
     along = np.roll(smooth, -3, axis=0) - np.roll(smooth, 3, axis=0)
     normals = np.column_stack([along[:, 1], -along[:, 0]]) / (np.linalg.norm(along, axis=1)[:, None] + 1e-9)
     # Which way round a border goes tells which side is out.
     area = float(np.sum(smooth[:, 0] * np.roll(smooth[:, 1], -1) - np.roll(smooth[:, 0], -1) * smooth[:, 1]))
-    return smooth * PIXEL + low, normals if area > 0.0 else -normals
+    return smooth * PIXEL + low, normals if (area > 0.0) != hole else -normals
 
 
 def upright(T: Array, yaw: float) -> Array:

@@ -13,9 +13,13 @@ from golem.robots.mujoco.hoist import HoistConfig
 from golem.robots.worlds.conditions import LayoutKind, check_condition
 
 Support = Literal["hoist", "ground"]
-World = Literal["pack", "plant", "open", "slope", "step", "rubble", "furnished", "corridor", "kitchen"]
+World = Literal[
+    "pack", "plant", "open", "slope", "step", "rubble", "furnished", "corridor", "kitchen", "counter"
+]
 WITH_PACK = ("pack", "plant")
 """Worlds with a pack to work on."""
+KITCHENS = ("kitchen", "counter")
+"""Worlds with a fridge and a counter."""
 
 
 @dataclass(frozen=True)
@@ -28,13 +32,15 @@ class MujocoConfig:
         world: `pack`: the hall with the battery pack; `open`: the empty hall; `slope`: a ramp ahead; `step`: a
             platform ahead; `rubble`: tiles of uneven height all around. The floor is flat for a metre around the start
             in each. `furnished`: a hall with walls, shelves, pillars, gantry and packs, drawn from the seed; `plant`:
-            that hall with the pack to work on; `corridor`: two bare walls; `kitchen`: a fridge and a counter with
-            tableware before the robot.
+            that hall with the pack to work on; `corridor`: two bare walls; `kitchen`: a fridge before the robot and a
+            counter with tableware beside it; `counter`: that kitchen with the counter before the robot, four things
+            within reach.
         arms: where they are when the world begins: at home, or hanging as they do while the motors are limp.
-        stance: where the robot should stand before the pack: x, y [m] and yaw [rad] from where it begins.
+        stance: where the robot should stand before pack or counter, from where it begins: x, y [m] and yaw [rad], which
+            is 0 in a kitchen.
         layout: `nominal`: pack and tray stand where `PackLayout` says, under a robot in the hoist; under one that
             stands they are lowered with it. `varied`: places, light, finishes and clutter are drawn from the seed; of
-            a kitchen also which way its fridge opens.
+            a kitchen also sizes, heights, and which way its fridge opens.
         conditions: those of `worlds.conditions` that are not left to the layout, e.g. `{light: 0.3}`.
         hoist: how the robot is held.
         reach_y: near-edge fasteners with |y| up to this are loosened [m]; a varied layout draws among those up to
@@ -110,10 +116,14 @@ class MujocoConfig:
             raise ConfigError("The twin's conditions are a mapping, e.g. {light: 0.3}.")
         for name, value in self.conditions.items():
             check_condition(name, value)
-        varied = self.layout != "nominal" and self.world != "kitchen"
+        varied = self.layout != "nominal" and self.world not in KITCHENS
         if self.world not in WITH_PACK and (self.conditions or varied):
             raise ConfigError(
                 f"The world '{self.world}' has no pack whose layout or conditions could differ."
+            )
+        if self.world in KITCHENS and self.stance[2] != 0.0:
+            raise ConfigError(
+                f"The twin's stance before a {self.world} has the yaw 0, not {self.stance[2]:g}."
             )
         own = (self.feet, self.torque_profile, self.self_collision)
         if self.mjcf is not None and own != ("spheres", "urdf", None):

@@ -12,7 +12,7 @@ from golem.errors import ConfigError
 from golem.robots.model import contact_shapes, magpie_model, mjcf
 from golem.robots.model.looks import VISUAL_GROUP
 from golem.robots.model.table import BASE_LINK, JOINT_NAMES
-from golem.robots.mujoco.config import WITH_PACK, MujocoConfig
+from golem.robots.mujoco.config import KITCHENS, WITH_PACK, MujocoConfig
 from golem.robots.mujoco.tag_plates import add_tag_cuffs
 from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream
@@ -29,7 +29,7 @@ from golem.robots.worlds.conditions import (
 from golem.robots.worlds.dressing import dress
 from golem.robots.worlds.fridge import Seal, seal_of
 from golem.robots.worlds.furnished import Person
-from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_kitchen
+from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_counter, draw_kitchen
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
 from golem.robots.worlds.screws import ScrewDraw, draw_screws
@@ -115,11 +115,12 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
         add_clutter(spec, layout, round(conditions.clutter), stream(seed, "world/clutter"))
         dress(spec, conditions, stance)
         _add_onlooker(spec, layout)
-    elif config.world == "kitchen":
+    elif config.world in KITCHENS:
         raised = layout.top_z - PackLayout().top_z
-        kitchen = draw_kitchen(stream(seed, "world/kitchen"), raised, config.layout == "varied")
-        names = PackNames((), np.zeros((0, 3)), "", add_kitchen(spec, kitchen))
-        _add_kitchen_onlooker(spec, kitchen)
+        draw = draw_kitchen if config.world == "kitchen" else draw_counter
+        kitchen = draw(stream(seed, "world/kitchen"), raised, config.layout == "varied")
+        names = PackNames((), np.zeros((0, 3)), "", add_kitchen(spec, kitchen, (stance.x, stance.y)))
+        _add_kitchen_onlooker(spec, kitchen, stance)
     else:
         people = _add_terrain(spec, config, seed)
         _add_companion(spec)
@@ -246,13 +247,18 @@ def _add_onlooker(spec: mujoco.MjSpec, layout: PackLayout) -> None:
     _aim(spec.worldbody.add_camera(name=ONLOOKER.name), eye, target)
 
 
-def _add_kitchen_onlooker(spec: mujoco.MjSpec, kitchen: KitchenLayout) -> None:
+def _add_kitchen_onlooker(spec: mujoco.MjSpec, kitchen: KitchenLayout, stance: PlanarPose) -> None:
     """Add a fixed camera that watches robot, fridge and counter from the counter's side, behind the robot."""
-    fridge = kitchen.fridge
+    fridge, at = kitchen.fridge, np.array([stance.x, stance.y, 0.0])
     side = 1.0 if fridge.handle_y < 0.0 else -1.0
     eye = np.array([-1.25, 1.35 * side, fridge.handle_z + 0.65])
     target = np.array([fridge.front - 0.05, 0.05 * side, fridge.handle_z - 0.22])
-    _aim(spec.worldbody.add_camera(name=ONLOOKER.name), eye, target)
+    if fridge.handle_y < kitchen.counter_start:
+        eye, target = (
+            np.array([-0.35, 1.25, kitchen.counter_top + 0.65]),
+            np.array([0.40, 0.0, kitchen.counter_top]),
+        )
+    _aim(spec.worldbody.add_camera(name=ONLOOKER.name), eye + at, target + at)
 
 
 def _add_companion(spec: mujoco.MjSpec) -> None:

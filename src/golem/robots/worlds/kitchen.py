@@ -5,6 +5,7 @@ Ours, built of boxes and turned shapes; nothing of RoboCasa is in it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -29,6 +30,8 @@ STEELS: tuple[tuple[float, float, float], ...] = (
 """Colours of the fridge."""
 APART = 0.04
 """Least distance between two things on the counter [m]."""
+LEAST_APART = 0.10
+"""The same of things before the robot [m]: an open finger comes between them."""
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
@@ -46,12 +49,13 @@ class StandingThing:
 
 @dataclass(frozen=True, slots=True)
 class KitchenLayout:
-    """One kitchen.
+    """One kitchen, as seen from where the robot should stand: that is the origin, and the robot heads along x.
 
     Attributes:
         fridge: the fridge.
         counter_top: height of the counter [m].
         counter_front: x of its front edge [m].
+        counter_start: where along y it begins, on the far side of the fridge's bar [m].
         things: what stands on it.
         front, top, steel: colours of cabinets, counter and fridge.
     """
@@ -59,10 +63,20 @@ class KitchenLayout:
     fridge: FridgeLayout
     counter_top: float
     counter_front: float
+    counter_start: float
     things: tuple[StandingThing, ...]
     front: tuple[float, float, float]
     top: tuple[float, float, float]
     steel: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """Where on the counter things stand: bounds along x and y, and what is left between two of them [m]."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    apart: float
 
 
 def draw_kitchen(rng: np.random.Generator, raised: float = 0.0, varied: bool = True) -> KitchenLayout:
@@ -95,21 +109,48 @@ def draw_kitchen(rng: np.random.Generator, raised: float = 0.0, varied: bool = T
         )
     picks = rng.integers(0, (len(FRONTS), len(TOPS), len(STEELS))) if varied else np.zeros(3, int)
     top, edge = 0.94 + raised, 0.44
-    things = _draw_things(rng, top, edge, sign)
-    return KitchenLayout(fridge, top, edge, things, FRONTS[picks[0]], TOPS[picks[1]], STEELS[picks[2]])
-
-
-def _draw_things(rng: np.random.Generator, top: float, edge: float, sign: float) -> tuple[StandingThing, ...]:
-    """Return a mug, a bowl, a can, a bottle and some more on the counter, apart from each other."""
     kinds = [*KINDS, *(str(kind) for kind in rng.choice(list(KINDS), size=int(rng.integers(0, 4))))]
+    area = Area((edge + 0.09, edge + 0.40), (0.12, 1.25), APART)
+    things = _draw_things(rng, kinds, top, area, sign)
+    colours = FRONTS[picks[0]], TOPS[picks[1]], STEELS[picks[2]]
+    return KitchenLayout(fridge, top, edge, 0.06, things, *colours)
+
+
+def draw_counter(rng: np.random.Generator, raised: float = 0.0, varied: bool = True) -> KitchenLayout:
+    """Return a kitchen whose counter is before the robot, with four things within reach, and whose fridge is aside.
+
+    Args:
+        rng: the same state gives the same kitchen.
+        raised: as for `draw_kitchen`.
+        varied: height, edge and colours are drawn; else only what stands where.
+    """
+    draws: list[float] = rng.uniform(-1.0, 1.0, 2).tolist() if varied else [0.0, 0.0]
+    picks = rng.integers(0, (len(FRONTS), len(TOPS), len(STEELS))) if varied else np.zeros(3, int)
+    top, edge = 0.96 + raised + 0.04 * draws[0], 0.35 + 0.02 * draws[1]
+    kinds = [str(kind) for kind in rng.permutation(list(KINDS))]
+    area = Area((edge + 0.09, edge + 0.22), (-0.38, 0.38), LEAST_APART)
+    # Where one finds no room, all are put elsewhere.
+    drawn = (_draw_things(rng, kinds, top, area, 1.0) for _ in range(40))
+    things = next(some for some in drawn if len(some) == len(kinds))
+    nominal = FridgeLayout()
+    fridge = replace(nominal, handle_y=-1.10, handle_z=nominal.handle_z + raised)
+    colours = FRONTS[picks[0]], TOPS[picks[1]], STEELS[picks[2]]
+    return KitchenLayout(fridge, top, edge, -0.88, things, *colours)
+
+
+def _draw_things(
+    rng: np.random.Generator, kinds: Sequence[str], top: float, area: Area, sign: float
+) -> tuple[StandingThing, ...]:
+    """Return things of `kinds` on the counter, apart from each other; one that finds no room is left out."""
     things: list[StandingThing] = []
     for k, kind in enumerate(kinds):
         radius = KINDS[kind][0] + (0.03 if kind == "mug" else 0.0)
         for _ in range(60):
-            x, y = rng.uniform((edge + 0.09, 0.12), (edge + 0.40, 1.25))
+            x, y = rng.uniform((area.x[0], area.y[0]), (area.x[1], area.y[1]))
             others = ((t, KINDS[t.kind][0]) for t in things)
             if all(
-                np.hypot(x - t.position[0], sign * y - t.position[1]) > radius + r + APART for t, r in others
+                np.hypot(x - t.position[0], sign * y - t.position[1]) > radius + r + area.apart
+                for t, r in others
             ):
                 colour = COLOURS[kind][int(rng.integers(len(COLOURS[kind])))]
                 yaw = float(rng.uniform(-np.pi, np.pi))
@@ -119,19 +160,32 @@ def _draw_things(rng: np.random.Generator, top: float, edge: float, sign: float)
     return tuple(things)
 
 
-def add_kitchen(spec: mujoco.MjSpec, layout: KitchenLayout) -> tuple[PackPart, ...]:
-    """Add floor, walls, cabinets, fridge and tableware; return what a detector can be asked for."""
+def add_kitchen(
+    spec: mujoco.MjSpec, layout: KitchenLayout, at: tuple[float, float] = (0.0, 0.0)
+) -> tuple[PackPart, ...]:
+    """Add floor, walls, cabinets, fridge and tableware; return what a detector can be asked for.
+
+    Args:
+        spec: the world to extend; only the robot is there.
+        layout: as seen from where the robot should stand.
+        at: that place in the world, x and y [m].
+    """
     _add_materials(spec, layout)
     sign = 1.0 if layout.fridge.handle_y < 0.0 else -1.0
-    _add_room(spec)
-    room = spec.worldbody.add_body(name="kitchen")
+    _add_room(spec, at)
+    room = spec.worldbody.add_body(name="kitchen", pos=[*at, 0.0])
     _add_counter(room, layout, sign)
-    add_fridge(spec, layout.fridge)
-    found = [_handle(layout.fridge)]
+    fridge = replace(
+        layout.fridge, front=layout.fridge.front + at[0], handle_y=layout.fridge.handle_y + at[1]
+    )
+    add_fridge(spec, fridge)
+    found = [_handle(fridge)]
     for thing in layout.things:
-        geoms = add_object(spec, thing.kind, thing.body, thing.position, thing.yaw, thing.colour)
+        x, y, z = thing.position
+        place = (x + at[0], y + at[1], z)
+        geoms = add_object(spec, thing.kind, thing.body, place, thing.yaw, thing.colour)
         radius, height = KINDS[thing.kind]
-        top = np.array(thing.position) + (0.0, 0.0, height)
+        top = np.array(place) + (0.0, 0.0, height)
         found.append(PackPart(thing.kind, thing.body, geoms, top, np.array([2 * radius, 2 * radius, height])))
     return tuple(found)
 
@@ -174,24 +228,25 @@ def _add_materials(spec: mujoco.MjSpec, layout: KitchenLayout) -> None:
     spec.add_material(name="fridge_glass", rgba=[0.75, 0.85, 0.88, 0.35], specular=0.8, shininess=0.8)
 
 
-def _add_room(spec: mujoco.MjSpec) -> None:
+def _add_room(spec: mujoco.MjSpec, at: tuple[float, float]) -> None:
     world = spec.worldbody
     world.add_geom(
         name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5.0, 5.0, 0.1], material="boards",
         contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1,
         friction=[hall.FLOOR_FRICTION, 0.01, 0.001],
     )  # fmt: skip
-    for size, pos, material in (
-        ((0.05, 4.0, 1.35), (1.40, 0.0, 1.35), "wall_paint"),
-        ((3.0, 0.05, 1.35), (-1.6, 3.2, 1.35), "wall_paint"),
-        ((3.0, 0.05, 1.35), (-1.6, -3.2, 1.35), "wall_paint"),
+    for size, x, y in (
+        ((0.05, 4.0, 1.35), 1.40, 0.0),
+        ((3.0, 0.05, 1.35), -1.6, 3.2),
+        ((3.0, 0.05, 1.35), -1.6, -3.2),
     ):
+        pos, material = (x + at[0], y + at[1], 1.35), "wall_paint"
         parts.collider(world, _BOX, size, pos)
         parts.visual(world, _BOX, size, pos, material=material)
     for x, y, level in ((0.1, 0.7, 0.40), (0.1, -0.9, 0.36), (-1.2, 0.0, 0.28)):
         world.add_light(
-            pos=[x, y, 2.6], dir=[0.45, -0.3 * y, -1.0], diffuse=[level] * 3, specular=[0.5 * level] * 3,
-            ambient=[0.09] * 3, castshadow=False, cutoff=75, exponent=1.0,
+            pos=[x + at[0], y + at[1], 2.6], dir=[0.45, -0.3 * y, -1.0], diffuse=[level] * 3,
+            specular=[0.5 * level] * 3, ambient=[0.09] * 3, castshadow=False, cutoff=75, exponent=1.0,
         )  # fmt: skip
 
 
@@ -199,7 +254,7 @@ def _add_counter(body: mujoco.MjsBody, layout: KitchenLayout, sign: float) -> No
     """Add the counter with base and wall cabinets on the far side of the fridge's bar."""
     top, front = layout.counter_top, layout.counter_front
     # Clear of the fridge, whose corner turns with it.
-    near, far = 0.06, 2.6
+    near, far = layout.counter_start, layout.counter_start + 2.54
     back = 1.34
     y, half = sign * (near + far) / 2, (far - near) / 2
     x, deep = (front + back) / 2, (back - front) / 2

@@ -145,7 +145,10 @@ def _bottle(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str)
         body, _CYLINDER, (radius, 0.32 * height), (0, 0, 0.32 * height), mass=0.9 * MASSES["bottle"]
     )
     neck = (0.0155, 0.16 * height)
-    parts.collider(body, _CYLINDER, neck, (0, 0, 0.84 * height), mass=0.1 * MASSES["bottle"])
+    parts.collider(body, _CYLINDER, neck, (0, 0, 0.84 * height), mass=0.08 * MASSES["bottle"])
+    for share, low in ((0.83, 0.64), (0.62, 0.71)):  # the shoulder, in steps
+        step = (share * radius, 0.035 * height)
+        parts.collider(body, _CYLINDER, step, (0, 0, (low + 0.035) * height), mass=0.01 * MASSES["bottle"])
     return f"{name}_shape", f"{name}_cap", f"{name}_label"
 
 

@@ -1,0 +1,128 @@
+"""Looks on while a robot works at a counter: what was lifted, where it stands at the end, what else was moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from golem.evaluation.episodes.oracle import Oracle
+from golem.interfaces import topics
+from golem.middleware.bus import News
+from golem.robots.mujoco.balance import BalanceRecorder
+from golem.robots.mujoco.engine import MujocoRobot
+from golem.runtime.lockstep import LockstepRunner
+from golem.types import Array
+
+LIFTED = 0.05
+"""Height from which on a thing counts as lifted [m]."""
+THERE = 0.06
+"""Distance from the place within which it counts as set down there [m]: somewhat less than its width."""
+LEVEL = 0.04
+"""How far its underside may be above the counter [m]; on top of another thing it is more."""
+UPRIGHT = 0.26
+"""How far it may lean [rad]: 15 deg."""
+MOVED = 0.05
+"""How far others may have been moved [m]."""
+PICTURED = ("release", "done")
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How a thing stands: kind, (3,) middle of its underside in the world [m], and how far it leans [rad]."""
+
+    kind: str
+    position: Array
+    lean: float
+
+
+class CounterWatch:
+    """Call it after every tick of an errand.
+
+    Attributes:
+        recorder: of the balance of a robot that stands; None of one that hangs.
+    """
+
+    def __init__(
+        self, running: LockstepRunner, robot: MujocoRobot, oracle: Oracle, kind: str, balances: bool
+    ) -> None:
+        """Look at the things as they stand now; one of `kind` is to be taken."""
+        assert robot.scene.kitchen is not None
+        self._running, self._robot, self._oracle, self._kind = running, robot, oracle, kind
+        self._names = tuple((thing.kind, thing.body) for thing in robot.scene.kitchen.things)
+        self._before = self._things()
+        self._highest = np.array([thing.position[2] for thing in self._before])
+        self.recorder = BalanceRecorder(robot) if balances else None
+        self._news = News(running.bus, topics.FEEDBACK)
+        self._picture: bytes | None = None
+
+    def __call__(self) -> None:
+        """Look on."""
+        self.look()
+        feedback = self._news.read()
+        if feedback is not None and (feedback.stage in PICTURED or feedback.data.get("failed")):
+            self._picture = self._oracle.picture()
+
+    def look(self) -> bool:
+        """Look on after the errand; it is never a reason to end."""
+        if self.recorder is not None:
+            self.recorder(self._running.executor.t)
+        heights = [self._robot.data.body(body).xpos[2] for _, body in self._names]
+        self._highest = np.maximum(self._highest, heights)
+        return False
+
+    def last_picture(self) -> bytes:
+        """Return the decisive picture: when it was let go, or when a stage failed; else of now."""
+        return self._picture or self._oracle.picture()
+
+    def problem(self, place: tuple[float, float]) -> str | None:
+        """Return what is not as it was asked for, in a sentence; None where all is.
+
+        Args:
+            place: x, y in the world where one of the kind was to be set down [m].
+        """
+        now = self._things()
+        lifted = self._lifted()
+        if not lifted:
+            return f"No {self._kind} was lifted."
+        one = now[lifted[0]]
+        off = float(np.hypot(*(one.position[:2] - place)))
+        if one.lean > UPRIGHT:
+            return f"The {self._kind} leans by {np.rad2deg(one.lean):.0f} deg."
+        if off > THERE or abs(one.position[2] - self._before[lifted[0]].position[2]) > LEVEL:
+            return f"The {self._kind} is {1e2 * off:.0f} cm from its place."
+        for k, (before, after) in enumerate(zip(self._before, now, strict=True)):
+            moved = float(np.linalg.norm(after.position - before.position))
+            if k != lifted[0] and (moved > MOVED or after.lean > UPRIGHT):
+                return f"The {after.kind} beside it was moved by {1e2 * moved:.0f} cm or knocked over."
+        return None
+
+    def series(self, place: tuple[float, float]) -> dict[str, float]:
+        """Return how far from its place the thing stands, where it was lifted, and how far others were moved [m]."""
+        now = self._things()
+        lifted = self._lifted()
+        moved = [
+            float(np.linalg.norm(b.position - a.position))
+            for k, (a, b) in enumerate(zip(self._before, now, strict=True))
+            if k not in lifted[:1]
+        ]
+        series = {"others_moved": max(moved, default=0.0), "was_lifted": float(bool(lifted))}
+        if lifted:
+            series["set_down_error"] = float(np.hypot(*(now[lifted[0]].position[:2] - place)))
+        return series
+
+    def _lifted(self) -> list[int]:
+        """Return which things of the kind were lifted."""
+        return [
+            k
+            for k, thing in enumerate(self._before)
+            if thing.kind == self._kind and self._highest[k] > thing.position[2] + LIFTED
+        ]
+
+    def _things(self) -> list[Standing]:
+        found: list[Standing] = []
+        for kind, name in self._names:
+            body = self._robot.data.body(name)
+            lean = float(np.arccos(np.clip(body.xmat[8], -1.0, 1.0)))
+            found.append(Standing(kind, body.xpos.copy(), lean))
+        return found

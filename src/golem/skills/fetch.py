@@ -1,0 +1,278 @@
+"""Fetch: bring a thing by its name: recall where it is, go there, take it, carry it to a place and set it down."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from golem.errors import ConfigError
+from golem.options import require
+from golem.skills.base import SkillResult, StageFailed
+from golem.skills.context import Context
+from golem.skills.counter_stance import BLIND, before, stand_before, step_back
+from golem.skills.navigate import NavigateGoal
+from golem.skills.place import PlaceGoal
+from golem.skills.pose_goal import FIRST_REPORT
+from golem.skills.recalled import RecalledPlace, RecalledPlaces, ask
+from golem.skills.remember import RememberGoal
+from golem.skills.take import TakeGoal, TakeReport
+from golem.types import Array, PlanarPose, Side
+
+NEAR = 1.3
+"""Distance from a place within which the last steps go by the counter's edge [m]."""
+STAGE = 0.85
+"""Distance from a place to which the navigator goes [m]."""
+SAME = 0.25
+"""Places nearer than this to each other are looked at from one stance [m]."""
+ASIDE = 0.6
+"""How far to either side along the counter it is searched for [m]."""
+TURN = 0.6
+"""How far the robot turns where nothing is remembered at all [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class FetchGoal:
+    """What to fetch, and where to.
+
+    Attributes:
+        text: the thing, in words that localizer and memory know.
+        to: x, y where it is set down [m], one after the other; empty: it is brought to where the robot began, in the
+            hand.
+        frame: what that is given in: `memory`, the frame of what is remembered (`map`, or `odom` without a map), or
+            `base_link`, where the robot stands when the skill begins.
+        side: which hand.
+        places: how many remembered places are gone to at most.
+        search: whether it is searched for where no remembered place has it.
+    """
+
+    text: str
+    to: tuple[float, ...] = ()
+    frame: Literal["memory", "base_link"] = "memory"
+    side: Literal["left", "right", "either"] = "either"
+    places: int = 3
+    search: bool = True
+
+    def __post_init__(self) -> None:
+        """Check that it can be meant.
+
+        Raises:
+            ConfigError: there is no thing, or a number cannot be meant.
+        """
+        if not self.text.strip():
+            raise ConfigError("Fetching needs the name of a thing, such as 'mug'.")
+        if len(self.to) not in (0, 2) or not all(map(math.isfinite, self.to)):
+            raise ConfigError("Where it is set down are two finite numbers, x and y.")
+        require("goal of fetching: ", ("places", self.places, 1 <= self.places <= 10, "from 1 to 10"))
+
+
+@dataclass
+class FetchReport:
+    """What was done.
+
+    Attributes:
+        looked: x, y of the places that were looked at, in odom [m], one after the other.
+        searched: whether it was searched for.
+        approaches: how often the robot stepped to a stance.
+        taken: how it was taken.
+        x, y: where it was set down, in odom [m].
+    """
+
+    looked: list[float] = field(default_factory=list[float])
+    searched: bool = False
+    approaches: int = 0
+    taken: TakeReport = field(default_factory=TakeReport)
+    x: float = 0.0
+    y: float = 0.0
+
+
+class Fetch:
+    """Bring a thing by its name: recall, go there, take it, carry it, set it down.
+
+    Where it is not at the best remembered place, the next best is tried, then it is searched for. Stages: `recall`,
+    `dock`, `search`, those of `navigate`, `take` and `place`, and `done`.
+    """
+
+    Goal, Result = FetchGoal, FetchReport
+
+    def timeout(self, goal: FetchGoal) -> float:
+        """Return the time it may take [s]; see `Skill`."""
+        return 300.0 + 150.0 * (goal.places + 2 * goal.search)
+
+    async def run(self, context: Context, goal: FetchGoal) -> SkillResult:
+        """Bring one thing; see `Skill`."""
+        start, report = context.t, FetchReport()
+        try:
+            await context.until(lambda: context.legs.reporting, FIRST_REPORT)
+            walks, home = context.legs.status.speed > 0.0, PlanarPose.of(context.legs.pose)
+            to = self._destination(context, goal, home)
+            taken = await self._take_one(context, goal, report, walks)
+            report.taken = taken
+            reason = await self._bring(context, goal, report, walks, home, to)
+        except StageFailed as failure:
+            context.say(failure.stage, str(failure), failed=True)
+            timings = {"total": context.t - start}
+            return SkillResult(False, failure.stage, failure.slot, str(failure), timings, report)
+        context.say("done", reason)
+        return SkillResult(True, "done", None, reason, {"total": context.t - start}, report)
+
+    def _destination(self, context: Context, goal: FetchGoal, home: PlanarPose) -> PlanarPose | None:
+        """Return where to set it down, in the frame of what is remembered or, without a map, in odom."""
+        if not goal.to:
+            return None
+        place = PlanarPose(goal.to[0], goal.to[1], 0.0)
+        if goal.frame == "memory":
+            return place
+        place = home @ place
+        return context.T_odom_map.to(place) if context.mapped else place
+
+    async def _take_one(
+        self, context: Context, goal: FetchGoal, report: FetchReport, walks: bool
+    ) -> TakeReport:
+        """Go from place to place until it is in a hand."""
+        context.say("recall", f"Where is the {goal.text}?")
+        places, result = await self._remembered(context, goal), None
+        if not places:
+            context.say("recall", f"Nothing is remembered of '{goal.text}'. Looking around.")
+            await context.run("remember", RememberGoal((goal.text,), 1.0))
+            places = await self._remembered(context, goal)
+        if not places and not walks:
+            result = await self._take(context, goal, None)
+        for place in places:
+            spot = self._in_odom(context, place)
+            result = await self._try(context, goal, report, spot, walks)
+            if result.success or not _elsewhere(result):
+                break
+            context.say("recall", f"{result.reason} The next best place.")
+        if goal.search and walks and (result is None or _elsewhere(result)):
+            result = await self._search(context, goal, report, places) or result
+        if result is None:
+            raise StageFailed("recall", "memory", f"Nothing is remembered of '{goal.text}', nor seen of it.")
+        if not result.success:
+            raise StageFailed(result.stage, result.slot or "skill", result.reason)
+        return result.value if isinstance(result.value, TakeReport) else TakeReport()
+
+    async def _remembered(self, context: Context, goal: FetchGoal) -> list[RecalledPlace]:
+        """Return where it is or was, best first, each place once."""
+        found: list[RecalledPlace] = []
+        for when in ("now", "anywhere"):
+            answer: RecalledPlaces = await ask(context, goal.text, when, None, goal.places)
+            for place in answer.places:
+                if all(math.hypot(place.x - p.x, place.y - p.y) > SAME for p in found):
+                    found.append(place)
+        return found[: goal.places]
+
+    def _in_odom(self, context: Context, place: RecalledPlace | PlanarPose) -> Array:
+        """Return (2,) a place of the memory's frame in odom [m]."""
+        pose = PlanarPose(place.x, place.y, 0.0)
+        pose = context.T_odom_map @ pose if context.mapped else pose
+        return np.array([pose.x, pose.y])
+
+    async def _try(
+        self, context: Context, goal: FetchGoal, report: FetchReport, spot: Array, walks: bool
+    ) -> SkillResult:
+        """Go before a place and take it there; once more, nearer, where it is seen out of reach."""
+        report.looked += [float(v) for v in spot]
+        result = SkillResult(False, "take", None, "")
+        for _ in range(2):
+            if walks:
+                report.approaches += await self._go(context, spot)
+            result = await self._take(context, goal, spot)
+            found = result.value if isinstance(result.value, TakeReport) else TakeReport()
+            if result.success or _elsewhere(result) or not walks:
+                break
+            context.say(result.stage, f"{result.reason} Trying again from a nearer stance.")
+            spot = np.array([found.x, found.y])
+        return result
+
+    async def _take(self, context: Context, goal: FetchGoal, spot: Array | None) -> SkillResult:
+        near = () if spot is None else (float(spot[0]), float(spot[1]))
+        return await context.run("take", TakeGoal(goal.text, goal.side, near=near))
+
+    async def _search(
+        self, context: Context, goal: FetchGoal, report: FetchReport, places: list[RecalledPlace]
+    ) -> SkillResult | None:
+        """Look along the counter to both sides of where it was thought to be; or all around, where it never was."""
+        context.say("search", f"Searching for the {goal.text}.")
+        report.searched = True
+        result: SkillResult | None = None
+        for step in (ASIDE, -2.0 * ASIDE) if places else ():
+            await step_back(context)
+            here = PlanarPose.of(context.legs.pose)
+            aside = here @ PlanarPose(STAGE, step, 0.0)
+            report.approaches += await self._go(context, np.array([aside.x, aside.y]))
+            result = await self._take(context, goal, None)
+            if result.success or not _elsewhere(result):
+                return result
+        for turn in () if places else (TURN, -2.0 * TURN):
+            here = PlanarPose.of(context.legs.pose)
+            await self._navigate(context, here @ PlanarPose(0.0, 0.0, turn))
+            await context.run("remember", RememberGoal((goal.text,), 1.0))
+            for place in await self._remembered(context, goal):
+                return await self._try(context, goal, report, self._in_odom(context, place), True)
+        return result
+
+    async def _go(self, context: Context, spot: Array) -> int:
+        """Bring the robot before a place in odom; returns how often it stepped."""
+        here = PlanarPose.of(context.legs.pose)
+        away = math.hypot(float(spot[0]) - here.x, float(spot[1]) - here.y)
+        # Arms that hold on to a place in odom would be left behind.
+        context.release_arms()
+        if away > NEAR:
+            await self._navigate(context, before(here, spot, STAGE))
+        try:
+            return await stand_before(context, spot)
+        except StageFailed as failure:
+            context.say("dock", f"{failure} Going by what is remembered alone.")
+            await self._navigate(context, before(PlanarPose.of(context.legs.pose), spot, BLIND))
+            return 1
+
+    async def _navigate(self, context: Context, target: PlanarPose) -> None:
+        """Walk to a pose in odom."""
+        goal = NavigateGoal(target.x, target.y, target.yaw, "odom", content=0.1)
+        walked = await context.run("navigate", goal)
+        if not walked.success:
+            raise StageFailed(walked.stage, walked.slot or "navigator", walked.reason)
+
+    async def _bring(
+        self,
+        context: Context,
+        goal: FetchGoal,
+        report: FetchReport,
+        walks: bool,
+        home: PlanarPose,
+        to: PlanarPose | None,
+    ) -> str:
+        """Carry it to where it is wanted; returns a sentence."""
+        taken = report.taken
+        side: Side = "left" if taken.side == "left" else "right"
+        if walks:
+            context.release_arms()
+            await step_back(context)
+        if to is None:
+            if walks:
+                await self._navigate(context, home)
+            self._still_held(context, goal, side)
+            return f"The {goal.text} is in the {side} hand, where the robot began."
+        spot = self._in_odom(context, to)
+        if walks:
+            report.approaches += await self._go(context, spot)
+            spot = self._in_odom(context, to)
+        self._still_held(context, goal, side)
+        there = PlaceGoal(float(spot[0]), float(spot[1]), "odom", side, taken.below, taken.above)
+        placed = await context.run("place", there)
+        if not placed.success:
+            raise StageFailed(placed.stage, placed.slot or "skill", placed.reason)
+        report.x, report.y = float(spot[0]), float(spot[1])
+        return f"The {goal.text} was set down at ({spot[0]:.2f}, {spot[1]:.2f}) in odom."
+
+    def _still_held(self, context: Context, goal: FetchGoal, side: Side) -> None:
+        if not context.hands[side].status.holding:
+            raise StageFailed("carry", "grasp_method", f"The {goal.text} was lost on the way.")
+
+
+def _elsewhere(result: SkillResult) -> bool:
+    """Return whether a take says that the thing is not there."""
+    return not result.success and result.stage == "detect"

@@ -1,0 +1,295 @@
+"""Place: set down what a hand holds, upright, where it is asked to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from golem.capabilities.arms.postures import posture
+from golem.capabilities.grasping.object_cloud import MIN_POINTS
+from golem.capabilities.planning.base import Held, PlanRefused
+from golem.errors import ConfigError
+from golem.interfaces.payloads import GripState
+from golem.options import require
+from golem.robots.model.magpie_model import MAX_GAP
+from golem.skills.base import SkillCancelled, SkillResult, StageFailed
+from golem.skills.context import Context
+from golem.skills.force_guard import ForceGuard
+from golem.skills.poses import at_height, lifted, retracted
+from golem.skills.ware_sight import surface_below
+from golem.types import SIDES, Array, Side
+
+if TYPE_CHECKING:
+    from golem.capabilities.planning.rules import Rule
+    from golem.skills.planned_motion import PlannedMotion
+
+TURNS = (0.0, 0.35, -0.35, 0.7, -0.7, 1.05, -1.05)
+"""Turns about the vertical in which the hand may set down, in this order [rad]."""
+IN_HAND = 0.16
+"""Radius around a hand within which the head camera shows what it holds [m]."""
+PROUD = 0.025
+"""Height above a surface from which on something stands there [m]: the head camera is not sure of less."""
+IN_WAY = 0.12
+"""Distance from the straight way within which things are in it [m]: both are a few centimetres wide."""
+ROOM = 0.03
+"""Height above such things at which what is held passes [m]."""
+STRAIGHT = (0.02, 0.1)
+"""How far a hand that carries may leave its line, and turn [m, rad]."""
+TILT = 0.4
+"""How far what is held may lean on the way [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceGoal:
+    """Where to set it down.
+
+    Attributes:
+        x, y: middle of the place [m].
+        frame: what they are given in: `odom`, or `base_link`, where the robot stands when the skill begins.
+        side: hand that holds it; `either` is the one that holds anything.
+        below: height of the fingertips above the surface when it stands, as `take` reports it [m]; 0 where it is not
+            known.
+        above: height of its top above the fingertips, as `take` reports it [m].
+    """
+
+    x: float
+    y: float
+    frame: Literal["odom", "base_link"] = "odom"
+    side: Literal["left", "right", "either"] = "either"
+    below: float = 0.0
+    above: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            ConfigError: one of them cannot be meant.
+        """
+        if not (math.isfinite(self.x) and math.isfinite(self.y)):
+            raise ConfigError("A place to set something down is two finite numbers, x and y.")
+        require(
+            "goal of placing: ",
+            ("below", self.below, 0.0 <= self.below <= 0.5, "from 0 to 0.5 m"),
+            ("above", self.above, 0.0 <= self.above <= 0.5, "from 0 to 0.5 m"),
+        )
+
+
+@dataclass(frozen=True)
+class PlaceConfig:
+    """Distances, speeds and forces.
+
+    Attributes:
+        hover: height above the surface from which it is lowered [m].
+        lower: how much further than expected it may be lowered [m]: the head camera is off by as much.
+        travel_speed: between places [m/s].
+        lower_speed: down onto the surface [m/s].
+        contact: force at which it stands [N].
+        room: free radius that it needs around its middle [m].
+        unknown: height of the fingertips above what is held where the goal does not say [m].
+        back: how far the hand backs off [m].
+        timeout: time after which it is given up [s].
+    """
+
+    hover: float = 0.10
+    lower: float = 0.05
+    travel_speed: float = 0.20
+    lower_speed: float = 0.04
+    contact: float = 8.0
+    room: float = 0.05
+    unknown: float = 0.10
+    back: float = 0.14
+    timeout: float = 60.0
+
+
+@dataclass
+class PlaceReport:
+    """How it was set down.
+
+    Attributes:
+        side: hand that had it.
+        x, y, z: where the fingertips let go, in odom [m].
+        touched: whether the surface was felt.
+    """
+
+    side: str = ""
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    touched: bool = False
+
+
+class Place:
+    """Set down what a hand holds, upright, on the surface at a place.
+
+    Stages: `detect`, `carry`, `lower`, `release`, `done`. What is held stays held where it fails before `release`.
+    """
+
+    Goal, Result = PlaceGoal, PlaceReport
+
+    def __init__(self, config: PlaceConfig | None = None) -> None:
+        """Take distances, speeds and forces from `config`."""
+        self._config = config or PlaceConfig()
+        self._report = PlaceReport()
+
+    def timeout(self, goal: PlaceGoal) -> float:
+        """Return the time it may take [s]; see `Skill`."""
+        return self._config.timeout
+
+    async def run(self, context: Context, goal: PlaceGoal) -> SkillResult:
+        """Set one thing down; see `Skill`."""
+        # Numba takes a second to import, and other skills do without it.
+        from golem.skills.planned_motion import PlannedMotion
+
+        start, motion = context.t, PlannedMotion(context)
+        try:
+            side = self._holder(context, goal)
+            self._report.side = side
+            spot = self._spot(context, motion, goal, side)
+            await self._carry(context, motion, goal, side, spot)
+            await self._lower(context, goal, side, float(spot[2]))
+            await self._release(context, motion, side)
+        except StageFailed as failure:
+            context.say(failure.stage, str(failure), failed=True)
+            timings = {"total": context.t - start}
+            return SkillResult(False, failure.stage, failure.slot, str(failure), timings, self._report)
+        except SkillCancelled:
+            # Stay where we are; what is held stays held.
+            context.say("cancelled", "Stopped where it was.")
+            raise
+        felt = "" if self._report.touched else ", though no contact was felt"
+        text = f"Set down at ({self._report.x:.2f}, {self._report.y:.2f}) in odom{felt}."
+        context.say("done", text)
+        return SkillResult(True, "done", None, text, {"total": context.t - start}, self._report)
+
+    def _holder(self, context: Context, goal: PlaceGoal) -> Side:
+        """Return the hand that holds something."""
+        for side in SIDES if goal.side == "either" else (goal.side,):
+            if context.hands[side].status.holding:
+                return side
+        who = "Neither hand holds" if goal.side == "either" else f"The {goal.side} hand does not hold"
+        raise StageFailed("detect", "grasp_method", f"{who} anything.")
+
+    def _spot(self, context: Context, motion: PlannedMotion, goal: PlaceGoal, side: Side) -> Array:
+        """Return the (3,) middle of the place on its surface, in odom, after a look whether it is free."""
+        T, hand = context.T_odom_base, context.arms[side].pose[:3, 3]
+        spot = np.array([goal.x, goal.y, 0.0])
+        if goal.frame == "base_link":
+            spot = T[:3, :3] @ spot + T[:3, 3]
+        context.say("detect", "Looking at the place.", target=spot.tolist())
+        motion.look([(hand, IN_HAND)])
+        scene = context.scene("head")
+        scene = scene[np.linalg.norm(scene - hand, axis=1) > IN_HAND]
+        level = surface_below(scene, spot)
+        if level is None:
+            raise StageFailed("detect", "localizer", "The head camera shows no surface at that place.")
+        spot[2] = level
+        off = np.hypot(scene[:, 0] - spot[0], scene[:, 1] - spot[1])
+        stands = (off < self._config.room) & (scene[:, 2] > level + PROUD) & (scene[:, 2] < level + 0.4)
+        if np.count_nonzero(stands) > MIN_POINTS:
+            raise StageFailed("detect", "localizer", "Something else stands at that place.")
+        return spot
+
+    async def _carry(
+        self, context: Context, motion: PlannedMotion, goal: PlaceGoal, side: Side, spot: Array
+    ) -> None:
+        """Bring the hand above the place, what it holds upright."""
+        from golem.skills.planned_motion import Then
+        from golem.skills.travel import APPROACH, OVER, failed
+
+        c, arm = self._config, context.arms[side]
+        below = goal.below or c.unknown
+        held = Held(side, _column(arm.pose, below, goal.above))
+        at = np.array([spot[0], spot[1], spot[2] + below + c.hover])
+        context.say("carry", "Carrying it there.", target=at.tolist(), side=side)
+        over = self._tallest(context, arm.pose[:3, 3], at) + below + ROOM
+        goals = [self._turned(arm.commanded, turn, at) for turn in TURNS]
+        for T in goals:
+            # Straight there and down, as long as the arm can: planned ways of a hand are long ways for a thing.
+            try:
+                up = at_height(arm.commanded, max(T[2, 3], arm.commanded[2, 3], over))
+                for stop in (up, at_height(T, up[2, 3]), T):
+                    await motion.line(side, stop, c.travel_speed, tolerance=STRAIGHT)
+                return
+            except PlanRefused:
+                continue
+        refused: PlanRefused | None = None
+        for T in goals:
+            then = [Then(side, lifted(T, -c.hover), c.lower_speed, APPROACH)]
+            try:
+                await motion.to({side: T}, c.travel_speed, then, self._upright(context, side), [held], OVER)
+                return
+            except PlanRefused as refusal:
+                refused = refused or refusal
+        assert refused is not None
+        raise failed("carry", refused) from refused
+
+    @staticmethod
+    def _tallest(context: Context, here: Array, there: Array) -> float:
+        """Return the height of the tallest thing on the straight way between two places (3,), in odom [m]."""
+        scene = context.scene("head")
+        scene = scene[np.linalg.norm(scene - here, axis=1) > IN_HAND]
+        way = (there - here)[:2]
+        share = np.clip((scene[:, :2] - here[:2]) @ way / max(float(way @ way), 1e-6), 0.0, 1.0)
+        off = np.linalg.norm(scene[:, :2] - here[:2] - share[:, None] * way, axis=1)
+        near = scene[(off < IN_WAY) & (scene[:, 2] < here[2] + 0.2)]
+        return float(np.quantile(near[:, 2], 0.995)) if len(near) else -np.inf
+
+    @staticmethod
+    def _turned(T: Array, turn: float, at: Array) -> Array:
+        """Return pose `T` (4, 4) at `at` (3,), turned by `turn` about the vertical [rad]."""
+        moved = T.copy()
+        moved[:3, :3] = Rotation.from_euler("z", turn).as_matrix() @ T[:3, :3]
+        moved[:3, 3] = at
+        return moved
+
+    def _upright(self, context: Context, side: Side) -> list[Rule]:
+        """Return the rule that what is held does not lean: a hand that came from above goes on looking down."""
+        from golem.capabilities.planning.rules import HandUpright
+
+        z = context.arms[side].commanded[:3, 2]
+        return [HandUpright(side, TILT)] if z[2] < -0.9 else []
+
+    async def _lower(self, context: Context, goal: PlaceGoal, side: Side, level: float) -> None:
+        """Lower it until it stands: where the surface is felt, or a little deeper than where it was seen."""
+        c, arm, hand = self._config, context.arms[side], context.hands[side]
+        if not hand.status.holding:
+            raise StageFailed("carry", "grasp_method", "It was lost on the way.")
+        context.say("lower", "Lowering it.", side=side)
+        await arm.settle(0.006, 1.0)
+        guard = ForceGuard(context, side, np.array([0.0, 0.0, -1.0]), c.contact)
+        T = arm.commanded.copy()
+        T[2, 3] = level + (goal.below or c.unknown) - c.lower
+        await arm.move(T, c.lower_speed, stop=lambda: guard() or not hand.status.holding)
+        self._report.touched = guard.stuck
+        if guard.stuck:
+            # What presses on the surface springs back: give way by what the arm is behind.
+            arm.stays_at(at_height(arm.commanded, float(arm.pose[2, 3])))
+        self._report.x, self._report.y, self._report.z = (float(v) for v in arm.pose[:3, 3])
+
+    async def _release(self, context: Context, motion: PlannedMotion, side: Side) -> None:
+        """Let go, back off, and go home."""
+        c, arm, hand = self._config, context.arms[side], context.hands[side]
+        context.say("release", "Letting go.", side=side)
+        hand.open(min(hand.status.gap + 0.03, MAX_GAP))
+        await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
+        T = retracted(arm.commanded, c.back)
+        await arm.move(T, 0.5 * c.travel_speed)
+        if T[2, 2] > -0.9:
+            await arm.move(lifted(T, 0.5 * c.back), c.travel_speed)
+        motion.look()
+        try:
+            await motion.to_joints(posture("home"), [side], c.travel_speed)
+        except PlanRefused as refusal:
+            context.say("release", f"The arm stays where it is: {refusal}")
+
+
+def _column(T: Array, below: float, above: float) -> Array:
+    """Return balls (k, 4) in the grasp frame of a hand at `T` (4, 4) that cover an upright thing [m]."""
+    down = T[:3, :3].T @ np.array([0.0, 0.0, -1.0])
+    # The lowest ball ends above the surface that the thing stands on.
+    heights = np.linspace(-above, max(below - 0.05, -above), 4)
+    return np.column_stack([heights[:, None] * down, np.full(len(heights), 0.035)])

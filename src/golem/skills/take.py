@@ -1,0 +1,373 @@
+"""Take: find a thing by its name, grasp it where it stands, lift it, and keep it in the hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from golem.capabilities.arms.postures import posture
+from golem.capabilities.arms.reach_map import load_map
+from golem.capabilities.grasping.base import Grasp, GraspMethod
+from golem.capabilities.grasping.centroid import grasp_pose
+from golem.capabilities.grasping.object_cloud import spaced
+from golem.capabilities.planning.base import PlanRefused
+from golem.errors import ConfigError
+from golem.interfaces.payloads import GripState
+from golem.robots.model.magpie_model import MAX_GAP
+from golem.skills.base import SkillCancelled, SkillResult, StageFailed
+from golem.skills.context import Context
+from golem.skills.poses import lifted, retracted
+from golem.skills.ware_sight import find, palm_view, seen_again, surface_below
+from golem.types import SIDES, Array, LocalizedObject, Side
+
+if TYPE_CHECKING:
+    from golem.skills.planned_motion import PlannedMotion
+
+CLOSED = (GripState.HOLDING, GripState.EMPTY)
+"""States of a hand whose fingers have closed, on something or on nothing."""
+SPARED = 0.07
+"""Radius around points of the thing within which nothing is in the hand's way [m]."""
+EVERY = 0.06
+"""Distance of those points [m]."""
+NEAR = 0.03
+"""How far from where the palm camera is to look from a hand may arrive [m]."""
+COMFORT: Array = np.array([0.45, -0.15, 0.0])
+"""Where the right hand works best, in base_link [m]; its height does not count."""
+TOP, FORWARD = "top", "forward"
+
+
+@dataclass(frozen=True, slots=True)
+class TakeGoal:
+    """What to take.
+
+    Attributes:
+        label: class of the thing.
+        side: which hand; `either` begins with the one on whose side it stands.
+        approach: `top` comes down on it, `forward` from the robot; `either` tries both.
+        near: x, y in odom where it is expected [m], one after the other; of several the nearest is taken.
+    """
+
+    label: str
+    side: Literal["left", "right", "either"] = "either"
+    approach: Literal["top", "forward", "either"] = "either"
+    near: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check that it can be meant.
+
+        Raises:
+            ConfigError: there is no class, or the place is none.
+        """
+        if not self.label:
+            raise ConfigError("Taking needs the class of the thing.")
+        if len(self.near) not in (0, 2) or not all(map(math.isfinite, self.near)):
+            raise ConfigError("Where a thing is expected are two finite numbers, x and y.")
+
+
+@dataclass(frozen=True)
+class TakeConfig:
+    """Distances, speeds and forces.
+
+    Attributes:
+        before: distance from the grasp, along the approach, from which the hand goes straight to it [m].
+        watch: distance of the fingertips from the thing when the palm camera looks at it [m].
+        lean: how far a forward approach leans down [rad]: level with a low counter the forearm does not reach.
+        look_again: whether the palm camera corrects what the head camera saw; without, all is open loop.
+        trust: how far from where the head camera has it the palm camera may see it [m].
+        attempts: how many proposed grasps of one approach are tried to be reached.
+        travel_speed: between places [m/s].
+        reach_speed: straight to the thing, and up with it [m/s].
+        force: of each finger [N].
+        close_timeout: time the fingers may take [s].
+        lift: how high it is lifted [m].
+        turn: how far the torso turns to either side where it is not in view [rad]; 0: not at all.
+        tolerance: distance from a commanded pose at which the arm counts as arrived [m].
+        look_timeout: time a camera may take to show it [s].
+        timeout: time after which it is given up [s].
+    """
+
+    before: float = 0.12
+    watch: float = 0.12
+    lean: float = 0.5
+    look_again: bool = True
+    trust: float = 0.15
+    attempts: int = 6
+    travel_speed: float = 0.25
+    reach_speed: float = 0.08
+    force: float = 16.0
+    close_timeout: float = 2.5
+    lift: float = 0.12
+    turn: float = 0.45
+    tolerance: float = 0.006
+    look_timeout: float = 1.5
+    timeout: float = 90.0
+
+
+@dataclass
+class TakeReport:
+    """What was taken, and how.
+
+    Attributes:
+        side: hand that has it; empty where none does.
+        approach: `top` or `forward`.
+        x, y, z: where it stood, in odom [m].
+        below: height of the fingertips above what it stood on [m].
+        above: height of its top above the fingertips [m].
+        width: how far the fingers are open around it [m].
+    """
+
+    side: str = ""
+    approach: str = ""
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    below: float = 0.0
+    above: float = 0.0
+    width: float = 0.0
+
+
+class Take:
+    """Grasp a thing by its name where it stands, lift it, and hold it.
+
+    Stages: `detect`, `approach`, `reach`, `grasp`, `lift`, `done`.
+    """
+
+    Goal, Result = TakeGoal, TakeReport
+
+    def __init__(self, config: TakeConfig | None = None) -> None:
+        """Take distances, speeds and forces from `config`."""
+        self._config = config or TakeConfig()
+        self._report = TakeReport()
+
+    def timeout(self, goal: TakeGoal) -> float:
+        """Return the time it may take [s]; see `Skill`."""
+        return self._config.timeout
+
+    async def run(self, context: Context, goal: TakeGoal) -> SkillResult:
+        """Take one thing; see `Skill`."""
+        # Numba takes a second to import, and other skills do without it.
+        from golem.skills.planned_motion import PlannedMotion
+
+        start, motion, home = context.t, PlannedMotion(context), context.commanded_joints.copy()
+        timings: dict[str, float] = {}
+        side: Side | None = None
+        try:
+            target = await self._look(context, motion, goal)
+            side, grasp = await self._approach(context, motion, goal, target)
+            await self._grasp(context, motion, side, grasp)
+            timings["detect_to_grasp"] = context.t - start
+            await self._lift(context, motion, side, grasp)
+        except StageFailed as failure:
+            context.say(failure.stage, str(failure), failed=True)
+            if side is not None or self._report.side:
+                await self._leave(context, motion, home)
+            self._report.side = ""
+            timings["total"] = context.t - start
+            return SkillResult(False, failure.stage, failure.slot, str(failure), timings, self._report)
+        except SkillCancelled:
+            # Stay where we are; what is held stays held.
+            context.say("cancelled", "Stopped where it was.")
+            raise
+        timings["total"] = context.t - start
+        text = f"The {side} hand holds the {goal.label}."
+        context.say("done", text)
+        return SkillResult(True, "done", None, text, timings, self._report)
+
+    async def _look(self, context: Context, motion: PlannedMotion, goal: TakeGoal) -> LocalizedObject:
+        """Return the thing as the head camera sees it, ahead or with the torso turned."""
+        c, near = self._config, goal.near[:2] if goal.near else None
+        expected = None if near is None else (near[0], near[1])
+        context.say("detect", f"Looking for a {goal.label}.")
+        target = await find(context, goal.label, expected, c.look_timeout)
+        ahead = context.commanded_joints.copy()
+        for turn in (c.turn, -c.turn) if c.turn > 0.0 and target is None else ():
+            context.say("detect", f"The head camera shows no {goal.label}. Looking around.")
+            turned = ahead.copy()
+            turned[0] += turn
+            try:
+                await motion.to_joints(turned, (), c.travel_speed)
+            except PlanRefused:
+                continue
+            target = await find(context, goal.label, expected, c.look_timeout)
+            if target is not None:
+                break
+        if target is None:
+            raise StageFailed("detect", "localizer", f"The head camera shows no {goal.label}.")
+        middle = np.median(target.points, axis=0) if len(target.points) else target.position
+        self._report.x, self._report.y, self._report.z = (float(v) for v in middle)
+        motion.look([(point, SPARED) for point in spaced(target.points, EVERY)])
+        context.say("detect", f"A {goal.label}.", target=middle.tolist())
+        return target
+
+    async def _approach(
+        self, context: Context, motion: PlannedMotion, goal: TakeGoal, target: LocalizedObject
+    ) -> tuple[Side, Grasp]:
+        """Bring an open hand before the thing; returns the hand and the grasp that it can go on to."""
+        T = np.linalg.inv(context.T_odom_base)
+        left = float((T[:3, :3] @ target.position + T[:3, 3])[1]) > 0.0
+        sides: tuple[Side, ...] = (goal.side,) if goal.side != "either" else SIDES if left else SIDES[::-1]
+        kinds = (goal.approach,) if goal.approach != "either" else (TOP, FORWARD)
+        method, why = context.grasp_method(), list[StageFailed]()
+        for kind in kinds:
+            for side in sides:
+                try:
+                    return side, await self._come(context, motion, method, target, side, kind)
+                except StageFailed as failure:
+                    why.append(failure)
+                    context.say("approach", f"Not with the {side} hand, {kind}: {failure}")
+        raise why[0]
+
+    async def _come(
+        self,
+        context: Context,
+        motion: PlannedMotion,
+        method: GraspMethod,
+        target: LocalizedObject,
+        side: Side,
+        kind: str,
+    ) -> Grasp:
+        """Bring one hand before the thing along one approach, look again, and return the grasp to go on to."""
+        from golem.skills.travel import failed
+
+        c, way = self._config, self._way(context, target, kind)
+        yaw = 0.5 * math.pi if side == "left" else -0.5 * math.pi
+        self._report.side, self._report.approach = side, kind
+        context.say("approach", f"Bringing the {side} hand before the {target.label}, {kind}.", side=side)
+        context.hands[side].open(MAX_GAP)
+        scene = context.scene("head")
+        try:
+            name = f"{'ready' if kind == TOP else 'forward'}_{side}"
+            await motion.to_joints(posture(name), [side], c.travel_speed)
+            if c.look_again:
+                T = self._watching(context, target, side, np.array(way), yaw)
+                await motion.to({side: T}, c.travel_speed, near=NEAR)
+                palm = await palm_view(context, side, target.label, c.look_timeout)
+                target, scene = self._corrected(context, motion, target, palm)
+        except PlanRefused as refusal:
+            raise failed("approach", refusal) from refusal
+        grasps = await context.propose(method, target, side, yaw, way, scene)
+        if not grasps:
+            raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {target.label}.")
+        grasp = await self._reach_before(motion, side, grasps)
+        self._measure(scene, target, grasp)
+        return grasp
+
+    def _watching(
+        self, context: Context, target: LocalizedObject, side: Side, way: Array, yaw: float
+    ) -> Array:
+        """Return the (4, 4) pose in odom from which the palm camera shows the thing, wherever it is about there.
+
+        A hand that looks down stays within its reach: the head camera may show the thing a little beyond it.
+        """
+        points = target.points if len(target.points) else target.position[None]
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        if way[2] > -0.9:
+            return grasp_pose(middle - self._config.watch * way, yaw, -way)
+        middle[2] = points[:, 2].max() + self._config.watch
+        T = context.T_odom_base
+        local = T[:3, :3].T @ (middle - T[:3, 3])
+        mirror = np.array([1.0, 1.0 if side == "right" else -1.0, 1.0])
+        best, reach = COMFORT * mirror + (0.0, 0.0, local[2]), load_map()
+        shares = np.linspace(0.0, 1.0, 11)
+        there = next((s for s in shares if reach.serves(side, local + s * (best - local))), 1.0)
+        return grasp_pose(T[:3, :3] @ (local + there * (best - local)) + T[:3, 3], yaw, -way)
+
+    def _corrected(
+        self, context: Context, motion: PlannedMotion, target: LocalizedObject, palm: Array
+    ) -> tuple[LocalizedObject, Array]:
+        """Return the thing and what is around it as the palm camera shows it, or as it was where that shows nothing."""
+        seen = seen_again(palm, target, self._config.trust)
+        if seen is None:
+            context.say("approach", f"The palm camera does not show the {target.label}.")
+            return target, context.scene("head")
+        off = np.median(seen.points, axis=0) - np.median(target.points, axis=0)
+        motion.displace(np.append(off[:2], 0.0))
+        context.say("approach", f"It is {1e3 * math.hypot(*off[:2]):.0f} mm from where it seemed.")
+        return seen, palm
+
+    def _way(self, context: Context, target: LocalizedObject, kind: str) -> tuple[float, float, float]:
+        """Return the direction in odom along which the hand is to come."""
+        if kind == TOP:
+            return 0.0, 0.0, -1.0
+        T = context.T_odom_base
+        off = T[:3, :3].T @ (target.position - T[:3, 3])
+        # Half of the way towards the thing: an elbow beside the trunk points ahead rather than across.
+        heading = math.atan2(T[1, 0], T[0, 0]) + 0.5 * math.atan2(float(off[1]), float(off[0]))
+        level, down = math.cos(self._config.lean), -math.sin(self._config.lean)
+        return level * math.cos(heading), level * math.sin(heading), down
+
+    async def _reach_before(self, motion: PlannedMotion, side: Side, grasps: list[Grasp]) -> Grasp:
+        """Bring the hand before the first grasp that it gets to, and on to; returns that grasp."""
+        from golem.skills.planned_motion import Then
+        from golem.skills.travel import APPROACH, failed
+
+        c, refused = self._config, list[PlanRefused]()
+        for grasp in grasps[: c.attempts]:
+            T = grasp.T_odom_gripper
+            then = [Then(side, T, c.reach_speed, APPROACH)]
+            try:
+                await motion.to({side: retracted(T, c.before)}, c.travel_speed, then)
+                return grasp
+            except PlanRefused as refusal:
+                refused.append(refusal)
+        raise failed("approach", refused[0]) from refused[0]
+
+    def _measure(self, points: Array, target: LocalizedObject, grasp: Grasp) -> None:
+        """Report how high the fingertips take the thing, by `points` (n, 3) around it."""
+        tips = float(grasp.T_odom_gripper[2, 3])
+        level = surface_below(points, target.position)
+        cloud = target.points if len(target.points) else target.position[None]
+        low = float(np.quantile(cloud[:, 2], 0.02)) if level is None else level
+        self._report.below = max(tips - low, 0.0)
+        self._report.above = max(float(np.quantile(cloud[:, 2], 0.98)) - tips, 0.0)
+        middle = np.median(cloud, axis=0)
+        self._report.x, self._report.y, self._report.z = (float(v) for v in middle)
+
+    async def _grasp(self, context: Context, motion: PlannedMotion, side: Side, grasp: Grasp) -> None:
+        """Go straight to the thing and close."""
+        from golem.skills.travel import APPROACH, failed
+
+        c, arm, hand = self._config, context.arms[side], context.hands[side]
+        hand.open(min(max(grasp.gap, 0.03), MAX_GAP))
+        context.say("reach", "Straight to it.", side=side, target=grasp.T_odom_gripper[:3, 3].tolist())
+        await context.until(lambda: hand.status.state is GripState.OPEN, 1.0)
+        try:
+            await motion.line(side, grasp.T_odom_gripper, c.reach_speed, tolerance=APPROACH)
+        except PlanRefused as refusal:
+            raise failed("reach", refusal) from refusal
+        await arm.settle(c.tolerance, 2.0)
+        context.say("grasp", f"Closing with {c.force:g} N per finger.", side=side)
+        hand.close(c.force)
+        await context.until(lambda: hand.status.state in CLOSED, c.close_timeout)
+        if not hand.status.holding:
+            text = f"The fingers hold nothing (gap {hand.status.gap * 1e3:.0f} mm)."
+            raise StageFailed("grasp", "grasp_method", text)
+        self._report.width = float(hand.status.gap)
+
+    async def _lift(self, context: Context, motion: PlannedMotion, side: Side, grasp: Grasp) -> None:
+        """Lift it, back along the approach: up at once, so that it is not dragged."""
+        c, arm, hand = self._config, context.arms[side], context.hands[side]
+        context.say("lift", "Lifting it.", side=side)
+        T = arm.commanded
+        rise = max(c.lift + c.before * float(T[2, 2]), 0.0)
+        up = lifted(T, 0.5 * c.lift) if rise > 0.02 else T
+        for goal in (up, lifted(retracted(T, c.before), rise)):
+            await arm.move(goal, c.reach_speed, stop=lambda: not hand.status.holding)
+        if not hand.status.holding:
+            raise StageFailed("lift", "grasp_method", "It slipped out of the fingers.")
+
+    async def _leave(self, context: Context, motion: PlannedMotion, home: Array) -> None:
+        """Open the hand, back off, and go home, as far as it can go."""
+        side: Side = "left" if self._report.side == "left" else "right"
+        arm = context.arms[side]
+        context.hands[side].open(MAX_GAP)
+        if arm.sent:
+            await arm.move(retracted(arm.commanded, self._config.before), self._config.travel_speed)
+        motion.look()
+        try:
+            await motion.to_joints(home, [side], self._config.travel_speed)
+        except PlanRefused as refusal:
+            context.say("approach", f"The arm stays where it is: {refusal}")

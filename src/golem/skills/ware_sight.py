@@ -1,0 +1,108 @@
+"""What a skill sees of things that stand on a surface: which to take, how high the surface is, what the palm shows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from golem.capabilities.grasping.object_cloud import MIN_POINTS, piece
+from golem.skills.base import StageFailed
+from golem.skills.context import Context
+from golem.types import Array, LocalizedObject, Side
+
+LAYER = 0.006
+"""Thickness of the layer of points that a surface is [m]: the noise of a head camera at arm's length."""
+ABOUT = 0.16
+"""Radius around a thing within which the surface is that it stands on [m]."""
+TIPS = 0.004
+"""Points of a palm camera that are less beyond the fingertips are the fingers' own [m]."""
+PROUD = 0.012
+"""Height above a surface from which on points are of what stands on it [m]."""
+STRAY = 8
+"""Pieces that are too small to be a thing, and are passed over."""
+FRAMES = 3
+"""Frames of a palm camera that are waited for, so that it shows the hand at rest."""
+
+
+def surface_below(points: Array, place: Array, radius: float = ABOUT) -> float | None:
+    """Return the height of the level surface around `place` (3,) or (2,), as `points` (n, 3) show it [m].
+
+    The fullest layer of what is within `radius` [m]; None where too little is seen.
+    """
+    near = points[np.hypot(points[:, 0] - place[0], points[:, 1] - place[1]) < radius]
+    if len(near) < MIN_POINTS:
+        return None
+    heights = np.sort(near[:, 2])
+    counts = np.searchsorted(heights, heights + LAYER) - np.arange(len(heights))
+    first = int(counts.argmax())
+    return float(np.median(heights[first : first + int(counts[first])]))
+
+
+async def find(
+    context: Context, label: str, near: tuple[float, float] | None, timeout: float
+) -> LocalizedObject | None:
+    """Return the thing of a class that the head camera shows, the one nearest to where it is expected.
+
+    Args:
+        context: whose camera.
+        label: class of the thing.
+        near: x, y in odom where it is expected [m]; None: the one that is told most surely.
+        timeout: how long to look [s].
+
+    Returns:
+        The thing; None where none is shown.
+
+    Raises:
+        StageFailed: the camera gave no detections.
+    """
+    with context.watch("head", label) as eye:
+        end, seen = context.t + timeout, False
+        while True:
+            sightings = await eye.look(end - context.t)
+            if sightings is None:
+                break
+            seen = True
+            found = [o for o in sightings.objects if o.label == label]
+            if found and near is None:
+                return max(found, key=lambda o: o.detection.score)
+            if found:
+                return min(found, key=lambda o: float(np.hypot(*(o.position[:2] - np.array(near)))))
+    if not seen:
+        raise StageFailed("detect", "localizer", "The head camera gave no detections in time.")
+    return None
+
+
+async def palm_view(context: Context, side: Side, label: str, seconds: float) -> Array:
+    """Return the (n, 3) points in odom that the palm camera shows beyond the fingertips [m]; n may be 0."""
+    camera = f"{side}_hand"
+    with context.watch(camera, label) as eye:
+        end = context.t + seconds
+        for _ in range(FRAMES):
+            if await eye.look(end - context.t) is None:
+                return np.zeros((0, 3))
+    T = context.arms[side].pose
+    points = context.scene(camera)
+    return points[(points - T[:3, 3]) @ T[:3, 2] > TIPS]
+
+
+def seen_again(points: Array, target: LocalizedObject, trust: float) -> LocalizedObject | None:
+    """Return `target` as another camera's `points` (n, 3) show it; None where nothing like it is within `trust` [m]."""
+    middle = np.median(target.points, axis=0) if len(target.points) else target.position
+    around = points[np.linalg.norm(points[:, :2] - middle[:2], axis=1) < trust + 0.10]
+    if len(around) < MIN_POINTS:
+        return None
+    level = surface_below(around, middle)
+    if level is not None:
+        around = around[around[:, 2] > level + PROUD]
+    cloud = around[:0]
+    for _ in range(STRAY):
+        cloud = piece(around, middle)
+        if len(cloud) >= MIN_POINTS or not len(cloud):
+            break
+        around = around[(np.abs(around[:, None] - cloud).sum(axis=2) > 0.0).all(axis=1)]
+    if len(cloud) < MIN_POINTS or np.hypot(*(np.median(cloud, axis=0) - middle)[:2]) > trust:
+        return None
+    centre = np.median(cloud, axis=0)
+    nearest = cloud[((cloud - centre) ** 2).sum(axis=1).argmin()].copy()
+    return replace(target, position=nearest, points=cloud, mask=None)

@@ -1,0 +1,120 @@
+"""Errands that go as a test says: recall, take, place, and what is done where the thing is not there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.skills.conftest import modules
+
+from golem.capabilities.memory.object_map import ObjectMap
+from golem.errors import ConfigError
+from golem.evaluation.conformance.memory_suite import look
+from golem.interfaces import topics
+from golem.interfaces.memory_payloads import MemoryStatus
+from golem.interfaces.payloads import GripState, HandStatus, LegStatus
+from golem.middleware.bus import Bus
+from golem.robots.model.kinematics import Kinematics
+from golem.skills.base import SkillResult
+from golem.skills.context import Context
+from golem.skills.fetch import Fetch, FetchGoal
+from golem.skills.place import Place
+from golem.skills.remember import Remember
+from golem.skills.runner import SkillRun
+from golem.skills.take import Take, TakeReport
+from golem.types import PlanarPose, Twist
+
+LEGS = LegStatus(
+    0.0, Twist(), Twist(), False, "", False, False, PlanarPose(0.0, 0.0, 0.0), np.zeros(2), "hold", speed=0.0
+)
+NOT_THERE = SkillResult(False, "detect", "localizer", "The head camera shows no mug.", value=TakeReport())
+TAKEN = SkillResult(True, "done", None, "", value=TakeReport("left", "top", below=0.08, above=0.02))
+DONE = SkillResult(True, "done", None, "")
+
+
+class Scripted:
+    """A skill that ends at once, each time with the next of its results."""
+
+    def __init__(self, kind: type[Any], results: Sequence[SkillResult]) -> None:
+        self.Goal, self.results, self.goals = kind.Goal, results, list[Any]()
+
+    def timeout(self, goal: object) -> float:
+        """Allow a second."""
+        return 1.0
+
+    async def run(self, context: Context, goal: object) -> SkillResult:
+        """End."""
+        self.goals.append(goal)
+        return self.results[len(self.goals) - 1]
+
+
+def fetch(
+    goal: FetchGoal, takes: Sequence[SkillResult], places: Sequence[SkillResult] = (DONE,), seen: bool = True,
+    state: GripState = GripState.HOLDING,
+) -> tuple[SkillResult, dict[str, Scripted]]:  # fmt: skip
+    """Return how an errand of a robot that does not walk ended, and what was asked of which skill."""
+    skills = {
+        "take": Scripted(Take, takes),
+        "place": Scripted(Place, places),
+        "remember": Scripted(Remember, [DONE]),
+    }
+    memory = ObjectMap()
+    if seen:
+        memory.observe(look(98.0))
+    context = Context(Bus(), Kinematics(), 0.01, modules(skill=skills.__getitem__, memory=memory))
+    context.bus.publish(topics.MEMORY_STATUS, MemoryStatus(0.0, "odom", 100.0, 1), 0.0)
+    context.bus.publish(topics.LEG_STATUS, LEGS, 0.0)
+    context.bus.publish(topics.hand_status("left"), HandStatus(0.0, state, 0.07, 0.0, np.zeros(2)), 0.0)
+    run = SkillRun("fetch", Fetch().run(context, goal))
+    for _ in range(200):
+        context.refresh(context.t + 0.01)
+        run.step()
+    assert run.error is None and run.result is not None
+    return run.result, skills
+
+
+def test_it_takes_it_where_it_is_remembered_and_sets_it_down_as_it_was_taken() -> None:
+    result, skills = fetch(FetchGoal("mug", (0.5, 0.1)), [TAKEN])
+    assert result.success, result
+    (taken,), (placed,) = skills["take"].goals, skills["place"].goals
+    assert taken.near == pytest.approx((0.4, 0.0)) and taken.label == "mug"
+    assert (placed.x, placed.y, placed.side, placed.below, placed.above) == (0.5, 0.1, "left", 0.08, 0.02)
+    assert result.value.looked == pytest.approx([0.4, 0.0])
+
+
+def test_without_a_place_it_stays_in_the_hand() -> None:
+    result, skills = fetch(FetchGoal("mug"), [TAKEN])
+    assert result.success and "left hand" in result.reason and not skills["place"].goals
+
+
+def test_what_is_not_there_is_said_with_the_slot() -> None:
+    result, skills = fetch(FetchGoal("mug"), [NOT_THERE])
+    assert (result.success, result.stage, result.slot) == (False, "detect", "localizer")
+    assert len(skills["take"].goals) == 1
+
+
+def test_what_was_never_seen_is_looked_for_and_taken() -> None:
+    result, skills = fetch(FetchGoal("mug"), [TAKEN], seen=False)
+    assert result.success and len(skills["remember"].goals) == 1
+    assert skills["take"].goals[0].near == ()
+
+
+def test_what_is_lost_on_the_way_is_noticed() -> None:
+    result, skills = fetch(FetchGoal("mug", (0.5, 0.1)), [TAKEN], state=GripState.SLIPPED)
+    assert (result.stage, result.slot) == ("carry", "grasp_method") and not skills["place"].goals
+
+
+def test_a_failed_place_is_the_errands_failure() -> None:
+    blocked = SkillResult(False, "detect", "localizer", "Something else stands at that place.")
+    result, _ = fetch(FetchGoal("mug", (0.5, 0.1)), [TAKEN], [blocked])
+    assert not result.success and result.reason == blocked.reason
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"text": " "}, {"text": "mug", "to": (1.0,)}, {"text": "mug", "places": 0}]
+)
+def test_a_goal_without_sense_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError):
+        FetchGoal(**wrong)

@@ -1,0 +1,116 @@
+"""What taking and placing see of a surface, where a hand is sent, and which goals they refuse."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from golem.capabilities.arms.postures import POSTURES
+from golem.capabilities.navigation.edge_fit import NearEdge
+from golem.errors import ConfigError
+from golem.interfaces import topics
+from golem.interfaces.payloads import GripState, HandStatus
+from golem.skills.counter_stance import STANDOFF, before, stance
+from golem.skills.place import Place, PlaceGoal
+from golem.skills.runner import SkillRun
+from golem.skills.take import Take, TakeConfig, TakeGoal
+from golem.skills.ware_sight import seen_again, surface_below
+from golem.types import NUM_JOINTS, UPPER, Array, Detection, Imu, LocalizedObject, LowState, PlanarPose
+
+TOP = -0.15
+
+
+def table_with_can(at: tuple[float, float] = (0.5, -0.2)) -> tuple[Array, Array]:
+    """Return the points of a table and those of the lid and wall of a can on it."""
+    rng = np.random.default_rng(0)
+    table = np.column_stack([rng.uniform((0.3, -0.5), (0.8, 0.2), (6000, 2)), np.full(6000, TOP)])
+    turn, height = rng.uniform(0, 2 * np.pi, 3000), rng.uniform(0.0, 0.12, 3000)
+    can = np.column_stack([at[0] + 0.034 * np.cos(turn), at[1] + 0.034 * np.sin(turn), TOP + height])
+    noise = 0.001 * rng.standard_normal((9000, 3))
+    return table + noise[:6000], can + noise[6000:]
+
+
+def can_at(points: Array) -> LocalizedObject:
+    box = np.array([0.0, 0.0, 9.0, 9.0])
+    return LocalizedObject(Detection("can", 0.9, box, box[:2]), 0.0, np.median(points, axis=0), points)
+
+
+def at_home(world: Any) -> None:
+    q, zero = np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
+    q[UPPER] = POSTURES["home"]
+    still = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
+    world.bus.publish(topics.LOW_STATE, LowState(0.0, q, zero, zero, still), 0.0)
+
+
+def test_the_surface_is_the_fullest_layer() -> None:
+    table, can = table_with_can()
+    level = surface_below(np.concatenate([table, can]), np.array([0.5, -0.2, 0.0]))
+    assert level == pytest.approx(TOP, abs=0.002)
+    assert surface_below(table, np.array([5.0, 0.0, 0.0])) is None
+
+
+def test_the_palm_camera_finds_it_beside_where_it_seemed() -> None:
+    table, can = table_with_can()
+    seen = seen_again(np.concatenate([table, can]), can_at(can + (0.06, 0.03, 0.01)), trust=0.15)
+    assert seen is not None
+    assert np.median(seen.points, axis=0)[:2] == pytest.approx([0.5, -0.2], abs=0.01)
+    assert seen.points[:, 2].min() > TOP + 0.008
+    assert seen_again(table, can_at(can), trust=0.15) is None
+    assert seen_again(np.zeros((0, 3)), can_at(can), trust=0.15) is None
+
+
+def test_nothing_is_taken_where_nothing_is_seen(world: Any) -> None:
+    world.objects["head"] = lambda: []
+    at_home(world)
+    result = world.run(Take(TakeConfig(turn=0.0)).run(world.context, TakeGoal("mug"))).result
+    assert (result.success, result.stage, result.slot) == (False, "detect", "localizer")
+    assert result.reason == "The head camera shows no mug."
+    assert world.bus.latest(topics.hand_goal("right")) is None
+
+
+def test_an_empty_hand_places_nothing(world: Any) -> None:
+    result = world.run(Place().run(world.context, PlaceGoal(0.4, 0.0))).result
+    assert (result.stage, result.reason) == ("detect", "Neither hand holds anything.")
+
+
+def test_what_is_held_stays_held_where_no_surface_is_seen(world: Any) -> None:
+    held = HandStatus(0.0, GripState.HOLDING, 0.06, 0.0, np.zeros(2))
+    at_home(world)
+    run = SkillRun("place", Place().run(world.context, PlaceGoal(0.4, 0.0)))
+    world.step()
+    world.bus.publish(topics.hand_status("right"), held, world.t)
+    world.bus.deliver(world.t + 1.0)
+    run.step()
+    assert run.result is not None
+    assert run.result.reason == "The head camera shows no surface at that place."
+    assert world.bus.latest(topics.hand_goal("right")) is None
+
+
+def test_a_stance_is_before_the_place_and_straight_to_the_edge() -> None:
+    edge = NearEdge(PlanarPose(1.0, 0.3, 0.2), 2.0, 0.003, 40)
+    here, place = PlanarPose(2.0, 1.0, 0.5), np.array([0.15, 0.5])
+    goal = edge.pose @ PlanarPose(place[0], place[1], 0.0)
+    spot = here @ goal
+    there = stance(edge, here, np.array([spot.x, spot.y]))
+    across = edge.pose.to(there)
+    assert across.yaw == pytest.approx(0.0) and STANDOFF[0] <= -across.x <= STANDOFF[1]
+    assert abs(across.y - 0.5) <= 0.16 + 1e-9
+    facing = before(PlanarPose(0.0, 0.0, 0.0), np.array([0.0, 2.0]), 0.5)
+    assert (facing.x, facing.y, facing.yaw) == pytest.approx((0.0, 1.5, np.pi / 2))
+
+
+@pytest.mark.parametrize(
+    ("kind", "wrong"),
+    [
+        (TakeGoal, {"label": ""}),
+        (TakeGoal, {"label": "mug", "near": (1.0,)}),
+        (TakeGoal, {"label": "mug", "near": (1.0, float("nan"))}),
+        (PlaceGoal, {"x": float("inf"), "y": 0.0}),
+        (PlaceGoal, {"x": 0.4, "y": 0.0, "below": 2.0}),
+    ],
+)
+def test_a_goal_without_sense_is_refused(kind: type[Any], wrong: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError):
+        kind(**wrong)
