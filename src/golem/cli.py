@@ -153,7 +153,7 @@ def _twin(words: list[str]) -> int:
 
 
 def _safety(words: list[str]) -> int:
-    """Run a robot's safety gate; `safety activate|stop|reset|press|release|status|take` asks it, `console` is quick."""
+    """Run a robot's safety gate; `safety activate|stop|reset|...` asks it, `safety console` is quick."""
     from golem.runtime.live import operator
 
     if words[:1] == ["console"]:
