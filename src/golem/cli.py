@@ -153,7 +153,7 @@ def _twin(words: list[str]) -> int:
 
 
 def _safety(words: list[str]) -> int:
-    """Run a robot's safety gate; `safety activate|stop|reset|press|release|status|take` asks it, `console` is quick."""
+    """Run a robot's safety gate; `safety activate|stop|reset|...` asks it, `safety console` is quick."""
     from golem.runtime.live import operator
 
     if words[:1] == ["console"]:
@@ -298,6 +298,11 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
                        "golem.runtime.live.topic_stats", "TopicStatsConfig:run_topic_stats"),
     "record": _record,
     "replay": _replay,
+    "black-box": _command(
+        "Show a stop of the safety gate at the moment of the fault.",
+        "golem.dashboard.stop_view",
+        "StopViewConfig:run_stop_view",
+    ),
     "view": _command("Show a domain live in Foxglove.", "golem.runtime.live.foxglove_view", "ViewConfig:run_view"),
     "check": _check,
     "new": _new,

@@ -9,22 +9,20 @@ from __future__ import annotations
 
 import contextlib
 import io
-import logging
-import socket
 import time
 from collections.abc import Callable
 from typing import Any
 
 import cv2
 import numpy as np
-import viser
 
 from golem.dashboard.balance_chart import SPAN, balance_chart
 from golem.dashboard.map_view import map_view
 from golem.dashboard.panel import Button, Panel
+from golem.dashboard.server import serve
 from golem.dashboard.stage import Stage
 from golem.dashboard.status import Timeline, camera_picture, read_status
-from golem.errors import ConfigError, GolemError
+from golem.errors import GolemError
 from golem.hardware.safety.base import OperatorRequest
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState
@@ -91,7 +89,7 @@ class LiveView:
             ConfigError: the port cannot be had.
         """
         local = is_loopback(host)
-        self._server = _serve(host, port) if local else _serve("127.0.0.1", 0)
+        self._server = serve(host, port) if local else serve("127.0.0.1", 0)
         inside = self._server.get_port()
         self._gate = None if local else TokenGate(host, port, inside)
         self.url = f"http://{host}:{inside}"
@@ -347,19 +345,3 @@ class LiveView:
     def __exit__(self, *_: object) -> None:
         """Stop serving."""
         self.close()
-
-
-def _serve(host: str, port: int) -> viser.ViserServer:
-    """Start a server at exactly the port that was asked for: viser would silently take the next free one."""
-    try:
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind((host, port))
-            port = probe.getsockname()[1]
-    except (OSError, OverflowError) as error:
-        raise ConfigError(
-            f"Cannot serve the live view at {host}:{port} ({error}); choose another --port."
-        ) from error
-    logging.getLogger("websockets").setLevel(logging.ERROR)
-    with contextlib.redirect_stdout(io.StringIO()):  # its banner; our callers say where to look
-        return viser.ViserServer(host=host, port=port, verbose=False)

@@ -316,7 +316,8 @@ class Reason(StrEnum):
     COMMAND_INVALID = "command_not_finite"
     COMMAND_UNSTAMPED = "command_unstamped"
     COMMAND_GAINS = "command_gains"
-    COMMAND_REVERSALS = "command_torque_reversals"
+    COMMAND_JOLTS = "command_torque_jumps"
+    COMMAND_BEYOND = "command_beyond_robot"
 
 
 class Fault(NamedTuple):

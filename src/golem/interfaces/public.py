@@ -208,6 +208,8 @@ SERVICES: tuple[ServiceRow, ...] = (
     ServiceRow("/safety/activate", TRIGGER, "safety", "Let commands through, if the gate is armed."),
     ServiceRow("/safety/stop", TRIGGER, "safety", "Stop the robot: its motors damp, then go limp."),
     ServiceRow("/safety/reset", TRIGGER, "safety", "Arm the gate again after a stop, if all is sound."),
+    ServiceRow("/safety/hand_over", TRIGGER, "safety",
+            "Give the lease for commands to the other of two stacks; not while the robot moves."),
     ServiceRow("/estop/press", "std_srvs/srv/SetBool", "safety",
             "Press or release the virtual emergency stop; simulation only."),
     ServiceRow("/elastic_band/release", TRIGGER, "robot", "Let the band of a standing robot go; simulation only."),

@@ -103,7 +103,8 @@ class TokenGate:
                 return
             outer.settimeout(None)
             with socket.create_connection(("127.0.0.1", self._server)) as inner, self._held(outer, inner):
-                inner.sendall(head)
+                # The token has shown where the page came from. The server itself answers this machine's pages only.
+                inner.sendall(re.sub(rb"(?im)^origin:[^\r\n]*", b"Origin: http://127.0.0.1", head))
                 back = threading.Thread(target=_pump, args=(outer, inner), daemon=True)
                 back.start()
                 if by_address:

@@ -20,7 +20,7 @@ from golem.types import Array, Imu, LowCommand, LowState
 
 LIMITS = replace(
     SafetyLimits.from_profile().still(),
-    **dict.fromkeys(("drift", "imu_drift", "gravity_angle", "dead_time", "reversals"), np.inf),
+    **dict.fromkeys(("drift", "imu_drift", "gravity_angle", "dead_time", "jolts"), np.inf),
 )
 """The states of these tests are noise: whether they are plausible is tested in `test_senses`."""
 DT = 0.002

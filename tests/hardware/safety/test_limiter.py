@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from golem.hardware.safety.base import Outgoing, SafetyLimits
-from golem.hardware.safety.limiter import limit_command
+from golem.hardware.safety.limiter import BRAKE, limit_command, spared
 from golem.types import Array, Imu, LowCommand, LowState
 
 DT = 0.002
@@ -145,3 +145,31 @@ def test_the_receiver_cannot_reach_into_the_memory(
     sent, last = limit_command(0.0, state_at(0.0), command_at(0.0), limits, at_rest(limits), DT)
     sent.q[:] = sent.kp[:] = sent.kd[:] = 9.0
     assert not (last.q == 9.0).any() and not (last.kp == 9.0).any() and not (last.kd == 9.0).any()
+
+
+@pytest.mark.parametrize(("dq", "share"), [(0.0, 1.0), (0.75, 1.0), (0.9, 0.5), (1.0, 0.0), (2.0, -BRAKE)])
+def test_a_joint_near_its_speed_is_driven_on_less_and_braked_beyond(dq: float, share: float) -> None:
+    up, down = spared(
+        np.zeros(1),
+        np.array([10.0 * dq]),
+        np.array([1e6]),
+        np.array([10.0]),
+        np.array([-1.0]),
+        np.array([1.0]),
+    )
+    assert up[0] == pytest.approx(share) and down[0] == 1.0
+
+
+def test_a_joint_near_the_end_of_its_range_is_driven_on_less_and_braked_beyond() -> None:
+    ends = np.array([-1.0, -1.0, -1.0]), np.array([1.0, 1.0, 1.0])
+    up, down = spared(np.array([0.9, 0.975, 1.2]), np.zeros(3), np.ones(3), np.ones(3), *ends)
+    assert up == pytest.approx([1.0, 0.5, -BRAKE]) and down == pytest.approx(1.0)
+
+
+def test_no_command_drives_a_fast_joint_on() -> None:
+    state = LowState(
+        0.0, np.zeros(27), LIMITS.velocity, np.zeros(27), Imu(np.eye(4)[0], np.zeros(3), np.zeros(3))
+    )
+    command = LowCommand(0.0, np.zeros(27), np.zeros(27), LIMITS.torque, np.zeros(27), np.zeros(27))
+    sent, _ = limit_command(0.0, state, command, LIMITS, at_rest(LIMITS), DT, strained=True)
+    assert np.all(predicted(sent, state) <= 1e-9)

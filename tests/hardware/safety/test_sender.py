@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.safety.sender import SenderMemory, examine_command
@@ -42,7 +45,28 @@ def test_negative_gains_are_a_fault_of_the_sender() -> None:
     assert fault is not None and fault.reason is Reason.COMMAND_GAINS
 
 
-def test_torques_that_go_to_and_fro_are_a_fault_and_one_reversal_is_none() -> None:
-    assert run(command(0, tau=200.0), *[command(1, tau=-200.0)] * 20)[1] is None
-    _, fault = run(*[command(k, tau=300.0 * (-1) ** k) for k in range(8)])
-    assert fault is not None and fault.reason is Reason.COMMAND_REVERSALS
+def test_torques_that_jump_to_and_fro_are_a_fault_and_one_jump_is_none() -> None:
+    assert run(command(0, tau=30.0), *[command(1, tau=-30.0)] * 20)[1] is None
+    _, fault = run(*[command(k, tau=30.0 * (-1) ** k) for k in range(4)])
+    assert fault is not None and fault.reason is Reason.COMMAND_JOLTS
+
+
+def test_a_position_that_jumps_is_a_torque_that_does() -> None:
+    def at(k: int, q: float) -> LowCommand:
+        return replace(command(k), q=np.full(27, q))
+
+    assert run(*[at(k, 0.001 * k) for k in range(300)])[1] is None
+    _, fault = run(*[at(k, 1.0 * (k // 50 % 2)) for k in range(151)])
+    assert fault is not None and fault.reason is Reason.COMMAND_JOLTS
+
+
+@pytest.mark.parametrize("field", ["q", "dq", "tau", "kp", "kd"])
+def test_what_no_sender_could_mean_is_not_followed_and_the_third_is_a_fault(field: str) -> None:
+    far = replace(command(1), **{field: np.full(27, 1e5)})
+    assert run(command(0), far, command(2)) == ([True, False, True], None)
+    _, fault = run(command(0), far, far, far)
+    assert fault is not None and fault.reason is Reason.COMMAND_BEYOND and f"with {field} 1" in fault.detail
+
+
+def test_ten_times_what_a_joint_may_do_is_merely_limited() -> None:
+    assert run(command(0), *[replace(command(1), q=np.full(27, 4.0), kp=np.full(27, 900.0))] * 9)[1] is None

@@ -76,6 +76,24 @@ def test_a_second_stack_and_a_second_robot_stop_the_first(
     )
 
 
+def test_an_operator_hands_over_to_a_second_stack_and_the_first_is_heard_no_more(live: Live) -> None:
+    live.activate()
+    assert live.ask("hand_over") == (False, "The robot is in motion; stop it first: golem safety stop.")
+    second, _ = live.member("second")
+    row = public.topic("/safety/lowcmd_in")
+    second.writer("rt/safety/lowcmd_in", hg.LOW_CMD.type_name, row.qos)
+    live.run(0.1)
+    assert live.reason == "two_writers" and not live.ask("reset")[0]
+    assert live.ask("hand_over")[0]
+    live.run(0.1)
+    assert live.ask("reset")[0]
+    # The second says nothing, and what the first says does not count.
+    assert live.gate is not None and live.gate._arrivals.ignored
+    live.run(0.3)
+    success, message = live.ask("activate")
+    assert not success and "command_stale" in message
+
+
 def test_a_motor_that_reports_an_error_is_named_once_it_persists(live: Live) -> None:
     live.activate()
     assert live.twin is not None

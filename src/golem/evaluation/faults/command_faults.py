@@ -16,6 +16,7 @@ from golem.evaluation.faults.injection import (
     edited_command,
 )
 from golem.interfaces.payloads import Reason
+from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_INDEX
 from golem.types import LEGS, NUM_JOINTS, UPPER
 
@@ -36,6 +37,9 @@ PARTS = {
     "knee": slice(3, 4),
     "elbow": slice(16, 17),
 }
+_VENDOR = load_limits("urdf")
+TORQUE, SPEED, UPPERMOST = _VENDOR.torque, _VENDOR.velocity, _VENDOR.upper
+"""Maxima of the joints that a command may well ask for [N m, rad/s, rad]."""
 DAMAGED, INVALID = (Reason.COMMAND_DAMAGED,), (Reason.COMMAND_DAMAGED, Reason.COMMAND_INVALID)
 LIMITS = (
     Reason.POSITION,
@@ -45,7 +49,7 @@ LIMITS = (
     Reason.TILT,
 )
 """Reasons of a robot that was moved beyond what it may do."""
-SENDER = (Reason.COMMAND_GAINS, Reason.COMMAND_REVERSALS)
+SENDER = (Reason.COMMAND_GAINS, Reason.COMMAND_JOLTS, Reason.COMMAND_BEYOND)
 
 Edit = Callable[[FaultMoment, Any], None]
 
@@ -164,6 +168,17 @@ def _motion() -> Iterator[Injection]:
         yield _safe(
             f"tau +-1000 at 10 Hz of {part}", command=_set("tau", where, lambda m: 1e3 * (-1) ** (m.k // 25))
         )
+        full = TORQUE[where]
+        yield _safe(f"tau at its limit of {part}", command=_set("tau", where, lambda m, tau=full: tau))
+        yield _safe(
+            f"tau at its limits at 10 Hz of {part}",
+            command=_set("tau", where, lambda m, tau=full: tau * (-1) ** (m.k // 25)),
+        )
+        yield _safe(
+            f"q 1 rad beyond its range of {part}",
+            command=_set("q", where, lambda m, q=UPPERMOST[where] + 1.0: q),
+        )
+        yield _safe(f"dq at its limit of {part}", command=_set("dq", where, lambda m, dq=SPEED[where]: dq))
         yield _safe(f"q 10 rad of {part}", command=_set("q", where, lambda m: 10.0))
         yield _safe(f"q -10 rad of {part}", command=_set("q", where, lambda m: -10.0))
         yield _safe(f"dq 100 of {part}", command=_set("dq", where, lambda m: 100.0))

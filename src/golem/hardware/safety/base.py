@@ -16,10 +16,18 @@ from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, BaseEstimate, LowCommand, LowState
 
+KP_MAX, KD_MAX = 500.0, 30.0
+"""Bounds of the gains [authors]."""
 LIMIT_RATIO = 0.9
 """Share of the vendor's maxima that is used [paper]."""
-REVERSAL = 0.25
-"""Share of the torque limit on either side of zero that makes a change of sign a reversal [own]."""
+EASE = 0.2
+"""Share of the speed limit over which the torque that drives a joint on gives way to the one that brakes it [own]."""
+SPACE = 0.05
+"""Distance before the end of its range over which it does [rad] [own]."""
+EARLY = 0.5
+"""Share of `deceleration` by which the limiter judges where a joint would come to rest [own]."""
+JOLT = 0.6
+"""Share of the torque limit by which what a command asks for may jump [own: legs that recover jump by 0.56]."""
 
 
 STANDING = slice(0, UPPER.start + 1)
@@ -52,8 +60,13 @@ class SafetyLimits:
             the noise of the torque estimate must not stop the robot].
         torque_rate: bound of the feed-forward torque's rate [N m/s]: the whole range in 0.1 s for torso and arms, whose
             weight changes slowly, in 0.02 s for the legs, which feel the ground [own].
-        flip: product of two feed-forward torques below which they are a reversal [N^2 m^2]: minus the square of
-            `REVERSAL` of `torque` [own: gravity changes its sign through zero].
+        jolt: jump of stiffness times position plus feed-forward, from one command to the next, that counts [N m]:
+            `JOLT` of `torque`.
+        middle: middle of the range of measured positions [rad].
+        ordinary: (108,) magnitudes of position and of the limiter's resting place, both from `middle`, of speed and
+            torque, below which nothing is to be limited or judged.
+        sane: (135,) magnitudes of q, dq, tau, kp, kd that no sender who knows the robot reaches: 5 rad beyond its
+            range, twice its speed and torque, ten times its gains [own: legs that fall ask for 2.4 rad beyond].
         slew: bound of the commanded position's rate [rad/s]: `velocity` for the legs, whose policies use distant
             targets as torques; 3 rad/s for torso and arms, three times what the controllers ask for [own].
         deceleration: what each joint can surely be braked with [rad/s^2]: torso and arms 20 [own: torque left after
@@ -72,6 +85,8 @@ class SafetyLimits:
             [own: the estimators call themselves stale after 0.2 s; together more than three times the longest time
             without a planted foot on a floor like ice, 0.15 s, and no step or push recovery comes near].
         command_age: age of the command that stops the robot [s] [own].
+        command_late: age that commands may have for no longer than `command_age` [s] [own: one hiccup is borne, but
+            legs that always answer what was 90 ms ago fall].
         future: how far ahead of the clock a stamp may be [s] [own].
         samples: consecutive bad samples of position, speed, braking distance or tilt that stop the robot [own].
         leg_samples: the same for position, speed and braking distance of the legs, whose stop is a fall [own: a foot
@@ -102,7 +117,9 @@ class SafetyLimits:
         bad_frames: level at which damaged frames stop the robot: each counts one, each sound one takes `frame_leak`
             off. So three in a row stop it, or more than one in fifty for long [own].
         frame_leak: see `bad_frames`.
-        reversals: level of reversals that stops the robot, as `bad_frames` [own].
+        jolts: level of jumps of torque that stops the robot: each counts one, each other command takes `jolt_leak`
+            off. So three within half a second stop it, or more than one a second for long [own].
+        jolt_leak: see `jolts`.
     """
 
     lower: Array
@@ -113,12 +130,15 @@ class SafetyLimits:
     torque: Array
     torque_command: Array
     torque_rate: Array
-    flip: Array
+    jolt: Array
+    middle: Array
+    ordinary: Array
+    sane: Array
     slew: Array
     deceleration: Array
     damping: Array
-    kp_max: float = 500.0
-    kd_max: float = 30.0
+    kp_max: float = KP_MAX
+    kd_max: float = KD_MAX
     kp_rate: float = 1000.0
     kd_rate: float = 100.0
     tilt: float = 0.8
@@ -126,6 +146,7 @@ class SafetyLimits:
     state_age: float = 0.050
     base_age: float = 0.300
     command_age: float = 0.100
+    command_late: float = 0.050
     future: float = 0.005
     samples: int = 3
     leg_samples: int = 25
@@ -149,7 +170,8 @@ class SafetyLimits:
     voltage: tuple[float, float] = (30.0, 75.0)
     bad_frames: float = 3.0
     frame_leak: float = 0.02
-    reversals: float = 5.0
+    jolts: float = 2.5
+    jolt_leak: float = 0.002
 
     def still(self) -> SafetyLimits:
         """Return these limits for sensors without noise, which may repeat their numbers while the robot rests."""
@@ -172,6 +194,7 @@ class SafetyLimits:
         limits = load_limits(profile)
         middle = 0.5 * (limits.lower + limits.upper)
         half = 0.5 * (limits.upper - limits.lower)
+        reach = half + 0.05
         velocity = ratio * limits.velocity
         torque = ratio * limits.torque
         slew = np.full(NUM_JOINTS, 3.0)
@@ -192,7 +215,18 @@ class SafetyLimits:
             torque=torque,
             torque_command=torque_command,
             torque_rate=torque_rate,
-            flip=-((REVERSAL * torque) ** 2),
+            jolt=JOLT * torque,
+            middle=middle,
+            ordinary=np.concatenate((reach, reach - SPACE, (1.0 - EASE) * velocity, torque)),
+            sane=np.concatenate(
+                (
+                    np.maximum(np.abs(limits.lower), np.abs(limits.upper)) + 5.0,
+                    2.0 * velocity,
+                    2.0 * torque,
+                    np.full(NUM_JOINTS, 10.0 * KP_MAX),
+                    np.full(NUM_JOINTS, 10.0 * KD_MAX),
+                )
+            ),
             slew=slew,
             deceleration=deceleration,
             damping=np.minimum(5.0, torque_command / velocity),
@@ -236,7 +270,10 @@ class GateInputs:
 
 @dataclass(frozen=True, slots=True)
 class Counters:
-    """Consecutive bad samples of each check."""
+    """Consecutive bad samples of each check, and whether a joint is fast, near its end, or loaded.
+
+    What is not `strained` needs no braking by the limiter.
+    """
 
     position: int = 0
     leg_position: int = 0
@@ -246,6 +283,7 @@ class Counters:
     braking: int = 0
     leg_braking: int = 0
     tilt: int = 0
+    strained: bool = False
 
 
 @dataclass(frozen=True, slots=True)

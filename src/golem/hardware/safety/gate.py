@@ -24,7 +24,7 @@ import numpy as np
 from golem.hardware.safety.base import Counters, GateInputs, OperatorRequest, Outgoing, SafetyLimits
 from golem.hardware.safety.limiter import limit_command
 from golem.hardware.safety.memory import GateMemory, GateResult
-from golem.hardware.safety.monitor import examine, strained, whole, whole_command
+from golem.hardware.safety.monitor import examine, whole
 from golem.hardware.safety.sender import SenderMemory, examine_command
 from golem.hardware.safety.senses import SensesMemory, sense
 from golem.interfaces.payloads import EstopMessage, Fault, GateState, Reason
@@ -41,7 +41,8 @@ STAND = frozenset(
         Reason.COMMAND_INVALID,
         Reason.COMMAND_UNSTAMPED,
         Reason.COMMAND_GAINS,
-        Reason.COMMAND_REVERSALS,
+        Reason.COMMAND_JOLTS,
+        Reason.COMMAND_BEYOND,
     }
 )
 """Reasons that say nothing against state and legs."""
@@ -63,7 +64,7 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     t = inputs.t if running else memory.t if math.isfinite(memory.t) else 0.0
     estop, estop_fault = _estop(inputs.estop, memory.estop, t, limits)
     state, counters, senses, state_fault = _state(inputs, memory, t, limits)
-    command, sender, command_fault = _command(inputs.command, memory, t, limits)
+    command, sender, prompt, command_fault = _command(inputs.command, memory, t, limits)
     grounded, base_fault = _base(inputs.base, memory, t, limits)
     clock_fault = None if running else Fault(Reason.CLOCK)
     faults = [clock_fault, _pause(memory, t, limits), inputs.transport, estop_fault, state_fault]
@@ -112,7 +113,7 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     wanted = {GateState.ACTIVE: command, GateState.STOP2: inputs.standing}.get(mode)
     if state is not None and wanted is not None and outgoing is not None:
         dt = min(t - memory.t, limits.longest_tick)
-        sent, outgoing = limit_command(t, state, wanted, limits, outgoing, dt, strained(counters))
+        sent, outgoing = limit_command(t, state, wanted, limits, outgoing, dt, counters.strained)
     else:
         if mode is not GateState.STOP2:
             outgoing = None
@@ -138,6 +139,7 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
             grounded=grounded,
             senses=senses,
             sender=sender,
+            prompt=prompt,
             sent=sent,
         ),
     )
@@ -251,21 +253,22 @@ def _base(
 
 def _command(
     new: LowCommand | None, memory: GateMemory, t: float, limits: SafetyLimits
-) -> tuple[LowCommand | None, SenderMemory, Fault | None]:
-    old = memory.command
-    sender = memory.sender if memory.mode is GateState.ACTIVE else SenderMemory()
+) -> tuple[LowCommand | None, SenderMemory, float, Fault | None]:
+    old, active = memory.command, memory.mode is GateState.ACTIVE
+    sender, prompt = (memory.sender, memory.prompt) if active else (SenderMemory(), t)
     if new is not None:
         if not _stamped(new.t, t, limits):
-            return old, sender, Fault(Reason.COMMAND_TIME, f"stamp {new.t} at {t}")
-        if not whole_command(new):
-            return old, sender, Fault(Reason.COMMAND_INVALID)
+            return old, sender, prompt, Fault(Reason.COMMAND_TIME, f"stamp {new.t} at {t}")
         if old is None or new.t > old.t:
             sender, followed, fault = examine_command(new, sender, limits)
             if fault is not None:
-                return new, sender, fault
+                return (old if fault.reason is Reason.COMMAND_INVALID else new), sender, prompt, fault
             old = new if followed or old is None else replace(old, t=new.t)
     if old is None:
-        return None, sender, Fault(Reason.COMMAND_MISSING)
-    if t - old.t > limits.command_age:
-        return old, sender, Fault(Reason.COMMAND_STALE, f"{(t - old.t) * 1e3:.0f} ms old")
-    return old, sender, None
+        return None, sender, prompt, Fault(Reason.COMMAND_MISSING)
+    age = t - old.t
+    if age <= limits.command_late:
+        prompt = t
+    if age > limits.command_age or t - prompt > limits.command_age:
+        return old, sender, prompt, Fault(Reason.COMMAND_STALE, f"{age * 1e3:.0f} ms old")
+    return old, sender, prompt, None

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.hardware.safety.base import Outgoing, SafetyLimits
+from golem.hardware.safety.base import EARLY, EASE, SPACE, Outgoing, SafetyLimits
 from golem.hardware.safety.monitor import at_rest
 from golem.types import NUM_JOINTS, Array, LowCommand, LowState
 
 # Arrays instead of numbers: numpy then skips a conversion, a third of such an operation's time.
 _ZERO = np.zeros(NUM_JOINTS)
-BRAKE = 0.2
-"""Share of the torque bound that brakes a joint which is too fast or too close to the end of its range [own]."""
+BRAKE = 0.5
+"""Share of the torque bound that brakes a joint which is too fast, or would come to rest beyond its range [own]."""
 _MIN_STIFFNESS = np.full(NUM_JOINTS, 1e-9)
 
 
@@ -48,13 +48,18 @@ def limit_command(
         limits: the limits.
         last: what the previous call returned.
         dt: time since then [s].
-        strained: whether a joint is too fast, or too close to the end of its range for its speed. It is then braked
-            whatever the command says, so that less is left for a stop to do.
+        strained: whether a joint may be too fast, or too close to the end of its range for its speed. It is then
+            driven on less, and braked in the end, whatever the command says, so that less is left for a stop to do.
     """
     minimum, maximum = np.minimum, np.maximum
     bound = limits.torque_command
     negative = -bound
-    highest, lowest = _spared(state, limits) if strained else (bound, negative)
+    highest, lowest = bound, negative
+    if strained:
+        up, down = spared(
+            state.q, state.dq, limits.deceleration, limits.velocity, limits.state_lower, limits.state_upper
+        )
+        highest, lowest = up * bound, -down * bound
 
     kp = minimum(maximum(command.kp, _ZERO), limits.kp_max)
     kp = minimum(kp, last.kp + limits.kp_rate * dt)
@@ -85,11 +90,24 @@ def limit_command(
     return limited, Outgoing(q, kp, kd, tau)
 
 
-def _spared(state: LowState, limits: SafetyLimits) -> tuple[Array, Array]:
-    """Return the (27,) highest and lowest torque that brakes every joint that moves too fast or too far [N m]."""
-    q, dq, bound = state.q, state.dq, limits.torque_command
-    rest = at_rest(q, dq, limits.deceleration)
-    up = (dq > limits.velocity) | (rest > limits.state_upper)
-    down = (dq < -limits.velocity) | (rest < limits.state_lower)
-    brake = BRAKE * bound
-    return np.where(up, -brake, bound), np.where(down, brake, -bound)
+def spared(
+    q: Array, dq: Array, deceleration: Array, velocity: Array, lower: Array, upper: Array
+) -> tuple[Array, Array]:
+    """Return which shares of their torque bounds may drive joints up and down; a negative one brakes.
+
+    It is 1 far from both limits, 0 at the speed limit and where the joint would come to rest at the end of its range,
+    and falls linearly in between, so that nothing chatters.
+
+    Args:
+        q: (..., n) positions [rad].
+        dq: (..., n) speeds [rad/s].
+        deceleration: (n,) what they can surely be braked with [rad/s^2].
+        velocity: (n,) limits of speed [rad/s].
+        lower: (n,) lower ends of their ranges [rad].
+        upper: (n,) upper ends [rad].
+    """
+    minimum, maximum = np.minimum, np.maximum
+    rest, ease = at_rest(q, dq, EARLY * deceleration), EASE * velocity
+    up = minimum((velocity - dq) / ease, (upper - rest) / SPACE)
+    down = minimum((velocity + dq) / ease, (rest - lower) / SPACE)
+    return minimum(maximum(up, -BRAKE), 1.0), minimum(maximum(down, -BRAKE), 1.0)

@@ -30,6 +30,7 @@ class GateMemory:
             activation. A robot that hangs in a band with its feet in the air has none, and is not stopped for it.
         senses: what is known of the life and the plausibility of the sensors.
         sender: what is known of whoever sends the commands.
+        prompt: when the newest command was no older than `command_late` last, while active [s].
         sent: what the motors were told last.
     """
 
@@ -47,6 +48,7 @@ class GateMemory:
     grounded: float | None = None
     senses: SensesMemory = field(default_factory=SensesMemory)
     sender: SenderMemory = field(default_factory=SenderMemory)
+    prompt: float = -np.inf
     sent: LowCommand | None = None
 
 

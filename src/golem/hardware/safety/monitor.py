@@ -7,23 +7,23 @@ from collections.abc import Callable
 
 import numpy as np
 
-from golem.hardware.safety.base import STANDING, Counters, SafetyLimits
+from golem.hardware.safety.base import EARLY, STANDING, Counters, SafetyLimits
 from golem.interfaces.payloads import Fault, Reason
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand, LowState
 
 _ABSURD = 1e6
 """No joint position, speed, torque or gain has a number this large; below it nothing here can overflow."""
-_SOUND = Counters()
+_SOUND, _STRAINED = Counters(), Counters(strained=True)
 
 
-def finite(*arrays: Array) -> bool:
-    """Return whether each array is (27,) and holds finite numbers of a believable size only."""
+def finite(*arrays: Array, below: Array | float = _ABSURD) -> bool:
+    """Return whether each array is (27,) and holds finite numbers of a size `below` a bound, by number or for all."""
     for array in arrays:
         if getattr(array, "shape", None) != (NUM_JOINTS,):
             return False
     joined = np.concatenate(arrays)
-    return np.count_nonzero(np.abs(joined) < _ABSURD) == joined.size
+    return np.count_nonzero(np.abs(joined) < below) == joined.size
 
 
 def whole(state: LowState) -> bool:
@@ -38,9 +38,9 @@ def whole(state: LowState) -> bool:
     return 0.9 < w * w + x * x + y * y + z * z < 1.1 and rates < _ABSURD
 
 
-def whole_command(command: LowCommand) -> bool:
-    """Return whether every array of `command` is (27,) and finite."""
-    return finite(command.q, command.dq, command.tau, command.kp, command.kd)
+def whole_command(command: LowCommand, below: Array | float = _ABSURD) -> bool:
+    """Return whether every array of `command` is (27,), and finite and `below` a bound, one or (135,)."""
+    return finite(command.q, command.dq, command.tau, command.kp, command.kd, below=below)
 
 
 def tilt(quat: Array) -> float:
@@ -52,12 +52,6 @@ def tilt(quat: Array) -> float:
 def at_rest(q: Array, dq: Array, deceleration: Array) -> Array:
     """Return where joints at `q` [rad] with `dq` [rad/s] come to rest if braked: dq^2 / (2 a) further on [rad]."""
     return q + dq * np.abs(dq) / (deceleration + deceleration)
-
-
-def strained(counters: Counters) -> bool:
-    """Return whether the newest sample was too fast, or would not come to rest within its range."""
-    c = counters
-    return c is not _SOUND and bool(c.velocity or c.leg_velocity or c.braking or c.leg_braking)
 
 
 def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[Counters, Fault | None]:
@@ -74,11 +68,14 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
         The new counters, and the fault if one has persisted or is gross.
     """
     q, dq = state.q, state.dq
-    speed = np.abs(dq)
-    load = np.abs(state.tau)
+    count = np.count_nonzero
     rest = at_rest(q, dq, limits.deceleration)
     angle = tilt(state.imu.quat)
-    count = np.count_nonzero
+    away = q - limits.middle
+    sizes = np.abs(np.concatenate((away, away + (rest - q) / EARLY, dq, state.tau)))
+    if count(sizes < limits.ordinary) == sizes.size and angle <= limits.tilt:
+        return _SOUND, None
+    speed, load = np.abs(dq), np.abs(state.tau)
     quick = speed > limits.velocity
     beyond_range = (rest > limits.state_upper) | (rest < limits.state_lower)
     fast, over = count(quick), count(beyond_range)
@@ -87,7 +84,7 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
     out = count(outside > 0.0)
     tilted = angle > limits.tilt
     if not (fast or strong or over or out or tilted):
-        return _SOUND, None
+        return _STRAINED, None
 
     new = Counters(
         position=counters.position + 1 if out and outside[UPPER].max() > 0.0 else 0,
@@ -98,6 +95,7 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
         braking=counters.braking + 1 if beyond_range[UPPER].any() else 0,
         leg_braking=counters.leg_braking + 1 if beyond_range[LEGS].any() else 0,
         tilt=counters.tilt + 1 if tilted else 0,
+        strained=True,
     )
     beyond = np.maximum(rest - limits.state_upper, limits.state_lower - rest)
     ratio = speed / limits.velocity

@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from golem.hardware.safety.base import SafetyLimits
+from golem.hardware.safety.base import JOLT, SafetyLimits
 from golem.hardware.safety.gate import STAND
 from golem.interfaces.payloads import Reason
 
@@ -148,7 +148,9 @@ REASONS: dict[Reason, ReasonText] = {
     ),
     Reason.COMMAND_MISSING: ReasonText(702, "No command yet.", "Start the stack: `golem up`."),
     Reason.COMMAND_STALE: ReasonText(
-        703, f"The newest answers a state {_ms(_L.command_age)} old.", "The stack is too slow, or has ended."
+        703,
+        f"The newest answers a state {_ms(_L.command_age)} old; or for so long all are over {_ms(_L.command_late)}.",
+        "The stack is too slow, or has ended.",
     ),
     Reason.COMMAND_TIME: ReasonText(704, f"A stamp more than {_ms(_L.future)} ahead.", "Restart the gate."),
     Reason.COMMAND_INVALID: ReasonText(
@@ -162,10 +164,15 @@ REASONS: dict[Reason, ReasonText] = {
         "Three commands let a held motor go (kd 0, or mode 0), or a gain is negative.",
         "A bug in the stack.",
     ),
-    Reason.COMMAND_REVERSALS: ReasonText(
-        708,
-        "A feed-forward changes its sign beyond 25 % of the torque, five times.",
-        "A controller that oscillates.",
+    Reason.COMMAND_JOLTS: ReasonText(
+        709,
+        f"What a motor is asked for jumps by {JOLT:.0%} of its torque, three times within half a second.",
+        "A controller that oscillates, or targets that jump.",
+    ),
+    Reason.COMMAND_BEYOND: ReasonText(
+        710,
+        "Three commands ask for 5 rad beyond a range, twice a speed or torque, or ten times a gain.",
+        "A bug in the stack, or other units than rad and N m.",
     ),
 }
 

@@ -1,7 +1,9 @@
-"""Judges whoever sends the commands: gains no motor can be held with, torques that go to and fro.
+"""Judges whoever sends the commands: what no motor can be held with, what nobody could mean, torques that jump.
 
 A motor without damping is limp or rings, so a sender that takes it away from one that had it is at fault, whatever else
-its command says. What is merely too large is limited, not judged; see `limiter`.
+its command says. What is merely too large is limited, not judged (see `limiter`). What is far beyond the robot, or
+jumps to and fro again and again, is judged: a limiter keeps the motors within their limits, and not what the ground
+does to a robot that is thrown about.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.hardware.safety.base import SafetyLimits
+from golem.hardware.safety.monitor import whole_command
 from golem.interfaces.payloads import Fault, Reason
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import NUM_JOINTS, LowCommand
@@ -24,16 +27,16 @@ class SenderMemory:
     """What is remembered of the commands so far.
 
     Attributes:
-        last: the newest command.
+        last: the newest command that was followed.
         held: which motors have been held since the activation, all of them or (27,) flags.
-        limp: commands in a row that let one of them go, or have a negative gain.
-        reversals: level of the reversals of feed-forward torques.
+        refused: commands in a row that were not followed.
+        jolts: level of the jumps of torque.
     """
 
     last: LowCommand | None = None
     held: NDArray[np.bool_] | bool = False
-    limp: int = 0
-    reversals: float = 0.0
+    refused: int = 0
+    jolts: float = 0.0
 
 
 def examine_command(
@@ -42,43 +45,50 @@ def examine_command(
     """Judge one new command.
 
     Args:
-        new: one that is finite.
+        new: the command, arrays (27,).
         memory: of the commands before it.
         limits: what to compare with.
 
     Returns:
-        The new memory, whether the command is to be followed, and the fault if one has persisted.
+        The new memory, whether the command is to be followed, and the fault if it is not finite or one has persisted.
     """
-    limp, held, reversals = 0, memory.held, memory.reversals
+    held = memory.held
+    wrong: Fault | None = None
     # Counting is the quickest question numpy answers.
     count = np.count_nonzero
-    if count(new.kd > _ZERO) < NUM_JOINTS or count(new.kp < _ZERO):
-        wrong = (new.kd <= 0.0) & held | (new.kp < 0.0) | (new.kd < 0.0)
-        limp = memory.limp + 1 if wrong.any() else 0
+    if not whole_command(new, limits.sane):
+        if not whole_command(new):
+            return memory, False, Fault(Reason.COMMAND_INVALID)
+        wrong = Fault(Reason.COMMAND_BEYOND, _beyond(new, limits))
+    elif count(new.kd > _ZERO) < NUM_JOINTS or count(new.kp < _ZERO):
+        let_go = (new.kd <= 0.0) & held | (new.kp < 0.0) | (new.kd < 0.0)
+        if let_go.any():
+            i = int(np.argmax(let_go))
+            wrong = Fault(
+                Reason.COMMAND_GAINS, f"{JOINT_NAMES[i]} with kp {new.kp[i]:g} and kd {new.kd[i]:g}"
+            )
         held = held | (new.kd > 0.0)
     else:
-        wrong, held = None, True
-    last = memory.last
+        held = True
+    if wrong is not None:
+        refused = memory.refused + 1
+        after = SenderMemory(memory.last, held, refused, memory.jolts)
+        return after, False, wrong if refused >= limits.samples else None
+    last, jolts = memory.last, memory.jolts
     if last is not None:
-        if count(new.tau * last.tau < limits.flip):
-            reversals += 1.0
-        elif reversals:
-            reversals = max(0.0, reversals - limits.frame_leak)
-    after = SenderMemory(new, held, limp, reversals)
-    if wrong is not None and limp >= limits.samples:
-        i = int(np.argmax(wrong))
-        return (
-            after,
-            False,
-            Fault(Reason.COMMAND_GAINS, f"{JOINT_NAMES[i]} with kp {new.kp[i]:g} and kd {new.kd[i]:g}"),
-        )
-    if reversals >= limits.reversals and last is not None:
-        i = int(np.argmax((new.tau * last.tau) / limits.flip))
-        return (
-            after,
-            False,
-            Fault(
-                Reason.COMMAND_REVERSALS, f"{JOINT_NAMES[i]} from {last.tau[i]:.0f} to {new.tau[i]:.0f} N m"
-            ),
-        )
-    return after, limp == 0, None
+        jump = np.abs(new.kp * (new.q - last.q) + (new.tau - last.tau))
+        if count(jump > limits.jolt):
+            jolts += 1.0
+            if jolts >= limits.jolts:
+                i = int(np.argmax(jump / limits.jolt))
+                wrong = Fault(Reason.COMMAND_JOLTS, f"{JOINT_NAMES[i]} by {jump[i]:.0f} N m")
+        elif jolts:
+            jolts = max(0.0, jolts - limits.jolt_leak)
+    return SenderMemory(new, held, 0, jolts), wrong is None, wrong
+
+
+def _beyond(command: LowCommand, limits: SafetyLimits) -> str:
+    """Return which number of `command` is the farthest beyond what any sender could mean."""
+    numbers = np.concatenate((command.q, command.dq, command.tau, command.kp, command.kd))
+    kind, joint = divmod(int(np.argmax(np.abs(numbers) / limits.sane)), NUM_JOINTS)
+    return f"{JOINT_NAMES[joint]} with {('q', 'dq', 'tau', 'kp', 'kd')[kind]} {numbers[NUM_JOINTS * kind + joint]:g}"

@@ -166,6 +166,8 @@ class Responder:
 
     def keep(self) -> None:
         """Send the replies that waited for their reader long enough; called at every poll."""
+        if not self._held:
+            return
         reached = {writer: self._reaches(writer) for writer in {writer for _, writer, _ in self._held}}
         for _ in range(len(self._held)):
             end, writer, payload = held = self._held.popleft()

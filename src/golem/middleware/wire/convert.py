@@ -25,11 +25,12 @@ _TICKS = 1000.0
 _UNIT = 1e-3
 """How far from one the norm of a unit quaternion in single precision may be [own]."""
 _LARGEST = 1e38
-"""Bound on the norm of all that motors say or are told [own]: single precision ends at 3.4e38."""
-_ON = (hg.ENABLE,) * NUM_JOINTS
-_ZEROS = (0.0,) * NUM_JOINTS
-_MEASURED = ("mode", "q", "dq", "ddq", "tau_est")
-_TARGET = ("mode", "q", "dq", "tau", "kp", "kd")
+"""Bound on the size of what motors say or are told [own]: single precision ends at 3.4e38."""
+_ON = bytes((hg.ENABLE,)) * NUM_JOINTS
+_ALL_ON = bytes(hg.all_on())
+_ZEROS = np.zeros(NUM_JOINTS)
+_MEASURED = ("q", "dq", "ddq", "tau_est")
+_TARGET = ("q", "dq", "tau", "kp", "kd")
 
 
 def encode_low_state(state: LowState, mode_machine: int = MODE_MACHINE) -> bytes:
@@ -44,11 +45,12 @@ def encode_low_state(state: LowState, mode_machine: int = MODE_MACHINE) -> bytes
     """
     quat, gyro, acc = state.imu.quat.tolist(), state.imu.gyro.tolist(), state.imu.acc.tolist()
     _check_imu(quat, gyro, acc, hg.LOW_STATE)
-    columns = _ON, state.q.tolist(), state.dq.tolist(), _ZEROS, state.tau.tolist()
-    motors = tuple(chain.from_iterable(zip(*columns, strict=True)))
+    motors = np.array((state.q, state.dq, _ZEROS, state.tau))
     _check_motors(motors, _MEASURED, hg.LOW_STATE)
+    columns = ((hg.ENABLE,) * NUM_JOINTS, *motors.tolist())
+    numbers = chain.from_iterable(zip(*columns, strict=True))
     head = ENCAPSULATION, hg.PR, mode_machine, _tick(state.t)
-    payload = bytearray(hg.STATE_NUMBERS.pack(*head, *quat, *gyro, *acc, *rpy(state.imu.quat), 0, *motors))
+    payload = bytearray(hg.STATE_NUMBERS.pack(*head, *quat, *gyro, *acc, *rpy(state.imu.quat), 0, *numbers))
     hg.STATE_CHECKSUM.seal(payload)
     return bytes(payload)
 
@@ -61,12 +63,13 @@ def decode_low_state(payload: Payload) -> LowState:
             finite, or the quaternion is none.
     """
     _check(payload, hg.LOW_STATE, hg.STATE_CHECKSUM)
-    _, mode_pr, _, tick, *numbers = hg.STATE_NUMBERS.unpack(payload)
+    mode_pr, tick, *inertial = hg.STATE_HEAD.unpack_from(payload)
     _check_ankles(mode_pr, "state")
-    quat, gyro, acc, motors = numbers[:4], numbers[4:7], numbers[7:10], numbers[14:]
+    quat, gyro, acc = inertial[:4], inertial[4:7], inertial[7:]
     _check_imu(quat, gyro, acc, hg.LOW_STATE)
+    motors = np.array(hg.state_motors(payload), dtype=np.float64)
     _check_motors(motors, _MEASURED, hg.LOW_STATE)
-    q, dq, tau = (np.array(motors[i :: len(_MEASURED)]) for i in (1, 2, 4))
+    q, dq, _, tau = motors
     return LowState(tick / _TICKS, q, dq, tau, Imu(np.array(quat), np.array(gyro), np.array(acc)))
 
 
@@ -106,11 +109,12 @@ def encode_low_command(command: LowCommand, mode_machine: int, answers: float = 
     Raises:
         WireError: a value is not finite in single precision.
     """
-    columns = (getattr(command, name).tolist() for name in _TARGET[1:])
-    motors = tuple(chain.from_iterable(zip(_ON, *columns, strict=True)))
+    motors = np.array((command.q, command.dq, command.tau, command.kp, command.kd))
     _check_motors(motors, _TARGET, hg.LOW_CMD)
-    head = ENCAPSULATION, hg.PR, mode_machine
-    payload = bytearray(hg.COMMAND_NUMBERS.pack(*head, *motors, _tick(answers)))
+    payload = bytearray(_ALL_ON)
+    hg.COMMAND_HEAD.pack_into(payload, len(ENCAPSULATION), hg.PR, mode_machine)
+    hg.command_motors(payload)[:] = motors
+    hg.ANSWERS.pack_into(payload, hg.ANSWERS_AT, _tick(answers))
     hg.COMMAND_CHECKSUM.seal(payload)
     return bytes(payload)
 
@@ -129,18 +133,18 @@ def decode_low_command(payload: Payload, t: float, mode_machine: int = MODE_MACH
             is another, or a value for a motor that is on is not finite.
     """
     _check(payload, hg.LOW_CMD, hg.COMMAND_CHECKSUM)
-    _, mode_pr, machine, *motors, _ = hg.COMMAND_NUMBERS.unpack(payload)
+    mode_pr, machine = hg.COMMAND_HEAD.unpack_from(payload, len(ENCAPSULATION))
     _check_ankles(mode_pr, "command")
     if machine != mode_machine:
         raise WireError(
             f"The command has mode_machine {machine}, this robot reports {mode_machine}: copy it from the LowState."
         )
-    stride = len(_TARGET)
-    for i in range(0, len(motors), stride):
-        if motors[i] != hg.ENABLE:
-            motors[i : i + stride] = [0.0] * stride
+    motors = np.array(hg.command_motors(payload), dtype=np.float64)
+    modes = hg.command_modes(payload)
+    if modes != _ON:
+        motors[:, np.frombuffer(modes, np.uint8) != hg.ENABLE] = 0.0
     _check_motors(motors, _TARGET, hg.LOW_CMD)
-    return LowCommand(t, *(np.array(motors[i::stride]) for i in range(1, stride)))
+    return LowCommand(t, *motors)
 
 
 def answered(payload: Payload) -> float:
@@ -149,7 +153,8 @@ def answered(payload: Payload) -> float:
     Raises:
         WireError: encapsulation or length is wrong.
     """
-    return int(hg.LOW_CMD.read(payload)["reserve"][0]) / _TICKS
+    hg.LOW_CMD.check(payload)
+    return hg.ANSWERS.unpack_from(payload, hg.ANSWERS_AT)[0] / _TICKS
 
 
 def _check_ankles(mode_pr: int, what: str) -> None:
@@ -183,13 +188,14 @@ def _tick(t: float) -> int:
     return round(t * _TICKS) % 2**32
 
 
-def _check_motors(values: Sequence[float], names: Sequence[str], layout: StructLayout) -> None:
-    """Refuse the values of motors, those with `names` of the first motor first, unless all are finite."""
-    if not math.hypot(*values) <= _LARGEST:
-        worst = max(range(len(values)), key=lambda i: math.inf if math.isnan(values[i]) else abs(values[i]))
-        motor, column = divmod(worst, len(names))
+def _check_motors(values: Array, names: Sequence[str], layout: StructLayout) -> None:
+    """Refuse the values of motors, (n, 27) by their `names`, unless all are finite."""
+    # Counting is the quickest question numpy answers.
+    if np.count_nonzero(np.abs(values) <= _LARGEST) != values.size:
+        column, motor = divmod(int(np.argmax(np.nan_to_num(np.abs(values), nan=np.inf))), NUM_JOINTS)
         raise WireError(
-            f"{names[column]} of motor {motor} in a {layout.type_name} is {values[worst]}: not finite, or too large."
+            f"{names[column]} of motor {motor} in a {layout.type_name} is {values[column, motor]}: "
+            "not finite, or too large."
         )
 
 

@@ -96,4 +96,4 @@ class BlackBox:
             self._tell(f"The black box of this stop was not written: {error}")
             return
         self.written.append(folder)
-        self._tell(f"Black box of the stop ({status.why}): {folder}; golem replay {folder} plays it.")
+        self._tell(f"Black box of the stop ({status.why}): {folder}; golem black-box {folder} shows it.")

@@ -26,6 +26,7 @@ REQUESTS: dict[str, tuple[str, Any]] = {
     "activate": ("/safety/activate", Trigger_Request()),
     "stop": ("/safety/stop", Trigger_Request()),
     "reset": ("/safety/reset", Trigger_Request()),
+    "hand-over": ("/safety/hand_over", Trigger_Request()),
     "press": ("/estop/press", SetBool_Request(True)),
     "release": ("/estop/press", SetBool_Request(False)),
     "status": ("", None),

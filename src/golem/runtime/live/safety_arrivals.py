@@ -59,6 +59,7 @@ class Arrivals:
         answered: robot time of the state that the newest command answers [s]; 0 where its sender does not say.
         rate: of the robot's time.
         tick: the robot's own time of `state` [s].
+        ignored: handles of the writers of commands that are not heard.
         damaged: damaged frames, by topic.
         sole: what reads each of the topics that one process alone may write.
     """
@@ -83,6 +84,7 @@ class Arrivals:
         self.commands, self._states = WaitSet(), WaitSet()
         self.mode_machine: int | None = None
         self.answered = 0.0
+        self.ignored: frozenset[int] = frozenset()
         self.rate = Rate()
         # Of each there is one: commands of two stacks would take turns, and states of two robots.
         self.sole = {
@@ -140,6 +142,8 @@ class Arrivals:
         now = self._clock()
         if self._observe is not None:
             self._observe("/safety/lowcmd_in", sample.payload, now)
+        if sample.writer in self.ignored:
+            return
         try:
             command = convert.decode_low_command(sample.payload, now, self.mode_machine or 0)
             answered = convert.answered(sample.payload)

@@ -37,8 +37,8 @@ ROBOT_LIMITS = "urdf"
 class SafetyConfig:
     """Guard the robot on a domain: emergency stop and safety gate, and nothing else in this process.
 
-    To ask something of the one that runs: golem safety activate, stop, reset, press, release or status. To have a
-    robot's own controller let go of the motors: golem safety take.
+    To ask something of the one that runs: golem safety activate, stop, reset, hand-over, press, release or status. To
+    have a robot's own controller let go of the motors: golem safety take.
     """
 
     limits: str = "urdf"

@@ -21,6 +21,7 @@ from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response
 from golem.middleware.wire import convert
 from golem.runtime.live import sim_sync
 from golem.runtime.live.clock import Every, Rate, time_since_boot
+from golem.runtime.live.command_lease import CommandLease
 from golem.runtime.live.motion_switcher_client import MotionSwitcherClient
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.safety_arrivals import Arrivals
@@ -88,6 +89,7 @@ class SafetyProcess:
         self._arrivals = Arrivals(endpoints, clock, limits, None if black_box is None else black_box.add)
         self._black_box, self._senders = black_box, senders
         self.commands = self._arrivals.commands
+        self._lease = CommandLease("/safety/lowcmd_in", self._arrivals.sole["/safety/lowcmd_in"].writers, who)
         self._out = endpoints.writer("/lowcmd")
         # Best effort, as the robot's own reader may be: a reliable one does not see writers that are.
         self._all_commands = endpoints.reader("/lowcmd", Qos(reliable=False, depth=8))
@@ -112,6 +114,7 @@ class SafetyProcess:
                 "/safety/activate": lambda _: self._ask(OperatorRequest.ACTIVATE, GateState.ACTIVE),
                 "/safety/stop": lambda _: self._ask(OperatorRequest.STOP, GateState.STOP1, GateState.STOP0),
                 "/safety/reset": lambda _: self._ask(OperatorRequest.RESET, GateState.ARMED),
+                "/safety/hand_over": lambda _: self._hand_over(),
                 "/estop/press": self._press,
             }
         )
@@ -168,6 +171,8 @@ class SafetyProcess:
                 self._arrivals.tick,
             )
         )
+        if result.state is GateState.ACTIVE and not moving:
+            self._lease.grant()
         self._steps += 1
         self.command = result.command
         strangers = "" if result.reason else "; ".join(self._senders())
@@ -235,11 +240,10 @@ class SafetyProcess:
         others = [g for g in self._all_commands.writers().values() if g != self._out.guid]
         if others:
             return f"/lowcmd is also written by {self._names(others)}"
-        for topic, inbox in self._arrivals.sole.items():
-            writers = list(inbox.writers().values())
-            if len(writers) > 1:
-                return f"{topic} is written by {len(writers)}: {self._names(writers)}"
-        return ""
+        states = list(self._arrivals.sole["/lowstate"].writers().values())
+        if len(states) > 1:
+            return f"/lowstate is written by {len(states)}: {self._names(states)}"
+        return self._lease.doubt(self.status.state in (GateState.ACTIVE, GateState.STOP2))
 
     def _listen(self) -> None:
         """Find out whether the motors hear: somebody who is none of ours (this gate, recorders)."""
@@ -267,6 +271,16 @@ class SafetyProcess:
             return Trigger_Response(False, f"The gate was held up; ask again in {WARY:g} s.")
         self._judge(request)
         return Trigger_Response(self.status.state in wanted, describe_status(self.status))
+
+    def _hand_over(self) -> Trigger_Response:
+        """Let the other of two stacks have the lease for commands; a robot that moves has to be stopped first."""
+        if self.status.state is GateState.ACTIVE:
+            return Trigger_Response(False, "The robot is in motion; stop it first: golem safety stop.")
+        name = self._lease.hand_over()
+        if not name:
+            return Trigger_Response(False, "There are no two stacks of which one has the lease.")
+        self._arrivals.ignored = self._lease.ignored
+        return Trigger_Response(True, f"The commands are those of {name} now; reset, then activate.")
 
     def _press(self, request: SetBool_Request) -> SetBool_Response:
         if not isinstance(self._estop, VirtualEstop):

@@ -29,4 +29,11 @@ robot that it works with, for dead [s]."""
 def relaxed_limits(limits: SafetyLimits) -> SafetyLimits:
     """Return `limits` for a robot whose time may stand still."""
     base_age = SILENCE + limits.base_age
-    return replace(limits, state_age=SILENCE, command_age=SILENCE, base_age=base_age, stall=SILENCE)
+    return replace(
+        limits,
+        state_age=SILENCE,
+        command_age=SILENCE,
+        command_late=SILENCE,
+        base_age=base_age,
+        stall=SILENCE,
+    )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.hardware.safety.base import SafetyLimits
-from golem.hardware.safety.limiter import BRAKE
+from golem.hardware.safety.limiter import spared
 from golem.hardware.safety.monitor import at_rest
 from golem.training.legs.training_model import KD, KP, STANCE, STEP
 from golem.types import LEGS, TICK, Array
@@ -63,9 +63,8 @@ class LegGate:
         then = (self._newest - delay) % REMEMBERED
         q, dq = self._q[then, self._rows], self._dq[then, self._rows]
         damp = np.clip(-KD * dq, -self._bound, self._bound)
-        end, brake = at_rest(q, dq, self._deceleration), BRAKE * self._bound
-        highest = np.where((dq > self._velocity) | (end > self._upper), -brake, self._bound)
-        lowest = np.where((dq < -self._velocity) | (end < self._lower), brake, -self._bound)
+        up, down = spared(q, dq, self._deceleration, self._velocity, self._lower, self._upper)
+        highest, lowest = up * self._bound, -down * self._bound
         rest = np.minimum(np.maximum(damp, lowest), highest)
         up = np.sqrt(2.0 * self._deceleration * np.maximum(self._range[1] - self._sent, 0.0))
         down = np.sqrt(2.0 * self._deceleration * np.maximum(self._sent - self._range[0], 0.0))
