@@ -169,6 +169,14 @@ def test_ours_walks_as_told_and_takes_a_shove_in_mid_step_on_its_own_terms() -> 
     assert found.series["speed_before"] == pytest.approx(0.3, abs=0.1)
 
 
+@pytest.mark.slow
+def test_ours_is_caught_where_the_walking_network_alone_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    shoves = [case(direction, 80.0, "walking", "own") for direction in ("left", "front_right")]
+    assert all(outcome.success for outcome in run(shoves, "almi"))
+    monkeypatch.setattr("golem.capabilities.legs.almi.SHOVED", None)
+    assert not any(outcome.success for outcome in run(shoves, "almi"))
+
+
 @pytest.mark.parametrize(
     ("change", "word"),
     [
