@@ -68,7 +68,7 @@ class TakeGoal:
 
 
 @dataclass(frozen=True)
-class TakeConfig:
+class TakeThingConfig:
     """Distances, speeds and forces.
 
     Attributes:
@@ -137,9 +137,9 @@ class Take:
 
     Goal, Result = TakeGoal, TakeReport
 
-    def __init__(self, config: TakeConfig | None = None) -> None:
+    def __init__(self, config: TakeThingConfig | None = None) -> None:
         """Take distances, speeds and forces from `config`."""
-        self._config = config or TakeConfig()
+        self._config = config or TakeThingConfig()
         self._report = TakeReport()
 
     def timeout(self, goal: TakeGoal) -> float:
