@@ -159,7 +159,7 @@ SLOTS: dict[str, Slot] = {
             "navigate": "golem.skills.navigate:Navigate",
             "open": "golem.skills.open_door:OpenDoor",
             "pick": "golem.skills.pick:Pick",
-            "place": "golem.skills.place:Place",
+            "place": "golem.skills.place:SetDown",
             "recall": "golem.skills.recall:Recall",
             "remember": "golem.skills.remember:Remember",
             "stand": "golem.skills.walk:Stand",

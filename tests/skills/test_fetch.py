@@ -20,7 +20,7 @@ from golem.robots.model.kinematics import Kinematics
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.fetch import Fetch, FetchGoal
-from golem.skills.place import Place
+from golem.skills.place import SetDown
 from golem.skills.remember import Remember
 from golem.skills.runner import SkillRun
 from golem.skills.take import Take, TakeReport
@@ -57,7 +57,7 @@ def fetch(
     """Return how an errand of a robot that does not walk ended, and what was asked of which skill."""
     skills = {
         "take": Scripted(Take, takes),
-        "place": Scripted(Place, places),
+        "place": Scripted(SetDown, places),
         "remember": Scripted(Remember, [DONE]),
     }
     memory = ObjectMap()

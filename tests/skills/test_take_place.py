@@ -13,9 +13,9 @@ from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.interfaces.payloads import GripState, HandStatus
 from golem.skills.counter_stance import STANDOFF, before, stance
-from golem.skills.place import Place, PlaceGoal
+from golem.skills.place import PlaceGoal, SetDown
 from golem.skills.runner import SkillRun
-from golem.skills.take import Take, TakeConfig, TakeGoal
+from golem.skills.take import Take, TakeGoal, TakeThingConfig
 from golem.skills.ware_sight import seen_again, surface_below
 from golem.types import NUM_JOINTS, UPPER, Array, Detection, Imu, LocalizedObject, LowState, PlanarPose
 
@@ -64,21 +64,21 @@ def test_the_palm_camera_finds_it_beside_where_it_seemed() -> None:
 def test_nothing_is_taken_where_nothing_is_seen(world: Any) -> None:
     world.objects["head"] = lambda: []
     at_home(world)
-    result = world.run(Take(TakeConfig(turn=0.0)).run(world.context, TakeGoal("mug"))).result
+    result = world.run(Take(TakeThingConfig(turn=0.0)).run(world.context, TakeGoal("mug"))).result
     assert (result.success, result.stage, result.slot) == (False, "detect", "localizer")
     assert result.reason == "The head camera shows no mug."
     assert world.bus.latest(topics.hand_goal("right")) is None
 
 
 def test_an_empty_hand_places_nothing(world: Any) -> None:
-    result = world.run(Place().run(world.context, PlaceGoal(0.4, 0.0))).result
+    result = world.run(SetDown().run(world.context, PlaceGoal(0.4, 0.0))).result
     assert (result.stage, result.reason) == ("detect", "Neither hand holds anything.")
 
 
 def test_what_is_held_stays_held_where_no_surface_is_seen(world: Any) -> None:
     held = HandStatus(0.0, GripState.HOLDING, 0.06, 0.0, np.zeros(2))
     at_home(world)
-    run = SkillRun("place", Place().run(world.context, PlaceGoal(0.4, 0.0)))
+    run = SkillRun("place", SetDown().run(world.context, PlaceGoal(0.4, 0.0)))
     world.step()
     world.bus.publish(topics.hand_status("right"), held, world.t)
     world.bus.deliver(world.t + 1.0)

@@ -34,7 +34,7 @@ RUNGS: dict[str, str] = {
     "fridge-stand": "golem.evaluation.rungs.open_fridge:FridgeStand",
     "counter-tether": "golem.evaluation.rungs.counter:CounterTether",
     "counter-stand": "golem.evaluation.rungs.counter:CounterStand",
-    "fetch": "golem.evaluation.rungs.fetch:FetchRung",
+    "fetch": "golem.evaluation.rungs.fetch_errand:FetchRung",
     "push": "golem.evaluation.rungs.push:PushRung",
     "push-ramp": "golem.evaluation.rungs.push_ramp:PushRampRung",
     "push-limit": "golem.evaluation.rungs.push_limit:PushLimit",

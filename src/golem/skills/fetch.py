@@ -194,7 +194,7 @@ class Fetch:
     async def _search(
         self, context: Context, goal: FetchGoal, report: FetchReport, places: list[RecalledPlace]
     ) -> SkillResult | None:
-        """Look along the counter to both sides of where it was thought to be; or all around, where it never was."""
+        """Look along the counter to both sides of where it was thought to be; ahead and around, where it never was."""
         context.say("search", f"Searching for the {goal.text}.")
         report.searched = True
         result: SkillResult | None = None
@@ -203,6 +203,13 @@ class Fetch:
             here = PlanarPose.of(context.legs.pose)
             aside = here @ PlanarPose(STAGE, step, 0.0)
             report.approaches += await self._go(context, np.array([aside.x, aside.y]))
+            result = await self._take(context, goal, None)
+            if result.success or not _elsewhere(result):
+                return result
+        if not places:
+            # From afar the localizer may have overlooked it: nearer to what is ahead first.
+            ahead = PlanarPose.of(context.legs.pose) @ PlanarPose(STAGE, 0.0, 0.0)
+            report.approaches += await self._go(context, np.array([ahead.x, ahead.y]))
             result = await self._take(context, goal, None)
             if result.success or not _elsewhere(result):
                 return result

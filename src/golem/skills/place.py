@@ -122,7 +122,7 @@ class PlaceReport:
     touched: bool = False
 
 
-class Place:
+class SetDown:
     """Set down what a hand holds, upright, on the surface at a place.
 
     Stages: `detect`, `carry`, `lower`, `release`, `done`. What is held stays held where it fails before `release`.

@@ -36,6 +36,8 @@ NEAR = 0.03
 """How far from where the palm camera is to look from a hand may arrive [m]."""
 COMFORT: Array = np.array([0.45, -0.15, 0.0])
 """Where the right hand works best, in base_link [m]; its height does not count."""
+SPARE = 0.024
+"""How much wider than the grasp asks for the hand arrives [m]: encoders and palm camera are off by a centimetre."""
 TOP, FORWARD = "top", "forward"
 
 
@@ -68,7 +70,7 @@ class TakeGoal:
 
 
 @dataclass(frozen=True)
-class TakeConfig:
+class TakeThingConfig:
     """Distances, speeds and forces.
 
     Attributes:
@@ -137,9 +139,9 @@ class Take:
 
     Goal, Result = TakeGoal, TakeReport
 
-    def __init__(self, config: TakeConfig | None = None) -> None:
+    def __init__(self, config: TakeThingConfig | None = None) -> None:
         """Take distances, speeds and forces from `config`."""
-        self._config = config or TakeConfig()
+        self._config = config or TakeThingConfig()
         self._report = TakeReport()
 
     def timeout(self, goal: TakeGoal) -> float:
@@ -331,7 +333,7 @@ class Take:
         from golem.skills.travel import APPROACH, failed
 
         c, arm, hand = self._config, context.arms[side], context.hands[side]
-        hand.open(min(max(grasp.gap, 0.03), MAX_GAP))
+        hand.open(min(grasp.gap + SPARE, MAX_GAP))
         context.say("reach", "Straight to it.", side=side, target=grasp.T_odom_gripper[:3, 3].tolist())
         await context.until(lambda: hand.status.state is GripState.OPEN, 1.0)
         try:

@@ -8,7 +8,7 @@ import pytest
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.rungs.counter import CounterOptions, CounterTether, draw_errand
-from golem.evaluation.rungs.fetch import FetchRung
+from golem.evaluation.rungs.fetch_errand import FetchRung
 from golem.robots.worlds.kitchen import draw_counter
 from golem.robots.worlds.tableware import KINDS
 

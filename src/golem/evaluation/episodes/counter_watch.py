@@ -28,7 +28,7 @@ PICTURED = ("release", "done")
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class StandingOne:
     """How a thing stands: kind, (3,) middle of its underside in the world [m], and how far it leans [rad]."""
 
     kind: str
@@ -119,10 +119,10 @@ class CounterWatch:
             if thing.kind == self._kind and self._highest[k] > thing.position[2] + LIFTED
         ]
 
-    def _things(self) -> list[Standing]:
-        found: list[Standing] = []
+    def _things(self) -> list[StandingOne]:
+        found: list[StandingOne] = []
         for kind, name in self._names:
             body = self._robot.data.body(name)
             lean = float(np.arccos(np.clip(body.xmat[8], -1.0, 1.0)))
-            found.append(Standing(kind, body.xpos.copy(), lean))
+            found.append(StandingOne(kind, body.xpos.copy(), lean))
         return found
