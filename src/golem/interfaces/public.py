@@ -213,6 +213,8 @@ SERVICES: tuple[ServiceRow, ...] = (
     ServiceRow("/estop/press", "std_srvs/srv/SetBool", "safety",
             "Press or release the virtual emergency stop; simulation only."),
     ServiceRow("/elastic_band/release", TRIGGER, "robot", "Let the band of a standing robot go; simulation only."),
+    ServiceRow("/skill/take_over", TRIGGER, "stack",
+            "Take the lease for skills from who has it: whoever asks for one next gets it."),
     *(service for side in SIDES for service in (
         ServiceRow(gripper(side, "open"), TRIGGER, "stack", "Open the hand as far as it goes."),
         ServiceRow(gripper(side, "close"), TRIGGER, "stack", "Close the hand until its fingers press."),

@@ -88,6 +88,22 @@ def stand(seconds: float) -> Stand_Goal:
     return Stand_Goal(convert.duration(seconds))
 
 
+def test_who_began_a_skill_has_the_lease_until_he_leaves_or_it_is_taken(client: Client, live: Live) -> None:
+    client.outcome(client.send("/skill/stand", stand(0.1)))
+    second = Client(live, live.member("second")[1])
+    _, refused = second.outcome(second.send("/skill/stand", stand(0.1)))
+    assert refused.stage == "refused" and "has the lease for skills" in refused.reason
+    assert second.call("/skill/take_over", Trigger_Request()).success
+    status, _ = second.outcome(second.send("/skill/stand", stand(0.1)))
+    assert status is GoalStatus.SUCCEEDED
+    _, refused = client.outcome(client.send("/skill/stand", stand(0.1)))
+    assert refused.stage == "refused"
+    live.leave_quietly(second.node)
+    live.run(0.1)
+    status, _ = client.outcome(client.send("/skill/stand", stand(0.1)))
+    assert status is GoalStatus.SUCCEEDED
+
+
 def test_a_goal_is_pursued_to_its_end(client: Client) -> None:
     goal = client.send("/skill/stand", stand(0.2))
     status, result = client.outcome(goal)

@@ -36,7 +36,8 @@ def page(records: Sequence[TrialRecord]) -> str:
     parts = [
         "# Safety: faults tried\n",
         f"`golem faults --profile {first.profile} --seed {first.seed}` tries {len(by_fault)} faults on a robot that "
-        f"is {', '.join(postures)}, one trial each. {_missing(len(records), len(by_fault) * len(postures))}\n"
+        f"is {', '.join(postures)}, one trial each.\n"
+        f"{_missing(len(records), len(by_fault) * len(postures))}"
         "`python -m golem.evaluation.faults.page` writes this page from its records.\n",
         CRITERIA,
         _summary(records, postures).markdown() + "\n",
@@ -54,7 +55,9 @@ def page(records: Sequence[TrialRecord]) -> str:
 
 
 def _missing(tried: int, all_: int) -> str:
-    return "" if tried == all_ else f"{tried} of {all_} were tried with this version, the rest is left open."
+    return (
+        "" if tried == all_ else f"With this version {tried} of {all_} were tried; the rest is left open.\n"
+    )
 
 
 CRITERIA = """\
@@ -62,8 +65,8 @@ A judge that shares nothing with the gate looks at every command that reached th
 did. This is what it wants:
 
 - The right reason, in time. One wrong frame has 2 ms of robot time, what is a fault from the third frame on has 6 ms.
-  Lost or frozen data has 52 ms. Damaged frames stop from the third in a row on, after 4 ms: one is what every cable has
-  now and then, and a stop for it would drop the robot; of three the gate still has a command that is 6 ms old.
+  Lost or frozen data has 52 ms. Damaged frames stop from the third in a row on, after 4 ms. One is what every cable
+  has now and then, and a stop for it could drop the robot. Meanwhile the last sound command, 6 ms old, holds.
 - No command beyond the motors.
 - After a fault of commands no joint is 5 % above its speed, or 0.05 rad beyond its range.
 - A fault that leaves legs and state sound leaves a robot standing that stood.

@@ -46,9 +46,9 @@ MAX_WAITING = 100
 class DdsServerGoal:
     """A goal as its server pursues it; see `base.ServerGoal`."""
 
-    def __init__(self, server: DdsActionServer, state: GoalState, request: Any) -> None:
-        """Belong to `server`, which has accepted it."""
-        self._server, self._state, self._request = server, state, request
+    def __init__(self, server: DdsActionServer, state: GoalState, request: Any, client: bytes) -> None:
+        """Belong to `server`, which has accepted it from `client`."""
+        self._server, self._state, self._request, self._client = server, state, request, client
 
     @property
     def id(self) -> bytes:
@@ -59,6 +59,15 @@ class DdsServerGoal:
     def request(self) -> Any:
         """The action's goal message."""
         return self._request
+
+    @property
+    def client(self) -> bytes:
+        """Whose it is."""
+        return self._client
+
+    def attended(self) -> bool:
+        """Return whether whoever sent it is still there."""
+        return self._server.serves(self._client)
 
     @property
     def status(self) -> GoalStatus:
@@ -118,6 +127,10 @@ class DdsActionServer:
     def goals(self) -> list[ServerGoal]:
         """Return the goals that have not ended, oldest first."""
         return list(self._active.values())
+
+    def serves(self, client: bytes) -> bool:
+        """Return whether the process `client` (12 bytes) may still send goals."""
+        return self._goal.knows(client)
 
     def keep(self) -> None:
         """Forget what expired, publish the status if it changed; called at every poll."""
@@ -181,7 +194,8 @@ class DdsActionServer:
         # The id of no goal could not be canceled: it means all of them.
         known = id == NO_ID or id in self._table
         accepted = not known and self._agrees(self._handler.decide, request.goal)
-        goal = DdsServerGoal(self, self._table.accept(id, stamp), request.goal) if accepted else None
+        state = self._table.accept(id, stamp) if accepted else None
+        goal = None if state is None else DdsServerGoal(self, state, request.goal, self._goal.client(origin))
         response = self._type.SendGoal.Response(accepted, to_time(stamp if accepted else 0))
         self._goal.reply(origin, codec.serialize(response))
         if goal is not None:

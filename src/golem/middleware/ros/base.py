@@ -186,6 +186,15 @@ class ServerGoal(Protocol):
         ...
 
     @property
+    def client(self) -> bytes:
+        """12 bytes, the same for all that one process of the sender's asks for; empty where nobody knows."""
+        ...
+
+    def attended(self) -> bool:
+        """Return whether whoever sent it is still there."""
+        ...
+
+    @property
     def status(self) -> GoalStatus:
         """Where it stands; CANCELING once a request to cancel was accepted."""
         ...

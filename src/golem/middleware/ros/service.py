@@ -164,6 +164,14 @@ class Responder:
         else:
             self._held.append((time.monotonic() + HOLD, origin.writer, payload))
 
+    def client(self, origin: Origin) -> bytes:
+        """Return the 12 bytes of the process that a request came from; empty where nobody knows."""
+        return self._inbox.writers().get(origin.writer, b"")[:12]
+
+    def knows(self, client: bytes) -> bool:
+        """Return whether the process `client` (12 bytes) can still send requests."""
+        return any(guid[:12] == client for guid in self._inbox.writers().values())
+
     def keep(self) -> None:
         """Send the replies that waited for their reader long enough; called at every poll."""
         if not self._held:

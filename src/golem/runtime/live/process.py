@@ -7,6 +7,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
+from functools import partial
 
 from tyro.conf import OmitArgPrefixes, Positional
 
@@ -16,7 +17,7 @@ from golem.middleware.dds.domain import ROBOT_DOMAIN, DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.interrupt import interrupted
 from golem.robots.base import Restorable
-from golem.runtime.live.exclusive_writers import launcher, refuse_second
+from golem.runtime.live.exclusive_writers import launcher, owner, refuse_second
 from golem.runtime.live.heap import map_large_blocks
 from golem.runtime.live.node_setup import AsyncLogger, company, member, settle
 from golem.runtime.live.render_worker import RenderWorker
@@ -119,7 +120,15 @@ def run_up(config: UpConfig) -> None:
     ):
         refuse_second(participant, config.dds, "/safety/lowcmd_in")
         pools = {slot: threads.enter_context(ThreadPoolExecutor(1, slot)) for slot in POOLED}
-        live = StackProcess(stack, participant, node, real=config.dds.robot, pools=pools, tell=tell)
+        live = StackProcess(
+            stack,
+            participant,
+            node,
+            real=config.dds.robot,
+            pools=pools,
+            tell=tell,
+            who=partial(owner, participant),
+        )
         tell(f"The stack '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
         waiting_since = time.monotonic()
         said, restarts = GateStatus(0.0, GateState.INIT), 0

@@ -33,8 +33,15 @@ class SkillActionServer:
 
     period = TICK
 
-    def __init__(self, endpoints: RoleEndpoints, log: Callable[[str], None] = log_error) -> None:
-        """Offer the actions on `endpoints`; what a skill raises is logged by `log`."""
+    def __init__(
+        self,
+        endpoints: RoleEndpoints,
+        log: Callable[[str], None] = log_error,
+        who: Callable[[bytes], str] = bytes.hex,
+    ) -> None:
+        """Offer the actions on `endpoints`; what a skill raises is logged by `log`, `who` names a client."""
+        self._lease: ServerGoal | None = None
+        self._who = who
         self._stack: StackNodes | None = None
         self._silent = False
         self._pursuit: ActiveGoal | None = None
@@ -61,7 +68,7 @@ class SkillActionServer:
         """Pursue a goal, or say in its result why not."""
         goal.execute()
         try:
-            stack = self._ready()
+            stack = self._ready(goal)
             name, fields = action.goal(goal.request)
             run = stack.start(name, fields)
         except Exception as error:  # the goal is a stranger's, and its skill a user's
@@ -69,9 +76,15 @@ class SkillActionServer:
             goal.abort(action.result(SkillResult(False, REFUSED, None, reason)))
             return
         self._pursuit = ActiveGoal(action, goal, run, News(stack.bus, topics.FEEDBACK))
+        self._lease = goal
 
-    def _ready(self) -> StackNodes:
-        """Return the stack, if a skill can begin now; raises `GolemError` otherwise."""
+    def take_over(self) -> str:
+        """Let whoever asks next have the lease for skills; return who had it, or an empty string if nobody did."""
+        lease, self._lease = self._lease, None
+        return "" if lease is None or not lease.attended() else self._who(lease.client)
+
+    def _ready(self, goal: ServerGoal) -> StackNodes:
+        """Return the stack, if the skill of `goal` can begin now; raises `GolemError` otherwise."""
         stack = self._stack
         safety = None if stack is None else stack.safety
         if stack is None or safety is None:
@@ -80,6 +93,11 @@ class SkillActionServer:
             raise GolemError(SILENT)
         if self._pursuit is not None:
             raise GolemError("Another skill is running; cancel it first.")
+        lease = self._lease
+        if lease is not None and lease.client != goal.client and lease.attended():
+            raise GolemError(
+                f"{self._who(lease.client)} has the lease for skills; end it, or: golem skill --take-over ..."
+            )
         if safety.state is not GateState.ACTIVE:
             raise GolemError(
                 f"The safety gate is {describe_status(safety)}; activate it first: golem safety activate."

@@ -20,8 +20,10 @@ from golem.middleware.ros.base import ClientGoal, RosNode
 from golem.middleware.ros.future import Future, RosError
 from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs.golem_interfaces import RunSkill_Goal
+from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.runtime.goal_parser import HELP, parse_goal
 from golem.runtime.live.node_setup import ANSWER, SEARCH, find, log_line, member, until
+from golem.runtime.live.operator import ask
 from golem.runtime.live.skill_messages import RUN, read_list
 from golem.runtime.skill_table import SkillTable
 from golem.skills.base import REFUSED
@@ -40,6 +42,8 @@ class SkillClientConfig:
 
     stack: str | None = None
     """Stack file to take the skills from; by default the stack on the domain is asked for them."""
+    take_over: bool = False
+    """Take the lease for skills from another client that has it, and is still there."""
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
 
 
@@ -67,7 +71,10 @@ def run_skill(words: list[str]) -> int:
         raise ConfigError("Say which skill; golem skill --help lists them.")
     with interrupted() as stop, member("skill", config.dds) as (_, node):
         remedy = f"start a stack with: {config.dds.command('up STACK')}"
-        return pursue(node, compose(node, config, rest, remedy), remedy, stop)
+        goal = compose(node, config, rest, remedy)
+        if config.take_over:
+            log_line(ask(node, "/skill/take_over", public.TRIGGER, Trigger_Request(), remedy).message)
+        return pursue(node, goal, remedy, stop)
 
 
 def _help(config: SkillClientConfig, words: list[str]) -> int:

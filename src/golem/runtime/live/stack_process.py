@@ -18,6 +18,7 @@ from golem.interfaces import public, topics
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant, Sample
 from golem.middleware.ros.base import RosNode
+from golem.middleware.ros.msgs.std_srvs import Trigger_Response
 from golem.middleware.ros.waitset import WaitSet
 from golem.middleware.wire import convert
 from golem.middleware.wire.api import request_topic, response_topic
@@ -73,6 +74,7 @@ class StackProcess:
         pools: Mapping[str, ThreadPoolExecutor] | None = None,
         clock: Callable[[], float] = time.monotonic,
         tell: Callable[[str], None] = log_line,
+        who: Callable[[bytes], str] = bytes.hex,
     ) -> None:
         """Join the domain; the modules are built when the robot reports.
 
@@ -86,6 +88,7 @@ class StackProcess:
             pools: where modules run beside the clock; see `StackNodes`.
             clock: this process's own [s].
             tell: says a line to a person; beside a real robot one that is never held up.
+            who: names the process of an endpoint by the first 12 bytes of its guid.
 
         Raises:
             ConfigError: the legs of a real robot would be its own controller's, which commands the motors itself.
@@ -114,9 +117,10 @@ class StackProcess:
         self._service = stack_loco_api(stack).service
         requests, responses = request_topic(self._service), response_topic(self._service)
         self._calls = RpcClient(endpoints.writer(f"/{requests}"), endpoints.reader(f"/{responses}"))
-        self._skills = SkillActionServer(endpoints, tell)
+        self._skills = SkillActionServer(endpoints, tell, who)
         endpoints.publish("/skill/list", list_message(SkillTable(stack).specs.values()))
-        endpoints.serve({k: v for s in SIDES for k, v in out.hand_services(self._bus, s, self._now).items()})
+        services = {k: v for s in SIDES for k, v in out.hand_services(self._bus, s, self._now).items()}
+        endpoints.serve({**services, "/skill/take_over": lambda _: self._take_over()})
         unheard = () if hears_lidar(stack) else public.LIDAR
         velocities = Velocities(self._bus, self._now, lambda: self._skills.busy() or not moving(self._bus))
         self._lidar_imu = OnePerTick(self._bus, topics.LIDAR_IMU, IMU_BACKLOG)
@@ -140,6 +144,11 @@ class StackProcess:
         if self._robot.t == before:
             self._node.poll()
         self._skills.hear(silent=self._clock() - self._heard > SILENCE)
+
+    def _take_over(self) -> Trigger_Response:
+        """Take the lease for skills from who has it."""
+        name = self._skills.take_over()
+        return Trigger_Response(True, f"The lease for skills was that of {name or 'nobody'}.")
 
     def _now(self) -> float:
         return max(self._robot.t, 0.0)
