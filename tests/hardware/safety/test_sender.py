@@ -10,7 +10,7 @@ import pytest
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.safety.sender import SenderMemory, examine_command
 from golem.interfaces.payloads import Fault, Reason
-from golem.types import LowCommand
+from golem.types import LEGS, LowCommand
 
 LIMITS = SafetyLimits.from_profile()
 
@@ -51,13 +51,22 @@ def test_torques_that_jump_to_and_fro_are_a_fault_and_one_jump_is_none() -> None
     assert fault is not None and fault.reason is Reason.COMMAND_JOLTS
 
 
-def test_a_position_that_jumps_is_a_torque_that_does() -> None:
+def test_an_arms_position_that_jumps_is_a_torque_that_does() -> None:
     def at(k: int, q: float) -> LowCommand:
         return replace(command(k), q=np.full(27, q))
 
     assert run(*[at(k, 0.001 * k) for k in range(300)])[1] is None
     _, fault = run(*[at(k, 1.0 * (k // 50 % 2)) for k in range(151)])
     assert fault is not None and fault.reason is Reason.COMMAND_JOLTS
+
+
+def test_legs_may_ask_for_positions_that_jump() -> None:
+    def at(k: int) -> LowCommand:
+        q = np.zeros(27)
+        q[LEGS] = 1.0 * (k // 10 % 2)
+        return replace(command(k), q=q)
+
+    assert run(*[at(k) for k in range(151)])[1] is None
 
 
 @pytest.mark.parametrize("field", ["q", "dq", "tau", "kp", "kd"])

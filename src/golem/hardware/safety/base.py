@@ -27,7 +27,7 @@ SPACE = 0.05
 EARLY = 0.5
 """Share of `deceleration` by which the limiter judges where a joint would come to rest [own]."""
 JOLT = 0.6
-"""Share of the torque limit by which what a command asks for may jump [own: legs that recover jump by 0.56]."""
+"""Share of the torque limit by which what a command asks for may jump [own]."""
 
 
 STANDING = slice(0, UPPER.start + 1)
@@ -60,8 +60,8 @@ class SafetyLimits:
             the noise of the torque estimate must not stop the robot].
         torque_rate: bound of the feed-forward torque's rate [N m/s]: the whole range in 0.1 s for torso and arms, whose
             weight changes slowly, in 0.02 s for the legs, which feel the ground [own].
-        jolt: jump of stiffness times position plus feed-forward, from one command to the next, that counts [N m]:
-            `JOLT` of `torque`.
+        jolt: jump of the feed-forward torque, of torso and arms of stiffness times position, too, from one command to
+            the next, that counts [N m]: `JOLT` of `torque`.
         middle: middle of the range of measured positions [rad].
         ordinary: (108,) magnitudes of position and of the limiter's resting place, both from `middle`, of speed and
             torque, below which nothing is to be limited or judged.

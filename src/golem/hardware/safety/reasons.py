@@ -166,7 +166,8 @@ REASONS: dict[Reason, ReasonText] = {
     ),
     Reason.COMMAND_JOLTS: ReasonText(
         709,
-        f"What a motor is asked for jumps by {JOLT:.0%} of its torque, three times within half a second.",
+        f"A feed-forward torque, or what an arm's motor is asked for, jumps by {JOLT:.0%} of the motor's torque, three "
+        "times within half a second.",
         "A controller that oscillates, or targets that jump.",
     ),
     Reason.COMMAND_BEYOND: ReasonText(

@@ -17,7 +17,7 @@ from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.safety.monitor import whole_command
 from golem.interfaces.payloads import Fault, Reason
 from golem.robots.model.table import JOINT_NAMES
-from golem.types import NUM_JOINTS, LowCommand
+from golem.types import NUM_JOINTS, UPPER, LowCommand
 
 _ZERO = np.zeros(NUM_JOINTS)
 
@@ -76,7 +76,10 @@ def examine_command(
         return after, False, wrong if refused >= limits.samples else None
     last, jolts = memory.last, memory.jolts
     if last is not None:
-        jump = np.abs(new.kp * (new.q - last.q) + (new.tau - last.tau))
+        jump = np.abs(new.tau - last.tau)
+        # Legs that recover from a push ask for targets that jump by as much; arms never do.
+        arms = new.kp[UPPER] * (new.q[UPPER] - last.q[UPPER]) + (new.tau[UPPER] - last.tau[UPPER])
+        jump[UPPER] = np.abs(arms)
         if count(jump > limits.jolt):
             jolts += 1.0
             if jolts >= limits.jolts:
