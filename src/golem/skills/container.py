@@ -70,7 +70,8 @@ class Container:
         raised = known & (change - np.median(change[known]) > RISE)
         # The robot sways: a wall may show a little beside where it was. Nothing dropped is as high.
         walls = np.nan_to_num(before, nan=-np.inf) - np.nanmedian(before) > TALL
-        raised &= ~maximum_filter(walls, 2 * SHIFT + 1)[SHIFT:-SHIFT, SHIFT:-SHIFT]
+        near_wall = np.asarray(maximum_filter(walls, 2 * SHIFT + 1), bool)
+        raised &= ~near_wall[SHIFT:-SHIFT, SHIFT:-SHIFT]
         return bool(raised.sum() >= SPOTS)
 
     def places(self, margin: float) -> Array:

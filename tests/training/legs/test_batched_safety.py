@@ -12,7 +12,7 @@ pytest.importorskip("torch", reason="training needs the extra 'train'")
 
 from golem.hardware.safety.base import Counters, Outgoing, SafetyLimits
 from golem.hardware.safety.limiter import limit_command
-from golem.hardware.safety.monitor import examine, strained
+from golem.hardware.safety.monitor import examine
 from golem.training.legs.batched_safety import LegGate
 from golem.training.legs.training_model import KD, KP, STANCE, STEP
 from golem.types import LEGS, NUM_JOINTS, Imu, LowCommand, LowState
@@ -45,7 +45,7 @@ def test_what_it_lets_through_is_what_the_real_gate_does_from_a_state_as_old_as_
             q_cmd = np.concatenate([targets[i], np.zeros(15)])
             command = LowCommand(0.0, q_cmd, np.zeros(27), np.zeros(27), *gains)
             measured = state(q, dq, none[0])
-            fast = strained(examine(measured, LIMITS, Counters())[0])
+            fast = examine(measured, LIMITS, Counters())[0].strained
             limited, sent[i] = limit_command(0.0, measured, command, LIMITS, sent[i], STEP, fast)
             # The trainer's motors take positions only: the braking torque is part of them.
             braked += bool(np.any(np.abs(limited.tau[LEGS]) > 1e-9))
