@@ -166,8 +166,15 @@ class Pick:
                 context.say(failure.stage, f"{failure} Trying again.")
                 context.hands[attempt.side].open(grasp.gap)
                 await self._back_off(context, attempt.side)
-                above = lifted(grasp.T_odom_gripper, self._config.clearance)
-                await self._travel.line(attempt.side, above, self._config.travel_speed, failure.stage)
+                await self._above_again(context, attempt, grasp, failure.stage)
+
+    async def _above_again(self, context: Context, attempt: Attempt, grasp: Grasp, stage: str) -> None:
+        """Bring the hand straight above the object again, or, where it cannot keep to the line, around."""
+        above = lifted(grasp.T_odom_gripper, self._config.clearance)
+        try:
+            await self._travel.line(attempt.side, above, self._config.travel_speed, stage)
+        except StageFailed:
+            await self._over(context, attempt, grasp)
 
     async def _descend(self, context: Context, attempt: Attempt, grasp: Grasp) -> None:
         """Open loop: go straight down to the grasp as proposed, and close."""
