@@ -36,7 +36,7 @@ BROKEN = {
     "run profile": (["run", "--profile", "feild"], "Did you mean 'field'?"),
     "skill": (
         ["run", "--skill", "pik"],
-        "stand, walk. Did you mean 'pick'?",
+        "stand, take, walk. Did you mean 'pick'?",
     ),
     "skill goal": (["run", "--skill", "walk", "--x", "nan"], "'x' is a finite number"),
     "skill and by hand": (["run", "--skill", "pick", "--operate"], "give it or --skill, not both"),

@@ -268,7 +268,7 @@ def test_a_stack_file_lists_skills_and_their_options() -> None:
         ("skills: pick", "'skills' wants '{NAME: {option: value, ...}, ...}'"),
         (
             "skills: {pik: {force: 8}}",
-            "stand, walk. Did you mean 'pick'",
+            "stand, take, walk. Did you mean 'pick'",
         ),
         ("skills: {Mine: {use: my.py:Mine}}", "a skill's name is a word of a-z, 0-9 and _"),
         ("skills: {mine: {use: 3}}", "'skills: mine' wants '{use: NAME"),

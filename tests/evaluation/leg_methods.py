@@ -24,7 +24,7 @@ class Stiff(JointHold):
         # An inverted pendulum of 67 kg and 0.9 m needs 330 N m per metre of each ankle; twice that for a margin.
         tau[[4, 10]] = 600.0 * x + 120.0 * base.velocity[0]
         tau[[5, 11]] = -300.0 * y - 60.0 * base.velocity[1]
-        return LegCommand(command.q, command.kp, command.kd, tau)
+        return LegCommand(command.q, command.kp, command.kd, np.clip(tau, -200.0, 200.0))
 
 
 class Limp(JointHold):

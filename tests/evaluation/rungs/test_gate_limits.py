@@ -27,7 +27,7 @@ def test_each_name_lifts_its_own_limits() -> None:
     assert changed("speed") == {"velocity"}
     assert changed("range") == {"state_lower", "state_upper"}
     assert changed("effort+slew") == {"torque_command", "slew"}
-    assert changed("stops") == {"velocity", "state_lower", "state_upper", "torque", "tilt"}
+    assert changed("stops") == {"velocity", "state_lower", "state_upper", "torque", "tilt", "sane", "jolts"}
     assert changed("bounds") == {
         "lower", "upper", "slew", "torque_command", "kp_max", "kd_max", "kp_rate", "kd_rate"
     }  # fmt: skip

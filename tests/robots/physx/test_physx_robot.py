@@ -137,7 +137,7 @@ def test_it_walks_into_what_stands_in_the_hall() -> None:
 @pytest.mark.parametrize(
     ("options", "why"),
     [
-        ({"world": "pack"}, "open, slope, rubble"),
+        ({"world": "pack"}, "open, slope, step, rubble"),
         ({"world": "kitchen"}, "no door"),
         ({"self_collision": True}, "option self_collision"),
         ({"cone": "elliptic"}, "option cone"),

@@ -229,6 +229,9 @@ def test_every_field_of_every_goal_in_json_at_its_edges(crowd: Crowd) -> None:
         "recall": {"text": "screw"},
         "remember": {"labels": ["screw"], "seconds": 0.02},
         "stand": {"seconds": 0.02},
+        "fetch": {"text": "can"},
+        "take": {"label": "can"},
+        "place": {"x": 0.5, "y": 0.0},
     }
     for spec in SPECS.values():
         for field in spec.goal["properties"]:

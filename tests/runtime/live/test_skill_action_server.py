@@ -390,7 +390,7 @@ def test_the_skills_and_their_goals_are_on_a_latched_topic(mine: Callable[[str],
         (
             "cuont",
             "{}",
-            "stand, walk. Did you mean 'count'?",
+            "stand, take, walk. Did you mean 'count'?",
         ),
         ("", "", "Unknown skill ''"),
         ("count", "", "'to' has no default"),

@@ -85,7 +85,7 @@ def test_a_class_of_a_file_is_found_by_the_name_that_the_stack_has_for_it(
     goal = say(waving, f"{tmp_path / 'wave.py'}:Wave", "--times", "2")
     assert (goal.skill, json.loads(goal.goal)) == ("wave", {"times": 2})
     (tmp_path / "other.py").write_text(WAVE)
-    with pytest.raises(ConfigError, match="Unknown skill '.*; valid: .*stand, walk, wave"):
+    with pytest.raises(ConfigError, match="Unknown skill '.*; valid: .*stand, take, walk, wave"):
         say(waving, f"{tmp_path / 'other.py'}:Wave")
 
 

@@ -28,8 +28,10 @@ STOPS: dict[str, Lift] = {
     "range": lambda limits: replace(limits, state_lower=-FAR, state_upper=FAR),
     "torque": lambda limits: replace(limits, torque=FAR),
     "tilt": lambda limits: replace(limits, tilt=math.pi),
+    "sender": lambda limits: replace(limits, sane=np.full_like(limits.sane, 1e6), jolts=math.inf),
 }
-"""Measured quantities that stop the robot; `range` is position and braking distance."""
+"""What stops the robot: measured quantities, of which `range` is position and braking distance, and `sender`, commands
+that are far beyond the robot or jump."""
 BOUNDS: dict[str, Lift] = {
     "position": lambda limits: replace(limits, lower=-FAR, upper=FAR),
     "slew": lambda limits: replace(limits, slew=FAR),

@@ -66,7 +66,8 @@ class SafetyLimits:
         ordinary: (108,) magnitudes of position and of the limiter's resting place, both from `middle`, of speed and
             torque, below which nothing is to be limited or judged.
         sane: (135,) magnitudes of q, dq, tau, kp, kd that no sender who knows the robot reaches: 5 rad beyond its
-            range, twice its speed and torque, ten times its gains [own: legs that fall ask for 2.4 rad beyond].
+            range, ten times its speed, torque and gains [own: legs that fall ask for 2.4 rad beyond, and a controller
+            that steers a fall with torques for four times an ankle's].
         slew: bound of the commanded position's rate [rad/s]: `velocity` for the legs, whose policies use distant
             targets as torques; 3 rad/s for torso and arms, three times what the controllers ask for [own].
         deceleration: what each joint can surely be braked with [rad/s^2]: torso and arms 20 [own: torque left after
@@ -221,8 +222,8 @@ class SafetyLimits:
             sane=np.concatenate(
                 (
                     np.maximum(np.abs(limits.lower), np.abs(limits.upper)) + 5.0,
-                    2.0 * velocity,
-                    2.0 * torque,
+                    10.0 * velocity,
+                    10.0 * torque,
                     np.full(NUM_JOINTS, 10.0 * KP_MAX),
                     np.full(NUM_JOINTS, 10.0 * KD_MAX),
                 )

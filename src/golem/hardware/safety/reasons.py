@@ -172,7 +172,7 @@ REASONS: dict[Reason, ReasonText] = {
     ),
     Reason.COMMAND_BEYOND: ReasonText(
         710,
-        "Three commands ask for 5 rad beyond a range, twice a speed or torque, or ten times a gain.",
+        "Three commands ask for 5 rad beyond a range, or ten times a speed, torque or gain.",
         "A bug in the stack, or other units than rad and N m.",
     ),
 }
