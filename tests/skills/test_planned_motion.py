@@ -47,7 +47,7 @@ class Rig:
 
     def __init__(self, planner: RrtConnect, q: Array | None = None) -> None:
         self.bus, self.t, self.stops = Bus(), 0.0, np.full(15, np.inf)
-        self.q = posture("home") if q is None else q
+        self.q, self.sag = posture("home") if q is None else q, np.zeros(15)
         self.node = UpperBodyNode(self.bus, DiffIK(), ContractCheck("upper_body", "diff_ik"))
         modules = Modules(lambda: pytest.fail(), lambda name: pytest.fail(), lambda: planner, ObjectMap())
         self.context = Context(self.bus, Kinematics(), PERIOD, modules)
@@ -56,7 +56,7 @@ class Rig:
     def step(self) -> None:
         self.t += PERIOD
         q = np.zeros(NUM_JOINTS)
-        q[UPPER] = np.minimum(self.q, self.stops)
+        q[UPPER] = np.minimum(self.q, self.stops) - self.sag
         zero = np.zeros(NUM_JOINTS)
         self.bus.publish(topics.BASE, BaseEstimate(self.t, np.eye(4)), self.t)
         self.bus.publish(topics.LOW_STATE, LowState(self.t, q, zero, zero, STILL), self.t)
@@ -167,6 +167,17 @@ def test_an_arm_that_is_held_off_gives_in_and_goes_on(rig: Rig) -> None:
 
     assert rig.run(press_and_return(rig.context)).result == DONE
     np.testing.assert_allclose(rig.q, home, atol=1e-6)
+
+
+def test_an_arm_that_sags_more_than_a_trajectory_allows_goes_all_the_same(rig: Rig) -> None:
+    rig.sag[PITCH] = 0.12
+
+    async def there(context: Context) -> SkillResult:
+        await PlannedMotion(context).to_joints(posture("ready"), ["right"], 0.25)
+        return DONE
+
+    assert rig.run(there(rig.context)).result == DONE
+    np.testing.assert_allclose(rig.q[8:], posture("ready")[8:], atol=1e-6)
 
 
 def test_arms_that_touch_the_robot_come_off_and_go_on(rig: Rig) -> None:

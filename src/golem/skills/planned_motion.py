@@ -180,7 +180,9 @@ class PlannedMotion:
 
     async def _follow(self, plan: Plan, sides: Sequence[Side]) -> None:
         context = self._context
-        await context.follow(plan.times, plan.q, plan.dq)
+        # An arm that sags or leans on something gets the time to come to where it was sent.
+        off = float(np.abs(context.joints - plan.q[0]).max())
+        await context.follow(plan.times + (0.0 if off < GIVEN else off / YIELD), plan.q, plan.dq)
         for side in sides:
             here = self._goals.pose(side, plan.q[-1])
             context.arms[side].stays_at(context.T_odom_base @ here)
