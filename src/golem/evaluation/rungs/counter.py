@@ -6,37 +6,27 @@ on either rung.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from golem import registry
 from golem.errors import ConfigError
-from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
+from golem.evaluation.base import Case, Results, TrialSpec
 from golem.evaluation.episodes.counter_watch import CounterWatch
-from golem.evaluation.episodes.episode import episode_seed, lost
 from golem.evaluation.episodes.oracle import Oracle
-from golem.evaluation.rungs.pick_screw import ABORTED, SLOT, balance, let_go
-from golem.provenance import stack_facts
-from golem.robots.mujoco.balance import TRACE
+from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.robots.mujoco.gl import shared_context
 from golem.robots.worlds.conditions import LayoutKind
 from golem.robots.worlds.kitchen import KitchenLayout
 from golem.robots.worlds.tableware import KINDS
-from golem.runtime.lockstep import LockstepRunner, build
+from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import SkillResult
 from golem.skills.place import PlaceGoal
 from golem.skills.take import TakeGoal, TakeReport
-from golem.slots import KEYS
-from golem.stack import Stack, load_stack
 from golem.types import Side
 
-SETTLE = 1.0
-"""Robot time that what was set down gets to come to rest [s]."""
 AREA = ((0.44, 0.54), (-0.38, 0.38))
 """x and y bounds in base_link of the places that are asked for [m]: both hands get there."""
 FREE = 0.17
@@ -59,7 +49,7 @@ class CounterOptions:
     """Whether every kind of thing is tried with each hand, case by case; else the trial's seed draws both."""
 
 
-class CounterRung(Rung[CounterOptions]):
+class CounterRung(KitchenRung[CounterOptions]):
     """One thing per trial: taken from the counter by its name, lifted, and set down at another place.
 
     It succeeds where such a thing was lifted by 5 cm, stands upright within 6 cm of the place, and nothing else has
@@ -67,16 +57,11 @@ class CounterRung(Rung[CounterOptions]):
 
     Attributes:
         name: of the rung, and of the shipped stack it runs.
-        balances: whether the robot stands on its own feet.
     """
 
     Options = CounterOptions
     default_methods = ("centroid", "antipodal", "reranked")
-    balances = False
-
-    def methods(self) -> tuple[str, ...]:
-        """Return the registered grasp methods."""
-        return registry.names(SLOT)
+    subject = "counter"
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return the things and hands that are tried one by one; see `Rung`."""
@@ -84,42 +69,19 @@ class CounterRung(Rung[CounterOptions]):
             return ({},)
         return [{"thing": kind, "hand": hand} for kind in KINDS for hand in ("left", "right")]
 
-    def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
-        """Return what determines a trial besides its seed; see `Rung`."""
-        stack = self._stack(method, profile, overrides)
-        for key, row in KEYS.items():
-            registry.load(row.slot, stack.choice(key).use)
-        shared_context()
-        return stack_facts(stack)
-
-    def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
-        """Run one trial; see `Rung`."""
-        stack = self._stack(spec.method, spec.profile, spec.overrides)
-        running, robot = build(stack, episode_seed(spec.seed, spec.index))
-        if not isinstance(robot, MujocoRobot) or robot.scene.kitchen is None:
-            raise ConfigError(
-                f"Rung {self.name} judges the twin's counter; robot: {stack.choice('robot').use} is none."
-            )
-        if self.onlooker is not None:
-            self.onlooker(running, robot)
-        oracle = Oracle(robot)
-        try:
-            hangs = let_go(running, robot) if self.balances else None
-            if hangs is not None:
-                return hangs
-            asked = draw_errand(spec, robot.scene.kitchen)
-            if asked is None:
-                raise ConfigError(f"The counter of trial {spec.index} has no room for an errand.")
-            kind, hand, place = asked
-            watch = CounterWatch(running, robot, oracle, kind, self.balances)
-            result = self._errand(running, robot, watch, TakeGoal(kind, hand, self.options.approach), place)
-            running.executor.run(running.executor.t + SETTLE, watch.look)
-            if artefacts is not None and watch.recorder is not None:
-                watch.recorder.trace().save(artefacts / TRACE)
-            return self._judge(stack, running, result, watch, place)
-        finally:
-            oracle.close()
-            robot.close()
+    def errand(
+        self,
+        spec: TrialSpec,
+        running: LockstepRunner,
+        robot: MujocoRobot,
+        kitchen: KitchenLayout,
+        oracle: Oracle,
+    ) -> Errand:
+        """Have one thing taken, and set down at another place; see `KitchenRung`."""
+        kind, hand, place = draw_errand(spec, kitchen)
+        watch = CounterWatch(running, robot, oracle, kind, self.balances)
+        result = self._errand(running, robot, watch, TakeGoal(kind, hand, self.options.approach), place)
+        return Errand(result, watch, lambda: counter_verdict(watch, place))
 
     def _errand(
         self,
@@ -146,45 +108,6 @@ class CounterRung(Rung[CounterOptions]):
             placed.success, placed.stage, placed.slot, placed.reason, timings, placed.value, placed.trace
         )
 
-    def _judge(
-        self,
-        stack: Stack,
-        running: LockstepRunner,
-        result: SkillResult,
-        watch: CounterWatch,
-        place: tuple[float, float],
-    ) -> TrialOutcome:
-        """Say whether it stands where it was asked for and the rest where it was, and if not, which module lost it."""
-        series = watch.series(place)
-        if watch.recorder is not None:
-            series |= balance(watch.recorder.trace())
-        picture, timings = watch.last_picture(), result.timings
-        loss = lost(running, watch.recorder)
-        if loss is not None and result.stage not in ABORTED:
-            module = f"lower_body: {stack.choice('lower_body').use}" if self.balances else None
-            detail = f"{loss.detail} The errand itself: {result.reason}"
-            return TrialOutcome(False, loss.stage, module, detail, timings, series, picture, loss.trace)
-        problem = watch.problem(place)
-        if problem is None and result.stage not in ABORTED:
-            return TrialOutcome(True, DONE, None, result.reason, timings, series, picture)
-        stage = result.stage if result.stage != DONE else "release"
-        slot = result.slot if result.stage != DONE else SLOT
-        module = None if slot is None else f"{slot}: {stack.choice(slot).use}" if slot in KEYS else slot
-        detail = f"{result.reason} {problem or ''}".strip()
-        return TrialOutcome(False, stage, module, detail, timings, series, picture, result.trace)
-
-    def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
-        if SLOT in overrides or "robot" in overrides:
-            raise ConfigError(
-                f"The method is what sits in {SLOT}, and the counter is the rung's; leave out --use {SLOT}=... and "
-                "--use robot=..."
-            )
-        stack = load_stack(self.name, profile=profile).with_choice(SLOT, method)
-        stack = stack.with_options("robot", layout=self.options.layout)
-        for slot, use in overrides.items():
-            stack = stack.with_choice(slot, use)
-        return stack
-
 
 class CounterTether(CounterRung):
     """Take a thing from a counter and set it down while the robot hangs in its hoist."""
@@ -199,12 +122,21 @@ class CounterStand(CounterRung):
     balances = True
 
 
+def counter_verdict(watch: CounterWatch, place: tuple[float, float]) -> Verdict:
+    """Return whether the thing stands at `place`, x, y in the world [m], and the rest where it was."""
+    problem = watch.problem(place)
+    return Verdict(problem is None, problem or "", watch.series(place))
+
+
 def draw_errand(
     spec: TrialSpec, kitchen: KitchenLayout
-) -> tuple[str, Literal["left", "right"], tuple[float, float]] | None:
-    """Return the kind of a thing, the hand, and x, y of a free place for it in the world [m]; None without any.
+) -> tuple[str, Literal["left", "right"], tuple[float, float]]:
+    """Return the kind of a thing, the hand, and x, y of a free place for it in the world [m].
 
     The case names thing and hand where there is one. Else a thing and the hand on its side are drawn.
+
+    Raises:
+        ConfigError: nothing of the kind stands there.
     """
     rng = spec.rng("errand")
     things = kitchen.things
@@ -213,7 +145,7 @@ def draw_errand(
     chosen = next((things[k] for k in order if wanted in ("", things[k].kind)), None)
     spots = rng.uniform((AREA[0][0], AREA[1][0]), (AREA[0][1], AREA[1][1]), (200, 2))
     if chosen is None:
-        return None
+        raise ConfigError(f"The counter of trial {spec.index} has no room for an errand.")
     own: Side = "left" if chosen.position[1] > 0.0 else "right"
     hand: Side = "left" if spec.case.get("hand", own) == "left" else "right"
     mirror = 1.0 if hand == "left" else -1.0
