@@ -381,6 +381,12 @@ class Context:
             await self.tick()
         return True
 
-    def watch(self, camera: str, *labels: str) -> DetectionStream:
-        """Let a camera stream what it sees of `labels`, for as long as the returned `DetectionStream` is open."""
-        return DetectionStream(self, camera, labels)
+    def watch(self, camera: str, *labels: str, doubtful: tuple[str, ...] = ()) -> DetectionStream:
+        """Let a camera stream what it sees of `labels`, for as long as the returned `DetectionStream` is open.
+
+        Args:
+            camera: which one.
+            labels: classes.
+            doubtful: those of them of which unsure sightings are passed on, too, since the caller can tell.
+        """
+        return DetectionStream(self, camera, labels, doubtful)

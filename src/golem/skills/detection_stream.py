@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from golem.interfaces import topics
@@ -10,15 +11,20 @@ from golem.interfaces.payloads import DetectionRequest, Detections
 if TYPE_CHECKING:
     from golem.skills.context import Context
 
+SURE = 0.3
+"""Score from which on a sighting is believed without anything else that speaks for it."""
+
 
 class DetectionStream:
     """A camera that streams sightings while it is open (a context manager)."""
 
-    def __init__(self, context: Context, camera: str, labels: tuple[str, ...]) -> None:
-        """Watch `camera` for `labels`."""
+    def __init__(
+        self, context: Context, camera: str, labels: tuple[str, ...], doubtful: tuple[str, ...]
+    ) -> None:
+        """Watch `camera` for `labels`; of those in `doubtful`, sightings below `SURE` are passed on, too."""
         self._context = context
         self._camera = camera
-        self._labels = labels
+        self._labels, self._doubtful = labels, doubtful
         self._seen = 0
         self._since = 0.0
 
@@ -41,7 +47,10 @@ class DetectionStream:
             return None
         self._seen = count
         newest = self._context.bus.latest(topic)
-        return newest if newest is not None and newest.t >= self._since else None
+        if newest is None or newest.t < self._since:
+            return None
+        believed = (o for o in newest.objects if o.detection.score >= SURE or o.label in self._doubtful)
+        return replace(newest, objects=tuple(believed))
 
     async def look(self, timeout: float) -> Detections | None:
         """Wait for the next fresh sightings, at most `timeout` [s]; None when no frame came."""

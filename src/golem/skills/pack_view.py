@@ -125,7 +125,7 @@ async def _look(
     trays: list[tuple[float, Array]],
 ) -> None:
     """Add what the head camera shows in some frames to `seen` and `trays`, in base_link."""
-    with context.watch("head", label, container) as eye:
+    with context.watch("head", label, container, doubtful=(container,)) as eye:
         end, frames = context.t + CAMERA, 0
         while frames < FRAMES and (sightings := await eye.look(end - context.t)) is not None:
             frames += 1

@@ -22,6 +22,9 @@ from golem.types import Side
 CLOSED = (GripState.HOLDING, GripState.EMPTY)
 """States of a hand whose fingers have closed, on something or on nothing."""
 
+FINAL = (PickOutcome.TIGHT, PickOutcome.OUT_OF_REACH)
+"""What a second try with the same hand would not change."""
+
 
 class Pick:
     """Find an object, grasp it, pull it straight out and drop it in a container."""
@@ -161,7 +164,7 @@ class Pick:
                 await pull(context, self._config, self._travel, attempt, self._heights)
                 return
             except StageFailed as failure:
-                if law is None or count == self._config.attempts or outcome_of(failure) is PickOutcome.TIGHT:
+                if law is None or count == self._config.attempts or outcome_of(failure) in FINAL:
                     raise
                 context.say(failure.stage, f"{failure} Trying again.")
                 context.hands[attempt.side].open(grasp.gap)
@@ -195,9 +198,9 @@ class Pick:
         """Closed loop: let the law bring the hand down, and let it follow the object while the fingers close."""
         arm, hand = context.arms[attempt.side], context.hands[attempt.side]
         end = context.t + self._config.servo_timeout
-        closing = False
+        closing, camera = False, f"{attempt.side}_hand"
         below = ForceGuard(context, attempt.side, arm.commanded[:3, 2], self._config.press_force)
-        with context.watch(f"{attempt.side}_hand", attempt.label) as eye:
+        with context.watch(camera, attempt.label, doubtful=(attempt.label,)) as eye:
             while context.t < end and not (closing and hand.status.state in CLOSED):
                 fresh = eye.fresh()
                 step = law.step(context.t, None if fresh is None else list(fresh.objects), arm.pose)

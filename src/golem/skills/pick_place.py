@@ -82,7 +82,7 @@ async def look_after(
     """
     frames: list[Array] = []
     clouds: list[Array] = []
-    with context.watch("head", attempt.label, attempt.container) as eye:
+    with context.watch("head", attempt.label, attempt.container, doubtful=(attempt.container,)) as eye:
         end = context.t + config.look_timeout
         while len(frames) < config.looks_after:
             sightings = await eye.look(end - context.t)

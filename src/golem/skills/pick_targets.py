@@ -147,7 +147,7 @@ class TargetChoice:
                 PickOutcome.FAILED, "detect", "localizer", "The head camera gave no detections in time."
             ),
         )
-        with context.watch("head", goal.label, goal.container) as eye:
+        with context.watch("head", goal.label, goal.container, doubtful=(goal.container,)) as eye:
             end = context.t + self._config.look_timeout
             while view.problem is not None:
                 sightings = await eye.look(end - context.t)

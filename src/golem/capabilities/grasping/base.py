@@ -64,7 +64,7 @@ class ServoStatus(StrEnum):
         CONVERGED: the fingers shall close now.
         LOST: the palm camera no longer sees the object; the attempt ends, and the localizer is named.
         STALLED: the hand comes no nearer; the attempt ends, and the upper body is named.
-        TIGHT: the object stands no higher than one that is screwed down; the attempt ends.
+        TIGHT: the object stands no higher than one that is screwed down, and none beside it does; the attempt ends.
     """
 
     TRACKING = "tracking"

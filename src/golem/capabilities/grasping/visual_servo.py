@@ -29,7 +29,10 @@ class ServoLawConfig:
         sigma_lateral: standard deviation of one sighting across the optical axis [m].
         sigma_depth: the same along the axis, at close range [m].
         gate: squared Mahalanobis distance beyond which a sighting is another object (chi2, 3 dof, p = 0.999).
-        first_radius: how far from the hand the first sighting may be [m]: one pitch of the screws and half of one.
+        first_score: least score of a first sighting; one that is where the object is expected may be doubtful.
+        first_radius: how far from where the hand began the first sighting may be [m]: one pitch of the screws and half
+            of one.
+        left_radius: what is seen this near to an object that was left is that [m].
         confirm: sightings needed before the hand leaves its stand-off.
         standoff: height above the grasp at which the hand centres itself [m].
         slope: metres of height the hand keeps per metre of lateral error beyond `tolerance`.
@@ -56,7 +59,9 @@ class ServoLawConfig:
     sigma_lateral: float = 0.002
     sigma_depth: float = 0.002
     gate: float = 16.3
+    first_score: float = 0.3
     first_radius: float = 0.14
+    left_radius: float = 0.035
     confirm: int = 3
     standoff: float = 0.07
     slope: float = 6.0
@@ -64,7 +69,7 @@ class ServoLawConfig:
     height_tolerance: float = 0.0025
     dwell: int = 3
     blind_after: float = 0.3
-    blind_from: float = 0.012
+    blind_from: float = 0.035
     lost_after: float = 1.0
     again_radius: float = 0.04
     retreat: float = 0.05
@@ -103,6 +108,9 @@ class CentroidServo:
         self._seen_at = t
         self._sightings = 0
         self._found, self._seen_from = False, np.inf
+        self._start: Array | None = None
+        self._left: list[Array] = []
+        self._left_as = ServoStatus.LOST
         self._retreats = 0
         self._inside = 0
         self._lift = 0.0
@@ -112,18 +120,16 @@ class CentroidServo:
     def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
         """Advance; see `ServoLaw`."""
         c = self._config
+        self._start = T_odom_gripper[:2, 3].copy() if self._start is None else self._start
         self._variance = self._variance + c.drift**2 * (t - self._t)
         self._t = t
         seen = sightings is not None and self._update(t, sightings, T_odom_gripper)
         status = ServoStatus.TRACKING
         if t - self._seen_at > c.lost_after:
-            self._seen_at = t
-            self._sightings = 0
             self._retreats += 1
-            self._lift = c.retreat * self._retreats
-            self._variance = np.full(3, c.first_radius**2)
+            self._look_again(t)
             if self._retreats > c.retreats:
-                status = ServoStatus.LOST
+                status = ServoStatus.LOST if self._found else self._left_as
 
         grasp = self._x - self._depth * self._normal
         offset = T_odom_gripper[:3, 3] - grasp
@@ -139,11 +145,11 @@ class CentroidServo:
             if blind or self._inside >= c.dwell:
                 status = ServoStatus.CONVERGED
             if self._is_tight():
-                status = ServoStatus.TIGHT
+                status = self._leave(t, ServoStatus.TIGHT)
             if error < self._best - c.progress:
                 self._best, self._best_at = error, t
             elif t - self._best_at > c.stall_after and status is ServoStatus.TRACKING:
-                status = ServoStatus.STALLED
+                status = self._leave(t, ServoStatus.STALLED)
         else:
             self._best, self._best_at = np.inf, t
 
@@ -160,15 +166,19 @@ class CentroidServo:
             return False
         noise = np.array([c.sigma_lateral**2, c.sigma_lateral**2, c.sigma_depth**2])
         if self._sightings == 0:
-            # The head camera may be off by more than the pitch of the screws: take what is under the hand, and of that
-            # what does not look tight. What was lost meanwhile is where it was; its neighbours are others.
-            again = self._found
-            middle, radius = (self._x, c.again_radius) if again else (T_odom_gripper[:3, 3], c.first_radius)
-            away = {id(s): float(np.hypot(*(s.position - middle)[:2])) for s in candidates}
-            near = [s for s in candidates if away[id(s)] <= radius]
+            # The head camera may be off by as much as the pitch of the screws: take what is under the hand, and from it
+            # go on to its neighbours. What was lost meanwhile is where it was; its neighbours are others.
+            middle, radius = (self._x[:2], c.again_radius) if self._found else (self._start, c.first_radius)
+            away = [float(np.linalg.norm(s.position[:2] - middle)) for s in candidates]
+            least = 0.0 if self._found else c.first_score
+            near = [
+                k
+                for k, s in enumerate(candidates)
+                if away[k] <= radius and s.detection.score >= least and not self._was_left(s)
+            ]
             if not near:
                 return False
-            nearest = min(near, key=lambda s: (not again and self._looks_tight(s), away[id(s)]))
+            nearest = candidates[min(near, key=lambda k: away[k])]
             self._x, self._variance = nearest.position.copy(), noise
             self._depth = self._wanted_depth(nearest)
         else:
@@ -196,10 +206,26 @@ class CentroidServo:
             mixed = self._normal + self._config.normal_gain * (normal - self._normal)
             self._normal = mixed / np.linalg.norm(mixed)
 
-    def _looks_tight(self, sighting: LocalizedObject) -> bool:
-        """Return whether one sighting shows an object that stands as low as one that is screwed down."""
-        loose, plane = self._config.loose_height.get(self.label), ground_plane(sighting)
-        return loose is not None and plane is not None and plane[1] < loose
+    def _look_again(self, t: float) -> None:
+        """Go up to look, higher each time."""
+        self._seen_at, self._sightings = t, 0
+        self._lift = self._config.retreat * self._retreats
+        self._variance = np.full(3, self._config.first_radius**2)
+
+    def _leave(self, t: float, status: ServoStatus) -> ServoStatus:
+        """Leave an object for its neighbour, from above where the hand began; `status` is said if there is none."""
+        assert self._start is not None  # set by the first step
+        self._left.append(self._x[:2].copy())
+        self._left_as = status
+        self._found, self._heights = False, []
+        self._x[:2], self._normal = self._start, UP
+        self._retreats = max(self._config.retreats - 1, 0)
+        self._look_again(t)
+        return ServoStatus.TRACKING
+
+    def _was_left(self, sighting: LocalizedObject) -> bool:
+        """Return whether a sighting is one of the objects that were left."""
+        return any(np.linalg.norm(sighting.position[:2] - x) < self._config.left_radius for x in self._left)
 
     def _is_tight(self) -> bool:
         """Return whether the object stands as low as one that is screwed down, by the last looks at the ground."""

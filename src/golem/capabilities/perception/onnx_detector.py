@@ -34,7 +34,7 @@ class OnnxDetectorConfig:
 
     weights: str | None = None
     threshold: float = 0.3
-    doubtful: Mapping[str, float] = field(default_factory=lambda: {"tray": 0.12})
+    doubtful: Mapping[str, float] = field(default_factory=lambda: {"tray": 0.12, "screw": 0.15})
     latency: float = 0.03
     lift: LiftConfig = field(default_factory=LiftConfig)
 
