@@ -13,7 +13,7 @@ from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.hand_force import HandForce
 from golem.capabilities.arms.postures import POSTURES
 from golem.interfaces import topics
-from golem.skills.force_guard import TICKS, ForceGuard
+from golem.skills.force_guard import REST, TICKS, ForceGuard
 from golem.types import NUM_JOINTS, SIDES, UPPER, Array, Imu, LowState, Side
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -47,13 +47,26 @@ def feel(world: Any, force: float) -> None:
 def test_a_force_that_lasts_is_noticed_and_a_jerk_is_not(world: Any) -> None:
     feel(world, 5.0)
     guard = ForceGuard(world.context, "right", UP, force=10.0, length=0.015)
-    for force in (14.0, 25.0, 25.0, 14.0):  # 5 N were there before: 9, 20, 20, 9
+    for force in (5.0, 5.0, 40.0, 5.0, 5.0, 5.0, 5.0):  # 5 N were there before
         feel(world, force)
         assert not guard()
     for _ in range(TICKS):
         feel(world, 17.0)
         stuck = guard()
-    assert stuck and guard.stuck and guard.largest == pytest.approx(20.0, abs=0.1)
+    assert stuck and guard.stuck and guard.largest == pytest.approx(12.0, abs=0.1)
+
+
+def test_the_force_of_a_hand_that_goes_on_is_that_of_its_own_acceleration(world: Any) -> None:
+    feel(world, 0.0)
+    guard = ForceGuard(world.context, "right", UP, force=10.0)
+    for _ in range(4 * TICKS):
+        world.kinematics.offset += (0.0, 0.0, 0.0015)
+        feel(world, 30.0)
+        assert not guard()
+    for _ in range(TICKS):
+        feel(world, 30.0)
+        stuck = guard()
+    assert stuck
 
 
 def test_beyond_its_length_nothing_is_asked(world: Any) -> None:
@@ -70,3 +83,17 @@ def test_beyond_its_length_nothing_is_asked(world: Any) -> None:
 def test_motors_that_do_not_report_feel_nothing(world: Any) -> None:
     guard = ForceGuard(world.context, "right", UP, force=1.0)
     assert not guard() and guard.largest == 0.0
+
+
+def test_what_is_there_before_is_averaged_over_the_rest(world: Any) -> None:
+    feel(world, 0.0)
+    resting = ForceGuard.at_rest(world.context, "right", UP, force=10.0)
+    with pytest.raises(StopIteration) as end:
+        for k in range(REST + 2):
+            resting.send(None)
+            feel(world, 8.0 if k % 2 else 2.0)
+    guard = end.value.value
+    for _ in range(TICKS):
+        feel(world, 17.0)
+        guard()
+    assert guard.stuck and guard.largest == pytest.approx(12.0, abs=0.5)

@@ -116,6 +116,23 @@ def test_the_screw_is_let_go_above_the_tray_however_much_the_head_camera_is_off(
     np.testing.assert_allclose(let_go[0], TRAY + (0.0, 0.0, CONFIG.drop_height), atol=1e-9)
 
 
+def test_the_palm_camera_brings_the_hand_further_into_the_tray(full: Any, thing: Any) -> None:
+    let_go: list[Array] = []
+    tick, middle = full.step, TRAY + (0.02, 0.07, 0.0)
+    full.objects["right_hand"] = lambda: [thing("screw", SCREW, full.t), thing("tray", middle, full.t, 0.15)]
+
+    def step() -> None:
+        held = full.holds
+        tick()
+        goal = full.bus.latest(topics.hand_goal("right"))
+        if held and goal is not None and goal.gap is not None and not let_go:
+            let_go.append(full.context.arms["right"].commanded[:3, 3].copy())
+
+    full.step = step
+    assert picked(full).success
+    np.testing.assert_allclose(let_go[0][:2], middle[:2], atol=1e-9)
+
+
 def test_the_extraction_is_straight_and_slow(full: Any) -> None:
     picked(full)
     path = np.array([T[:3, 3] for T in full.sent])

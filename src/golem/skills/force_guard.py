@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 
 from golem.capabilities.arms.hand_force import HandForce
@@ -9,22 +11,41 @@ from golem.interfaces import topics
 from golem.skills.context import Context
 from golem.types import UPPER, Array, Side
 
-TICKS = 3
-"""Ticks in a row that a force has to last: one alone is a jerk of the arm."""
+TICKS = 5
+"""Ticks over which the force is averaged: the torques of one tick are off by 2 to 3 N at the hand."""
+REST = 10
+"""Ticks at rest over which the force before the motion is averaged."""
+STILL = 0.001
+"""What goes further than this within `TICKS` is not held [m]: its force is that of the arm's own acceleration."""
 
 
 class ForceGuard:
-    """Ask it every tick of a motion whether the hand meets more force than it should.
+    """Ask it every tick of a motion whether the hand meets more force than it should, and goes no further.
 
     Attributes:
         stuck: whether it did.
-        largest: largest force of the hand along the motion while it was asked [N].
+        largest: largest force of the hand along the motion while it was asked, averaged over `TICKS` [N].
     """
 
     def __init__(
         self, context: Context, side: Side, axis: Array, force: float, length: float = np.inf
     ) -> None:
-        """Begin where the hand is now, which should be at rest.
+        """Begin where the hand is now; see `at_rest`."""
+        self._context, self._axis = context, axis
+        self._side: Side = side
+        self._force, self._length = force, length
+        self._feel = HandForce()
+        self._start = context.arms[side].commanded[:3, 3].copy()
+        self._before = self._along()
+        self._last: deque[tuple[float, float]] = deque(maxlen=TICKS)
+        self.stuck = False
+        self.largest = 0.0
+
+    @classmethod
+    async def at_rest(
+        cls, context: Context, side: Side, axis: Array, force: float, length: float = np.inf
+    ) -> ForceGuard:
+        """Return a guard of a hand that is at rest now, after having felt for `REST` ticks what is there before.
 
         Args:
             context: whose hand.
@@ -33,24 +54,23 @@ class ForceGuard:
             force: what it may meet [N].
             length: way of the commanded pose along the axis after which nothing more is asked [m].
         """
-        self._context, self._axis = context, axis
-        self._side: Side = side
-        self._force, self._length = force, length
-        self._feel = HandForce()
-        self._start = context.arms[side].commanded[:3, 3].copy()
-        self._before = self._along()
-        self._ticks = 0
-        self.stuck = False
-        self.largest = 0.0
+        guard, before = cls(context, side, axis, force, length), list[float]()
+        for _ in range(REST):
+            await context.tick()
+            before.append(guard._along())
+        guard._before = float(np.mean(before))
+        return guard
 
     def __call__(self) -> bool:
         """Return whether it does, or did."""
-        gone = float((self._context.arms[self._side].commanded[:3, 3] - self._start) @ self._axis)
+        arm = self._context.arms[self._side]
+        gone = float((arm.commanded[:3, 3] - self._start) @ self._axis)
         if not self.stuck and gone <= self._length:
-            force = self._along() - self._before
-            self.largest = max(self.largest, force)
-            self._ticks = self._ticks + 1 if force > self._force else 0
-            self.stuck = self._ticks >= TICKS
+            self._last.append((self._along() - self._before, float(arm.pose[:3, 3] @ self._axis)))
+            if len(self._last) == TICKS:
+                force = float(np.mean([f for f, _ in self._last]))
+                self.largest = max(self.largest, force)
+                self.stuck = force > self._force and self._last[-1][1] - self._last[0][1] < STILL
         return self.stuck
 
     def _along(self) -> float:

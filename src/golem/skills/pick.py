@@ -199,7 +199,9 @@ class Pick:
         arm, hand = context.arms[attempt.side], context.hands[attempt.side]
         end = context.t + self._config.servo_timeout
         closing, camera = False, f"{attempt.side}_hand"
-        below = ForceGuard(context, attempt.side, arm.commanded[:3, 2], self._config.press_force)
+        below = await ForceGuard.at_rest(
+            context, attempt.side, arm.commanded[:3, 2], self._config.press_force
+        )
         with context.watch(camera, attempt.label, doubtful=(attempt.label,)) as eye:
             while context.t < end and not (closing and hand.status.state in CLOSED):
                 fresh = eye.fresh()

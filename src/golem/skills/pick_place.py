@@ -7,7 +7,7 @@ import numpy as np
 from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.interfaces.payloads import GripState
 from golem.skills.base import StageFailed
-from golem.skills.container import shift_of
+from golem.skills.container import Container, shift_of
 from golem.skills.context import Context
 from golem.skills.hand_reach import HandReach
 from golem.skills.pick_config import PickConfig
@@ -19,6 +19,16 @@ from golem.types import Array
 
 DROPS = 6
 """Places in the container that are tried."""
+CORRECTIONS = 2
+"""Moves further inside that the palm camera may ask for: where its view is cut off, the middle is farther."""
+LOOKS = 3
+"""Pictures of the palm camera in which it looks for the container."""
+INSIDE = 0.05
+"""A hand this near to the container's middle lets go there [m]."""
+FARTHEST = 0.25
+"""What is farther away than this is not the container that the hand was sent to [m]."""
+SHARES = (1.0, 0.75, 0.5)
+"""Shares of the way to the middle that are tried."""
 SAME = 0.035
 """Two looks of the head camera at one object differ by less [m]; screws stand 9 cm apart."""
 NEAR = 0.12
@@ -65,11 +75,45 @@ async def place(
                 PickOutcome.TRAY_OUT_OF_REACH, failure.stage, failure.slot, str(failure)
             ) from cause
         raise
+    for _ in range(CORRECTIONS):
+        if not await _nearer(context, config, travel, attempt):
+            break
     if not hand.status.holding:
         text = f"The {attempt.label} was lost on the way."
         raise PickFailed(PickOutcome.SLIPPED, "place", "grasp_method", text)
     hand.open(config.release_gap)
     await context.until(lambda: hand.status.state is GripState.OPEN, 2.0)
+
+
+async def _nearer(context: Context, config: PickConfig, travel: Travel, attempt: Attempt) -> bool:
+    """Look down at the container with the palm camera, and go further inside if the hand is near its rim or beside it.
+
+    What head camera and encoders are off by does not count here. Returns whether the hand has moved.
+    """
+    arm, box = context.arms[attempt.side], None
+    with context.watch(f"{attempt.side}_hand", attempt.container, doubtful=(attempt.container,)) as eye:
+        for _ in range(LOOKS):
+            sightings = await eye.look(config.look_timeout)
+            seen = [o for o in sightings.objects if o.label == attempt.container] if sightings else []
+            if seen:
+                best = max(seen, key=lambda o: o.detection.score)
+                box = Container.of(best, config.container_radius)
+                break
+    if box is None:
+        return False
+    hand = arm.commanded
+    middle = box.sighting.position[:2] if box.box is None else box.box.center
+    away = middle - hand[:2, 3]
+    if not INSIDE < np.linalg.norm(away) < FARTHEST:
+        return False
+    goals = [hand.copy() for _ in SHARES]
+    for T, share in zip(goals, SHARES, strict=True):
+        T[:2, 3] += share * away
+    try:
+        await travel.carry(attempt.side, goals, config.travel_speed)
+    except StageFailed:
+        return False  # no nearer than it is
+    return True
 
 
 async def look_after(

@@ -32,7 +32,9 @@ async def pull(
     centred[:3, 3] += hand.status.offset * centred[:3, 1]
     await arm.move(centred, config.pull_speed)
     context.say("extract", "Pulling straight out.")
-    guard = ForceGuard(context, attempt.side, -arm.commanded[:3, 2], config.guard_force, config.guard_length)
+    guard = await ForceGuard.at_rest(
+        context, attempt.side, -arm.commanded[:3, 2], config.guard_force, config.guard_length
+    )
     await travel.line(
         attempt.side,
         retracted(arm.commanded, config.pull),

@@ -260,7 +260,7 @@ class SetDown:
             raise StageFailed("carry", "grasp_method", "It was lost on the way.")
         context.say("lower", "Lowering it.", side=side)
         await arm.settle(0.006, 1.0)
-        guard = ForceGuard(context, side, np.array([0.0, 0.0, -1.0]), c.contact)
+        guard = await ForceGuard.at_rest(context, side, np.array([0.0, 0.0, -1.0]), c.contact)
         T = arm.commanded.copy()
         T[2, 3] = level + (goal.below or c.unknown) - c.lower
         await arm.move(T, c.lower_speed, stop=lambda: guard() or not hand.status.holding)

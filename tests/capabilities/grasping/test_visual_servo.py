@@ -126,7 +126,7 @@ def test_it_converges_under_noise(seed: int) -> None:
 def test_the_filtered_target_is_better_than_one_sighting() -> None:
     rng = np.random.default_rng(0)
     chase = Chase(lambda t: [thing(SCREW + rng.normal(0.0, 0.002, 3))], blocked=True)
-    for _ in range(350):
+    for _ in range(280):
         chase.tick()
     errors = np.array([s.target - SCREW for s in chase.steps[150:]])
     assert np.sqrt((errors**2).mean()) < 0.0012

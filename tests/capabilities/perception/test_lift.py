@@ -45,6 +45,21 @@ def test_a_pixel_at_integer_coordinates_lies_on_its_own_ray() -> None:
     np.testing.assert_allclose(found.position, expected, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("label", "inside", "found"),
+    [
+        ("screw", PLATE + 0.02, False),
+        ("screw", PLATE, True),
+        ("screw", HEAD, True),
+        ("tray", PLATE + 0.02, True),
+    ],
+)
+def test_what_lies_deeper_than_its_ground_is_no_screw(label: str, inside: float, found: bool) -> None:
+    c = (300.0, 200.0)
+    seen = lift(frame(scene(c, 8, inside)), detection(label, c, 8), LiftConfig())
+    assert (seen is not None) is found
+
+
 def test_position_and_points_go_through_the_pose_of_the_frame() -> None:
     c = (239.5, 134.5)  # the principal point
     pose = np.eye(4)

@@ -32,6 +32,7 @@ class ServoLawConfig:
         first_score: least score of a first sighting; one that is where the object is expected may be doubtful.
         first_radius: how far from where the hand began the first sighting may be [m]: one pitch of the screws and half
             of one.
+        first_height: how far above or below where it is expected that may be [m].
         left_radius: what is seen this near to an object that was left is that [m].
         confirm: sightings needed before the hand leaves its stand-off.
         standoff: height above the grasp at which the hand centres itself [m].
@@ -61,6 +62,7 @@ class ServoLawConfig:
     gate: float = 16.3
     first_score: float = 0.3
     first_radius: float = 0.14
+    first_height: float = 0.05
     left_radius: float = 0.035
     confirm: int = 3
     standoff: float = 0.07
@@ -76,8 +78,8 @@ class ServoLawConfig:
     retreats: int = 2
     loose_height: Mapping[str, float] = field(default_factory=lambda: {"screw": 0.0085})
     looks: int = 8
-    stall_after: float = 4.0
-    progress: float = 0.001
+    stall_after: float = 3.0
+    progress: float = 0.003
 
 
 class CentroidServo:
@@ -168,13 +170,17 @@ class CentroidServo:
         if self._sightings == 0:
             # The head camera may be off by as much as the pitch of the screws: take what is under the hand, and from it
             # go on to its neighbours. What was lost meanwhile is where it was; its neighbours are others.
-            middle, radius = (self._x[:2], c.again_radius) if self._found else (self._start, c.first_radius)
+            start = T_odom_gripper[:2, 3] if self._start is None else self._start
+            middle, radius = (self._x[:2], c.again_radius) if self._found else (start, c.first_radius)
             away = [float(np.linalg.norm(s.position[:2] - middle)) for s in candidates]
             least = 0.0 if self._found else c.first_score
             near = [
                 k
                 for k, s in enumerate(candidates)
-                if away[k] <= radius and s.detection.score >= least and not self._was_left(s)
+                if away[k] <= radius
+                and abs(s.position[2] - self._x[2]) <= c.first_height
+                and s.detection.score >= least
+                and not self._was_left(s)
             ]
             if not near:
                 return False

@@ -32,6 +32,8 @@ class LiftConfig:
         min_valid: smallest number of valid depths in the window.
         flush: labels whose depth is the greatest mode.
         around: labels whose depth is looked for in the grown box, as their inside is deeper.
+        standing: labels of what rises from its ground: seen behind most of its grown box, it is a hole, and is dropped.
+        sunk: how far behind [m]; `bin` and `bin_growth` come on top.
     """
 
     window: float = 0.6
@@ -44,6 +46,12 @@ class LiftConfig:
     min_valid: int = 5
     flush: tuple[str, ...] = ("screw_hole", "tray")
     around: tuple[str, ...] = ("screw_hole",)
+    standing: tuple[str, ...] = ("screw", "nut")
+    sunk: float = 0.005
+
+    def width(self, depth: float) -> float:
+        """Return the width of a mode at a depth [m]."""
+        return self.bin + self.bin_growth * depth**2
 
 
 def surface_depth(depths: NDArray[np.float32], config: LiftConfig, *, flush: bool) -> float | None:
@@ -57,7 +65,7 @@ def surface_depth(depths: NDArray[np.float32], config: LiftConfig, *, flush: boo
     valid = np.sort(depths[np.isfinite(depths) & (depths > 0)].astype(np.float64))
     if len(valid) < config.min_valid:
         return None
-    width = config.bin + config.bin_growth * float(np.median(valid)) ** 2
+    width = config.width(float(np.median(valid)))
     # For every depth, how many lie within one width behind it.
     last = np.searchsorted(valid, valid + width, side="right")
     counts = last - np.arange(len(valid))
@@ -73,7 +81,7 @@ def surface_depth(depths: NDArray[np.float32], config: LiftConfig, *, flush: boo
 
 
 def lift(frame: RgbdImage, detection: Detection, config: LiftConfig) -> LocalizedObject | None:
-    """Return the detection in space, or None when its depth is not valid.
+    """Return the detection in space, or None when its depth is not valid, or that of a hole.
 
     Args:
         frame: depth, camera and pose.
@@ -101,6 +109,10 @@ def lift(frame: RgbdImage, detection: Detection, config: LiftConfig) -> Localize
     rows, columns = cloud
     inside = frame.depth[cloud]
     mask = Mask(np.isfinite(inside) & (inside > 0), columns.start, rows.start)
+    if detection.label in config.standing and depth > np.median(
+        inside[mask.pixels]
+    ) + config.sunk + config.width(depth):
+        return None
     return LocalizedObject(detection, frame.t, position, unproject(frame, mask), mask)
 
 
