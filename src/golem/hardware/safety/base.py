@@ -6,11 +6,12 @@ leaves open is chosen here; `SafetyLimits` names the source of each number.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
 
+from golem.hardware.safety.limit_table import limit_table
 from golem.interfaces.payloads import EstopMessage, Fault
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
@@ -121,6 +122,7 @@ class SafetyLimits:
         jolts: level of jumps of torque that stops the robot: each counts one, each other command takes `jolt_leak`
             off. So three within half a second stop it, or more than one a second for long [own].
         jolt_leak: see `jolts`.
+        table: the limits by motor for compiled code, see `limit_table`.
     """
 
     lower: Array
@@ -173,6 +175,11 @@ class SafetyLimits:
     frame_leak: float = 0.02
     jolts: float = 2.5
     jolt_leak: float = 0.002
+    table: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Fill the table."""
+        object.__setattr__(self, "table", limit_table(self))
 
     def still(self) -> SafetyLimits:
         """Return these limits for sensors without noise, which may repeat their numbers while the robot rests."""
