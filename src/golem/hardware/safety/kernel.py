@@ -142,23 +142,36 @@ def rate_state(
 
 
 @njit(cache=True)
-def ordinary_command(numbers: Array, table: Array) -> bool:  # pragma: no cover - compiled
+def ordinary_command(
+    numbers: Array, table: Array, one: float, all_: float
+) -> bool:  # pragma: no cover - compiled
     """Return whether a command, after another, is one that `sender.examine_command` has nothing against.
 
     Args:
         numbers: (270,) the command, then the one before it.
         table: the limits.
+        one: most that may be asked of a leg's motor beyond the last command, in shares of its torque limit.
+        all_: the same of the legs' motors together.
     """
     for k in range(5):
         for i in range(_N):
             if not abs(numbers[k * _N + i]) < table[rows.SANE + k, i]:
                 return False
+    thrown = 0.0
     for i in range(_N):
-        if not (numbers[4 * _N + i] > 0.0 and numbers[3 * _N + i] >= 0.0):
+        kp, kd = numbers[3 * _N + i], numbers[4 * _N + i]
+        if not (kd > 0.0 and kp >= 0.0):
             return False
         jump = numbers[2 * _N + i] - numbers[COMMAND + 2 * _N + i]
-        if i >= _UPPER:
-            jump += numbers[3 * _N + i] * (numbers[i] - numbers[COMMAND + i])
+        spring = kp * (numbers[i] - numbers[COMMAND + i])
+        if i < _UPPER:
+            most = table[rows.TORQUE_LIMIT, i]
+            asked = abs(jump + kd * (numbers[_N + i] - numbers[COMMAND + _N + i]) + spring)
+            if not asked <= one * most:
+                return False
+            thrown += asked / most
+        else:
+            jump += spring
         if not abs(jump) <= table[rows.JOLT, i]:
             return False
-    return True
+    return thrown <= all_
