@@ -91,14 +91,20 @@ def legs(q: float = 0.0, dq: float = 0.0, tau: float = 0.0, which: slice = LEGS)
 
 
 @pytest.mark.parametrize(
-    "thrown",
-    [legs(tau=1.1), legs(tau=-1.1, which=slice(3, 4)), legs(dq=1.0), legs(q=1.0)],
+    ("thrown", "needed"),
+    [
+        (legs(tau=1.1), LIMITS.samples),
+        (legs(tau=-1.1, which=slice(3, 4)), LIMITS.samples),
+        (legs(dq=1.0), LIMITS.throws),
+        (legs(q=1.0), LIMITS.throws),
+    ],
     ids=["torque of all", "torque of a knee", "speed of all", "position of all"],
 )
-def test_legs_are_not_thrown_and_the_third_such_command_is_a_fault(thrown: LowCommand) -> None:
-    rest = legs()
-    assert run(rest, thrown, rest, thrown, thrown, rest) == ([True, False, True, False, False, True], None)
-    _, fault = run(rest, thrown, thrown, thrown)
+def test_legs_are_not_thrown_and_a_run_of_such_commands_is_a_fault(thrown: LowCommand, needed: int) -> None:
+    rest, few = legs(), [thrown] * (needed - 1)
+    followed = [True] + ([False] * len(few) + [True]) * 2
+    assert run(rest, *few, rest, *few, rest) == (followed, None)
+    _, fault = run(rest, *few, thrown)
     assert fault is not None and fault.reason is Reason.COMMAND_JOLTS
 
 

@@ -124,6 +124,8 @@ class SafetyLimits:
         jolt_leak: see `jolts`.
         throw: by how much what a command asks of a leg's motor, and of all twelve together, may differ from the one
             before, in shares of `torque` [own: the shipped legs reach 1.03 and 4.3 in the hardest shoves they stand].
+        throws: consecutive commands that throw all legs together which stop the robot [own: legs that decide at 50 Hz
+            and once saw nonsense give their answer ten times; meanwhile the last sound command holds].
         table: the limits by motor for compiled code, see `limit_table`.
     """
 
@@ -178,6 +180,7 @@ class SafetyLimits:
     jolts: float = 2.5
     jolt_leak: float = 0.002
     throw: tuple[float, float] = (1.05, 5.0)
+    throws: int = 15
     table: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -57,7 +57,7 @@ def examine_command(
     if memory.last is not None and _ordinary(new, memory.last, limits):
         jolts = max(0.0, memory.jolts - limits.jolt_leak) if memory.jolts else 0.0
         return SenderMemory(new, True, 0, jolts), True, None
-    held = memory.held
+    held, needed = memory.held, limits.samples
     wrong: Fault | None = None
     # Counting is the quickest question numpy answers.
     count = np.count_nonzero
@@ -76,11 +76,11 @@ def examine_command(
     else:
         held = True
     if wrong is None and memory.last is not None:
-        wrong = _thrown(new, memory.last, limits)
+        wrong, needed = _thrown(new, memory.last, limits)
     if wrong is not None:
         refused = memory.refused + 1
         after = SenderMemory(memory.last, held, refused, memory.jolts)
-        return after, False, wrong if refused >= limits.samples else None
+        return after, False, wrong if refused >= needed else None
     last, jolts = memory.last, memory.jolts
     if last is not None:
         jump = np.abs(new.tau - last.tau)
@@ -110,8 +110,8 @@ def _ordinary(new: LowCommand, last: LowCommand, limits: SafetyLimits) -> bool:
     return ordinary_command(numbers, limits.table, *limits.throw)
 
 
-def _thrown(new: LowCommand, last: LowCommand, limits: SafetyLimits) -> Fault | None:
-    """Return what throws the legs: from one command to the next they are asked for more than any legs need.
+def _thrown(new: LowCommand, last: LowCommand, limits: SafetyLimits) -> tuple[Fault | None, int]:
+    """Return what throws the legs, from one command to the next by more than any need, and how many are a fault.
 
     One motor is given another constant torque by all that it has, or all of them together a torque that is far from
     the last one. Targets of a single motor may be: legs that take a shove ask for that.
@@ -121,10 +121,12 @@ def _thrown(new: LowCommand, last: LowCommand, limits: SafetyLimits) -> Fault | 
     one, together = limits.throw
     if constant.max() > one:
         i = int(constant.argmax())
-        return Fault(Reason.COMMAND_JOLTS, f"{JOINT_NAMES[i]} by {constant[i] * limits.torque[i]:.0f} N m")
+        said = f"{JOINT_NAMES[i]} by {constant[i] * limits.torque[i]:.0f} N m"
+        return Fault(Reason.COMMAND_JOLTS, said), limits.samples
     if asked.sum() > together:
-        return Fault(Reason.COMMAND_JOLTS, f"the legs by {asked.sum():.1f} times a motor's torque")
-    return None
+        said = f"the legs by {asked.sum():.1f} times a motor's torque"
+        return Fault(Reason.COMMAND_JOLTS, said), limits.throws
+    return None, limits.samples
 
 
 def _asked_of_legs(new: LowCommand, last: LowCommand) -> tuple[Array, Array]:
