@@ -222,7 +222,7 @@ def test_the_fault_generator_does_reach_motion() -> None:
 def test_a_million_random_states_and_commands_let_no_dangerous_command_out() -> None:
     rng, n, block = np.random.default_rng(1), 0, 1000
     active = 0
-    limits = replace(LIMITS, jump=np.inf, throw=(np.inf, np.inf))
+    limits = replace(LIMITS, jump=np.inf, throw=(np.inf, np.inf, np.inf))
     while n < 1_000_000:
         # Anything from a robot at work to noise far beyond every limit, and commands that are finite or not.
         reach = 10.0 ** rng.uniform(-3.0, 1.0)

@@ -95,7 +95,7 @@ def legs(q: float = 0.0, dq: float = 0.0, tau: float = 0.0, which: slice = LEGS)
     [
         (legs(tau=1.1), LIMITS.samples),
         (legs(tau=-1.1, which=slice(3, 4)), LIMITS.samples),
-        (legs(dq=1.0), LIMITS.throws),
+        (legs(dq=1.0), LIMITS.samples),
         (legs(q=1.0), LIMITS.throws),
     ],
     ids=["torque of all", "torque of a knee", "speed of all", "position of all"],

@@ -29,7 +29,7 @@ STOPS: dict[str, Lift] = {
     "torque": lambda limits: replace(limits, torque=FAR),
     "tilt": lambda limits: replace(limits, tilt=math.pi),
     "sender": lambda limits: replace(
-        limits, sane=np.full_like(limits.sane, 1e6), jolts=math.inf, throw=(1e6, 1e6)
+        limits, sane=np.full_like(limits.sane, 1e6), jolts=math.inf, throw=(1e6, 1e6, 1e6)
     ),
 }
 """What stops the robot: measured quantities, of which `range` is position and braking distance, and `sender`, commands

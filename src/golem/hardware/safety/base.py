@@ -122,10 +122,11 @@ class SafetyLimits:
         jolts: level of jumps of torque that stops the robot: each counts one, each other command takes `jolt_leak`
             off. So three within half a second stop it, or more than one a second for long [own].
         jolt_leak: see `jolts`.
-        throw: by how much what a command asks of a leg's motor, and of all twelve together, may differ from the one
-            before, in shares of `torque` [own: the shipped legs reach 1.03 and 4.3 in the hardest shoves they stand].
-        throws: consecutive commands that throw all legs together which stop the robot [own: legs that decide at 50 Hz
-            and once saw nonsense give their answer ten times; meanwhile the last sound command holds].
+        throw: by how much the constant torque of a leg's motor, that of all twelve together, and all that is asked of
+            the twelve may differ from the command before, in shares of `torque` [own: in the hardest shoves they stand
+            the shipped legs reach 0.5, 0.9 and 4.3].
+        throws: consecutive commands beyond the last of these that stop the robot [own: legs that decide at 50 Hz and
+            once saw nonsense give their answer ten times; meanwhile the last sound command holds].
         table: the limits by motor for compiled code, see `limit_table`.
     """
 
@@ -179,7 +180,7 @@ class SafetyLimits:
     frame_leak: float = 0.02
     jolts: float = 2.5
     jolt_leak: float = 0.002
-    throw: tuple[float, float] = (1.05, 5.0)
+    throw: tuple[float, float, float] = (1.05, 3.0, 5.0)
     throws: int = 15
     table: Array = field(init=False, repr=False, compare=False)
 

@@ -143,7 +143,7 @@ def rate_state(
 
 @njit(cache=True)
 def ordinary_command(
-    numbers: Array, table: Array, one: float, all_: float
+    numbers: Array, table: Array, one: float, constants: float, all_: float
 ) -> bool:  # pragma: no cover - compiled
     """Return whether a command, after another, is one that `sender.examine_command` has nothing against.
 
@@ -151,13 +151,14 @@ def ordinary_command(
         numbers: (270,) the command, then the one before it.
         table: the limits.
         one: most that may be asked of a leg's motor beyond the last command, in shares of its torque limit.
+        constants: the same of the constant torques of the legs' motors together.
         all_: the same of the legs' motors together.
     """
     for k in range(5):
         for i in range(_N):
             if not abs(numbers[k * _N + i]) < table[rows.SANE + k, i]:
                 return False
-    thrown = 0.0
+    thrown, constant = 0.0, 0.0
     for i in range(_N):
         kp, kd = numbers[3 * _N + i], numbers[4 * _N + i]
         if not (kd > 0.0 and kp >= 0.0):
@@ -166,12 +167,16 @@ def ordinary_command(
         spring = kp * (numbers[i] - numbers[COMMAND + i])
         if i < _UPPER:
             most = table[rows.TORQUE_LIMIT, i]
-            asked = abs(jump + kd * (numbers[_N + i] - numbers[COMMAND + _N + i]) + spring)
+            steady = jump + kd * (numbers[_N + i] - numbers[COMMAND + _N + i])
+            asked = abs(steady + spring)
             if not asked <= one * most:
                 return False
+            if not abs(steady) <= one * most:
+                return False
             thrown += asked / most
+            constant += abs(steady) / most
         else:
             jump += spring
         if not abs(jump) <= table[rows.JOLT, i]:
             return False
-    return thrown <= all_
+    return thrown <= all_ and constant <= constants

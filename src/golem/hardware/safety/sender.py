@@ -118,8 +118,8 @@ def _thrown(new: LowCommand, last: LowCommand, limits: SafetyLimits) -> tuple[Fa
     """
     constant, asked = _asked_of_legs(new, last)
     constant, asked = np.abs(constant) / limits.torque[LEGS], np.abs(asked) / limits.torque[LEGS]
-    one, together = limits.throw
-    if constant.max() > one:
+    one, constants, together = limits.throw
+    if constant.max() > one or constant.sum() > constants:
         i = int(constant.argmax())
         said = f"{JOINT_NAMES[i]} by {constant[i] * limits.torque[i]:.0f} N m"
         return Fault(Reason.COMMAND_JOLTS, said), limits.samples
