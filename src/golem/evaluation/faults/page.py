@@ -62,10 +62,10 @@ def _missing(tried: int, all_: int) -> str:
 
 
 def _commits(records: Sequence[TrialRecord]) -> str:
-    """Say of which commits the trials are, where they are of several."""
-    counts = Counter(record.commit for record in records)
-    said = ", ".join(f"{n} of `{commit}`" for commit, n in counts.most_common())
-    return f"Trials by commit: {said}.\n" if len(counts) > 1 else ""
+    """Say how many trials each version of the code has, where there are several."""
+    counts = Counter(record.commit for record in records).most_common()
+    said = ", ".join(str(n) for _, n in counts)
+    return f"The trials are of {len(counts)} versions of the code: {said}.\n" if len(counts) > 1 else ""
 
 
 CRITERIA = """\
