@@ -286,7 +286,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "safety": _safety,
     "bringup": _command("Bring a robot up step by step, each one checked; --rehearse: with a twin that has a fault.",
                         "golem.evaluation.rehearsal.rehearse", "BringupCommandConfig:run_bringup_command"),
-    "calibrate": _command("Calibrate the head camera and the arms' encoders by tags on the hands.",
+    "calibrate": _command("Calibrate cameras and the arms' encoders by tags on the hands.",
                           "golem.runtime.calibrate_command", "CalibrateConfig:run_calibrate", True),
     "drivers": _drivers,
     "up": _up,

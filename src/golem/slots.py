@@ -152,6 +152,7 @@ SLOTS: dict[str, Slot] = {
         "golem.skills.base:Skill",
         {
             "calibrate": "golem.skills.calibrate:Calibrate",
+            "calibrate_hands": "golem.skills.calibrate_hands:CalibrateHands",
             "disassemble": "golem.skills.disassemble:Disassemble",
             "dock": "golem.skills.dock:Dock",
             "explore": "golem.skills.explore:Explore",

@@ -11,7 +11,6 @@ import contextlib
 import functools
 import io
 import logging
-import re
 import socket
 from unittest import mock
 
@@ -19,9 +18,7 @@ import viser
 import websockets.asyncio.server
 
 from golem.errors import ConfigError
-
-LOCAL = re.compile(r"https?://(localhost|127\.\d+\.\d+\.\d+|\[::1\])(:\d+)?")
-"""Origins of pages of this machine, whatever port they came from: its users are trusted."""
+from golem.middleware.origin_gate import LOCAL
 
 
 def serve(host: str, port: int) -> viser.ViserServer:

@@ -173,6 +173,7 @@ class Rung(ABC, Generic[O]):
         default_methods, default_n, default_profile: what is compared where the command does not say.
         adaptive: whether the cases are the result: levels of a search, which depend on results, or variants of a stack.
             Elsewhere they are conditions under which methods are compared.
+        provokes: whether it shoves or harms robots until they are lost, so that a stop may be right.
         timed: whether it measures the machine, so that nothing may run at the same time as a trial.
         options: the options of this one.
         onlooker: who is shown the stacks of its trials; None on a ladder.
@@ -185,6 +186,7 @@ class Rung(ABC, Generic[O]):
     default_n: int = 30
     default_profile: str = "field"
     adaptive: bool = False
+    provokes: bool = False
     timed: bool = False
 
     def __init__(self, options: O | None = None) -> None:

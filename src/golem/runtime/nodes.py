@@ -28,6 +28,7 @@ from golem.middleware.bus import Bus, News
 from golem.robots.base import Robot
 from golem.runtime.arm_limits import ArmLimits
 from golem.runtime.contract_check import ContractCheck
+from golem.runtime.gate_tally import current_tally
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import LACKS, SkillRun
@@ -315,6 +316,7 @@ class SafetyNode:
         """Enforce `limits`; what `standing` makes gets the legs where a stop leaves them sound."""
         self._bus, self._gate = bus, StandingGate(Gate(limits), standing)
         self._faults = News(bus, topics.TRANSPORT_FAULT)
+        self._tally = current_tally()
         self.request = OperatorRequest.NONE
 
     def step(self, t: float) -> None:
@@ -334,7 +336,10 @@ class SafetyNode:
             self._bus.latest(topics.BASE),
             self._faults.read(),
         )
+        before = self._gate.memory.mode
         result = self._gate.step(inputs)
+        if self._tally is not None:
+            self._tally.add(before, result.state, result.reason)
         self._bus.publish(topics.LOW_CMD, result.command, t)
         self._bus.publish(topics.SAFETY, GateStatus(t, result.state, result.reason, result.detail), t)
 

@@ -154,27 +154,36 @@ class Calibrate:
                 except PlanRefused:
                     continue
                 await context.sleep(goal.settle)
-                seen, info = await self._look(context, detector, side, info)
+                seen, info = await look_at_tags(context, detector, CAMERA, side, info)
                 if seen is not None:
                     views.append(seen)
             await motion.to_joints(home, (side,), SPEED)
         return views, info
 
-    async def _look(
-        self, context: Context, detector: TagDetector, side: Side, info: CameraInfo | None
-    ) -> tuple[TagView | None, CameraInfo | None]:
-        """Look at a hand that rests; return what was seen with the joints of that moment, None for nothing."""
-        own = cuff_tags(side)
-        with context.watch(CAMERA, "screw") as stream:
-            for _ in range(FRAMES):
-                if await stream.look(FRAME_TIME) is None:
-                    continue
-                frame = context.bus.latest(topics.rgbd_images(CAMERA))
-                state = context.bus.latest(topics.LOW_STATE)
-                if frame is None or state is None:
-                    continue
-                info = frame.info
-                corners = {n: c for n, c in detector.find(frame.rgb).items() if n in own}
-                if corners:
-                    return TagView(side, state.q.copy(), corners), info
-        return None, info
+
+async def look_at_tags(
+    context: Context, detector: TagDetector, camera: str, side: Side, info: CameraInfo | None
+) -> tuple[TagView | None, CameraInfo | None]:
+    """Look at a hand that rests; return what was seen with the joints of that moment, and the camera.
+
+    Args:
+        context: of the skill.
+        detector: of the tags.
+        camera: which camera looks.
+        side: the hand that is looked at.
+        info: the camera as far as it is known; returned where no image came.
+    """
+    own = cuff_tags(side)
+    with context.watch(camera, "screw") as stream:
+        for _ in range(FRAMES):
+            if await stream.look(FRAME_TIME) is None:
+                continue
+            frame = context.bus.latest(topics.rgbd_images(camera))
+            state = context.bus.latest(topics.LOW_STATE)
+            if frame is None or state is None:
+                continue
+            info = frame.info
+            corners = {n: c for n, c in detector.find(frame.rgb).items() if n in own}
+            if corners:
+                return TagView(side, state.q.copy(), corners), info
+    return None, info

@@ -10,7 +10,7 @@ import pytest
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.safety.sender import SenderMemory, examine_command
 from golem.interfaces.payloads import Fault, Reason
-from golem.types import LEGS, LowCommand
+from golem.types import LEGS, UPPER, LowCommand
 
 LIMITS = SafetyLimits.from_profile()
 
@@ -46,14 +46,16 @@ def test_negative_gains_are_a_fault_of_the_sender() -> None:
 
 
 def test_torques_that_jump_to_and_fro_are_a_fault_and_one_jump_is_none() -> None:
-    assert run(command(0, tau=30.0), *[command(1, tau=-30.0)] * 20)[1] is None
-    _, fault = run(*[command(k, tau=30.0 * (-1) ** k) for k in range(4)])
+    assert run(command(0, tau=10.0), *[command(1, tau=-10.0)] * 20)[1] is None
+    _, fault = run(*[command(k, tau=10.0 * (-1) ** k) for k in range(4)])
     assert fault is not None and fault.reason is Reason.COMMAND_JOLTS
 
 
 def test_an_arms_position_that_jumps_is_a_torque_that_does() -> None:
     def at(k: int, q: float) -> LowCommand:
-        return replace(command(k), q=np.full(27, q))
+        q27 = np.zeros(27)
+        q27[UPPER] = q
+        return replace(command(k), q=q27)
 
     assert run(*[at(k, 0.001 * k) for k in range(300)])[1] is None
     _, fault = run(*[at(k, 1.0 * (k // 50 % 2)) for k in range(151)])
@@ -78,4 +80,37 @@ def test_what_no_sender_could_mean_is_not_followed_and_the_third_is_a_fault(fiel
 
 
 def test_ten_times_what_a_joint_may_do_is_merely_limited() -> None:
-    assert run(command(0), *[replace(command(1), q=np.full(27, 4.0), kp=np.full(27, 900.0))] * 9)[1] is None
+    assert run(*[replace(command(1), q=np.full(27, 4.0), kp=np.full(27, 900.0))] * 10)[1] is None
+
+
+def legs(q: float = 0.0, dq: float = 0.0, tau: float = 0.0, which: slice = LEGS) -> LowCommand:
+    """A command whose legs get targets by `q` [rad], and speed and torque in shares of their limits."""
+    new = replace(command(1), q=np.zeros(27), dq=np.zeros(27), tau=np.zeros(27), kd=np.full(27, 5.0))
+    new.q[which], new.dq[which], new.tau[which] = q, dq * LIMITS.velocity[which], tau * LIMITS.torque[which]
+    return new
+
+
+@pytest.mark.parametrize(
+    ("thrown", "needed"),
+    [
+        (legs(tau=1.1), LIMITS.samples),
+        (legs(tau=-1.1, which=slice(3, 4)), LIMITS.samples),
+        (legs(dq=1.0), LIMITS.samples),
+        (legs(q=1.0), LIMITS.throws),
+    ],
+    ids=["torque of all", "torque of a knee", "speed of all", "position of all"],
+)
+def test_legs_are_not_thrown_and_a_run_of_such_commands_is_a_fault(thrown: LowCommand, needed: int) -> None:
+    rest, few = legs(), [thrown] * (needed - 1)
+    followed = [True] + ([False] * len(few) + [True]) * 2
+    assert run(rest, *few, rest, *few, rest) == (followed, None)
+    _, fault = run(rest, *few, thrown)
+    assert fault is not None and fault.reason is Reason.COMMAND_JOLTS
+
+
+def test_one_leg_may_ask_for_more_than_a_motor_has_and_not_thrice_in_half_a_second() -> None:
+    step = legs(q=1.1 * LIMITS.torque[3] / 100.0, which=slice(3, 4))
+    rest = legs()
+    assert run(rest, step, *[step] * 400, rest)[1] is None
+    _, fault = run(rest, step, rest, step)
+    assert fault is not None and fault.reason is Reason.COMMAND_JOLTS

@@ -12,8 +12,9 @@ pytest.importorskip("foxglove")
 pytest.importorskip("rosbags")
 
 from rosbags.typesys import Stores, get_typestore
+from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Subprotocol
+from websockets.typing import Origin, Subprotocol
 
 from golem.errors import ConfigError
 from golem.middleware.bags.base import BagMessage, BagTopic
@@ -111,6 +112,13 @@ def test_what_holds_is_repeated_to_those_who_come_later(server: FoxgloveServer, 
         while not heard.done():
             server.refresh()
         assert heard.result() == (1, 900, "the model")
+
+
+def test_a_page_of_a_stranger_is_refused_and_foxgloves_is_not(server: FoxgloveServer) -> None:
+    protocol = [Subprotocol("foxglove.sdk.v1")]
+    connect(server.url, origin=Origin("https://app.foxglove.dev"), subprotocols=protocol).close()
+    with pytest.raises(InvalidStatus, match="403"):
+        connect(server.url, origin=Origin("https://stranger.example"), subprotocols=protocol)
 
 
 def test_a_port_that_is_taken_is_named() -> None:

@@ -219,6 +219,7 @@ def test_every_field_of_every_goal_in_json_at_its_edges(crowd: Crowd) -> None:
     walk = {"x": 1.0}
     sound = {
         "calibrate": {"file": ""},
+        "calibrate_hands": {"file": ""},
         "disassemble": {},
         "open": {},
         "pick": {},

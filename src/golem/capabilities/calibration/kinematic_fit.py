@@ -9,6 +9,7 @@ zero plays no part.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -73,25 +74,19 @@ def fit(views: Sequence[TagView], info: CameraInfo) -> Calibration:
         if n < VIEWS:
             raise ConfigError(f"The {side} hand's tags were seen in {n} postures; {VIEWS} are the least.")
     problem = _Problem(views, info)
-    start = np.zeros(problem.size)
-    rough = least_squares(problem.residuals, start, loss="cauchy", f_scale=OUTLIER, x_scale=problem.scale)
-    # A tag that is partly hidden has corners where it has none.
-    problem.keep(rough.x)
-    found = least_squares(problem.residuals, rough.x, x_scale=problem.scale)
-    residuals = problem.pixels(found.x)
-    covariance = np.linalg.inv(found.jac.T @ found.jac)
+    x, covariance, residual = solve(problem)
     offset = np.zeros(NUM_JOINTS)
     sigma = np.zeros(NUM_JOINTS)
     for k, side in enumerate(SIDES):
         part = slice(6 + 7 * k, 13 + 7 * k)
-        offset[ARM[side]] = found.x[part]
+        offset[ARM[side]] = x[part]
         sigma[ARM[side]] = np.sqrt(np.diag(covariance)[part])
     return Calibration(
-        cameras={"head": _pose(found.x[:6])},
+        cameras={"head": pose(x[:6])},
         covariances={"head": covariance[:6, :6]},
         joint_offset=offset,
         joint_sigma=sigma,
-        residual=float(np.sqrt(np.mean(residuals**2))),
+        residual=residual,
         views=problem.count,
     )
 
@@ -107,32 +102,35 @@ def information(side: Side, q: Array, tags: Sequence[int]) -> Array:
     problem = _Problem([TagView(side, q, dict.fromkeys(tags, np.zeros((4, 2))))], HEAD)
     k = SIDES.index(side)
     columns = (*range(6), *range(6 + 7 * k, 13 + 7 * k), *range(20 + 6 * k, 26 + 6 * k))
-    here = problem.pixels(np.zeros(problem.size))
-    J = np.empty((len(here), len(columns)))
-    for row, column in enumerate(columns):
-        x = np.zeros(problem.size)
-        x[column] = STEP
-        J[:, row] = (problem.pixels(x) - here) / STEP * (problem.scale[column] / PIXEL)
-    return J.T @ J
+    return problem.information()[np.ix_(columns, columns)]
 
 
-class _Problem:
-    """The unknowns: mount (rotation vector, translation), left arm's zeros, right arm's, left cuff's pose, right's."""
+class ViewProblem(ABC):
+    """Unknowns that explain views, each with a prior about zero.
 
-    def __init__(self, views: Sequence[TagView], info: CameraInfo) -> None:
-        self._views, self._info = list(views), info
-        self._kinematics = Kinematics()
-        self._corners = np.column_stack([tag_corners(), np.ones(4)])
-        self._tags = {side: cuff_tags(side) for side in SIDES}
-        mount = np.repeat(MOUNT, 3)
-        cuff = np.repeat(CUFF, 3)
-        self.scale = np.concatenate([mount, np.full(14, ZERO), cuff, cuff])
-        self.size = len(self.scale)
+    Attributes:
+        scale: standard deviation of each unknown's prior.
+    """
+
+    scale: Array
+
+    def __init__(self, views: Sequence[TagView]) -> None:
+        """Explain `views`."""
+        self.views = list(views)
+
+    @abstractmethod
+    def pixels(self, x: Array) -> Array:
+        """Return predicted minus seen corners [px]."""
+
+    @property
+    def size(self) -> int:
+        """How many unknowns there are."""
+        return len(self.scale)
 
     @property
     def count(self) -> int:
         """How many views count."""
-        return len(self._views)
+        return len(self.views)
 
     def residuals(self, x: Array) -> Array:
         """Return the corners' errors and the priors', each by its standard deviation."""
@@ -141,19 +139,57 @@ class _Problem:
     def keep(self, x: Array) -> None:
         """Leave out the tags that `x` does not explain."""
         kept: list[TagView] = []
-        for view in tuple(self._views):
-            self._views = [view]
+        for view in tuple(self.views):
+            self.views = [view]
             errors = self.pixels(x).reshape(len(view.corners), 8)
             good = np.sqrt(np.mean(errors**2, axis=1)) < OUTLIER * PIXEL
             corners = {n: c for (n, c), ok in zip(view.corners.items(), good, strict=True) if ok}
             kept.append(replace(view, corners=corners))
-        self._views = [view for view in kept if view.corners]
+        self.views = [view for view in kept if view.corners]
+
+    def information(self) -> Array:
+        """Return what the views tell of the unknowns without their priors, (n, n), in units of the priors."""
+        here = self.pixels(np.zeros(self.size))
+        J = np.empty((len(here), self.size))
+        for column in range(self.size):
+            x = np.zeros(self.size)
+            x[column] = STEP
+            J[:, column] = (self.pixels(x) - here) / STEP * (self.scale[column] / PIXEL)
+        return J.T @ J
+
+
+def solve(problem: ViewProblem) -> tuple[Array, Array, float]:
+    """Return the likeliest unknowns (n,), their covariance (n, n), and the corners' error that is left, RMS [px].
+
+    Tags that the unknowns do not explain are left out.
+    """
+    start = np.zeros(problem.size)
+    rough = least_squares(problem.residuals, start, loss="cauchy", f_scale=OUTLIER, x_scale=problem.scale)
+    # A tag that is partly hidden has corners where it has none.
+    problem.keep(rough.x)
+    found = least_squares(problem.residuals, rough.x, x_scale=problem.scale)
+    residual = float(np.sqrt(np.mean(problem.pixels(found.x) ** 2)))
+    return found.x, np.linalg.inv(found.jac.T @ found.jac), residual
+
+
+class _Problem(ViewProblem):
+    """The unknowns: mount (rotation vector, translation), left arm's zeros, right arm's, left cuff's pose, right's."""
+
+    def __init__(self, views: Sequence[TagView], info: CameraInfo) -> None:
+        super().__init__(views)
+        self._info = info
+        self._kinematics = Kinematics()
+        self._corners = np.column_stack([tag_corners(), np.ones(4)])
+        self._tags = {side: cuff_tags(side) for side in SIDES}
+        mount = np.repeat(MOUNT, 3)
+        cuff = np.repeat(CUFF, 3)
+        self.scale = np.concatenate([mount, np.full(14, ZERO), cuff, cuff])
 
     def pixels(self, x: Array) -> Array:
         """Return predicted minus seen corners [px]."""
-        T_optical_torso = np.linalg.inv(T_TORSO_HEAD_OPTICAL @ _pose(x[:6]))
+        T_optical_torso = np.linalg.inv(T_TORSO_HEAD_OPTICAL @ pose(x[:6]))
         errors: list[Array] = []
-        for view in self._views:
+        for view in self.views:
             k = SIDES.index(view.side)
             q = view.q.copy()
             q[ARM[view.side]] -= x[6 + 7 * k : 13 + 7 * k]
@@ -163,7 +199,7 @@ class _Problem:
             T = (
                 T_optical_torso
                 @ np.linalg.solve(T_base_torso, T_base_hand)
-                @ _pose(x[20 + 6 * k : 26 + 6 * k])
+                @ pose(x[20 + 6 * k : 26 + 6 * k])
             )
             for number, seen in view.corners.items():
                 points = (T @ self._tags[view.side][number] @ self._corners.T).T[:, :3]
@@ -171,7 +207,7 @@ class _Problem:
         return np.concatenate(errors)
 
 
-def _pose(x: Array) -> Array:
+def pose(x: Array) -> Array:
     """Return the (4, 4) pose with rotation vector and translation `x` (6,)."""
     T = np.eye(4)
     T[:3, :3] = Rotation.from_rotvec(x[:3]).as_matrix()

@@ -76,7 +76,11 @@ def view_postures(
                 found.append((q, tags))
         if len(found) >= CANDIDATES:
             break
-    return _telling(found[:CANDIDATES], count, side) if found else []
+    joints, told = np.zeros(NUM_JOINTS), list[Array]()
+    for q, tags in found[:CANDIDATES]:
+        joints[UPPER] = q
+        told.append(information(side, joints, tags))
+    return [found[i][0] for i in telling(told, count)]
 
 
 def hand_poses(side: Side, Q: Array) -> Array:
@@ -120,19 +124,21 @@ def hidden(eye: Array, tag: Array, spheres: Array) -> bool:
     return bool((between & (beside < spheres[:, 3] + CLEARANCE)).any())
 
 
-def _telling(found: list[tuple[Array, list[int]]], count: int, side: Side) -> list[Array]:
-    """Return the postures that tell the most together: each next one adds most to the determinant of information."""
-    joints = np.zeros(NUM_JOINTS)
-    told: list[Array] = []
-    for q, tags in found:
-        joints[UPPER] = q
-        told.append(information(side, joints, tags))
+def telling(told: list[Array], count: int) -> list[int]:
+    """Return which views tell the most together: each next one adds most to the determinant of information.
+
+    Args:
+        told: information of each view, (n, n), in units of the priors.
+        count: how many are chosen at most.
+    """
+    if not told:
+        return []
     views = np.array(told)
     total = np.eye(views.shape[1])
     chosen: list[int] = []
-    for _ in range(min(count, len(found))):
+    for _ in range(min(count, len(told))):
         gain = np.linalg.slogdet(total + views)[1]
         gain[chosen] = -np.inf
         chosen.append(int(np.argmax(gain)))
         total = total + views[chosen[-1]]
-    return [found[i][0] for i in chosen]
+    return chosen

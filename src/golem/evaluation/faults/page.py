@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +38,7 @@ def page(records: Sequence[TrialRecord]) -> str:
         f"`golem faults --profile {first.profile} --seed {first.seed}` tries {len(by_fault)} faults on a robot that "
         f"is {', '.join(postures)}, one trial each.\n"
         f"{_missing(len(records), len(by_fault) * len(postures))}"
+        f"{_commits(records)}"
         "`python -m golem.evaluation.faults.page` writes this page from its records.\n",
         CRITERIA,
         _summary(records, postures).markdown() + "\n",
@@ -58,6 +59,13 @@ def _missing(tried: int, all_: int) -> str:
     return (
         "" if tried == all_ else f"With this version {tried} of {all_} were tried; the rest is left open.\n"
     )
+
+
+def _commits(records: Sequence[TrialRecord]) -> str:
+    """Say how many trials each version of the code has, where there are several."""
+    counts = Counter(record.commit for record in records).most_common()
+    said = ", ".join(str(n) for _, n in counts)
+    return f"The trials are of {len(counts)} versions of the code: {said}.\n" if len(counts) > 1 else ""
 
 
 CRITERIA = """\

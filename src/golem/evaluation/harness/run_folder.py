@@ -35,6 +35,8 @@ class Finished:
     Attributes:
         outcome: what became of it.
         wall, cpu: what it cost on its machine [s].
+        active: robot time in which its gate let commands through [s]; None where that was not counted.
+        stops: stops of that gate by reason, without those that were asked for.
         files: what it keeps in addition to its record, by file name.
     """
 
@@ -42,6 +44,8 @@ class Finished:
     wall: float
     cpu: float
     files: Mapping[str, bytes] = field(default_factory=dict[str, bytes])
+    active: float | None = None
+    stops: Mapping[str, int] = field(default_factory=dict[str, int])
 
 
 class RunFolder:
@@ -150,6 +154,8 @@ class RunFolder:
         """
         cost = {"method": record.method, "case": dict(record.case), "index": record.index}
         cost |= {"wall": finished.wall, "cpu": finished.cpu, **finished.outcome.costs}
+        if finished.active is not None:
+            cost |= {"active": round(finished.active, 3), "stops": dict(finished.stops)}
         try:
             for name, content in finished.files.items():
                 file = artefacts(self.path, record) / name

@@ -19,6 +19,7 @@ from golem.evaluation.harness.copies import CopyDied
 from golem.evaluation.harness.culprit import culprit_of
 from golem.evaluation.harness.run_folder import Finished
 from golem.provenance import changes, code_files, commit, digest, versions
+from golem.runtime.gate_tally import GateTally, tallied
 from golem.skills.base import FAULT
 
 
@@ -129,12 +130,14 @@ def run_batch(batch: Batch) -> tuple[Finished, ...] | Refused | Died:
         if mismatch:
             return Refused(mismatch)
         files: dict[str, bytes] = {}
+        tally: GateTally | None = None
         if len(batch.specs) > 1:
             found = rung.run_together(batch.specs)
         else:
             with tempfile.TemporaryDirectory(prefix="golem-trial-") as folder:
                 path = Path(folder) / "artefacts"
-                found = [run_trial(rung, first, path)]
+                with tallied() as tally:
+                    found = [run_trial(rung, first, path)]
                 files = {file.name: file.read_bytes() for file in path.glob("*")}
     except (ModuleFault, CopyDied, *LEAVING) as error:
         # `run_trial` lets none through: trials that were run together are run one by one.
@@ -147,7 +150,8 @@ def run_batch(batch: Batch) -> tuple[Finished, ...] | Refused | Died:
         return Refused(f"{type(error).__name__}: {error}", traceback.format_exc())
     share = 1.0 / len(batch.specs)
     wall, cpu = share * (time.perf_counter() - wall), share * (_cpu() - cpu)
-    return tuple(Finished(outcome, wall, cpu, files) for outcome in found)
+    active, stops = (None, {}) if tally is None else (tally.active, tally.stops)
+    return tuple(Finished(outcome, wall, cpu, files, active, stops) for outcome in found)
 
 
 def _mismatch(batch: Batch, rung: Rung[Any]) -> str | None:

@@ -12,6 +12,7 @@ from golem.errors import ConfigError, OutputError
 from golem.evaluation.base import RUNGS, make_rung
 from golem.evaluation.harness.records import TrialRecord, read_records
 from golem.evaluation.harness.run_folder import read_costs, read_facts
+from golem.evaluation.metrics.gate_hours import GateHours
 from golem.evaluation.metrics.summary import summarise
 from golem.evaluation.metrics.tables import run_tables
 
@@ -35,7 +36,11 @@ def run_results(config: ResultsConfig) -> str:
     """
     if not config.runs:
         raise ConfigError("Name at least one run folder.")
-    text = "\n\n".join(section(folder) for folder in config.runs) + "\n"
+    parts = [section(folder) for folder in config.runs]
+    if len(parts) > 1:
+        total = sum((gate_hours(folder) for folder in config.runs), GateHours())
+        parts += [f"In all. {total.sentence()}"] if total.trials else []
+    text = "\n\n".join(parts) + "\n"
     if config.out is None:
         print(text, end="")
         return text
@@ -73,8 +78,22 @@ def section(folder: Path) -> str:
         f"seed {first.seed}, commit `{commits[0]}`:"
     )
     command = read_facts(folder).get("command", "")
+    hours = gate_hours(folder)
     parts = [head, f"```sh\n{command}\n```" if command else "", *(table.markdown() for table in tables)]
+    parts += [hours.sentence()] if hours.trials else []
     return "\n\n".join(part for part in parts if part)
+
+
+def gate_hours(folder: Path) -> GateHours:
+    """Return what the gates of a run folder did; nothing for a rung that provokes stops.
+
+    Raises:
+        OutputError: its file is no trial record.
+    """
+    records = read_records(folder / "trials.jsonl")
+    if not records or make_rung(RUNGS[records[0].rung], records[0].options).provokes:
+        return GateHours()
+    return GateHours.of(read_costs(folder))
 
 
 def _paired(records: Sequence[TrialRecord]) -> bool:

@@ -171,7 +171,7 @@ def row(records: Sequence[TrialRecord], costs: Sequence[Mapping[str, Any]] = ())
         {
             name: value
             for name, value in line.items()
-            if name not in ("method", "case", "index", "wall", "cpu")
+            if name not in ("method", "case", "index", "wall", "cpu", "active", "stops")
         }
         for line in costs
         if line["index"] in indices

@@ -53,6 +53,7 @@ class FaultsRung(Rung[FaultOptions]):
 
     name = "faults"
     Options = FaultOptions
+    provokes = True
     default_methods = (GATE,)
     default_n = 1
     default_profile = "bench"

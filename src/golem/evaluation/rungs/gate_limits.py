@@ -28,7 +28,9 @@ STOPS: dict[str, Lift] = {
     "range": lambda limits: replace(limits, state_lower=-FAR, state_upper=FAR),
     "torque": lambda limits: replace(limits, torque=FAR),
     "tilt": lambda limits: replace(limits, tilt=math.pi),
-    "sender": lambda limits: replace(limits, sane=np.full_like(limits.sane, 1e6), jolts=math.inf),
+    "sender": lambda limits: replace(
+        limits, sane=np.full_like(limits.sane, 1e6), jolts=math.inf, throw=(1e6, 1e6, 1e6)
+    ),
 }
 """What stops the robot: measured quantities, of which `range` is position and braking distance, and `sender`, commands
 that are far beyond the robot or jump."""

@@ -41,6 +41,7 @@ class PushRung(LegRung[PlantOptions]):
     """
 
     name = "push"
+    provokes = True
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""

@@ -75,6 +75,7 @@ class PushedRung(LegRung[O]):
     """A rung whose cases name a phase, a direction and the level of a push."""
 
     Options = PushedOptions
+    provokes = True
     default_n = 20
     default_profile = "bench"
 

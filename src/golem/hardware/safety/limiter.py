@@ -1,7 +1,8 @@
 """Turns a command into the nearest one that keeps every limit.
 
 Limits are kept by clipping, not by stopping: an inverse kinematics that leans on a joint limit, or a leg policy that
-asks for more torque than there is, is ordinary operation, and a stop would drop what the hand holds.
+asks for more torque than there is, is ordinary operation, and a stop would drop what the hand holds. The arithmetic is
+compiled; `tests/hardware/safety/slow_gate.py` has it in numpy.
 """
 
 from __future__ import annotations
@@ -9,14 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from golem.hardware.safety.base import EARLY, EASE, SPACE, Outgoing, SafetyLimits
+from golem.hardware.safety.kernel import BRAKE, limited
 from golem.hardware.safety.monitor import at_rest
-from golem.types import NUM_JOINTS, Array, LowCommand, LowState
-
-# Arrays instead of numbers: numpy then skips a conversion, a third of such an operation's time.
-_ZERO = np.zeros(NUM_JOINTS)
-BRAKE = 0.5
-"""Share of the torque bound that brakes a joint which is too fast, or would come to rest beyond its range [own]."""
-_MIN_STIFFNESS = np.full(NUM_JOINTS, 1e-9)
+from golem.types import Array, LowCommand, LowState
 
 
 def limit_command(
@@ -51,43 +47,25 @@ def limit_command(
         strained: whether a joint may be too fast, or too close to the end of its range for its speed. It is then
             driven on less, and braked in the end, whatever the command says, so that less is left for a stop to do.
     """
-    minimum, maximum = np.minimum, np.maximum
-    bound = limits.torque_command
-    negative = -bound
-    highest, lowest = bound, negative
-    if strained:
-        up, down = spared(
-            state.q, state.dq, limits.deceleration, limits.velocity, limits.state_lower, limits.state_upper
-        )
-        highest, lowest = up * bound, -down * bound
-
-    kp = minimum(maximum(command.kp, _ZERO), limits.kp_max)
-    kp = minimum(kp, last.kp + limits.kp_rate * dt)
-    kd = minimum(maximum(command.kd, _ZERO), limits.kd_max)
-    kd = minimum(kd, last.kd + limits.kd_rate * dt)
-
-    twice = limits.deceleration + limits.deceleration
-    up = minimum(np.sqrt(twice * maximum(limits.upper - last.q, _ZERO)), limits.slew) * dt
-    down = minimum(np.sqrt(twice * maximum(last.q - limits.lower, _ZERO)), limits.slew) * dt
-    q = minimum(maximum(command.q, limits.lower), limits.upper)
-    q = minimum(maximum(q, last.q - down), last.q + up)
-
-    dq = minimum(maximum(command.dq, -limits.velocity), limits.velocity)
-    damp = kd * (dq - state.dq)
-    share = bound / maximum(np.abs(damp), bound)
-    damp *= share
-    tau = minimum(maximum(command.tau, negative), bound)
-    if last.tau is not None:
-        step = limits.torque_rate * dt
-        tau = minimum(maximum(tau, last.tau - step), last.tau + step)
-    rest = minimum(maximum(tau + damp, lowest), highest)
-    soft = maximum(kp, _MIN_STIFFNESS)
-    center = state.q - rest / soft
-    q = minimum(maximum(q, center + lowest / soft), center + highest / soft)
-
-    # Copies: whoever receives the command must not be able to reach into the memory.
-    limited = LowCommand(t=t, q=q.copy(), dq=dq, tau=rest - damp, kp=kp.copy(), kd=kd * share)
-    return limited, Outgoing(q, kp, kd, tau)
+    tau = command.tau if last.tau is None else last.tau
+    numbers = np.concatenate(
+        (
+            command.q,
+            command.dq,
+            command.tau,
+            command.kp,
+            command.kd,
+            state.q,
+            state.dq,
+            last.q,
+            last.kp,
+            last.kd,
+            tau,
+        ),
+        dtype=np.float64,
+    )
+    rows = limited(numbers, limits.table, float(dt), last.tau is not None, strained)
+    return LowCommand(t, *rows[:5]), Outgoing(*rows[5:])
 
 
 def spared(

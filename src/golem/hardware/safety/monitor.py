@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from golem.hardware.safety.base import EARLY, STANDING, Counters, SafetyLimits
+from golem.hardware.safety.kernel import rate_state
 from golem.interfaces.payloads import Fault, Reason
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand, LowState
@@ -15,6 +16,9 @@ from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand, LowState
 _ABSURD = 1e6
 """No joint position, speed, torque or gain has a number this large; below it nothing here can overflow."""
 _SOUND, _STRAINED = Counters(), Counters(strained=True)
+_SHAPES = [(NUM_JOINTS,), (NUM_JOINTS,), (NUM_JOINTS,), (4,), (3,), (3,)]
+_KNOWN = (None, _STRAINED, _SOUND)
+"""By `kernel.UNKNOWN`, `STRAINED` and `ORDINARY`."""
 
 
 def finite(*arrays: Array, below: Array | float = _ABSURD) -> bool:
@@ -41,6 +45,23 @@ def whole(state: LowState) -> bool:
 def whole_command(command: LowCommand, below: Array | float = _ABSURD) -> bool:
     """Return whether every array of `command` is (27,), and finite and `below` a bound, one or (135,)."""
     return finite(command.q, command.dq, command.tau, command.kp, command.kd, below=below)
+
+
+def quickly(state: LowState, before: Array, limits: SafetyLimits, jump: float) -> Counters | None:
+    """Return the counters of a sample that is `whole`, has not jumped, and breaks no limit, in one call; else None.
+
+    Args:
+        state: the sample.
+        before: (27,) positions of the sample before [rad].
+        limits: what to compare with.
+        jump: how far a joint may have moved since then [rad].
+    """
+    imu = state.imu
+    arrays = state.q, state.dq, state.tau, imu.quat, imu.gyro, imu.acc
+    if [getattr(array, "shape", None) for array in arrays] != _SHAPES:
+        return None
+    numbers = np.concatenate((*arrays, before), dtype=np.float64)
+    return _KNOWN[rate_state(numbers, limits.table, jump, math.cos(limits.tilt))]
 
 
 def tilt(quat: Array) -> float:

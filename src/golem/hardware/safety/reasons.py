@@ -166,8 +166,10 @@ REASONS: dict[Reason, ReasonText] = {
     ),
     Reason.COMMAND_JOLTS: ReasonText(
         709,
-        f"A feed-forward torque, or what an arm's motor is asked for, jumps by {JOLT:.0%} of the motor's torque, three "
-        "times within half a second.",
+        f"A feed-forward torque, or what an arm's motor is asked for, jumps by {JOLT:.0%} of the motor's torque, or a "
+        f"leg's by {_L.throw[0]:.0%}, three times within half a second. Or commands in a row throw the legs: three "
+        f"by {_L.throw[0]:.0%} of a motor's constant torque, or all by {_L.throw[1]:g} motors'; or {_L.throws} by "
+        f"{_L.throw[2]:g} motors' torques together.",
         "A controller that oscillates, or targets that jump.",
     ),
     Reason.COMMAND_BEYOND: ReasonText(

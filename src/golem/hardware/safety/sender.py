@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.hardware.safety.base import SafetyLimits
+from golem.hardware.safety.kernel import ordinary_command
 from golem.hardware.safety.monitor import whole_command
 from golem.interfaces.payloads import Fault, Reason
 from golem.robots.model.table import JOINT_NAMES
-from golem.types import NUM_JOINTS, UPPER, LowCommand
+from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand
 
 _ZERO = np.zeros(NUM_JOINTS)
+_SHAPES = [(NUM_JOINTS,)] * 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,10 @@ def examine_command(
     Returns:
         The new memory, whether the command is to be followed, and the fault if it is not finite or one has persisted.
     """
-    held = memory.held
+    if memory.last is not None and _ordinary(new, memory.last, limits):
+        jolts = max(0.0, memory.jolts - limits.jolt_leak) if memory.jolts else 0.0
+        return SenderMemory(new, True, 0, jolts), True, None
+    held, needed = memory.held, limits.samples
     wrong: Fault | None = None
     # Counting is the quickest question numpy answers.
     count = np.count_nonzero
@@ -70,14 +75,20 @@ def examine_command(
         held = held | (new.kd > 0.0)
     else:
         held = True
+    if wrong is None and memory.last is not None:
+        wrong, needed = _thrown(new, memory.last, limits)
     if wrong is not None:
         refused = memory.refused + 1
         after = SenderMemory(memory.last, held, refused, memory.jolts)
-        return after, False, wrong if refused >= limits.samples else None
+        return after, False, wrong if refused >= needed else None
     last, jolts = memory.last, memory.jolts
     if last is not None:
         jump = np.abs(new.tau - last.tau)
-        # Legs that recover from a push ask for targets that jump by as much; arms never do.
+        # Legs that recover from a push ask for targets that jump by nearly all of a motor's torque; arms never do.
+        asked = np.abs(_asked_of_legs(new, last)[1])
+        jump[LEGS] = np.maximum(
+            jump[LEGS], np.where(asked > limits.throw[0] * limits.torque[LEGS], asked, 0.0)
+        )
         arms = new.kp[UPPER] * (new.q[UPPER] - last.q[UPPER]) + (new.tau[UPPER] - last.tau[UPPER])
         jump[UPPER] = np.abs(arms)
         if count(jump > limits.jolt):
@@ -88,6 +99,41 @@ def examine_command(
         elif jolts:
             jolts = max(0.0, jolts - limits.jolt_leak)
     return SenderMemory(new, held, 0, jolts), wrong is None, wrong
+
+
+def _ordinary(new: LowCommand, last: LowCommand, limits: SafetyLimits) -> bool:
+    """Return whether there is nothing against `new`, in one call; False says nothing."""
+    arrays = new.q, new.dq, new.tau, new.kp, new.kd
+    if [getattr(array, "shape", None) for array in arrays] != _SHAPES:
+        return False
+    numbers = np.concatenate((*arrays, last.q, last.dq, last.tau, last.kp, last.kd), dtype=np.float64)
+    return ordinary_command(numbers, limits.table, *limits.throw)
+
+
+def _thrown(new: LowCommand, last: LowCommand, limits: SafetyLimits) -> tuple[Fault | None, int]:
+    """Return what throws the legs, from one command to the next by more than any need, and how many are a fault.
+
+    One motor is given another constant torque by all that it has, or all of them together a torque that is far from
+    the last one. Targets of a single motor may be: legs that take a shove ask for that.
+    """
+    constant, asked = _asked_of_legs(new, last)
+    constant, asked = np.abs(constant) / limits.torque[LEGS], np.abs(asked) / limits.torque[LEGS]
+    one, constants, together = limits.throw
+    if constant.max() > one or constant.sum() > constants:
+        i = int(constant.argmax())
+        said = f"{JOINT_NAMES[i]} by {constant[i] * limits.torque[i]:.0f} N m"
+        return Fault(Reason.COMMAND_JOLTS, said), limits.samples
+    if asked.sum() > together:
+        said = f"the legs by {asked.sum():.1f} times a motor's torque"
+        return Fault(Reason.COMMAND_JOLTS, said), limits.throws
+    return None, limits.samples
+
+
+def _asked_of_legs(new: LowCommand, last: LowCommand) -> tuple[Array, Array]:
+    """Return (12,) by how much the constant torque differs, and all that is asked of motors at rest [N m]."""
+    q, dq, tau = (getattr(new, name)[LEGS] - getattr(last, name)[LEGS] for name in ("q", "dq", "tau"))
+    constant = tau + new.kd[LEGS] * dq
+    return constant, constant + new.kp[LEGS] * q
 
 
 def _beyond(command: LowCommand, limits: SafetyLimits) -> str:

@@ -12,22 +12,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
 from golem.hardware.safety.base import STANDING, SafetyLimits
+from golem.hardware.safety.senses_kernel import ASKED, DELAYS, FIRST, SCALARS, looked
 from golem.interfaces.payloads import Fault, Reason
 from golem.robots.model.table import JOINT_NAMES
-from golem.types import NUM_JOINTS, TICK, Array, Imu, LowCommand, LowState
+from golem.types import NUM_JOINTS, TICK, Array, LowCommand, LowState
 
 EVERY = 5
 """Samples from one look at life and plausibility to the next."""
 LIMBS = {
-    "left leg": slice(0, 6),
-    "right leg": slice(6, 12),
-    "torso": slice(12, 13),
-    "left arm": slice(13, 20),
-    "right arm": slice(20, 27),
+    name: slice(*ends)
+    for name, ends in zip(
+        ("left leg", "right leg", "torso", "left arm", "right arm"), pairwise(FIRST), strict=True
+    )
 }
 """Joints that share a bus, and so a fate."""
 GROUPS = (*LIMBS, "IMU")
@@ -37,10 +38,9 @@ FORGET = 1.0
 """Time constant with which a difference between two sensors is forgotten [s] [own]."""
 GRAVITY_TIME = 0.5
 """Time constant of the mean specific force, and how long a robot has to be calm for it to be judged [s]."""
-DELAYS = 6
-"""Looks over which a command may take to reach its motor: 50 ms."""
 CALM = 0.3
 """Rate of the torso below which the robot hardly moves [rad/s]."""
+_ZERO, _NONE = np.zeros(NUM_JOINTS), np.zeros(ASKED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +53,13 @@ class SensesMemory:
         count: samples accepted.
         bad: level of the samples that were dropped.
         looked: the sample looked at last, with its time.
-        raw: its numbers by group of `GROUPS`.
-        since: since when each group has had them [s].
+        since: since when each group of `GROUPS` has had its numbers [s].
         drift: (27,) position minus integrated speed, fading [rad].
         turn: (3,) orientation minus integrated rate, fading, in the IMU's frame [rad].
         force: (3,) mean specific force [m/s^2].
         restless: when the torso turned quickly last [s].
-        asked: what the motors were asked for at the looks of late, see `_asked`; None while no command passes.
+        asked: (486,) what the motors were asked for at the looks of late, see `senses_kernel`; None while no command
+            passes.
         dead: (27,) for how long each motor has not followed [s].
     """
 
@@ -69,7 +69,6 @@ class SensesMemory:
     bad: float = 0.0
     looked: LowState | None = None
     looked_at: float = -math.inf
-    raw: tuple[bytes, ...] = (b"",) * len(GROUPS)
     since: tuple[float, ...] = (0.0,) * len(GROUPS)
     drift: Array = field(default_factory=lambda: np.zeros(NUM_JOINTS))
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -85,6 +84,7 @@ def sense(
     memory: SensesMemory,
     limits: SafetyLimits,
     sent: LowCommand | None,
+    smooth: bool = False,
 ) -> tuple[SensesMemory, bool, Fault | None]:
     """Judge one new sample.
 
@@ -94,12 +94,13 @@ def sense(
         memory: of the samples before it.
         limits: what to compare with.
         sent: what the motors were told last while commands pass; None else, and a jump is then believed.
+        smooth: whether it is known that no joint has jumped.
 
     Returns:
         The new memory, whether the sample is to be believed, and the fault if one has persisted.
     """
     apart, q = tick - memory.tick, memory.q
-    if q is not None and 0.0 < apart < LOST:
+    if not smooth and q is not None and 0.0 < apart < LOST:
         moved = np.abs(state.q - q)
         if np.count_nonzero(moved > limits.jump * max(1.0, apart / TICK)):
             return _jumped(state, tick, memory, limits, moved, sent is not None)
@@ -122,7 +123,6 @@ def _kept(m: SensesMemory, tick: float, q: Array, count: int, bad: float) -> Sen
         bad,
         m.looked,
         m.looked_at,
-        m.raw,
         m.since,
         m.drift,
         m.turn,
@@ -156,47 +156,57 @@ def _look(
     state: LowState, tick: float, m: SensesMemory, limits: SafetyLimits, sent: LowCommand | None
 ) -> tuple[SensesMemory, Fault | None]:
     """Judge life and plausibility of `state` against the sample looked at before."""
-    raw = _raw(state) if limits.frozen else m.raw
     before, dt = m.looked, tick - m.looked_at
     if before is None or not 0.0 < dt < LOST:
-        calm = replace(m, looked=state, looked_at=tick, raw=raw, since=(tick,) * len(GROUPS))
-        return calm, None
-    since = tuple(old if a == b else tick for a, b, old in zip(raw, m.raw, m.since, strict=True))
-    keep = 1.0 - dt / FORGET
-    speed = state.dq + before.dq
-    drift = keep * m.drift + (state.q - before.q) - (0.5 * dt) * speed
-    turn = _turned(before.imu, state.imu, dt, m.turn, keep)
-    force = _mean(m.force, state.imu.acc, dt)
-    restless = tick if np.abs(state.imu.gyro).max() > CALM else m.restless
-    dead, asked = m.dead, None
-    if sent is not None:
-        asked = _asked(m.asked, sent)
-        # By none of the commands of late: which of them the motors have by now depends on their delay.
-        torque = np.abs(asked[0] - asked[1] * state.q - asked[2] * state.dq).min(axis=0)
-        weak = (torque > limits.dead_load * limits.torque) & (np.abs(state.tau) < limits.dead_share * torque)
-        dead = (dead + dt) * weak
+        return replace(m, looked=state, looked_at=tick, since=(tick,) * len(GROUPS)), None
+    now, was = state.imu, before.imu
+    force = now.acc if m.force is None else m.force
+    # Which of the commands of late the motors have by now depends on their delay: a motor follows if it does one.
+    told = (_ZERO,) * 5 if sent is None else (sent.q, sent.dq, sent.tau, sent.kp, sent.kd)
+    asked = _NONE if sent is None else _asked(sent) if m.asked is None else m.asked
+    new = (state.q, state.dq, state.tau, now.quat, now.gyro, now.acc)
+    old = (before.q, before.dq, before.tau, was.quat, was.gyro, was.acc)
+    numbers = np.concatenate((*new, *old, m.drift, m.dead, asked, *told, m.turn, force), dtype=np.float64)
+    out = looked(
+        numbers,
+        limits.table,
+        dt,
+        1.0 - dt / FORGET,
+        dt / GRAVITY_TIME,
+        limits.drift_lag,
+        limits.dead_load,
+        limits.dead_share,
+        sent is not None,
+    )
+    tx, ty, tz, fx, fy, fz, rate, drifts, dead, *same = out[SCALARS:].tolist()
     after = SensesMemory(
-        m.tick, m.q, m.count, m.bad, state, tick, raw, since, drift, turn, force, restless, asked, dead
+        m.tick,
+        m.q,
+        m.count,
+        m.bad,
+        state,
+        tick,
+        tuple([since if repeats else tick for since, repeats in zip(m.since, same, strict=True)]),
+        out[:NUM_JOINTS],
+        (tx, ty, tz),
+        (fx, fy, fz),
+        tick if rate > CALM else m.restless,
+        None if sent is None else out[2 * NUM_JOINTS : SCALARS],
+        out[NUM_JOINTS : 2 * NUM_JOINTS],
     )
     return after, (
         _frozen(after, limits)
-        or _drifts(after, speed, limits)
+        or (_drifts(after, state.dq + before.dq, limits) if drifts > limits.drift else None)
         or _imu(after, state, limits)
-        or _dead(after, limits)
+        or (_dead(after, limits) if dead >= limits.dead_time else None)
     )
 
 
-def _asked(before: Array | None, sent: LowCommand) -> Array:
-    """Return the (3, `DELAYS`, 27) constant torque, stiffness and damping of the commands at the looks of late."""
-    new = np.stack((sent.kp * sent.q + sent.kd * sent.dq + sent.tau, sent.kp, sent.kd))[:, None]
-    return np.repeat(new, DELAYS, axis=1) if before is None else np.concatenate((before[:, 1:], new), axis=1)
-
-
-def _raw(state: LowState) -> tuple[bytes, ...]:
-    q, dq, tau, imu = state.q.tobytes(), state.dq.tobytes(), state.tau.tobytes(), state.imu
-    limbs = (slice(8 * part.start, 8 * part.stop) for part in LIMBS.values())
-    motors = [q[part] + dq[part] + tau[part] for part in limbs]
-    return (*motors, imu.quat.tobytes() + imu.gyro.tobytes() + imu.acc.tobytes())
+def _asked(sent: LowCommand) -> Array:
+    """Return (486,) `sent` as all of the commands of late."""
+    return np.repeat(
+        (sent.kp * sent.q + sent.kd * sent.dq + sent.tau, sent.kp, sent.kd), DELAYS, axis=0
+    ).ravel()
 
 
 def _frozen(m: SensesMemory, limits: SafetyLimits) -> Fault | None:
@@ -211,11 +221,10 @@ def _frozen(m: SensesMemory, limits: SafetyLimits) -> Fault | None:
     return Fault(Reason.STATE_FROZEN, f"{', '.join(names)} for {still * 1e3:.0f} ms", stands)
 
 
-def _drifts(m: SensesMemory, speed: Array, limits: SafetyLimits) -> Fault | None:
+def _drifts(m: SensesMemory, speed: Array, limits: SafetyLimits) -> Fault:
+    """A joint has left its speed's integral."""
     beyond = np.abs(m.drift) - limits.drift_lag * np.abs(speed)
     i = int(beyond.argmax())
-    if beyond[i] <= limits.drift:
-        return None
     stands = i >= STANDING.stop and bool(beyond[STANDING].max() <= limits.drift)
     return Fault(
         Reason.STATE_IMPLAUSIBLE,
@@ -244,36 +253,11 @@ def _imu(m: SensesMemory, state: LowState, limits: SafetyLimits) -> Fault | None
     return None
 
 
-def _dead(m: SensesMemory, limits: SafetyLimits) -> Fault | None:
+def _dead(m: SensesMemory, limits: SafetyLimits) -> Fault:
+    """A motor does not follow."""
     i = int(m.dead.argmax())
-    if m.dead[i] < limits.dead_time:
-        return None
     legs = bool(m.dead[STANDING].max() >= limits.dead_time)
     return Fault(Reason.MOTOR_DEAD, f"{JOINT_NAMES[i]} has no torque", stands=not legs)
-
-
-def _turned(
-    before: Imu, now: Imu, dt: float, turn: tuple[float, float, float], keep: float
-) -> tuple[float, float, float]:
-    """Return `turn` with what the orientation turned beyond the mean rate, for small angles."""
-    pw, px, py, pz = before.quat.tolist()
-    w, x, y, z = now.quat.tolist()
-    scale = math.copysign(2.0, pw * w + px * x + py * y + pz * z)
-    ax = scale * (pw * x - px * w - py * z + pz * y)
-    ay = scale * (pw * y + px * z - py * w - pz * x)
-    az = scale * (pw * z - px * y + py * x - pz * w)
-    gx, gy, gz = ((0.5 * dt) * (before.gyro + now.gyro)).tolist()
-    tx, ty, tz = turn
-    return keep * tx + ax - gx, keep * ty + ay - gy, keep * tz + az - gz
-
-
-def _mean(force: tuple[float, float, float] | None, acc: Array, dt: float) -> tuple[float, float, float]:
-    ax, ay, az = acc.tolist()
-    if force is None:
-        return ax, ay, az
-    share = dt / GRAVITY_TIME
-    x, y, z = force
-    return x + share * (ax - x), y + share * (ay - y), z + share * (az - z)
 
 
 def _up(quat: Array) -> tuple[float, float, float]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Protocol
 
 from golem.errors import GolemError
@@ -48,7 +47,11 @@ class StandingGate:
         return self.gate.memory
 
     def prepare(self) -> None:
-        """Make the controller now: where the wall clock counts, it must not take its time at the stop."""
+        """Compile and make now what the ticks need: where the wall clock counts, none of them must wait."""
+        self.gate.prepare()
+        self._make_legs()
+
+    def _make_legs(self) -> None:
         if self._make is not None and self._legs is None:
             self._legs = self._make()
 
@@ -62,10 +65,13 @@ class StandingGate:
             except GolemError:
                 standing = None  # the gate then damps
         if self._make is not None:
-            inputs = replace(inputs, stands=True, standing=standing)
+            # `replace` would take a fifth of the tick.
+            i = inputs
+            frames = i.t, i.state, i.command, i.estop, i.request, i.base, i.transport, i.tick
+            inputs = GateInputs(*frames, True, standing)
         result = self.gate.step(inputs)
         if result.state is GateState.STOP2 and before.mode is not GateState.STOP2:
-            self.prepare()
+            self._make_legs()
             assert self._legs is not None and result.memory.state is not None
             self._legs.start(_believed(result.memory.state))
         return result

@@ -13,6 +13,7 @@ from typing import Any
 from golem.errors import ConfigError, MissingExtra
 from golem.middleware.bags.base import BagMessage, BagTopic
 from golem.middleware.bags.recorder import Recorder
+from golem.middleware.origin_gate import OriginGate, hidden_loopback
 from golem.middleware.token_gate import TokenGate, is_loopback
 
 try:
@@ -22,6 +23,8 @@ except ModuleNotFoundError as error:
     raise MissingExtra("foxglove-sdk", "foxglove") from error
 
 
+VIEWERS = ("https://app.foxglove.dev", "file://")
+"""Origins beside those of this machine whose pages may connect to the loopback: Foxglove's own [assumption]."""
 TIME_STEP = 10_000_000
 """Least time between two announcements of the time [ns]."""
 
@@ -57,12 +60,12 @@ class FoxgloveServer:
         self._newcomers: set[str] = set()
         self._lock = threading.Lock()
         self._now = self._announced = -TIME_STEP
-        local = is_loopback(config.host)
+        inner, local = hidden_loopback(), is_loopback(config.host)
         try:
             self._server = foxglove.start_server(
                 name="golem",
-                host=config.host if local else "127.0.0.1",
-                port=config.port if local else 0,
+                host=inner,
+                port=0,
                 capabilities=[Capability.Time],
                 supported_encodings=["cdr"],
                 server_listener=_Listener(self),
@@ -73,10 +76,17 @@ class FoxgloveServer:
             raise ConfigError(
                 f"Cannot listen on {config.host}:{config.port} ({error}); choose another port or host."
             ) from error
-        self._gate = None if local else TokenGate(config.host, config.port, self._server.port)
-        self.url = f"ws://{config.host}:{self._server.port}"
-        if self._gate is not None:
-            self.url = f"ws://{config.host}:{self._gate.port}/?token={self._gate.token}"
+        server = inner, self._server.port
+        try:
+            if local:
+                self._gate = OriginGate(config.host, config.port, server, VIEWERS)
+                self.url = f"ws://{config.host}:{self._gate.port}"
+            else:
+                self._gate = TokenGate(config.host, config.port, server)
+                self.url = f"ws://{config.host}:{self._gate.port}/?token={self._gate.token}"
+        except ConfigError:
+            self._server.stop()
+            raise
 
     def wanted(self, topic: BagTopic) -> bool:
         """Offer `topic` to the viewers, and return whether one subscribes to it."""
@@ -119,8 +129,7 @@ class FoxgloveServer:
 
     def close(self) -> None:
         """Send the viewers away; see `Sink`."""
-        if self._gate is not None:
-            self._gate.close()
+        self._gate.close()
         self._server.stop()
         for channel in self._channels.values():
             channel.close()

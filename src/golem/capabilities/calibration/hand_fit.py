@@ -1,0 +1,94 @@
+"""Fits the mount of a palm camera to views of the tags on the other hand.
+
+As the fit of the head camera (see `kinematic_fit`), with a chain that runs through both arms: what the arms' zeros are
+still off by is found with it, so far as the views tell, and counts in the covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from golem.capabilities.calibration.kinematic_fit import ARM, CUFF, VIEWS, TagView, ViewProblem, pose, solve
+from golem.errors import ConfigError
+from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.magpie_model import T_HAND_CAMERA, hand_name
+from golem.robots.model.tag_cuff import cuff_tags, tag_corners
+from golem.robots.sensors.calibration_file import Calibration
+from golem.robots.sensors.cameras import CAMERAS, project
+from golem.types import SIDES, Array, CameraInfo, Side
+
+MOUNT = (0.02, 0.005)
+"""Prior of a palm camera's mount, rotation [rad] and translation [m]."""
+OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
+
+
+def fit_hand(views: Sequence[TagView], camera: Side, info: CameraInfo, zero: float) -> Calibration:
+    """Return the calibration of one palm camera that explains the views best; joints are left alone.
+
+    Args:
+        views: of the other hand.
+        camera: the side whose hand carries the camera.
+        info: of the camera.
+        zero: standard deviation of what the arms' zeros are off by [rad].
+
+    Raises:
+        ConfigError: too few views.
+    """
+    if len(views) < VIEWS:
+        raise ConfigError(
+            f"The {camera} palm camera saw the {OTHER[camera]} hand's tags in {len(views)} postures; {VIEWS} are the "
+            "least."
+        )
+    problem = _HandProblem(views, camera, info, zero)
+    x, covariance, residual = solve(problem)
+    name = f"{camera}_hand"
+    return Calibration(
+        cameras={name: pose(x[:6])},
+        covariances={name: covariance[:6, :6]},
+        residual=residual,
+        views=problem.count,
+    )
+
+
+def hand_information(camera: Side, q: Array, tags: Sequence[int], zero: float) -> Array:
+    """Return what a view would tell of mount, zeros and cuff, (26, 26), in units of their priors; see `fit_hand`.
+
+    Args:
+        camera: the side whose hand carries the camera.
+        q: (27,) joints [rad].
+        tags: which of the other hand's tags are seen.
+        zero: see `fit_hand`.
+    """
+    view = TagView(OTHER[camera], q, dict.fromkeys(tags, np.zeros((4, 2))))
+    return _HandProblem([view], camera, CAMERAS[f"{camera}_hand"], zero).information()
+
+
+class _HandProblem(ViewProblem):
+    """The unknowns: mount (rotation vector, translation), left arm's zeros, right arm's, pose of the cuff seen."""
+
+    def __init__(self, views: Sequence[TagView], camera: Side, info: CameraInfo, zero: float) -> None:
+        super().__init__(views)
+        self._camera: Side = camera
+        self._info = info
+        self._kinematics = Kinematics()
+        self._corners = np.column_stack([tag_corners(), np.ones(4)])
+        self._tags = cuff_tags(OTHER[camera])
+        self.scale = np.concatenate([np.repeat(MOUNT, 3), np.full(14, zero), np.repeat(CUFF, 3)])
+
+    def pixels(self, x: Array) -> Array:
+        """Return predicted minus seen corners [px]."""
+        mount, cuff = T_HAND_CAMERA @ pose(x[:6]), pose(x[20:26])
+        errors: list[Array] = []
+        for view in self.views:
+            q = view.q.copy()
+            for k, side in enumerate(SIDES):
+                q[ARM[side]] -= x[6 + 7 * k : 13 + 7 * k]
+            self._kinematics.update(q)
+            T_base_camera = self._kinematics.pose(hand_name(self._camera)) @ mount
+            T = np.linalg.solve(T_base_camera, self._kinematics.pose(hand_name(OTHER[self._camera]))) @ cuff
+            for number, seen in view.corners.items():
+                points = (T @ self._tags[number] @ self._corners.T).T[:, :3]
+                errors.append((project(self._info, points) - seen).ravel())
+        return np.concatenate(errors)

@@ -1,0 +1,128 @@
+"""A TCP relay before a server on this machine that reads the head of the first HTTP request of each connection."""
+
+from __future__ import annotations
+
+import re
+import socket
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+from golem.errors import ConfigError
+
+HEAD = 16_384
+"""Bytes of a request's head that are read at most."""
+PATIENCE = 5.0
+"""How long a head may take to come [s]."""
+
+
+class Relay(ABC):
+    """Relays connections to a server on this machine, those whose first request it admits.
+
+    Attributes:
+        port: on which it listens.
+    """
+
+    refusal = ""
+    """What whoever is not admitted is told."""
+
+    def __init__(self, host: str, port: int, server: tuple[str, int]) -> None:
+        """Listen at `host` and `port` (0 takes a free one) for the server at an address of this machine.
+
+        Raises:
+            ConfigError: the address cannot be had.
+        """
+        self._server = server
+        try:
+            family = socket.AF_INET6 if ":" in host else socket.AF_INET
+            self._listener = socket.create_server((host, port), family=family)
+        except (OSError, OverflowError) as error:
+            raise ConfigError(
+                f"Cannot listen on {host}:{port} ({error}); choose another port or host."
+            ) from error
+        self.port = int(self._listener.getsockname()[1])
+        self._open: set[socket.socket] = set()
+        self._lock = threading.Lock()
+        threading.Thread(target=self._accept, name="relay", daemon=True).start()
+
+    @abstractmethod
+    def admits(self, head: bytes) -> bool:
+        """Return whether the request that begins with `head` is relayed."""
+
+    def greeting(self, head: bytes) -> bytes:
+        """Return lines that are added to the head of the first answer to `head`."""
+        return b""
+
+    def close(self) -> None:
+        """Stop listening, and end every connection."""
+        with suppress(OSError):
+            self._listener.shutdown(socket.SHUT_RDWR)
+        self._listener.close()
+        with self._lock:
+            for connection in self._open:
+                with suppress(OSError):
+                    connection.shutdown(socket.SHUT_RDWR)
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                connection, _ = self._listener.accept()
+            except OSError:
+                return
+            threading.Thread(target=self._serve, args=(connection,), daemon=True).start()
+
+    def _serve(self, outer: socket.socket) -> None:
+        with outer, suppress(OSError):
+            outer.settimeout(PATIENCE)
+            head = _head(outer)
+            if not self.admits(head):
+                outer.sendall(_REFUSED + self.refusal.encode() + b"\n")
+                return
+            outer.settimeout(None)
+            with socket.create_connection(self._server) as inner, self._held(outer, inner):
+                # Where the page came from has been judged. The server itself answers this machine's pages only.
+                inner.sendall(re.sub(rb"(?im)^origin:[^\r\n]*", b"Origin: http://127.0.0.1", head))
+                back = threading.Thread(target=_pump, args=(outer, inner), daemon=True)
+                back.start()
+                greeting = self.greeting(head)
+                if greeting:
+                    answer = _head(inner)
+                    first, end, rest = answer.partition(b"\r\n")
+                    outer.sendall(first + end + (greeting if end else b"") + rest)
+                _pump(inner, outer)
+                back.join()
+
+    @contextmanager
+    def _held(self, *sockets: socket.socket) -> Iterator[None]:
+        """Keep sockets among those that `close` ends."""
+        with self._lock:
+            self._open.update(sockets)
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._open.difference_update(sockets)
+
+
+_REFUSED = b"HTTP/1.1 403 Forbidden\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\n"
+
+
+def _head(connection: socket.socket) -> bytes:
+    """Return what has come up to the end of a head, and what came with it."""
+    head = b""
+    while b"\r\n\r\n" not in head and len(head) < HEAD:
+        more = connection.recv(4096)
+        if not more:
+            break
+        head += more
+    return head
+
+
+def _pump(source: socket.socket, sink: socket.socket) -> None:
+    """Pass on everything until `source` ends, and then say so."""
+    with suppress(OSError):
+        while data := source.recv(65_536):
+            sink.sendall(data)
+    with suppress(OSError):
+        sink.shutdown(socket.SHUT_WR)
