@@ -28,7 +28,14 @@ def base_rate(gyro: Array, waist: Array, waist_rate: Array) -> Array:
 
 def sensed_base_rate(state: LowState) -> Array:
     """Return the (3,) angular rate of base_link in base_link as `state` measures it [rad/s]."""
-    return base_rate(state.imu.gyro, state.q[TORSO], state.dq[TORSO])
+    return turned_rate(state.imu.gyro, float(state.q[TORSO]), float(state.dq[TORSO]))
+
+
+def turned_rate(gyro: Array, waist: float, waist_rate: float) -> Array:
+    """Return what `base_rate` does, of one sample; in a 500 Hz loop arrays of one cost more than the arithmetic."""
+    c, s = math.cos(waist), math.sin(waist)
+    x, y, z = gyro.tolist()
+    return np.array([c * x - s * y, s * x + c * y, z - waist_rate])
 
 
 def torso_motion(quat: Array, rate: Array, waist: float, waist_rate: float) -> tuple[Array, Array]:
