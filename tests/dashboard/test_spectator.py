@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 
 from golem.robots.mujoco.spectator import Shot, SpectatorView
-from golem.runtime.lockstep import LockstepRunner
+from golem.runtime.lockstep import LockstepRunner, build_robot
+from golem.stack import load_stack
 
 SHOT = Shot(look_at=(0.4, 0.0, 1.1), azimuth=180.0, elevation=-20.0, distance=2.0)
 
@@ -56,3 +57,19 @@ def test_looking_changes_neither_the_scene_nor_what_the_robot_sees(twin: tuple[L
     np.testing.assert_array_equal(model.vis.headlight.ambient, lamp)
     np.testing.assert_array_equal(robot.data.qpos, qpos)
     np.testing.assert_equal(robot._depth["head"]._rng.bit_generator.state, noise)
+
+
+def test_a_camera_that_follows_goes_where_nothing_hides_the_robot() -> None:
+    robot = build_robot(load_stack("hall", profile="ideal"), 0)
+    shot = Shot(look_at=(0.3, 0.0, 0.84), azimuth=62.0, elevation=-11.0, distance=3.3)
+    view, start = SpectatorView(robot, {"wide": shot}), robot.data.qpos[:2].copy()
+    azimuths = set[float]()
+    for x in np.linspace(0.0, 6.0, 13):
+        for y in (-1.5, 0.0):
+            robot.data.qpos[:2] = start + (x, y)
+            mujoco.mj_kinematics(robot.scene.model, robot.data)
+            view.follow("pelvis")
+            camera = view._views["wide"]
+            assert view._sees(camera, camera.azimuth)
+            azimuths.add(camera.azimuth)
+    assert 1 < len(azimuths) < 10

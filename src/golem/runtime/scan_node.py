@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from golem.capabilities.mapping.floor_plane import FloorPlane
 from golem.capabilities.mapping.robot_filter import RobotFilter
+from golem.capabilities.mapping.scan_kernel import posed, sound
 from golem.interfaces import topics
 from golem.interfaces.lidar import LidarScan
 from golem.interfaces.nav_payloads import Scan
@@ -46,10 +47,10 @@ class ScanNode:
         scan = self._scans.read()
         if scan is None or not self._track or _frozen(scan, self._before):
             return
-        posed = self._posed(scan)
-        if posed is not None:
+        in_odom = self._posed(scan)
+        if in_odom is not None:
             self._before = scan
-            self._bus.publish(topics.SCAN, posed, t)
+            self._bus.publish(topics.SCAN, in_odom, t)
 
     def _keep(self, pose: Odometry, T_base_lidar: Array) -> None:
         if self._track and not 0.0 < pose.t - self._track[-1][0] < MEMORY:
@@ -65,7 +66,7 @@ class ScanNode:
         if not (times[0] - EARLY <= start and scan.t <= times[-1] + EARLY) or len(times) < 2:
             return None
         points, offsets = scan.points.astype(np.float64), scan.offsets.astype(np.float64)
-        good = ((points**2).sum(axis=1) > BLIND**2) & np.isfinite(points).all(axis=1) & np.isfinite(offsets)
+        good = sound(points, offsets, BLIND)
         state = self._bus.latest(topics.LOW_STATE)
         if state is not None:
             T = self._T_base_lidar
@@ -78,11 +79,7 @@ class ScanNode:
         T = np.array([T for _, T in self._track])
         R = Slerp(times, Rotation.from_matrix(T[:, :3, :3]))(moments).as_matrix()
         p = np.column_stack([np.interp(moments, times, T[:, a, 3]) for a in range(3)])
-        k = np.minimum((offsets / scan.duration * 10.0).astype(int), 9)
-        share = (offsets / scan.duration * 10.0 - k)[:, None]
-        early = np.einsum("nij,nj->ni", R[k], points) + p[k]
-        late = np.einsum("nij,nj->ni", R[k + 1], points) + p[k + 1]
-        world = early + share * (late - early)
+        world = posed(points, offsets, scan.duration, R, p)
         return Scan(scan.t, world, p[-1], self._floor.update(world, p[-1]))
 
 

@@ -49,3 +49,13 @@ def test_who_is_out_of_sight_is_forgotten() -> None:
     assert len(movers.ahead(1.0)) == 0
     movers.update(2.0, np.zeros((0, 2)), (0.0, 0.0))  # another clock
     assert len(movers.ahead(1.0)) == 0
+
+
+def test_who_walks_has_a_place_now_a_velocity_and_a_radius() -> None:
+    velocity = np.array([1.0, -0.3])
+    movers, at = watch(velocity)
+    ((x, y, vx, vy, radius),) = movers.people(1.1 + 0.2)
+    assert np.hypot(*((x, y) - at - 0.2 * velocity)) < 0.3
+    assert np.hypot(*((vx, vy) - velocity)) < 0.3
+    assert 0.2 < radius < 0.4
+    assert movers.people(1.3).shape == (1, 5) and watch(np.zeros(2))[0].people(1.3).shape == (0, 5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from golem.types import Array
 
@@ -42,16 +43,14 @@ class FloorPlane:
         if self.plane is None:
             self.plane = np.array([0.0, 0.0, origin[2] - SENSOR_HEIGHT])
         tolerance = FOLLOW if self._found else BEGIN
-        off = points[:, 2] - points[:, :2] @ self.plane[:2] - self.plane[2]
-        near = (np.abs(off) < tolerance) & (((points[:, :2] - origin[:2]) ** 2).sum(axis=1) < REACH**2)
-        floor = points[near]
+        floor, off = _close(points, origin, self.plane, tolerance)
         if len(floor) < FEWEST:
             return self.plane
         if not self._found:
             # The fullest slice of 4 cm: whatever else is near the floor has fewer points.
-            counts, edges = np.histogram(off[near], bins=12, range=(-tolerance, tolerance))
+            counts, edges = np.histogram(off, bins=12, range=(-tolerance, tolerance))
             middle = edges[int(counts.argmax())] + tolerance / 12.0
-            floor = floor[np.abs(off[near] - middle) < 0.04]
+            floor = floor[np.abs(off - middle) < 0.04]
             if len(floor) < FEWEST:
                 return self.plane
         floor = floor[:: max(1, len(floor) // 1000)]
@@ -62,3 +61,18 @@ class FloorPlane:
         self.plane = newest if not self._found else self.plane + SHARE * (newest - self.plane)
         self._found = True
         return self.plane
+
+
+@njit(cache=True, nogil=True)
+def _close(points: Array, origin: Array, plane: Array, tolerance: float) -> tuple[Array, Array]:
+    """Return the points (n, 3) less than `tolerance` from the plane and `REACH` from `origin`, and their heights."""
+    out, heights = np.empty(points.shape), np.empty(len(points))
+    n = 0
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        off = z - (x * plane[0] + y * plane[1]) - plane[2]
+        u, v = x - origin[0], y - origin[1]
+        if abs(off) < tolerance and u * u + v * v < REACH * REACH:
+            out[n, 0], out[n, 1], out[n, 2], heights[n] = x, y, z, off
+            n += 1
+    return out[:n].copy(), heights[:n].copy()

@@ -33,25 +33,25 @@ class RobotFilter:
 
     def own(self, points: Array, q: Array) -> NDArray[np.bool_]:
         """Return which points (n, 3) in base_link [m] are the robot's at joints `q` (27,)."""
-        balls = self.balls(q)
-        reach = balls[:, 3, None] + MARGIN
-        low, high = (balls[:, :3] - reach).min(axis=0), (balls[:, :3] + reach).max(axis=0)
-        near = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
-        own = np.zeros(len(points), np.bool_)
-        own[near] = _inside(np.ascontiguousarray(points[near]), balls, MARGIN)
-        return own
+        return _inside(points, self.balls(q), MARGIN)
 
 
 @njit(cache=True, nogil=True)
 def _inside(points: Array, balls: Array, margin: float) -> NDArray[np.bool_]:
     """Return which points (n, 3) are within `margin` [m] of a ball (m, 4)."""
     found = np.zeros(len(points), np.bool_)
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for j in range(len(balls)):
+        for a in range(3):
+            low[a] = min(low[a], balls[j, a] - balls[j, 3] - margin)
+            high[a] = max(high[a], balls[j, a] + balls[j, 3] + margin)
     for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        if not (low[0] < x < high[0] and low[1] < y < high[1] and low[2] < z < high[2]):
+            continue
         for j in range(len(balls)):
-            square = 0.0
-            for a in range(3):
-                square += (points[i, a] - balls[j, a]) ** 2
-            if square < (balls[j, 3] + margin) ** 2:
+            u, v, w = x - balls[j, 0], y - balls[j, 1], z - balls[j, 2]
+            if u * u + v * v + w * w < (balls[j, 3] + margin) ** 2:
                 found[i] = True
                 break
     return found

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from golem.capabilities.mapping import voxel_kernel
 from golem.capabilities.mapping.map_file import StoredMap, load_map
 from golem.capabilities.mapping.scan_match import Landmarks, Match
 from golem.capabilities.mapping.voxel_kernel import FREE, FULL
@@ -129,8 +130,7 @@ class VoxelGridMapper:
         if not fresh or not np.isfinite([*scan.origin, *scan.floor]).all():
             return
         points = np.asarray(scan.points, np.float64)
-        near = ((points - scan.origin) ** 2).sum(axis=1) < self.config.reach**2
-        points = np.ascontiguousarray(points[near])  # what is not finite is not near
+        points = voxel_kernel.within(points, np.asarray(scan.origin, np.float64), self.config.reach)
         self._t = scan.t
         self.floor = plane = scan.floor
         self.voxels.add(points, np.asarray(scan.origin, np.float64), plane, self.config.rays)

@@ -26,6 +26,29 @@ UNKNOWN, FREE, FULL = -1, 0, 100
 
 
 @njit(cache=True, nogil=True)
+def within(points: Array, origin: Array, reach: float) -> Array:
+    """Return the points (n, 3) less than `reach` [m] from `origin` (3,); those that are not finite are not."""
+    out = np.empty(points.shape)
+    n = 0
+    for i in range(len(points)):
+        x, y, z = points[i, 0] - origin[0], points[i, 1] - origin[1], points[i, 2] - origin[2]
+        if x * x + y * y + z * z < reach * reach:
+            out[n] = points[i]
+            n += 1
+    return out[:n].copy()
+
+
+@njit(cache=True, nogil=True)
+def span(points: Array, origin: Array) -> tuple[Array, Array]:
+    """Return the least and the greatest x and y, (2,) each, of `origin` (3,) and points (n, 3)."""
+    low, high = origin[:2].copy(), origin[:2].copy()
+    for i in range(len(points)):
+        for a in range(2):
+            low[a], high[a] = min(low[a], points[i, a]), max(high[a], points[i, a])
+    return low, high
+
+
+@njit(cache=True, nogil=True)
 def mark(
     voxels: Voxels, stamps: Stamps, points: Array, corner: Array, resolution: float, number: int
 ) -> None:

@@ -51,10 +51,11 @@ class VoxelMap:
             floor: (3,) plane of the floor, see `FloorPlane`.
             every: of so many points one clears the way to it.
         """
-        if len(points) == 0 or not self._reach(points, origin, float(floor[2])):
+        low, high = voxel_kernel.span(points, origin)
+        if len(points) == 0 or not self._reach(low, high, float(floor[2])):
             return
         self._number = self._number % 65535 + 1
-        box = self._box(points, origin)
+        box = self._box(low, high)
         arguments = self.corner, self.resolution, self._number
         voxel_kernel.mark(self.voxels, self._stamps, points, *arguments)
         voxel_kernel.clear(
@@ -85,10 +86,8 @@ class VoxelMap:
         r, c, k = np.nonzero(self.voxels >= voxel_kernel.OCCUPIED)
         return self.corner + (np.column_stack([c, r, k]) + 0.5) * self.resolution
 
-    def _box(self, points: Array, origin: Array) -> NDArray[np.int64]:
-        """Return first and last row and column, the last exclusive, that rays to `points` may change."""
-        low = np.minimum(points[:, :2].min(axis=0), origin[:2])
-        high = np.maximum(points[:, :2].max(axis=0), origin[:2])
+    def _box(self, low: Array, high: Array) -> NDArray[np.int64]:
+        """Return first and last row and column, the last exclusive, that rays from `low` to `high` (2,) may change."""
         first = np.floor((low - self.corner[:2]) / self.resolution).astype(np.int64)
         last = np.floor((high - self.corner[:2]) / self.resolution).astype(np.int64) + 1
         rows, columns, _ = self.voxels.shape
@@ -96,10 +95,8 @@ class VoxelMap:
             [max(0, first[1]), min(rows, last[1]), max(0, first[0]), min(columns, last[0])], np.int64
         )
 
-    def _reach(self, points: Array, origin: Array, floor: float) -> bool:
-        """Grow until `points` are inside; return whether they are."""
-        low = np.minimum(points[:, :2].min(axis=0), origin[:2])
-        high = np.maximum(points[:, :2].max(axis=0), origin[:2])
+    def _reach(self, low: Array, high: Array, floor: float) -> bool:
+        """Grow until everything from `low` to `high` (2,) is inside; return whether it is."""
         layers = round((BELOW + ABOVE) / self.resolution)
         if self.empty:
             self.corner = np.array([*(np.floor((low - MARGIN) / self.resolution) * self.resolution), 0.0])

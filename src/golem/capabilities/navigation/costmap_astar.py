@@ -159,7 +159,9 @@ class CostmapAstar:
             self._approach.start(self._goal)
             return self._finish(inputs, dt)
         s = self._surroundings
-        twist = self._local.follow(pose, self._way, self._goal, self._footprint, s.clearance, s.frame)
+        twist = self._local.follow(
+            pose, self._way, self._goal, self._footprint, s.clearance, s.frame, self._people
+        )
         if twist is None:
             return self._stand(left, dt, "The way is blocked.")
         if self._is_stuck(dt):
@@ -195,6 +197,11 @@ class CostmapAstar:
             return "There is no map: the stack needs a mapper, and an odometry that goes by the LiDAR."
         self._surroundings.update(grid, scan if fresh else None, self._pose, self._half_width)
         return ""
+
+    @property
+    def _people(self) -> Array:
+        """Those who walk now; see `rollout.score`."""
+        return self._surroundings.people(self._scan_age)
 
     @property
     def _half_width(self) -> float:
@@ -238,7 +245,7 @@ class CostmapAstar:
         s = self._surroundings
         step = self._approach.step(inputs, dt)
         if step.twist != ZERO and not self._local.clear(
-            step.twist, self._pose, self._footprint, s.clearance, s.frame
+            step.twist, self._pose, self._footprint, s.clearance, s.frame, self._people
         ):
             self._blocked += dt
             if self._blocked > self.config.patience:
@@ -277,7 +284,9 @@ class CostmapAstar:
         if self._way is None:
             return BehaviourStatus.FAILURE
         s = self._surroundings
-        twist = self._local.follow(self._pose, self._way, self._goal, self._footprint, s.clearance, s.frame)
+        twist = self._local.follow(
+            self._pose, self._way, self._goal, self._footprint, s.clearance, s.frame, self._people
+        )
         return BehaviourStatus.FAILURE if twist is None else BehaviourStatus.SUCCESS
 
     def _clear(self, since: float) -> BehaviourStatus:
@@ -295,7 +304,7 @@ class CostmapAstar:
         if math.hypot(gone.x, gone.y) >= self.config.back or since > 4.0 * self.config.back / -twist.vx:
             self._backed = None
             return BehaviourStatus.SUCCESS
-        if not self._local.clear(twist, self._pose, self._footprint, s.clearance, s.frame):
+        if not self._local.clear(twist, self._pose, self._footprint, s.clearance, s.frame, self._people):
             self._backed = None
             return BehaviourStatus.FAILURE
         self._twist = twist

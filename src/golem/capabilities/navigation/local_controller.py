@@ -24,6 +24,7 @@ class LocalControllerConfig:
         turn: greatest rate of turning [rad/s].
         look: distance ahead on the way that it aims at [m].
         horizon: time over which a twist is tried [s].
+        yields: time up to which nobody shall walk into it where it then stands [s].
         margin: distance from obstacles that the footprint keeps [m]: the body sways by some centimetres.
         slow: distance from obstacles within which the robot is slower [m].
     """
@@ -34,6 +35,7 @@ class LocalControllerConfig:
     turn: float = 0.5
     look: float = 1.1
     horizon: float = 1.6
+    yields: float = 2.4
     margin: float = 0.06
     slow: float = 0.35
 
@@ -43,11 +45,15 @@ class LocalControllerConfig:
         Raises:
             ConfigError: one of them cannot be meant.
         """
-        names = ("forward", "backward", "sideways", "turn", "look", "horizon", "margin", "slow")
+        names = ("forward", "backward", "sideways", "turn", "look", "horizon", "yields", "margin", "slow")
         rows = ((name, getattr(self, name)) for name in names)
         require("local option ", *((n, v, 0.0 < v < math.inf, "a positive number") for n, v in rows))
 
 
+NOBODY: Array = np.zeros((0, 5))
+"""People of whom there are none."""
+GAIN = 0.05
+"""Distance from people that evading must win [m]."""
 STEP = 0.2
 """Time between two places at which a twist is tried [s]."""
 WEIGHTS = (1.0, 0.5, 0.03)
@@ -81,8 +87,9 @@ class LocalController:
         footprint: Footprint,
         clearance: Array,
         frame: Array,
+        people: Array = NOBODY,
     ) -> Twist | None:
-        """Return the best twist; None where each leads into an obstacle.
+        """Return the best twist, or one out of the way of people; None where each leads into an obstacle.
 
         Args:
             pose: of base_link in the frame of the map.
@@ -91,6 +98,7 @@ class LocalController:
             footprint: of the robot.
             clearance: of the window around the robot, see `rollout.score`.
             frame: of that window.
+            people: those who walk, likewise.
         """
         i, _ = way.nearest(pose)
         left = way.left(i)
@@ -105,16 +113,37 @@ class LocalController:
             fastest *= max(0.35, room / self.config.slow)
         twists = self._twists * np.array([fastest / self.config.forward, 1.0, 1.0])
         aim = np.array([ahead.x, ahead.y, heading])
-        scores, hits = self._score(twists, pose, footprint, clearance, frame, aim)
+        scores, _, _ = self._score(twists, pose, footprint, clearance, frame, people, aim)
         best = int(scores.argmin())
-        return None if scores[best] >= HIT / 2 else Twist(*(float(v) for v in twists[best]))
+        if scores[best] < HIT / 2:
+            return Twist(*(float(v) for v in twists[best]))
+        return self._evaded(pose, footprint, clearance, frame, people)
+
+    def _evaded(
+        self, pose: PlanarPose, footprint: Footprint, clearance: Array, frame: Array, people: Array
+    ) -> Twist | None:
+        """Return the twist that leaves those who come most room; None where standing is as good."""
+        if not len(people):
+            return None
+        twists, here = np.vstack([self._twists, np.zeros(3)]), np.array([pose.x, pose.y, pose.yaw])
+        _, hits, spare = self._score(twists, pose, footprint, clearance, frame, people, here)
+        best = int(spare.argmax())
+        if not np.isfinite(hits[-1]) or spare[best] < spare[-1] + GAIN:
+            return None
+        return Twist(*(float(v) for v in twists[best]))
 
     def clear(
-        self, twist: Twist, pose: PlanarPose, footprint: Footprint, clearance: Array, frame: Array
+        self,
+        twist: Twist,
+        pose: PlanarPose,
+        footprint: Footprint,
+        clearance: Array,
+        frame: Array,
+        people: Array = NOBODY,
     ) -> bool:
-        """Return whether a twist leads into no obstacle within the horizon."""
-        twists = np.array([[twist.vx, twist.vy, twist.wz]])
-        _, hits = self._score(twists, pose, footprint, clearance, frame, np.array([pose.x, pose.y, pose.yaw]))
+        """Return whether a twist leads into no obstacle within the horizon; arguments as for `follow`."""
+        twists, here = np.array([[twist.vx, twist.vy, twist.wz]]), np.array([pose.x, pose.y, pose.yaw])
+        _, hits, _ = self._score(twists, pose, footprint, clearance, frame, people, here)
         return not np.isfinite(hits[0])
 
     def room(self, pose: PlanarPose, footprint: Footprint, clearance: Array, frame: Array) -> float:
@@ -133,19 +162,22 @@ class LocalController:
         footprint: Footprint,
         clearance: Array,
         frame: Array,
+        people: Array,
         aim: Array,
-    ) -> tuple[Array, Array]:
-        scores, hits = np.empty(len(twists)), np.empty(len(twists))
+    ) -> tuple[Array, Array, Array]:
+        scores, hits, spare = (np.empty(len(twists)) for _ in range(3))
         score(
             twists,
             np.array([pose.x, pose.y, pose.yaw]),
             footprint.samples,
             clearance,
             frame,
+            people,
             aim,
             np.array([*WEIGHTS, self.config.margin]),
-            np.array([self.config.horizon, STEP]),
+            np.array([self.config.horizon, STEP, self.config.yields]),
             scores,
             hits,
+            spare,
         )
-        return scores, hits
+        return scores, hits, spare

@@ -26,6 +26,8 @@ GATE = 0.4
 """Distance of a blob from where one is expected within which it is that one [m]."""
 LOST = 0.35
 """Time after which a blob that is not seen is forgotten [s]."""
+BODY = 0.25
+"""Radius of a person [m]; a scan shows one side alone."""
 HISTORY, ENOUGH = 8, 5
 """Places of a blob that are kept, and from how many on it has a velocity."""
 WALKS = (0.3, 2.5)
@@ -94,6 +96,15 @@ class Movers:
                 blob = _Blob()
                 blob.take(t, part)
                 self._blobs.append(blob)
+
+    def people(self, t: float) -> Array:
+        """Return (k, 5) those who walk at time `t` [s]: place [m], velocity [m/s] and radius [m]; see `rollout`."""
+        rows: list[tuple[float, ...]] = []
+        for blob in self._blobs:
+            if blob.velocity.any():
+                radius = max(BODY, 0.5 * float(np.ptp(blob.points, axis=0).max()))
+                rows.append((*blob.expected(t), *blob.velocity, radius))
+        return np.array(rows).reshape(-1, 5)
 
     def ahead(self, horizon: float, step: float = 0.2) -> Array:
         """Return (m, 2) where those who walk will be within `horizon` [s], every `step` [s], in m."""

@@ -29,8 +29,7 @@ class Surroundings:
         clearance: (rows, columns) of the window, the distance from the nearest obstacle [m]; what is not in the map
             counts as nearer than it is by `shy`.
         frame: (5,) x, y, cosine and sine of the corner of the window in the frame of the map, and its resolution.
-        new: (n, 2) points of the newest scan that are in no obstacle of the map, and where those who walk will be
-            within `ahead` [m].
+        new: (n, 2) points of the newest scan that are in no obstacle of the map [m].
     """
 
     def __init__(self, config: CostmapConfig, shy: float, ahead: float) -> None:
@@ -53,6 +52,7 @@ class Surroundings:
         self.clearance: Array = np.full((1, 1), 10.0)
         self.frame: Array = np.array([0.0, 0.0, 1.0, 0.0, 1.0])
         self.new: Array = np.zeros((0, 2))
+        self._seen = 0.0
 
     def drop_new(self) -> None:
         """Leave out, until the next scan, what is not in the map."""
@@ -80,14 +80,21 @@ class Surroundings:
             self.new = points[costmap.free_at(points) > KNOWN]
             if self._ahead > 0.0:
                 self._movers.update(scan.t, points, (pose.x, pose.y))
-                self.new = np.concatenate([self.new, self._movers.ahead(self._ahead)])
+                self._seen = scan.t
         self._window(costmap, pose)
 
+    def people(self, age: float) -> Array:
+        """Return those who walk, `age` [s] after the newest scan; see `rollout.score`."""
+        people = self._movers.people(self._seen + age)
+        people[:, 4] += self._shy
+        return people
+
     def with_new(self, radius: float) -> Costmap | None:
-        """Return the costmap with the newest scan in it; None before there is a map."""
+        """Return the costmap with the newest scan in it, and where people will be; None before there is a map."""
         if self._grid is None:
             return None
-        return Costmap(self._grid, self.new, radius, self._config)
+        there = np.concatenate([self.new, self._movers.ahead(self._ahead)])
+        return Costmap(self._grid, there, radius, self._config)
 
     def _window(self, costmap: Costmap, pose: PlanarPose) -> None:
         """Draw the window around the robot, aligned with the map."""

@@ -171,14 +171,18 @@ def about_z(angle: float) -> Array:
 
 
 @njit(cache=True)
+def _series(square: float) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Return sin(a) / a and (1 - cos(a)) / a^2 of the angle whose square is given [rad^2]."""
+    if square < 1e-8:
+        return 1.0 - square / 6.0, 0.5 - square / 24.0
+    angle = math.sqrt(square)
+    return math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
+
+
+@njit(cache=True)
 def exp(v: Array) -> Array:  # pragma: no cover - compiled
     """Return the (3, 3) rotation of a rotation vector (3,) [rad]."""
-    square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-    if square < 1e-8:
-        s, c = 1.0 - square / 6.0, 0.5 - square / 24.0
-    else:
-        angle = math.sqrt(square)
-        s, c = math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
+    s, c = _series(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     x, y, z = v[0], v[1], v[2]
     out = np.empty((3, 3))
     out[0, 0], out[0, 1], out[0, 2] = 1.0 - c * (y * y + z * z), c * x * y - s * z, c * x * z + s * y
@@ -251,16 +255,33 @@ def deskew(
     """
     out = np.empty((len(points), 3))
     last = len(t) - 1
-    R_end, p_end = R[last].T.copy(), p[last]
+    E, ex, ey, ez = R[last], p[last, 0], p[last, 1], p[last, 2]
     k = 0
     for i in range(len(points)):
         while k < last - 1 and times[i] > t[k + 1]:
             k += 1
-        share = (times[i] - t[k]) / (t[k + 1] - t[k])
         dt = t[k + 1] - t[k]
-        here = exp(share * dt * omega[k])
+        share = (times[i] - t[k]) / dt
+        angle = share * dt
+        u, w = angle * omega[k, 0], angle * omega[k, 1]
+        z = angle * omega[k, 2]
+        s, c = _series(u * u + w * w + z * z)
+        a0, a1, a2 = points[i, 0] + arm[0], points[i, 1] + arm[1], points[i, 2] + arm[2]
+        # Rodrigues' formula: a + s v x a + c v x (v x a).
+        b0, b1, b2 = w * a2 - z * a1, z * a0 - u * a2, u * a1 - w * a0
+        a0 += s * b0 + c * (w * b2 - z * b1)
+        a1 += s * b1 + c * (z * b0 - u * b2)
+        a2 += s * b2 + c * (u * b1 - w * b0)
         # A cubic would do no better: between two samples the velocity is straight.
-        place = p[k] + share * dt * (v[k] + 0.5 * share * (v[k + 1] - v[k])) - p_end
-        q = R[k] @ (here @ (points[i] + arm)) + place
-        out[i] = R_end @ q
+        h = 0.5 * share
+        Q = R[k]
+        q0 = Q[0, 0] * a0 + Q[0, 1] * a1 + Q[0, 2] * a2 + p[k, 0] - ex
+        q1 = Q[1, 0] * a0 + Q[1, 1] * a1 + Q[1, 2] * a2 + p[k, 1] - ey
+        q2 = Q[2, 0] * a0 + Q[2, 1] * a1 + Q[2, 2] * a2 + p[k, 2] - ez
+        q0 += angle * (v[k, 0] + h * (v[k + 1, 0] - v[k, 0]))
+        q1 += angle * (v[k, 1] + h * (v[k + 1, 1] - v[k, 1]))
+        q2 += angle * (v[k, 2] + h * (v[k + 1, 2] - v[k, 2]))
+        out[i, 0] = E[0, 0] * q0 + E[1, 0] * q1 + E[2, 0] * q2
+        out[i, 1] = E[0, 1] * q0 + E[1, 1] * q1 + E[2, 1] * q2
+        out[i, 2] = E[0, 2] * q0 + E[1, 2] * q1 + E[2, 2] * q2
     return out

@@ -141,7 +141,7 @@ class Lio(Ignores):
 
     def add_imu(self, sample: LidarImu) -> None:
         """Take one sample of the IMU; see `LidarOdometry`."""
-        if not (np.isfinite(sample.gyro).all() and np.isfinite(sample.acc).all() and math.isfinite(sample.t)):
+        if not all(map(math.isfinite, [*sample.gyro.tolist(), *sample.acc.tolist(), sample.t])):
             return
         if self._ahead is None:
             legs = self._legs if self.config.legs else None
@@ -162,7 +162,7 @@ class Lio(Ignores):
 
     def add_legs(self, legs: LegOdometry) -> None:
         """Take what the legs say; see `LidarOdometry`."""
-        if not (np.isfinite(legs.velocity).all() and math.isfinite(legs.waist)):
+        if not all(map(math.isfinite, [*legs.velocity.tolist(), legs.waist])):
             return
         self._waist, self._legs = legs.waist, legs
         if self._ahead is None or legs.stale or not self.config.legs:
@@ -366,7 +366,7 @@ class Lio(Ignores):
 
     def _judge(self, state: ErrorState) -> None:
         """Say whether the odometry is lost."""
-        spread = math.sqrt(float(state.P[[3, 4, 5], [3, 4, 5]].max()))
+        spread = math.sqrt(max(float(state.P[3, 3]), float(state.P[4, 4]), float(state.P[5, 5])))
         age = state.t - self._fitted_at
         if age > self.config.silent_at:
             self._lost, self._fits = f"No scan has fitted the map for {age:.1f} s.", 0

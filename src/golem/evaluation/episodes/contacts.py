@@ -23,26 +23,24 @@ class ContactWatch:
         """Watch `robot`."""
         model = robot.scene.model
         self._robot = robot
-        self._mine = (model.body_rootid == model.body(BASE_LINK).id)[model.geom_bodyid]
-        self._floor = np.array([model.geom(i).name == FLOOR for i in range(model.ngeom)])
+        mine = (model.body_rootid == model.body(BASE_LINK).id)[model.geom_bodyid]
+        floor = np.array([model.geom(i).name == FLOOR for i in range(model.ngeom)])
+        # 1 for what is the robot's, 2 for what it may touch with its feet, 0 for the rest.
+        self._kind: list[int] = np.where(floor, 2, mine).tolist()
         self.touched: dict[str, float] = {}
         self.places: dict[str, tuple[float, float, float]] = {}
 
     def __call__(self, t: float) -> None:
         """Look at time `t` [s]."""
-        contact = self._robot.data.contact
-        pairs = contact.geom
-        if not len(pairs):
-            return
-        mine = self._mine[pairs]
-        foreign = mine[:, 0] ^ mine[:, 1]
-        foreign &= ~self._floor[pairs].any(axis=1)
-        for i in np.flatnonzero(foreign).tolist():
-            own, other = pairs[i] if mine[i, 0] else pairs[i][::-1]
+        contact, kind = self._robot.data.contact, self._kind
+        for i, pair in enumerate(contact.geom.tolist()):
+            if kind[pair[0]] + kind[pair[1]] != 1:
+                continue
+            own, other = pair if kind[pair[0]] else pair[::-1]
             model = self._robot.scene.model
             names = [model.body(model.geom_bodyid[g]).name for g in (own, other)]
-            pair = " on ".join(names)
-            if pair not in self.touched:
-                self.touched[pair] = t
+            touch = " on ".join(names)
+            if touch not in self.touched:
+                self.touched[touch] = t
                 x, y, z = contact.pos[i].tolist()
-                self.places[pair] = (x, y, z)
+                self.places[touch] = (x, y, z)

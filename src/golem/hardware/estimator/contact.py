@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.hardware.estimator import feet_kernel
 from golem.types import Array
 
 
@@ -44,6 +45,7 @@ class Contact:
         self.planted: NDArray[np.bool_] = np.zeros((*shape, 2), dtype=bool)
         self.age: Array = np.zeros((*shape, 2))
         self._new: NDArray[np.bool_] = np.ones(shape, dtype=bool)
+        self._numbers: Array = np.array(astuple(config))
 
     def reset(self, where: NDArray[np.bool_] | None = None) -> None:
         """Forget the robots `where` (*shape,); None is all.
@@ -63,13 +65,13 @@ class Contact:
             probability (*shape, 2) that the foot carries load, and weight (*shape, 2): how far it is to be believed
             to stand still; zero for a while after touch-down, then the probability.
         """
-        c = self.config
-        new = self._new[..., None]
-        planted = force > np.where(self.planted & ~new, c.leave, c.touch)
-        long_ago = c.settle + c.ramp
-        self.age = np.where(planted, np.where(new, long_ago, np.where(self.planted, self.age + dt, 0.0)), 0.0)
-        self.planted = planted
-        self._new = np.zeros_like(self._new)
-        probability = planted / (1.0 + np.exp((c.middle - force) / c.width))
-        trust = np.minimum(np.maximum((self.age - c.settle) / c.ramp, 0.0), 1.0)
-        return probability, probability * trust
+        rows = force.reshape(-1, 2)
+        probability, weight = feet_kernel.contacts(
+            rows,
+            self.planted.reshape(-1, 2),
+            self.age.reshape(-1, 2),
+            self._new.reshape(-1),
+            self._numbers,
+            dt,
+        )
+        return probability.reshape(force.shape), weight.reshape(force.shape)

@@ -6,19 +6,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from golem.hardware.estimator import feet_kernel
 from golem.hardware.estimator.contact import Contact, ContactConfig
 from golem.hardware.estimator.foot_force import FootForce, FootForceConfig
 from golem.robots.model.leg_dynamics import LegDynamics
-from golem.robots.model.spatial import skew
 from golem.robots.model.table import SOLE
 from golem.types import LEGS, Array, LowState
 
 GRAVITY = 9.81
 """[m/s^2], as in the twin."""
-_HALF_LENGTH = 0.5 * (SOLE.x[1] - SOLE.x[0])
-_HALF_WIDTH = 0.5 * (SOLE.y[1] - SOLE.y[0])
+_HALF: Array = 0.5 * np.array([SOLE.x[1] - SOLE.x[0], SOLE.y[1] - SOLE.y[0]])
+"""(2,) half length and half width of a sole [m]."""
 _THICKNESS = 0.01
-"""Height above the other foot from which one may stand on it [m]: half of what it takes."""
+"""Height above the other foot from which one may stand on it [m]: half of what it takes. What a foot carries that
+stands on the other one goes to that one, which it pins to the ground: pushed to a side, a robot that walks may cross
+its legs, and the leg of the lower foot then feels no load."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,49 +89,20 @@ class Feet:
         legs, config = self._legs, self.config
         legs.update(state.q[LEGS], state.dq[LEGS])
         wrench = self._force.step(legs, state, -GRAVITY * up, dt)
-        self.force = wrench[:, :3] @ up
-        self._stand_on_foot(up)
-        self.contact, weight = self._contact.step(self.force, dt)
-        turn = legs.twists[:, 3:]
-        rate = (turn + omega) / config.turning
-        self.weight = weight / (1.0 + (rate * rate).sum(axis=1))
-
-        # Force and moment in the axes of the foot; a row times a rotation is its transpose times the column.
-        (force_l, moment_l), (force_r, moment_r) = (wrench.reshape(2, 2, 3) @ legs.rotations).tolist()
-        self.local = np.array([self._pressure(force_l, moment_l), self._pressure(force_r, moment_r)])
         self.rotations = legs.rotations
-        lever = (legs.rotations @ self.local[..., None])[..., 0]
-        self.points = legs.soles + lever
-        self.rates = legs.twists[:, :3] + (skew(turn) @ lever[..., None])[..., 0]
-        apart = self.rates[0] - self.rates[1] + skew(omega) @ (self.points[0] - self.points[1])
-        lesser = int(self.force[1] < self.force[0])
-        self.weight[lesser] /= 1.0 + float(apart @ apart) / config.sliding**2
-
-    def _stand_on_foot(self, up: Array) -> None:
-        """Give what a foot carries that stands on the other one to that one, which it pins to the ground.
-
-        Pushed to a side, a robot that walks may cross its legs. The leg of the lower foot then feels no load.
-        """
-        legs = self._legs
-        apart = legs.soles[0] - legs.soles[1]
-        rise = float(apart @ up)
-        if abs(rise) < _THICKNESS:
-            return
-        lower = int(rise > 0.0)
-        x, y, _ = (apart @ legs.rotations[lower]).tolist()
-        if abs(x) < 2.0 * _HALF_LENGTH and abs(y) < 2.0 * _HALF_WIDTH:
-            self.force[lower] += self.force[1 - lower]
-            self.force[1 - lower] = 0.0
-
-    def _pressure(self, force: list[float], moment: list[float]) -> tuple[float, float, float]:
-        normal = force[2]
-        if normal < self.config.min_force:
-            return 0.0, 0.0, 0.0
-        x, y = -moment[1] / normal, moment[0] / normal
-        return (
-            min(max(x, -_HALF_LENGTH), _HALF_LENGTH),
-            min(max(y, -_HALF_WIDTH), _HALF_WIDTH),
-            0.0,
+        self.force = feet_kernel.loads(wrench, up, legs.soles, legs.rotations, _HALF, _THICKNESS)
+        self.contact, self.weight = self._contact.step(self.force, dt)
+        numbers = np.array([config.min_force, config.turning, config.sliding])
+        self.local, self.points, self.rates = feet_kernel.pressed(
+            wrench,
+            self.force,
+            self.weight,
+            omega,
+            legs.soles,
+            legs.rotations,
+            legs.twists,
+            _HALF,
+            numbers,
         )
 
 

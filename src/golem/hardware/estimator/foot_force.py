@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from golem.hardware.estimator import feet_kernel
 from golem.robots.model.leg_dynamics import LEG, LegDynamics
 from golem.types import LEGS, Array, LowState
 
@@ -42,7 +43,7 @@ class FootForce:
         """Start with nothing known."""
         self.config = config
         moment = config.damping / config.foot
-        self._floor = np.diag(np.repeat([config.damping, moment], 3) ** 2)
+        self._floor: Array = np.repeat([config.damping, moment], 3) ** 2
         self._torque: Array | None = None
         self._momentum: Array = np.zeros((2, LEG))
 
@@ -68,6 +69,4 @@ class FootForce:
         self._momentum = self._momentum + share * (legs.momentum - self._momentum)
         external = self._torque + (legs.momentum - self._momentum) / lag
         # Least squares, damped: J J^T w = J tau.
-        J = legs.jacobians
-        wrench = np.linalg.solve(J @ J.swapaxes(-1, -2) + self._floor, J @ external[..., None])
-        return np.asarray(wrench[..., 0], dtype=np.float64)
+        return feet_kernel.wrenches(legs.jacobians, external, self._floor)

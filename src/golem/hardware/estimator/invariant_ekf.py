@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from golem.finite import check_measured
+from golem.hardware.estimator import feet_kernel
 from golem.hardware.estimator.attitude import Attitude
 from golem.hardware.estimator.feet import Feet, FeetConfig, LevelFloor
 from golem.hardware.estimator.invariant import InvariantConfig, InvariantFilter
-from golem.robots.model.imu_mount import TORSO, base_rate
+from golem.robots.model.imu_mount import TORSO, turned_rate
 from golem.robots.model.spatial import skew
 from golem.robots.model.table import FRAMES
 from golem.types import Array, BaseEstimate, LowState
@@ -72,13 +73,12 @@ class InvariantEKF:
         filter, feet = self._filter, self._feet
         waist = _waist(state)
         up = waist @ filter.R[2]
-        omega = base_rate(state.imu.gyro - filter.bias[0], state.q[TORSO], state.dq[TORSO])
+        omega = turned_rate(state.imu.gyro - filter.bias[0], float(state.q[TORSO]), float(state.dq[TORSO]))
         feet.step(state, up, omega, dt)
         filter.predict(state.imu.gyro, state.imu.acc, feet.weight, dt)
 
-        points = feet.points @ waist - _IMU
-        moved = feet.local - self._local
-        shift = (feet.rotations @ moved[..., None])[..., 0] @ waist
+        points, shift = feet_kernel.in_torso(feet.points, feet.rotations, feet.local - self._local, waist)
+        points -= _IMU
         self._local = feet.local
         R = filter.R @ waist.T
         own = self._attitude.rotation(state)
@@ -93,8 +93,7 @@ class InvariantEKF:
         R_imu = filter.R
         velocity = filter.x[0] + R_imu @ (_LEVER @ (state.imu.gyro - filter.bias[0]))
         T = np.eye(4)
-        T[:3, :3] = R_imu @ waist.T
-        T[:3, 3] = filter.x[1] - R_imu @ _IMU
+        T[:3, :3], T[:3, 3] = R_imu @ waist.T, filter.x[1] - R_imu @ _IMU
         height, T[2, 3] = self._floor.step(float(velocity[2]), T[2, :3], feet, dt)
         return BaseEstimate(
             t=state.t,

@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from golem.finite import check_finite, check_measured
 from golem.hardware.safety.base import SafetyLimits
@@ -105,8 +106,36 @@ class Servo:
         return LowCommand(t=state.t, q=q_cmd.copy(), dq=np.zeros(NUM_JOINTS), tau=tau, kp=kp, kd=kd)
 
     def _integrate(self, error: Array, dq: Array, predicted: Array, dt: float) -> None:
-        steady = (np.abs(error) < self.config.steady_error) & (np.abs(dq) < self.config.steady_speed)
-        outward = (np.abs(predicted) >= self._torque) & (predicted * error > 0.0)
-        bound = self.gains.bias
-        bias = self.bias + self.gains.ki * error * dt * (steady & ~outward)
-        self.bias = np.minimum(np.maximum(bias, -bound), bound)
+        c, gains = self.config, self.gains
+        self.bias = _integrated(
+            self.bias,
+            error,
+            dq,
+            predicted,
+            self._torque,
+            gains.bias,
+            gains.ki * dt,
+            c.steady_error,
+            c.steady_speed,
+        )
+
+
+@njit(cache=True, nogil=True)
+def _integrated(
+    bias: Array,
+    error: Array,
+    dq: Array,
+    predicted: Array,
+    torque: Array,
+    bound: Array,
+    gain: Array,
+    steady_error: float,
+    steady_speed: float,
+) -> Array:
+    """Return the bias (27,) after one step: of joints that rest near their target and whose torque has room."""
+    out = bias.copy()
+    for i in range(len(bias)):
+        steady = abs(error[i]) < steady_error and abs(dq[i]) < steady_speed
+        if steady and not (abs(predicted[i]) >= torque[i] and predicted[i] * error[i] > 0.0):
+            out[i] = min(max(bias[i] + gain[i] * error[i], -bound[i]), bound[i])
+    return out

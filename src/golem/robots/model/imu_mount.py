@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 
 from golem.robots.model.table import JOINT_INDEX
 from golem.types import Array, LowState
@@ -28,9 +29,17 @@ def base_rate(gyro: Array, waist: Array, waist_rate: Array) -> Array:
 
 def sensed_base_rate(state: LowState) -> Array:
     """Return the (3,) angular rate of base_link in base_link as `state` measures it [rad/s]."""
-    return base_rate(state.imu.gyro, state.q[TORSO], state.dq[TORSO])
+    return turned_rate(state.imu.gyro, float(state.q[TORSO]), float(state.dq[TORSO]))
 
 
+def turned_rate(gyro: Array, waist: float, waist_rate: float) -> Array:
+    """Return what `base_rate` does, of one sample; in a 500 Hz loop arrays of one cost more than the arithmetic."""
+    c, s = math.cos(waist), math.sin(waist)
+    x, y, z = gyro.tolist()
+    return np.array([c * x - s * y, s * x + c * y, z - waist_rate])
+
+
+@njit(cache=True, nogil=True)
 def torso_motion(quat: Array, rate: Array, waist: float, waist_rate: float) -> tuple[Array, Array]:
     """Return the orientation (4,) wxyz of imu_link and its angular rate (3,) in imu_link [rad/s].
 
@@ -40,9 +49,9 @@ def torso_motion(quat: Array, rate: Array, waist: float, waist_rate: float) -> t
         waist: position of `torso_joint` [rad].
         waist_rate: its velocity [rad/s].
     """
-    w, x, y, z = quat.tolist()
+    w, x, y, z = quat[0], quat[1], quat[2], quat[3]
     c, s = math.cos(0.5 * waist), math.sin(0.5 * waist)
     turned = np.array([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s])
     c, s = math.cos(waist), math.sin(waist)
-    a, b, yaw = rate.tolist()
+    a, b, yaw = rate[0], rate[1], rate[2]
     return turned, np.array([c * a + s * b, c * b - s * a, yaw + waist_rate])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 from golem.interfaces.lidar import LidarImu, LidarScan
 from golem.robots.model.imu_mount import torso_motion
 from golem.robots.model.table import BASE_LINK, FRAMES
-from golem.robots.mujoco.quaternion_kernel import matrix, turn, turned
-from golem.robots.mujoco.ray_kernel import KNOWN, cast
+from golem.robots.mujoco.quaternion_kernel import between, sensed
+from golem.robots.mujoco.ray_kernel import KNOWN, carried, cast, shaken
 from golem.robots.mujoco.scene import Scene
 from golem.robots.sensors.imu import ImuModel
 from golem.robots.sensors.mid360 import (
@@ -146,34 +147,24 @@ class LidarSensor:
         """Add the IMU's sample at time `t` [s], the mean since the one before."""
         late, early = self._moments[-1], self._moments[-2]
         share = (t - early.t) / (late.t - early.t)
-        (q0, v0), (q1, v1) = self._motion(early), self._motion(late)
-        q, v = turned(q0, share * turn(q0, q1)), v0 + share * (v1 - v0)
+        q, v = between(*self._motion(early), *self._motion(late), self._arm, share)
         if self._before is not None:
-            q_before, v_before = self._before
-            rotvec, mount = turn(q_before, q), self._T_torso_lidar[:3, :3]
-            R_mid = matrix(turned(q_before, 0.5 * rotvec)) @ mount
-            force = R_mid.T @ ((v - v_before) / IMU_PERIOD - self._gravity)
-            told = self._imu_model.measure(_UPRIGHT, mount.T @ rotvec / IMU_PERIOD, force)
+            mount = self._T_torso_lidar[:3, :3]
+            rate, force = sensed(*self._before, q, v, mount, self._gravity, IMU_PERIOD)
+            told = self._imu_model.measure(_UPRIGHT, rate, force)
             self._imu.append(LidarImu(t, told.gyro, told.acc))
         self._before = q, v
 
-    def _motion(self, moment: LidarMoment) -> tuple[Array, Array]:
-        """Return orientation (4,) of the torso, and velocity (3,) of the sensor's IMU in the world [m/s]."""
+    def _motion(self, moment: LidarMoment) -> tuple[Array, Array, Array]:
+        """Return orientation (4,) and angular rate (3,) of the torso [rad/s], and velocity (3,) of base_link [m/s]."""
         q, v = moment.qpos, moment.qvel
-        quat = q[self._q + 3 : self._q + 7]
         torso, rate = torso_motion(
-            quat, v[self._v + 3 : self._v + 6], float(q[self._waist]), float(v[self._waist_v])
+            q[self._q + 3 : self._q + 7],
+            v[self._v + 3 : self._v + 6],
+            float(q[self._waist]),
+            float(v[self._waist_v]),
         )
-        arm = self._arm
-        spin = np.array(
-            [
-                rate[1] * arm[2] - rate[2] * arm[1],
-                rate[2] * arm[0] - rate[0] * arm[2],
-                rate[0] * arm[1] - rate[1] * arm[0],
-            ]
-        )
-        # base_link and torso have one origin, on the axis of the waist.
-        return torso, v[self._v : self._v + 3] + matrix(torso) @ spin
+        return torso, rate, v[self._v : self._v + 3]
 
     def _draw(self) -> tuple[Array, Array]:
         """Draw the errors of one scan: (n, 3) of range and direction, and (n,) for the losses."""
@@ -187,8 +178,7 @@ class LidarSensor:
         offsets = np.arange(1, n + 1) / POINT_RATE
         rays = directions(start + offsets)
         if errors.direction_noise > 0.0:
-            shaken = rays + errors.direction_noise * np.cross(rays, noise)
-            rays_true = shaken / np.linalg.norm(shaken, axis=1, keepdims=True)
+            rays_true = shaken(rays, noise, errors.direction_noise)
         else:
             rays_true = rays
         distance = np.empty(n)
@@ -212,11 +202,10 @@ class LidarSensor:
             R = R_torso @ self._T_torso_lidar[:3, :3]
             origin = data.xpos[self._torso] + R_torso @ self._T_torso_lidar[:3, 3]
             # Directions turn with the sensor between the moments; its place is that of the nearest moment.
-            local = rays_true[part]
-            turned = local + np.cross(self._rate(moment), local) * (offsets[part] - times[i])[:, None]
-            world = np.ascontiguousarray(turned @ R.T)
+            world = carried(rays_true[part], self._rate(moment), offsets[part] - times[i], R)
             half = np.pi * TURNS * count / POINT_RATE
-            wedge = np.array([np.angle(np.exp(1j * (azimuth[part.start] + half))), half + slack])
+            middle = float(azimuth[part.start]) + half
+            wedge = np.array([math.atan2(math.sin(middle), math.cos(middle)), half + slack])
             cast(origin, R, wedge, world, self._shapes, self._kinds, self._model.geom_size, self._model.geom_rbound,
                  data.geom_xpos, data.geom_xmat, distance[part])  # fmt: skip
             if self._others:
@@ -251,10 +240,7 @@ class LidarSensor:
 
     def _rate(self, moment: LidarMoment) -> Array:
         """Return the (3,) angular rate of the sensor in its own axes [rad/s]."""
-        q, v = moment.qpos, moment.qvel
-        quat, rate = q[self._q + 3 : self._q + 7], v[self._v + 3 : self._v + 6]
-        turning = torso_motion(quat, rate, float(q[self._waist]), float(v[self._waist_v]))[1]
-        return self._T_torso_lidar[:3, :3].T @ turning
+        return self._T_torso_lidar[:3, :3].T @ self._motion(moment)[1]
 
 
 SLACK = 0.03

@@ -47,3 +47,31 @@ def matrix(q: Array) -> Array:  # pragma: no cover - compiled
     R[1, 0], R[1, 1], R[1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
     R[2, 0], R[2, 1], R[2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
     return R
+
+
+@njit(cache=True)
+def between(
+    q0: Array, rate0: Array, v0: Array, q1: Array, rate1: Array, v1: Array, arm: Array, share: float
+) -> tuple[Array, Array]:  # pragma: no cover - compiled
+    """Return the orientation (4,) of a body, and the velocity (3,) of a point of it, between two moments.
+
+    `q0`, `rate0` and `v0` are orientation, angular rate in the body's axes [rad/s] and velocity of its origin [m/s] at
+    one moment, `q1`, `rate1` and `v1` at the next. `arm` (3,) is the point in the body [m], `share` how far it is from
+    one moment to the next.
+    """
+    p0, p1 = v0 + matrix(q0) @ np.cross(rate0, arm), v1 + matrix(q1) @ np.cross(rate1, arm)
+    return turned(q0, share * turn(q0, q1)), p0 + share * (p1 - p0)
+
+
+@njit(cache=True)
+def sensed(
+    q0: Array, v0: Array, q1: Array, v1: Array, mount: Array, gravity: Array, dt: float
+) -> tuple[Array, Array]:  # pragma: no cover - compiled
+    """Return the mean angular rate [rad/s] and specific force [m/s^2], (3,) each, of an IMU between two moments.
+
+    `q0`, `v0` and `q1`, `v1` are orientation of the body and velocity of the IMU at both, `dt` the time between them
+    [s], `mount` (3, 3) the IMU's axes in the body, `gravity` (3,) in the world [m/s^2].
+    """
+    rotvec, axes = turn(q0, q1), np.ascontiguousarray(mount.T)
+    R = axes @ np.ascontiguousarray(matrix(turned(q0, 0.5 * rotvec)).T)
+    return axes @ rotvec / dt, R @ ((v1 - v0) / dt - gravity)

@@ -96,6 +96,42 @@ def cast(
 
 
 @njit(cache=True, nogil=True)
+def shaken(rays: Array, noise: Array, deviation: float) -> Array:  # pragma: no cover - compiled
+    """Return unit directions (n, 3) off by `noise` (n, 3), standard normal, of `deviation` [rad]."""
+    out = np.empty(rays.shape)
+    for i in range(len(rays)):
+        x, y, z = rays[i, 0], rays[i, 1], rays[i, 2]
+        a, b, c = noise[i, 0], noise[i, 1], noise[i, 2]
+        u = x + deviation * (y * c - z * b)
+        v = y + deviation * (z * a - x * c)
+        w = z + deviation * (x * b - y * a)
+        length = math.sqrt(u * u + v * v + w * w)
+        out[i, 0], out[i, 1], out[i, 2] = u / length, v / length, w / length
+    return out
+
+
+@njit(cache=True, nogil=True)
+def carried(rays: Array, rate: Array, dt: Array, R: Array) -> Array:  # pragma: no cover - compiled
+    """Return directions (n, 3) in the world of a sensor that turns.
+
+    Args:
+        rays: (n, 3) in the sensor's frame.
+        rate: (3,) its angular rate in its own axes [rad/s].
+        dt: (n,) time of each ray after the sensor was at `R` [s].
+        R: (3, 3) axes of the sensor in the world.
+    """
+    out = np.empty(rays.shape)
+    for i in range(len(rays)):
+        x, y, z = rays[i, 0], rays[i, 1], rays[i, 2]
+        u = x + (rate[1] * z - rate[2] * y) * dt[i]
+        v = y + (rate[2] * x - rate[0] * z) * dt[i]
+        w = z + (rate[0] * y - rate[1] * x) * dt[i]
+        for a in range(3):
+            out[i, a] = R[a, 0] * u + R[a, 1] * v + R[a, 2] * w
+    return out
+
+
+@njit(cache=True, nogil=True)
 def _plane(o: Array, d: Array, size: Array) -> float:  # pragma: no cover - compiled
     if d[2] > -_TINY:
         return NONE

@@ -23,6 +23,11 @@ from golem.types import Array, CameraInfo
 HEADLIGHT = (0.28, 0.32)
 """Ambient and diffuse part of the light at a spectator's camera: the hall itself is lit for the robot's eyes."""
 
+TURNS = (0.0, 30.0, -30.0, 60.0, -60.0, 90.0, -90.0, 135.0, -135.0, 180.0)
+"""By how much a camera that follows a body may be turned about it [deg], the best first."""
+REACH = 1.0
+"""Distance from what a camera looks at within which everything is the body's own [m]."""
+
 
 @dataclass(frozen=True)
 class Shot:
@@ -128,7 +133,19 @@ class SpectatorView:
         """Move the spectator's cameras along with a body: they look at it as they looked at the world's origin."""
         x, y, _ = self.position(body)
         for name, shot in self._shots.items():
-            self._views[name].lookat[:2] = shot.look_at[0] + x, shot.look_at[1] + y
+            view = self._views[name]
+            view.lookat[:2] = shot.look_at[0] + x, shot.look_at[1] + y
+            # It stays where it is until something hides the body, then it goes to the nearest free side.
+            turns = (view.azimuth, *(shot.azimuth + turn for turn in TURNS))
+            view.azimuth = next((a for a in turns if self._sees(view, a)), shot.azimuth)
+
+    def _sees(self, view: mujoco.MjvCamera, azimuth: float) -> bool:
+        """Return whether nothing stands between a camera at `azimuth` [deg] and what it looks at."""
+        a, e = np.radians(azimuth), np.radians(view.elevation)
+        sight = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        place, hit = view.lookat - view.distance * sight, np.zeros(1, np.int32)
+        met = mujoco.mj_ray(self._model, self._data, place, sight, None, 1, -1, hit)
+        return met < 0.0 or met > view.distance - REACH
 
     def picture(self, name: str) -> NDArray[np.uint8]:
         """Return (height, width, 3) what a shot, or a camera of the robot, shows now."""

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from golem.types import Array, Imu
 
@@ -71,24 +72,31 @@ class ImuModel:
             acc: (3,) true specific force [m/s^2], imu frame.
         """
         noise = self._rng.standard_normal((3, 3))
-        shaken = _multiply(quat, _small_rotation(self._errors.attitude_noise * noise[0]))
         return Imu(
-            quat=_multiply(self._bias.tilt, shaken),
+            quat=_shaken(self._bias.tilt, quat, self._errors.attitude_noise * noise[0]),
             gyro=gyro + self._bias.gyro + self._errors.gyro_noise * noise[1],
             acc=acc + self._bias.acc + self._errors.acc_noise * noise[2],
         )
 
 
+@njit(cache=True, nogil=True)
 def _small_rotation(rotvec: Array) -> Array:
     """Return the unit quaternion of a rotation vector; exact to third order, for angles of a few degrees."""
-    x, y, z = (0.5 * rotvec).tolist()
+    x, y, z = 0.5 * rotvec[0], 0.5 * rotvec[1], 0.5 * rotvec[2]
     scale = 1.0 / math.sqrt(1.0 + x * x + y * y + z * z)
     return np.array([scale, scale * x, scale * y, scale * z])
 
 
+@njit(cache=True, nogil=True)
+def _shaken(tilt: Array, quat: Array, rotvec: Array) -> Array:
+    """Return the product of `tilt` (4,), `quat` (4,) and the small rotation `rotvec` (3,)."""
+    return _multiply(tilt, _multiply(quat, _small_rotation(rotvec)))
+
+
+@njit(cache=True, nogil=True)
 def _multiply(p: Array, q: Array) -> Array:
-    pw, px, py, pz = p.tolist()
-    qw, qx, qy, qz = q.tolist()
+    pw, px, py, pz = p[0], p[1], p[2], p[3]
+    qw, qx, qy, qz = q[0], q[1], q[2], q[3]
     return np.array(
         [
             pw * qw - px * qx - py * qy - pz * qz,

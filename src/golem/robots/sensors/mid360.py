@@ -8,9 +8,11 @@ the density over the elevation are not those of the product.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.spatial.transform import Rotation
 
 from golem.errors import unknown_name
@@ -122,6 +124,7 @@ def draw_mount(profile: str, seed: int) -> Array:
     return lidar_errors(profile).draw_mount(stream(seed, "lidar/mount"))
 
 
+@njit(cache=True, nogil=True)
 def directions(t: Array) -> Array:
     """Return where the sensor looks.
 
@@ -131,12 +134,18 @@ def directions(t: Array) -> Array:
     Returns:
         (n, 3) unit vectors in lidar_link.
     """
-    shot = np.rint(t * POINT_RATE)
-    beam = np.mod(shot, BEAMS)
-    azimuth = 2.0 * np.pi * np.mod(TURNS * t, 1.0)
-    # The beams nod a quarter of a period apart; a triangle wave spreads the points evenly over the elevation.
-    nod = np.mod(NODS * t + beam / BEAMS, 1.0)
+    out = np.empty((len(t), 3))
     low, high = ELEVATION
-    elevation = low + (high - low) * (1.0 - np.abs(2.0 * nod - 1.0))
-    flat = np.cos(elevation)
-    return np.column_stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
+    for i in range(len(t)):
+        beam = round(t[i] * POINT_RATE) % BEAMS
+        azimuth = 2.0 * np.pi * ((TURNS * t[i]) % 1.0)
+        # The beams nod a quarter of a period apart; a triangle wave spreads the points evenly over the elevation.
+        nod = (NODS * t[i] + beam / BEAMS) % 1.0
+        elevation = low + (high - low) * (1.0 - abs(2.0 * nod - 1.0))
+        flat = math.cos(elevation)
+        out[i, 0], out[i, 1], out[i, 2] = (
+            flat * math.cos(azimuth),
+            flat * math.sin(azimuth),
+            math.sin(elevation),
+        )
+    return out
