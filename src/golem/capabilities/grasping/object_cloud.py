@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
@@ -21,8 +24,20 @@ TESTED = 800
 """Points that each of them is tried on."""
 CELL = 0.012
 """Points of neighbouring cells of this size belong to one piece [m]."""
+PIXEL = 0.003
+"""Size of a pixel of a silhouette [m]."""
+SEARCH = 0.06
+"""How far a thing may have moved between two looks [m]."""
 MIN_POINTS = 20
 """Fewer points are no object to grasp."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What a camera showed: the `thing` (n, 3), and all points `around` (m, 3) with it, in one frame [m]."""
+
+    thing: Array
+    around: Array
 
 
 def object_points(points: Array, position: Array, seed: int = 0) -> Array:
@@ -91,6 +106,56 @@ def piece(points: Array, position: Array) -> Array:
     own = number[tuple(cells.T)]
     nearest = int(((points - position) ** 2).sum(axis=1).argmin())
     return points[own == own[nearest]]
+
+
+def across(approach: Array) -> tuple[Array, Array]:
+    """Return two (3,) unit vectors across `approach` (3,) and each other."""
+    u = np.cross(approach, (0.0, 0.0, 1.0) if abs(approach[2]) < 0.7 else (1.0, 0.0, 0.0))
+    u /= np.linalg.norm(u)
+    return u, np.cross(approach, u)
+
+
+def shift_between(before: View, after: View, axis: Array) -> Array:
+    """Return by how much (3,) a thing has moved from one view to another [m], both along about `axis` (3,).
+
+    Across the axis, it is the shift at which the silhouettes differ in the fewest pixels; pixels of which one view
+    knows nothing do not count. Along it, it is how much nearer or farther the first layer is.
+    """
+    flat = np.column_stack(across(axis))
+    low = np.minimum((before.thing @ flat).min(axis=0), (after.thing @ flat).min(axis=0)) - SEARCH
+    high = np.maximum((before.thing @ flat).max(axis=0), (after.thing @ flat).max(axis=0)) + SEARCH
+    size, edge = np.ceil((high - low) / PIXEL).astype(int) + 1, round(SEARCH / PIXEL)
+    (one, known), (two, _) = (_silhouette(view, flat, low, size) for view in (before, after))
+    padded = np.pad(two, edge, constant_values=0.5)
+    differ = np.asarray(
+        cv2.matchTemplate(padded, one, cv2.TM_SQDIFF, mask=known.astype(np.float32)), np.float64
+    )
+    i, j = np.unravel_index(int(differ.argmin()), differ.shape)
+    best = np.array([i + _vertex(differ[:, j], int(i)), j + _vertex(differ[i], int(j))]) - edge
+    along = float(np.quantile(after.thing @ axis, 0.1) - np.quantile(before.thing @ axis, 0.1))
+    return flat @ (best * PIXEL) + along * axis
+
+
+def _vertex(values: Array, k: int) -> float:
+    """Return how far from the least value, the `k`-th, the parabola through it and its neighbours is least."""
+    if not 0 < k < len(values) - 1:
+        return 0.0
+    a, b, c = (float(v) for v in values[k - 1 : k + 2])
+    return 0.5 * (a - c) / max(a - 2.0 * b + c, 1e-6)
+
+
+def _silhouette(
+    view: View, flat: Array, low: Array, size: NDArray[np.intp]
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Return an image of `size` pixels from `low` (2,) on, 1 the thing, 0 the rest, 0.5 unknown; and the known."""
+    images: list[NDArray[np.bool_]] = []
+    for points in (view.around, view.thing):
+        pixels = np.round((points @ flat - low) / PIXEL).astype(int)
+        image = np.zeros(tuple(size), np.uint8)
+        image[tuple(pixels[((pixels >= 0) & (pixels < size)).all(axis=1)].T)] = 1
+        images.append(cv2.morphologyEx(image, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)).astype(bool))
+    around, thing = images
+    return np.where(thing, 1.0, np.where(around, 0.0, 0.5)).astype(np.float32), around | thing
 
 
 def thinned(points: Array, most: int, seed: int = 0) -> Array:

@@ -170,6 +170,9 @@ def add_kitchen(
         layout: as seen from where the robot should stand.
         at: that place in the world, x and y [m].
     """
+    # MuJoCo's native collision of convex shapes gives a can at a pad's edge a normal across the pad, which throws it out
+    # of the hand; libccd gives it the right one.
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
     _add_materials(spec, layout)
     sign = 1.0 if layout.fridge.handle_y < 0.0 else -1.0
     _add_room(spec, at)
