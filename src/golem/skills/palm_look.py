@@ -111,10 +111,12 @@ class PalmLook:
                 await self._motion.line(
                     self._side, retracted(grasp.T_odom_gripper, rest), c.reach_speed, tolerance=LEAVE
                 )
-            seen = await self._seen(target)
-            if seen is None:
+            glances = [one for _ in range(c.glances if k else 1) if (one := await self._seen(target))]
+            if not glances:
                 break
-            shift = shift_between(view, seen, axis)
+            seen, shifts = glances[-1], [shift_between(view, seen, axis) for seen in glances]
+            # A base that sways is taken in its middle.
+            shift = 0.5 * (np.min(shifts, axis=0) + np.max(shifts, axis=0))
             if k and float(np.linalg.norm(shift)) > STRAYED:
                 break
             T = grasp.T_odom_gripper.copy()

@@ -48,6 +48,7 @@ class TakeThingConfig:
         look_again: whether the palm camera corrects what the head camera saw; without, all is open loop.
         looks: how often the hand is brought above the thing at most, each time by what its camera saw before.
         centred: distance from where it was expected below which one look was enough [m].
+        glances: how often it is looked at just before the grasp: in a hoist and on its feet the robot sways.
         trust: how far from where the head camera has it the palm camera may see it [m].
         attempts: how many proposed grasps of one approach are tried to be reached.
         travel_speed: between places [m/s].
@@ -68,6 +69,7 @@ class TakeThingConfig:
     look_again: bool = True
     looks: int = 3
     centred: float = 0.015
+    glances: int = 6
     trust: float = 0.15
     attempts: int = 6
     travel_speed: float = 0.25

@@ -56,6 +56,8 @@ ROUND = 0.03
 """Greatest half width for which a thing that is seen across is taken to be round [m]: half of the hand's."""
 TWISTS: Array = np.array([2.0, 0.5])
 """How much it counts that a thing hangs beside the fingers, across the closing axis and along it."""
+SPARE, TIGHT = 0.015, 0.4
+"""Opening beyond what a grasp asks for that leaves nothing to be wished [m], and what a grasp without it counts."""
 COMPACT = 0.10
 """Greatest width of a thing that is held in its middle [m]."""
 SCENE = 20000
@@ -144,6 +146,8 @@ class Antipodal(OpenLoop):
         score = quality[index] * (1.0 - 0.3 * turned / max(c.tilt, 1e-6))
         score *= np.exp(-(off**2) @ TWISTS / size**2)
         score *= np.minimum(held / 6.0, 1.0) * worth
+        # A hand that is as wide as it gets, and a few millimetres off, comes down on what it is to hold.
+        score *= np.clip((gripper.max_gap - gaps) / SPARE, TIGHT, 1.0)
         good = np.flatnonzero((gaps <= gripper.max_gap) & (held > 0))
         order = good[np.argsort(-score[good], kind="stable")]
         kept = self._distinct(T, gaps, order, self._around(cloud, scene))

@@ -91,6 +91,8 @@ def support_plane(points: Array, position: Array, seed: int = 0) -> tuple[Array,
     middle = on.mean(axis=0)
     normal = np.linalg.svd(on[:: max(1, len(on) // TESTED)] - middle, full_matrices=False)[2][2]
     offset = float(middle @ normal)
+    if abs(float(position @ normal) - offset) < 0.75 * PLANE:
+        return None
     return (normal, offset) if position @ normal > offset else (-normal, -offset)
 
 
@@ -125,11 +127,15 @@ def shift_between(before: View, after: View, axis: Array) -> Array:
     low = np.minimum((before.thing @ flat).min(axis=0), (after.thing @ flat).min(axis=0)) - SEARCH
     high = np.maximum((before.thing @ flat).max(axis=0), (after.thing @ flat).max(axis=0)) + SEARCH
     size, edge = np.ceil((high - low) / PIXEL).astype(int) + 1, round(SEARCH / PIXEL)
-    (one, known), (two, _) = (_silhouette(view, flat, low, size) for view in (before, after))
-    padded = np.pad(two, edge, constant_values=0.5)
-    differ = np.asarray(
-        cv2.matchTemplate(padded, one, cv2.TM_SQDIFF, mask=known.astype(np.float32)), np.float64
-    )
+    (one, known), (two, seen) = (_silhouette(view, flat, low, size) for view in (before, after))
+    two, seen = (np.pad(image, edge) for image in (two, seen))
+
+    def overlap(image: NDArray[np.float32], template: NDArray[np.float32]) -> Array:
+        return np.asarray(cv2.matchTemplate(image, template, cv2.TM_CCORR), np.float64)
+
+    shared = overlap(seen, known)
+    differ = overlap(seen - two, one) + overlap(two, known - one)
+    differ = np.where(shared > 0.5 * shared.max(), differ / np.maximum(shared, 1.0), np.inf)
     i, j = np.unravel_index(int(differ.argmin()), differ.shape)
     best = np.array([i + _vertex(differ[:, j], int(i)), j + _vertex(differ[i], int(j))]) - edge
     along = float(np.quantile(after.thing @ axis, 0.1) - np.quantile(before.thing @ axis, 0.1))
@@ -138,7 +144,7 @@ def shift_between(before: View, after: View, axis: Array) -> Array:
 
 def _vertex(values: Array, k: int) -> float:
     """Return how far from the least value, the `k`-th, the parabola through it and its neighbours is least."""
-    if not 0 < k < len(values) - 1:
+    if not 0 < k < len(values) - 1 or not np.isfinite(values[k - 1 : k + 2]).all():
         return 0.0
     a, b, c = (float(v) for v in values[k - 1 : k + 2])
     return 0.5 * (a - c) / max(a - 2.0 * b + c, 1e-6)
@@ -146,16 +152,16 @@ def _vertex(values: Array, k: int) -> float:
 
 def _silhouette(
     view: View, flat: Array, low: Array, size: NDArray[np.intp]
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Return an image of `size` pixels from `low` (2,) on, 1 the thing, 0 the rest, 0.5 unknown; and the known."""
-    images: list[NDArray[np.bool_]] = []
-    for points in (view.around, view.thing):
-        pixels = np.round((points @ flat - low) / PIXEL).astype(int)
-        image = np.zeros(tuple(size), np.uint8)
-        image[tuple(pixels[((pixels >= 0) & (pixels < size)).all(axis=1)].T)] = 1
-        images.append(cv2.morphologyEx(image, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)).astype(bool))
-    around, thing = images
-    return np.where(thing, 1.0, np.where(around, 0.0, 0.5)).astype(np.float32), around | thing
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return two images of `size` pixels from `low` (2,) on: where the thing is, and what the camera has in view."""
+    thing, seen = np.zeros(tuple(size), np.uint8), np.zeros(tuple(size), np.uint8)
+    pixels = np.round((view.thing @ flat - low) / PIXEL).astype(int)
+    thing[tuple(pixels[((pixels >= 0) & (pixels < size)).all(axis=1)].T)] = 1
+    thing = cv2.morphologyEx(thing, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
+    # What the thing hides is in view, too: it is not the thing.
+    around = np.round((np.concatenate([view.around, view.thing]) @ flat - low) / PIXEL).astype(np.int32)
+    cv2.fillConvexPoly(seen, cv2.convexHull(around[:, ::-1]), 1)
+    return (thing & seen).astype(np.float32), seen.astype(np.float32)
 
 
 def thinned(points: Array, most: int, seed: int = 0) -> Array:
