@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.grasping.base import Grasp
 from golem.capabilities.grasping.centroid import UP, grasp_pose
-from golem.capabilities.grasping.object_cloud import View, shift_between
+from golem.capabilities.grasping.view_shift import View, shift_between
 from golem.skills.context import Context
 from golem.skills.planned_motion import PlannedMotion
 from golem.skills.poses import retracted

@@ -8,7 +8,8 @@ import pytest
 from golem.capabilities.grasping.antipodal import Antipodal, AntipodalConfig, upright
 from golem.capabilities.grasping.base import Gripper
 from golem.capabilities.grasping.hand_volume import collides
-from golem.capabilities.grasping.object_cloud import View, normals_of, object_points, shift_between
+from golem.capabilities.grasping.object_cloud import normals_of, object_points
+from golem.capabilities.grasping.view_shift import View, shift_between
 from golem.errors import ConfigError
 from golem.finite import NotFinite
 from golem.types import Array, LocalizedObject

@@ -172,8 +172,8 @@ def add_kitchen(
         layout: as seen from where the robot should stand.
         at: that place in the world, x and y [m].
     """
-    # MuJoCo's native collision of convex shapes gives a can at a pad's edge a normal across the pad, which throws it out
-    # of the hand; libccd gives it the right one.
+    # MuJoCo's native collision of convex shapes gives a can at a pad's edge a normal across the pad, which throws it
+    # out of the hand; libccd gives it the right one.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
     spec.option.impratio = GRIP
     _add_materials(spec, layout)
