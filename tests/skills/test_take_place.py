@@ -77,6 +77,23 @@ def test_a_hand_whose_encoders_are_off_sees_what_is_upright() -> None:
     assert np.ptp(seen.points[:, 0]) < 0.08 and np.ptp(seen.points[:, 1]) < 0.09
 
 
+def test_from_above_a_cap_and_the_shoulder_below_it_are_one_thing() -> None:
+    table, _ = table_with_can()
+    rng = np.random.default_rng(1)
+    turn, radius = rng.uniform(0, 2 * np.pi, 2000), np.sqrt(rng.uniform(0.0, 1.0, 2000))
+    cap = np.column_stack(
+        [0.5 + 0.015 * radius * np.cos(turn), 0.015 * radius * np.sin(turn), 0.0 * turn + 0.22]
+    )
+    ring = 0.016 + 0.019 * radius
+    shoulder = np.column_stack([0.5 + ring * np.cos(turn), ring * np.sin(turn), 0.17 - 1.2 * (ring - 0.016)])
+    bottle = np.concatenate([cap, shoulder]) + (0.0, -0.2, TOP)
+    found = seen_again(np.concatenate([table, bottle]), can_at(bottle - (0.0, 0.0, 0.1)), trust=0.15)
+    assert found is not None
+    assert len(found[0].points) == len(bottle)
+    # What is grasped is at its top.
+    assert found[0].position[2] > TOP + 0.2
+
+
 def test_a_lid_before_the_camera_is_not_the_surface() -> None:
     table, _ = table_with_can()
     rng = np.random.default_rng(1)

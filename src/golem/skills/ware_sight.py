@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from golem.capabilities.grasping.centroid import UP
-from golem.capabilities.grasping.object_cloud import MIN_POINTS, piece, spaced
+from golem.capabilities.grasping.object_cloud import MIN_POINTS, piece_at, spaced
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
 from golem.types import Array, LocalizedObject, Side
@@ -107,14 +107,16 @@ def seen_again(points: Array, target: LocalizedObject, trust: float) -> tuple[Lo
         upright, offset = surface
         around = around[around @ upright > offset + PROUD]
     cloud = around[:0]
-    for _ in range(STRAY):
-        cloud = piece(around, middle)
-        if len(cloud) >= MIN_POINTS or not len(cloud):
+    for _ in range(STRAY if len(around) else 0):
+        # Seen from above a bottle is a cap over a shoulder, with nothing between them: pieces are those of its plan.
+        own = piece_at(around - np.outer((around - middle) @ upright, upright), middle)
+        cloud, around = around[own], around[~own]
+        if len(cloud) >= MIN_POINTS or not len(around):
             break
-        around = around[(np.abs(around[:, None] - cloud).sum(axis=2) > 0.0).all(axis=1)]
     if len(cloud) < MIN_POINTS or np.hypot(*(np.median(cloud, axis=0) - middle)[:2]) > trust:
         return None
-    centre = np.median(cloud, axis=0)
+    centre = 0.5 * (cloud.min(axis=0) + cloud.max(axis=0))
+    centre += (np.quantile(cloud @ upright, 0.9) - centre @ upright) * upright
     nearest = cloud[((cloud - centre) ** 2).sum(axis=1).argmin()].copy()
     return replace(target, position=nearest, points=cloud, mask=None), upright
 

@@ -46,6 +46,8 @@ RIMS = 40
 """Pairs across a rim along which hands are laid at most."""
 DEPTHS = (0.045, 0.025, 0.0)
 """How much deeper than need be the fingertips go where that is free [m]: what is held by its edge turns and slips."""
+NARROW = 0.045
+"""Width up to which fingers do not go deepest [m]."""
 SHALLOW = 0.8
 """What a grasp counts that goes one of these less deep."""
 LEANS = (0.0, 0.3, -0.3, 0.6, -0.6)
@@ -135,7 +137,7 @@ class Antipodal(OpenLoop):
         middles, axes, widths, quality, rims = self._pairs(cloud, gripper)
         if not len(middles):
             return []
-        T, turned, index, worth = self._hands(middles, axes, gripper, rims)
+        T, turned, index, worth = self._hands(middles, axes, widths, gripper, rims)
         if not len(T):
             return []
         rim = index >= len(middles) - rims
@@ -243,12 +245,12 @@ class Antipodal(OpenLoop):
         return middle, axes, width, np.full(len(thin), 0.7)
 
     def _hands(
-        self, middles: Array, axes: Array, gripper: Gripper, rims: int
+        self, middles: Array, axes: Array, widths: Array, gripper: Gripper, rims: int
     ) -> tuple[Array, Array, NDArray[np.intp], Array]:
         """Return poses (m, 4, 4), how far each leans (m,) [rad], its pair (m,), and what its depth is worth (m,).
 
         A hand on one of the last `rims` pairs does not lean: the finger that leans over a bowl tips it. Nor does it go
-        deepest: there is a bottom.
+        deepest: there is a bottom; and what is narrow stands on something wider, such as a bottle's neck.
         """
         c, approach = self.config, gripper.approach
         z = approach - (axes @ approach)[:, None] * axes
@@ -260,6 +262,7 @@ class Antipodal(OpenLoop):
             lean = np.arccos(np.clip(z_turned @ approach, -1.0, 1.0))
             kept = np.flatnonzero(lean <= c.tilt + 1e-9)
             kept = kept[kept < len(middles) - rims] if turn or not less else kept
+            kept = kept if less else kept[widths[kept] > NARROW]
             T = np.tile(np.eye(4), (len(kept), 1, 1))
             T[:, :3, 1], T[:, :3, 2] = axes[kept], z_turned[kept]
             T[:, :3, 0] = np.cross(axes[kept], z_turned[kept])

@@ -85,8 +85,11 @@ def support_plane(points: Array, position: Array, seed: int = 0) -> tuple[Array,
 
 def piece(points: Array, position: Array) -> Array:
     """Return the connected piece of `points` (n, 3) that is nearest to `position` (3,)."""
-    if not len(points):
-        return points
+    return points[piece_at(points, position)] if len(points) else points
+
+
+def piece_at(points: Array, position: Array) -> NDArray[np.bool_]:
+    """Return which of `points` (n, 3), at least one, are of that piece."""
     cells = np.floor((points - points.min(axis=0)) / CELL).astype(int)
     taken = np.zeros(cells.max(axis=0) + 1, bool)
     taken[tuple(cells.T)] = True
@@ -94,7 +97,7 @@ def piece(points: Array, position: Array) -> Array:
     ndimage.label(taken, np.ones((3, 3, 3)), output=number)
     own = number[tuple(cells.T)]
     nearest = int(((points - position) ** 2).sum(axis=1).argmin())
-    return points[own == own[nearest]]
+    return own == own[nearest]
 
 
 def across(approach: Array) -> tuple[Array, Array]:
