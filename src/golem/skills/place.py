@@ -237,8 +237,11 @@ class SetDown:
     def _scene(context: Context, goal: PlaceGoal, hand: Array) -> Array:
         """Return the points (n, 3) in odom that the head camera shows, as this hand finds them, less what it holds."""
         scene = context.scene("head")
-        scene = scene[np.linalg.norm(scene - hand, axis=1) > IN_HAND]
-        return scene + (*goal.off, 0.0) if goal.off else scene
+        scene = scene + (*goal.off, 0.0) if goal.off else scene
+        # Distance from hand and what hangs below it.
+        away = scene - hand
+        away[:, 2] -= np.clip(away[:, 2], -goal.below, 0.0)
+        return scene[np.linalg.norm(away, axis=1) > IN_HAND]
 
     @staticmethod
     def _tallest(scene: Array, here: Array, there: Array) -> float:
