@@ -81,7 +81,9 @@ class PalmLook:
             seen, upright = found
             off = (np.median(seen.points, axis=0) - np.median(target.points, axis=0))[:2]
             self._motion.displace(np.append(off, 0.0))
-            target, scene, self.off = seen, palm, self.off + off
+            # The head sees the front of a thing, a hand its top: the middle of both is nearer than their medians.
+            self.off += (_middle(seen.points) - _middle(target.points))[:2]
+            target, scene = seen, palm
             seen_way = Rotation.align_vectors(upright[None], UP[None])[0].apply(way)
             if math.hypot(*off) < c.centred or k == c.looks - 1:
                 break
@@ -156,3 +158,9 @@ class PalmLook:
         shares = np.linspace(0.0, 1.0, 11)
         there = next((s for s in shares if reach.serves(self._side, local + s * (best - local))), 1.0)
         return grasp_pose(T[:3, :3] @ (local + there * (best - local)) + T[:3, 3], yaw, -way)
+
+
+def _middle(points: Array) -> Array:
+    """Return the middle (3,) of the bounds of points (n, 3), strays left out."""
+    low, high = np.quantile(points, (0.02, 0.98), axis=0)
+    return 0.5 * (low + high)
