@@ -71,7 +71,7 @@ class TakeThingConfig:
     centred: float = 0.015
     glances: int = 6
     trust: float = 0.15
-    attempts: int = 6
+    attempts: int = 12
     travel_speed: float = 0.25
     reach_speed: float = 0.08
     touch: float = 1.0
