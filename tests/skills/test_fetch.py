@@ -23,7 +23,8 @@ from golem.skills.fetch import Fetch, FetchGoal
 from golem.skills.place import SetDown
 from golem.skills.remember import Remember
 from golem.skills.runner import SkillRun
-from golem.skills.take import Take, TakeReport
+from golem.skills.take import Take
+from golem.skills.take_config import TakeReport
 from golem.types import PlanarPose, Twist
 
 LEGS = LegStatus(

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.navigation.edge_fit import NearEdge
@@ -15,8 +16,9 @@ from golem.interfaces.payloads import GripState, HandStatus
 from golem.skills.counter_stance import STANDOFF, before, stance
 from golem.skills.place import PlaceGoal, SetDown
 from golem.skills.runner import SkillRun
-from golem.skills.take import Take, TakeGoal, TakeThingConfig
-from golem.skills.ware_sight import seen_again, surface_below
+from golem.skills.take import Take
+from golem.skills.take_config import TakeGoal, TakeThingConfig
+from golem.skills.ware_sight import leaning_surface, seen_again, surface_below
 from golem.types import NUM_JOINTS, UPPER, Array, Detection, Imu, LocalizedObject, LowState, PlanarPose
 
 TOP = -0.15
@@ -53,12 +55,53 @@ def test_the_surface_is_the_fullest_layer() -> None:
 
 def test_the_palm_camera_finds_it_beside_where_it_seemed() -> None:
     table, can = table_with_can()
-    seen = seen_again(np.concatenate([table, can]), can_at(can + (0.06, 0.03, 0.01)), trust=0.15)
-    assert seen is not None
+    found = seen_again(np.concatenate([table, can]), can_at(can + (0.06, 0.03, 0.01)), trust=0.15)
+    assert found is not None
+    seen, upright = found
+    np.testing.assert_allclose(upright, [0.0, 0.0, 1.0], atol=0.01)
     assert np.median(seen.points, axis=0)[:2] == pytest.approx([0.5, -0.2], abs=0.01)
     assert seen.points[:, 2].min() > TOP + 0.008
     assert seen_again(table, can_at(can), trust=0.15) is None
     assert seen_again(np.zeros((0, 3)), can_at(can), trust=0.15) is None
+
+
+def test_a_hand_whose_encoders_are_off_sees_what_is_upright() -> None:
+    table, can = table_with_can()
+    lean = Rotation.from_euler("x", 0.09)
+    points = lean.apply(np.concatenate([table, can]))
+    found = seen_again(points, can_at(lean.apply(can)), trust=0.15)
+    assert found is not None
+    seen, upright = found
+    np.testing.assert_allclose(upright, lean.apply([0.0, 0.0, 1.0]), atol=0.01)
+    # What is left is the can, not the higher side of the table.
+    assert np.ptp(seen.points[:, 0]) < 0.08 and np.ptp(seen.points[:, 1]) < 0.09
+
+
+def test_from_above_a_cap_and_the_shoulder_below_it_are_one_thing() -> None:
+    table, _ = table_with_can()
+    rng = np.random.default_rng(1)
+    turn, radius = rng.uniform(0, 2 * np.pi, 2000), np.sqrt(rng.uniform(0.0, 1.0, 2000))
+    cap = np.column_stack(
+        [0.5 + 0.015 * radius * np.cos(turn), 0.015 * radius * np.sin(turn), 0.0 * turn + 0.22]
+    )
+    ring = 0.016 + 0.019 * radius
+    shoulder = np.column_stack([0.5 + ring * np.cos(turn), ring * np.sin(turn), 0.17 - 1.2 * (ring - 0.016)])
+    bottle = np.concatenate([cap, shoulder]) + (0.0, -0.2, TOP)
+    found = seen_again(np.concatenate([table, bottle]), can_at(bottle - (0.0, 0.0, 0.1)), trust=0.15)
+    assert found is not None
+    assert len(found[0].points) == len(bottle)
+    # What is grasped is at its top.
+    assert found[0].position[2] > TOP + 0.2
+
+
+def test_a_lid_before_the_camera_is_not_the_surface() -> None:
+    table, _ = table_with_can()
+    rng = np.random.default_rng(1)
+    lid = np.column_stack([rng.uniform((0.47, -0.23), (0.53, -0.17), (60000, 2)), np.full(60000, TOP + 0.12)])
+    surface = leaning_surface(np.concatenate([table, lid]))
+    assert surface is not None
+    assert surface[1] == pytest.approx(TOP, abs=0.002)
+    assert leaning_surface(np.zeros((0, 3))) is None
 
 
 def test_nothing_is_taken_where_nothing_is_seen(world: Any) -> None:
@@ -109,6 +152,8 @@ def test_a_stance_is_before_the_place_and_straight_to_the_edge() -> None:
         (TakeGoal, {"label": "mug", "near": (1.0, float("nan"))}),
         (PlaceGoal, {"x": float("inf"), "y": 0.0}),
         (PlaceGoal, {"x": 0.4, "y": 0.0, "below": 2.0}),
+        (PlaceGoal, {"x": 0.4, "y": 0.0, "aside": (0.1,)}),
+        (PlaceGoal, {"x": 0.4, "y": 0.0, "off": (0.1, float("nan"))}),
     ],
 )
 def test_a_goal_without_sense_is_refused(kind: type[Any], wrong: dict[str, Any]) -> None:

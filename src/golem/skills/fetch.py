@@ -18,7 +18,7 @@ from golem.skills.place import PlaceGoal
 from golem.skills.pose_goal import FIRST_REPORT
 from golem.skills.recalled import RecalledPlace, RecalledPlaces, ask
 from golem.skills.remember import RememberGoal
-from golem.skills.take import TakeGoal, TakeReport
+from golem.skills.take_config import TakeGoal, TakeReport
 from golem.types import Array, PlanarPose, Side
 
 NEAR = 1.3
@@ -268,7 +268,8 @@ class Fetch:
             report.approaches += await self._go(context, spot)
             spot = self._in_odom(context, to)
         self._still_held(context, goal, side)
-        there = PlaceGoal(float(spot[0]), float(spot[1]), "odom", side, taken.below, taken.above)
+        aside = (taken.aside_x, taken.aside_y)
+        there = PlaceGoal(float(spot[0]), float(spot[1]), "odom", side, taken.below, taken.above, aside)
         placed = await context.run("place", there)
         if not placed.success:
             raise StageFailed(placed.stage, placed.slot or "skill", placed.reason)

@@ -54,6 +54,9 @@ class PlaceGoal:
         below: height of the fingertips above the surface when it stands, as `take` reports it [m]; 0 where it is not
             known.
         above: height of its top above the fingertips, as `take` reports it [m].
+        aside: where its middle is beside the fingertips along the hand's x and y axes, as `take` reports it [m]; empty:
+            between them.
+        off: how far from where the head camera has them the hand finds things, in odom, as `take` reports it [m].
     """
 
     x: float
@@ -62,6 +65,8 @@ class PlaceGoal:
     side: Literal["left", "right", "either"] = "either"
     below: float = 0.0
     above: float = 0.0
+    aside: tuple[float, ...] = ()
+    off: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Check the numbers.
@@ -71,6 +76,8 @@ class PlaceGoal:
         """
         if not (math.isfinite(self.x) and math.isfinite(self.y)):
             raise ConfigError("A place to set something down is two finite numbers, x and y.")
+        if any(len(v) not in (0, 2) or not all(map(math.isfinite, v)) for v in (self.aside, self.off)):
+            raise ConfigError("What is aside and off, of a thing to set down, are two finite numbers each.")
         require(
             "goal of placing: ",
             ("below", self.below, 0.0 <= self.below <= 0.5, "from 0 to 0.5 m"),
@@ -181,8 +188,7 @@ class SetDown:
             spot = T[:3, :3] @ spot + T[:3, 3]
         context.say("detect", "Looking at the place.", target=spot.tolist())
         motion.look([(hand, IN_HAND)])
-        scene = context.scene("head")
-        scene = scene[np.linalg.norm(scene - hand, axis=1) > IN_HAND]
+        scene = self._scene(context, goal, hand)
         level = surface_below(scene, spot)
         if level is None:
             raise StageFailed("detect", "localizer", "The head camera shows no surface at that place.")
@@ -205,8 +211,8 @@ class SetDown:
         held = Held(side, _column(arm.pose, below, goal.above))
         at = np.array([spot[0], spot[1], spot[2] + below + c.hover])
         context.say("carry", "Carrying it there.", target=at.tolist(), side=side)
-        over = self._tallest(context, arm.pose[:3, 3], at) + below + ROOM
-        goals = [self._turned(arm.commanded, turn, at) for turn in TURNS]
+        over = self._tallest(self._scene(context, goal, arm.pose[:3, 3]), arm.pose[:3, 3], at) + below + ROOM
+        goals = [self._turned(arm.commanded, turn, at, goal.aside or (0.0, 0.0)) for turn in TURNS]
         for T in goals:
             # Straight there and down, as long as the arm can: planned ways of a hand are long ways for a thing.
             try:
@@ -228,10 +234,18 @@ class SetDown:
         raise failed("carry", refused) from refused
 
     @staticmethod
-    def _tallest(context: Context, here: Array, there: Array) -> float:
-        """Return the height of the tallest thing on the straight way between two places (3,), in odom [m]."""
+    def _scene(context: Context, goal: PlaceGoal, hand: Array) -> Array:
+        """Return the points (n, 3) in odom that the head camera shows, as this hand finds them, less what it holds."""
         scene = context.scene("head")
-        scene = scene[np.linalg.norm(scene - here, axis=1) > IN_HAND]
+        scene = scene + (*goal.off, 0.0) if goal.off else scene
+        # Distance from hand and what hangs below it.
+        away = scene - hand
+        away[:, 2] -= np.clip(away[:, 2], -goal.below, 0.0)
+        return scene[np.linalg.norm(away, axis=1) > IN_HAND]
+
+    @staticmethod
+    def _tallest(scene: Array, here: Array, there: Array) -> float:
+        """Return the height of the tallest of `scene` (n, 3) on the straight way between two places (3,) [m]."""
         way = (there - here)[:2]
         share = np.clip((scene[:, :2] - here[:2]) @ way / max(float(way @ way), 1e-6), 0.0, 1.0)
         off = np.linalg.norm(scene[:, :2] - here[:2] - share[:, None] * way, axis=1)
@@ -239,11 +253,12 @@ class SetDown:
         return float(np.quantile(near[:, 2], 0.995)) if len(near) else -np.inf
 
     @staticmethod
-    def _turned(T: Array, turn: float, at: Array) -> Array:
-        """Return pose `T` (4, 4) at `at` (3,), turned by `turn` about the vertical [rad]."""
+    def _turned(T: Array, turn: float, at: Array, aside: tuple[float, ...]) -> Array:
+        """Return pose `T` (4, 4) turned by `turn` about the vertical [rad], with what is `aside` it at `at` (3,)."""
         moved = T.copy()
         moved[:3, :3] = Rotation.from_euler("z", turn).as_matrix() @ T[:3, :3]
         moved[:3, 3] = at
+        moved[:2, 3] -= moved[:2, :2] @ aside
         return moved
 
     def _upright(self, context: Context, side: Side) -> list[Rule]:

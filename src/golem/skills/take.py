@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from golem.capabilities.arms.postures import posture
-from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.grasping.base import Grasp, GraspMethod
-from golem.capabilities.grasping.centroid import grasp_pose
 from golem.capabilities.grasping.object_cloud import spaced
 from golem.capabilities.planning.base import PlanRefused
-from golem.errors import ConfigError
 from golem.interfaces.payloads import GripState
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.poses import lifted, retracted
-from golem.skills.ware_sight import find, palm_view, seen_again, surface_below
+from golem.skills.take_config import TakeGoal, TakeReport, TakeThingConfig
+from golem.skills.ware_sight import find, surface_below
 from golem.types import SIDES, Array, LocalizedObject, Side
 
 if TYPE_CHECKING:
@@ -32,103 +30,13 @@ SPARED = 0.07
 """Radius around points of the thing within which nothing is in the hand's way [m]."""
 EVERY = 0.06
 """Distance of those points [m]."""
-NEAR = 0.03
-"""How far from where the palm camera is to look from a hand may arrive [m]."""
-COMFORT: Array = np.array([0.45, -0.15, 0.0])
-"""Where the right hand works best, in base_link [m]; its height does not count."""
 SPARE = 0.024
 """How much wider than the grasp asks for the hand arrives [m]: encoders and palm camera are off by a centimetre."""
+CENTRED = 0.02
+"""Distance along the closing axis within which a thing's middle comes between the fingers as they close [m]."""
+HEARD = 0.06
+"""Time in which a hand begins what it was told [s]."""
 TOP, FORWARD = "top", "forward"
-
-
-@dataclass(frozen=True, slots=True)
-class TakeGoal:
-    """What to take.
-
-    Attributes:
-        label: class of the thing.
-        side: which hand; `either` begins with the one on whose side it stands.
-        approach: `top` comes down on it, `forward` from the robot; `either` tries both.
-        near: x, y in odom where it is expected [m], one after the other; of several the nearest is taken.
-    """
-
-    label: str
-    side: Literal["left", "right", "either"] = "either"
-    approach: Literal["top", "forward", "either"] = "either"
-    near: tuple[float, ...] = ()
-
-    def __post_init__(self) -> None:
-        """Check that it can be meant.
-
-        Raises:
-            ConfigError: there is no class, or the place is none.
-        """
-        if not self.label:
-            raise ConfigError("Taking needs the class of the thing.")
-        if len(self.near) not in (0, 2) or not all(map(math.isfinite, self.near)):
-            raise ConfigError("Where a thing is expected are two finite numbers, x and y.")
-
-
-@dataclass(frozen=True)
-class TakeThingConfig:
-    """Distances, speeds and forces.
-
-    Attributes:
-        before: distance from the grasp, along the approach, from which the hand goes straight to it [m].
-        watch: distance of the fingertips from the thing when the palm camera looks at it [m].
-        lean: how far a forward approach leans down [rad]: level with a low counter the forearm does not reach.
-        look_again: whether the palm camera corrects what the head camera saw; without, all is open loop.
-        trust: how far from where the head camera has it the palm camera may see it [m].
-        attempts: how many proposed grasps of one approach are tried to be reached.
-        travel_speed: between places [m/s].
-        reach_speed: straight to the thing, and up with it [m/s].
-        force: of each finger [N].
-        close_timeout: time the fingers may take [s].
-        lift: how high it is lifted [m].
-        turn: how far the torso turns to either side where it is not in view [rad]; 0: not at all.
-        tolerance: distance from a commanded pose at which the arm counts as arrived [m].
-        look_timeout: time a camera may take to show it [s].
-        timeout: time after which it is given up [s].
-    """
-
-    before: float = 0.12
-    watch: float = 0.12
-    lean: float = 0.5
-    look_again: bool = True
-    trust: float = 0.15
-    attempts: int = 6
-    travel_speed: float = 0.25
-    reach_speed: float = 0.08
-    force: float = 16.0
-    close_timeout: float = 2.5
-    lift: float = 0.12
-    turn: float = 0.45
-    tolerance: float = 0.006
-    look_timeout: float = 1.5
-    timeout: float = 90.0
-
-
-@dataclass
-class TakeReport:
-    """What was taken, and how.
-
-    Attributes:
-        side: hand that has it; empty where none does.
-        approach: `top` or `forward`.
-        x, y, z: where it stood, in odom [m].
-        below: height of the fingertips above what it stood on [m].
-        above: height of its top above the fingertips [m].
-        width: how far the fingers are open around it [m].
-    """
-
-    side: str = ""
-    approach: str = ""
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    below: float = 0.0
-    above: float = 0.0
-    width: float = 0.0
 
 
 class Take:
@@ -232,6 +140,7 @@ class Take:
         kind: str,
     ) -> Grasp:
         """Bring one hand before the thing along one approach, look again, and return the grasp to go on to."""
+        from golem.skills.palm_look import PalmLook
         from golem.skills.travel import failed
 
         c, way = self._config, self._way(context, target, kind)
@@ -243,63 +152,35 @@ class Take:
         try:
             name = f"{'ready' if kind == TOP else 'forward'}_{side}"
             await motion.to_joints(posture(name), [side], c.travel_speed)
+            look = PalmLook(context, motion, side, c)
             if c.look_again:
-                T = self._watching(context, target, side, np.array(way), yaw)
-                await motion.to({side: T}, c.travel_speed, near=NEAR)
-                palm = await palm_view(context, side, target.label, c.look_timeout)
-                target, scene = self._corrected(context, motion, target, palm)
+                target, scene, way = await look.at(target, way, yaw)
+                self._report.off_x, self._report.off_y = look.off.tolist()
         except PlanRefused as refusal:
             raise failed("approach", refusal) from refusal
-        grasps = await context.propose(method, target, side, yaw, way, scene)
+        grasps = await context.propose(method, target, side, yaw, (way[0], way[1], way[2]), scene)
         if not grasps:
             raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {target.label}.")
         grasp = await self._reach_before(motion, side, grasps)
+        if c.look_again:
+            try:
+                grasp, view = await look.before(target, scene, grasp)
+            except PlanRefused as refusal:
+                raise failed("approach", refusal) from refusal
+            target, scene = replace(target, points=view.thing), view.around
         self._measure(scene, target, grasp)
         return grasp
 
-    def _watching(
-        self, context: Context, target: LocalizedObject, side: Side, way: Array, yaw: float
-    ) -> Array:
-        """Return the (4, 4) pose in odom from which the palm camera shows the thing, wherever it is about there.
-
-        A hand that looks down stays within its reach: the head camera may show the thing a little beyond it.
-        """
-        points = target.points if len(target.points) else target.position[None]
-        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        if way[2] > -0.9:
-            return grasp_pose(middle - self._config.watch * way, yaw, -way)
-        middle[2] = points[:, 2].max() + self._config.watch
-        T = context.T_odom_base
-        local = T[:3, :3].T @ (middle - T[:3, 3])
-        mirror = np.array([1.0, 1.0 if side == "right" else -1.0, 1.0])
-        best, reach = COMFORT * mirror + (0.0, 0.0, local[2]), load_map()
-        shares = np.linspace(0.0, 1.0, 11)
-        there = next((s for s in shares if reach.serves(side, local + s * (best - local))), 1.0)
-        return grasp_pose(T[:3, :3] @ (local + there * (best - local)) + T[:3, 3], yaw, -way)
-
-    def _corrected(
-        self, context: Context, motion: PlannedMotion, target: LocalizedObject, palm: Array
-    ) -> tuple[LocalizedObject, Array]:
-        """Return the thing and what is around it as the palm camera shows it, or as it was where that shows nothing."""
-        seen = seen_again(palm, target, self._config.trust)
-        if seen is None:
-            context.say("approach", f"The palm camera does not show the {target.label}.")
-            return target, context.scene("head")
-        off = np.median(seen.points, axis=0) - np.median(target.points, axis=0)
-        motion.displace(np.append(off[:2], 0.0))
-        context.say("approach", f"It is {1e3 * math.hypot(*off[:2]):.0f} mm from where it seemed.")
-        return seen, palm
-
-    def _way(self, context: Context, target: LocalizedObject, kind: str) -> tuple[float, float, float]:
-        """Return the direction in odom along which the hand is to come."""
+    def _way(self, context: Context, target: LocalizedObject, kind: str) -> Array:
+        """Return the direction (3,) in odom along which the hand is to come."""
         if kind == TOP:
-            return 0.0, 0.0, -1.0
+            return np.array([0.0, 0.0, -1.0])
         T = context.T_odom_base
         off = T[:3, :3].T @ (target.position - T[:3, 3])
         # Half of the way towards the thing: an elbow beside the trunk points ahead rather than across.
         heading = math.atan2(T[1, 0], T[0, 0]) + 0.5 * math.atan2(float(off[1]), float(off[0]))
         level, down = math.cos(self._config.lean), -math.sin(self._config.lean)
-        return level * math.cos(heading), level * math.sin(heading), down
+        return np.array([level * math.cos(heading), level * math.sin(heading), down])
 
     async def _reach_before(self, motion: PlannedMotion, side: Side, grasps: list[Grasp]) -> Grasp:
         """Bring the hand before the first grasp that it gets to, and on to; returns that grasp."""
@@ -325,8 +206,13 @@ class Take:
         low = float(np.quantile(cloud[:, 2], 0.02)) if level is None else level
         self._report.below = max(tips - low, 0.0)
         self._report.above = max(float(np.quantile(cloud[:, 2], 0.98)) - tips, 0.0)
-        middle = np.median(cloud, axis=0)
+        middle = 0.5 * (np.quantile(cloud, 0.02, axis=0) + np.quantile(cloud, 0.98, axis=0))
         self._report.x, self._report.y, self._report.z = (float(v) for v in middle)
+        T = grasp.T_odom_gripper
+        self._report.aside_x, self._report.aside_y = ((middle - T[:3, 3]) @ T[:3, :2]).tolist()
+        # What the closing fingers do not hold in their middle they bring there, or go to.
+        if abs(self._report.aside_y) < CENTRED:
+            self._report.aside_y = 0.0
 
     async def _grasp(self, context: Context, motion: PlannedMotion, side: Side, grasp: Grasp) -> None:
         """Go straight to the thing and close."""
@@ -342,8 +228,11 @@ class Take:
             raise failed("reach", refusal) from refusal
         await arm.settle(c.tolerance, 2.0)
         context.say("grasp", f"Closing with {c.force:g} N per finger.", side=side)
-        hand.close(c.force)
-        await context.until(lambda: hand.status.state in CLOSED, c.close_timeout)
+        # Softly first: the finger that touches first waits for the other instead of pushing the thing over.
+        for force in (c.touch, c.force):
+            hand.close(force)
+            await context.sleep(HEARD)
+            await context.until(lambda: hand.status.state in CLOSED, c.close_timeout)
         if not hand.status.holding:
             text = f"The fingers hold nothing (gap {hand.status.gap * 1e3:.0f} mm)."
             raise StageFailed("grasp", "grasp_method", text)

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from golem.capabilities.grasping.object_cloud import MIN_POINTS, piece
+from golem.capabilities.grasping.centroid import UP
+from golem.capabilities.grasping.object_cloud import MIN_POINTS, piece_at, spaced
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
 from golem.types import Array, LocalizedObject, Side
@@ -19,6 +20,10 @@ TIPS = 0.004
 """Points of a palm camera that are less beyond the fingertips are the fingers' own [m]."""
 PROUD = 0.012
 """Height above a surface from which on points are of what stands on it [m]."""
+LEANS = 0.25
+"""How far a level surface may seem to lean to a hand [rad]."""
+HYPOTHESES = 400
+"""Planes through three points that are tried."""
 STRAY = 8
 """Pieces that are too small to be a thing, and are passed over."""
 FRAMES = 3
@@ -86,23 +91,60 @@ async def palm_view(context: Context, side: Side, label: str, seconds: float) ->
     return points[(points - T[:3, 3]) @ T[:3, 2] > TIPS]
 
 
-def seen_again(points: Array, target: LocalizedObject, trust: float) -> LocalizedObject | None:
-    """Return `target` as another camera's `points` (n, 3) show it; None where nothing like it is within `trust` [m]."""
+def seen_again(points: Array, target: LocalizedObject, trust: float) -> tuple[LocalizedObject, Array] | None:
+    """Return `target` as a palm camera's `points` (n, 3) show it, and the (3,) normal of the surface it stands on.
+
+    A hand whose encoders are off by degrees sees a level surface lean: its normal is what is upright to that hand.
+    None where nothing like the thing is within `trust` [m].
+    """
     middle = np.median(target.points, axis=0) if len(target.points) else target.position
     around = points[np.linalg.norm(points[:, :2] - middle[:2], axis=1) < trust + 0.10]
     if len(around) < MIN_POINTS:
         return None
-    level = surface_below(around, middle)
-    if level is not None:
-        around = around[around[:, 2] > level + PROUD]
+    upright = UP
+    surface = leaning_surface(around)
+    if surface is not None:
+        upright, offset = surface
+        around = around[around @ upright > offset + PROUD]
     cloud = around[:0]
-    for _ in range(STRAY):
-        cloud = piece(around, middle)
-        if len(cloud) >= MIN_POINTS or not len(cloud):
+    for _ in range(STRAY if len(around) else 0):
+        # Seen from above a bottle is a cap over a shoulder, with nothing between them: pieces are those of its plan.
+        own = piece_at(around - np.outer((around - middle) @ upright, upright), middle)
+        cloud, around = around[own], around[~own]
+        if len(cloud) >= MIN_POINTS or not len(around):
             break
-        around = around[(np.abs(around[:, None] - cloud).sum(axis=2) > 0.0).all(axis=1)]
     if len(cloud) < MIN_POINTS or np.hypot(*(np.median(cloud, axis=0) - middle)[:2]) > trust:
         return None
-    centre = np.median(cloud, axis=0)
+    centre = 0.5 * (cloud.min(axis=0) + cloud.max(axis=0))
+    centre += (np.quantile(cloud @ upright, 0.9) - centre @ upright) * upright
     nearest = cloud[((cloud - centre) ** 2).sum(axis=1).argmin()].copy()
-    return replace(target, position=nearest, points=cloud, mask=None)
+    return replace(target, position=nearest, points=cloud, mask=None), upright
+
+
+def leaning_surface(points: Array) -> tuple[Array, float] | None:
+    """Return the largest nearly level plane in `points` (n, 3): its upward unit normal (3,), and its offset along it.
+
+    Each cube of space counts once, however many pixels see it: a lid near to a camera has more than its table. None
+    where too little is seen.
+    """
+    cubes = spaced(points, 0.008)
+    if len(cubes) < MIN_POINTS:
+        return None
+    rng = np.random.default_rng(0)
+    a, b, c = cubes[rng.integers(0, len(cubes), (3, HYPOTHESES))]
+    normals = np.cross(b - a, c - a)
+    normals *= np.sign(normals[:, 2:3])
+    size = np.linalg.norm(normals, axis=1)
+    kept = normals[:, 2] > np.cos(LEANS) * size
+    normals, a = normals[kept] / np.maximum(size[kept, None], 1e-12), a[kept]
+    if not len(normals):
+        return None
+    counts = (np.abs(cubes @ normals.T - np.einsum("ij,ij->i", a, normals)) < 0.5 * LAYER).sum(axis=0)
+    best = int(counts.argmax())
+    on = cubes[np.abs((cubes - a[best]) @ normals[best]) < 0.5 * LAYER]
+    if len(on) < MIN_POINTS:
+        return None
+    middle = on.mean(axis=0)
+    normal = np.linalg.svd(on - middle, full_matrices=False)[2][2]
+    normal = normal if normal[2] > 0.0 else -normal
+    return (normal, float(middle @ normal)) if normal[2] > np.cos(LEANS) else None

@@ -9,6 +9,7 @@ from golem.capabilities.grasping.antipodal import Antipodal, AntipodalConfig, up
 from golem.capabilities.grasping.base import Gripper
 from golem.capabilities.grasping.hand_volume import collides
 from golem.capabilities.grasping.object_cloud import normals_of, object_points
+from golem.capabilities.grasping.view_shift import View, shift_between
 from golem.errors import ConfigError
 from golem.finite import NotFinite
 from golem.types import Array, LocalizedObject
@@ -65,6 +66,37 @@ def test_a_grasp_closes_on_two_sides_along_the_wanted_approach(
     away = (axis - best[:2, 3]) @ best[:2, 1]
     assert abs(away) < 0.008
     assert abs(best[2, 1]) < 0.4
+
+
+def test_a_lid_is_held_in_its_middle_and_far_down() -> None:
+    rng = np.random.default_rng(0)
+    turn, radius = rng.uniform(0.0, 2 * np.pi, 2000), 0.034 * np.sqrt(rng.random(2000))
+    lid = things.CAN + np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full(2000, 0.12)])
+    table = things.CAN + np.column_stack([rng.uniform(-0.15, 0.15, (4000, 2)), np.zeros(4000)])
+    scene = np.concatenate([lid, table])
+    grasps = Antipodal().propose(things.seen(lid, lid[0]), scene, hand(DOWN))
+    best = grasps[0].T_odom_gripper
+    np.testing.assert_allclose(best[:2, 3], things.CAN[:2], atol=0.004)
+    assert 0.03 < best[2, 3] - things.CAN[2] < 0.075
+    # A round thing is offered to the wrist in many turns.
+    turns = {round(float(np.arctan2(*g.T_odom_gripper[:2, 1])) % np.pi, 1) for g in grasps[:20]}
+    assert len(turns) > 4
+
+
+def test_what_has_moved_is_found_again_though_a_part_is_hidden() -> None:
+    rng = np.random.default_rng(0)
+    turn, radius = rng.uniform(0.0, 2 * np.pi, 2000), 0.04 * np.sqrt(rng.random(2000))
+    lid = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full(2000, 0.12)])
+    table = np.column_stack([rng.uniform(-0.15, 0.15, (9000, 2)), np.zeros(9000)])
+    moved = lid + (0.017, -0.008, -0.006)
+    # The second view ends in the middle of the thing.
+    shown = moved[moved[:, 1] < 0.01]
+    before, after = (
+        View(lid, np.concatenate([lid, table])),
+        View(shown, np.concatenate([shown, table[table[:, 1] < 0.01]])),
+    )
+    shift = shift_between(before, after, DOWN)
+    np.testing.assert_allclose(shift, [0.017, -0.008, -0.006], atol=0.003)
 
 
 def test_fingers_that_would_be_in_a_wall_are_not_proposed() -> None:

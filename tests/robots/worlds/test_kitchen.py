@@ -8,6 +8,7 @@ import pytest
 
 from golem.robots.worlds.fridge import HANDLE, HINGE, FridgeLayout, seal_of
 from golem.robots.worlds.kitchen import add_kitchen, draw_kitchen
+from golem.robots.worlds.parts import COLLISION_GROUP, VISUAL_GROUP
 from golem.robots.worlds.tableware import KINDS, add_object
 
 
@@ -41,6 +42,44 @@ def test_what_stands_on_the_counter_stays(seed: int) -> None:
         place = data.body(thing.body).xpos
         assert np.linalg.norm(place - thing.position) < 0.004
         assert data.body(thing.body).xmat[8] > 0.999
+
+
+def test_a_pad_beside_the_middle_of_a_can_presses_on_it_and_not_aside() -> None:
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    add_kitchen(spec, draw_kitchen(np.random.default_rng(0)))
+    radius = KINDS["can"][0]
+    add_object(spec, "can", "held", (0.0, 0.0, 3.0), 0.0, (1.0, 1.0, 1.0))
+    spec.worldbody.add_geom(
+        name="pad",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[0.008, 0.0015, 0.04],
+        pos=[0.01, radius + 0.0012, 3.05],
+    )
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    pad = model.geom("pad").id
+    normals = [c.frame[:3] for c in data.contact if pad in (c.geom1, c.geom2)]
+    assert normals and all(abs(normal[1]) > 0.95 for normal in normals)
+
+
+def test_a_bowl_is_as_wide_to_the_touch_as_to_the_eye() -> None:
+    spec = mujoco.MjSpec()
+    for name in ("steel", "dark", "label_white"):
+        spec.add_material(name=name)
+    add_object(spec, "bowl", "bowl", (0.0, 0.0, 0.0), 0.0, (1.0, 1.0, 1.0), loose=False)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    way = np.array([[-1.0], [0.0], [0.0]])
+    for height in (0.02, 0.035, 0.05):
+        far = {}
+        for group in (VISUAL_GROUP, COLLISION_GROUP):
+            seen = np.array([[int(k == group)] for k in range(6)], np.uint8)
+            hit = np.zeros((1, 1), np.int32)
+            far[group] = mujoco.mj_ray(model, data, np.array([[1.0], [0.0], [height]]), way, seen, 1, -1, hit)
+        assert far[VISUAL_GROUP] == pytest.approx(far[COLLISION_GROUP], abs=0.004)
 
 
 def test_a_mug_and_a_bowl_are_hollow() -> None:

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
@@ -20,29 +20,48 @@ from scipy.spatial import KDTree
 from golem.capabilities.grasping.base import Grasp, Gripper, OpenLoop
 from golem.capabilities.grasping.centroid import ACROSS, UP
 from golem.capabilities.grasping.hand_volume import collides, in_hands
-from golem.capabilities.grasping.object_cloud import MIN_POINTS, normals_of, object_points, spaced, thinned
+from golem.capabilities.grasping.object_cloud import (
+    MIN_POINTS,
+    PIXEL,
+    across,
+    normals_of,
+    object_points,
+    spaced,
+    thinned,
+)
+from golem.capabilities.grasping.outlines import borders, outline
 from golem.finite import check_finite
 from golem.options import require
 from golem.types import Array, LocalizedObject
 
 BETWEEN = 600
 """Points of the object on which hands are fitted."""
-PIXEL = 0.003
-"""Size of a pixel of the outline's image [m]."""
 RIM = 0.018
 """Thickness of the layer nearest to the hand that is a rim, if it is thin [m]; a wrong tilt of the camera leans it."""
 THIN = 0.020
 """Widest rim [m], as the layer's image shows it."""
-RIMS = 24
+STRAIGHT = 0.97
+"""Cosine of the angle at which a pair may cross a rim."""
+RIMS = 40
 """Pairs across a rim along which hands are laid at most."""
-DEEP = 0.025
+DEPTHS = (0.045, 0.025, 0.0)
 """How much deeper than need be the fingertips go where that is free [m]: what is held by its edge turns and slips."""
+NARROW = 0.045
+"""Width up to which fingers do not go deepest [m]."""
 SHALLOW = 0.8
-"""What a grasp that goes no deeper counts, of one that does."""
+"""What a grasp counts that goes one of these less deep."""
+LEANS = (0.0, 0.3, -0.3, 0.6, -0.6)
+"""How far hands lean about the closing axis [rad]."""
 DEEPER = 0.015
 """How much further than elsewhere the fingertips go on both sides of a rim [m]: what hangs on it turns the less."""
 ROUND = 0.03
 """Greatest half width for which a thing that is seen across is taken to be round [m]: half of the hand's."""
+TWISTS: Array = np.array([2.0, 0.5])
+"""How much it counts that a thing hangs beside the fingers, across the closing axis and along it."""
+SPARE, TIGHT = 0.015, 0.4
+"""Opening beyond what a grasp asks for that leaves nothing to be wished [m], and what a grasp without it counts."""
+COMPACT = 0.10
+"""Greatest width of a thing that is held in its middle [m]."""
 SCENE = 20000
 """Points of the surroundings that are looked at."""
 
@@ -118,15 +137,19 @@ class Antipodal(OpenLoop):
         middles, axes, widths, quality, rims = self._pairs(cloud, gripper)
         if not len(middles):
             return []
-        T, turned, index, deep = self._hands(middles, axes, gripper, rims)
+        T, turned, index, worth = self._hands(middles, axes, widths, gripper, rims)
         if not len(T):
             return []
-        T, gaps, held = self._fit(T, widths[index], thinned(cloud, BETWEEN, c.seed))
-        off = T[:, :3, 3] - cloud.mean(axis=0)
-        off = np.linalg.norm(off - (off @ gripper.approach)[:, None] * gripper.approach, axis=1)
+        rim = index >= len(middles) - rims
+        T, gaps, held = self._fit(T, widths[index], thinned(cloud, BETWEEN, c.seed), rim)
+        # What hangs beside the closing axis turns about it, and friction alone is against that; along it, pads are.
+        off = np.einsum("nij,ni->nj", T[:, :3, :2], T[:, :3, 3] - cloud.mean(axis=0))
         size = float(np.linalg.norm(cloud.std(axis=0))) + 1e-6
-        score = quality[index] * (1.0 - 0.3 * turned / max(c.tilt, 1e-6)) * np.exp(-((off / size) ** 2))
-        score *= np.minimum(held / 6.0, 1.0) * np.where(deep, 1.0, SHALLOW)
+        score = quality[index] * (1.0 - 0.3 * turned / max(c.tilt, 1e-6))
+        score *= np.exp(-(off**2) @ TWISTS / size**2)
+        score *= np.minimum(held / 6.0, 1.0) * worth
+        # A hand that is as wide as it gets, and a few millimetres off, comes down on what it is to hold.
+        score *= np.clip((gripper.max_gap - gaps) / SPARE, TIGHT, 1.0)
         good = np.flatnonzero((gaps <= gripper.max_gap) & (held > 0))
         order = good[np.argsort(-score[good], kind="stable")]
         kept = self._distinct(T, gaps, order, self._around(cloud, scene))
@@ -152,9 +175,9 @@ class Antipodal(OpenLoop):
             np.abs(np.einsum("ij,ij->i", normals[a], way)), np.abs(np.einsum("ij,ij->i", normals[b], way))
         )
         # A closing axis along the approach lets no hand come.
-        across = np.abs(way @ gripper.approach) < math.sin(c.tilt)
+        sideways = np.abs(way @ gripper.approach) < math.sin(c.tilt)
         cone = math.cos(math.atan(c.friction))
-        held = np.flatnonzero((cosine > cone) & across)
+        held = np.flatnonzero((cosine > cone) & sideways)
         middle = 0.5 * (cloud[a[held]] + cloud[b[held]])
         way, width = way[held], width[held]
         quality = (cosine[held] - cone) / (1.0 - cone) * 0.5 + 0.5
@@ -177,7 +200,7 @@ class Antipodal(OpenLoop):
 
         Seen across it is more likely round: there they are half of the width behind what is seen.
         """
-        c, (u, v) = self.config, _across(gripper.approach)
+        c, (u, v) = self.config, across(gripper.approach)
         spots, normals = outline(cloud @ np.column_stack([u, v]))
         if len(spots) < 4:
             return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0)
@@ -202,7 +225,7 @@ class Antipodal(OpenLoop):
 
     def _rim_pairs(self, cloud: Array, gripper: Gripper) -> tuple[Array, Array, Array, Array]:
         """Return the same of pairs across the rim of a hollow thing: its nearest layer, where that is thin."""
-        u, v = _across(gripper.approach)
+        u, v = across(gripper.approach)
         along = cloud @ gripper.approach
         first = float(np.quantile(along, 0.01))
         spots, normals = borders(cloud[along < first + RIM] @ np.column_stack([u, v]))
@@ -213,7 +236,7 @@ class Antipodal(OpenLoop):
         way = spots[b] - spots[a]
         width = np.linalg.norm(way, axis=1)
         cosine = np.minimum(-np.einsum("ij,ij->i", normals[a], way), np.einsum("ij,ij->i", normals[b], way))
-        thin = np.flatnonzero((width > PIXEL) & (cosine > 0.9 * width))
+        thin = np.flatnonzero((width > PIXEL) & (cosine > STRAIGHT * width))
         thin = thin[np.linspace(0, len(thin) - 1, min(RIMS, len(thin))).astype(int)]
         a, b, width = a[thin], b[thin], width[thin]
         flat = 0.5 * (spots[a] + spots[b])
@@ -222,22 +245,24 @@ class Antipodal(OpenLoop):
         return middle, axes, width, np.full(len(thin), 0.7)
 
     def _hands(
-        self, middles: Array, axes: Array, gripper: Gripper, rims: int
-    ) -> tuple[Array, Array, NDArray[np.intp], NDArray[np.bool_]]:
-        """Return poses (m, 4, 4), how far each leans (m,) [rad], its pair (m,), and (m,) whether it goes `DEEP`.
+        self, middles: Array, axes: Array, widths: Array, gripper: Gripper, rims: int
+    ) -> tuple[Array, Array, NDArray[np.intp], Array]:
+        """Return poses (m, 4, 4), how far each leans (m,) [rad], its pair (m,), and what its depth is worth (m,).
 
-        A hand on one of the last `rims` pairs does not lean: the finger that leans over a bowl tips it.
+        A hand on one of the last `rims` pairs does not lean: the finger that leans over a bowl tips it. Nor does it go
+        deepest: there is a bottom; and what is narrow stands on something wider, such as a bottle's neck.
         """
         c, approach = self.config, gripper.approach
         z = approach - (axes @ approach)[:, None] * axes
         z /= np.linalg.norm(z, axis=1, keepdims=True)
         x = np.cross(axes, z)
-        rows, leans, pairs, deep = [], [], [], []
-        for turn, extra in ((0.0, DEEP), (0.0, 0.0), (0.3, 0.0), (-0.3, 0.0), (0.6, 0.0), (-0.6, 0.0)):
+        rows, leans, pairs, worth = [], [], [], []
+        for (less, extra), turn in product(enumerate(DEPTHS), LEANS):
             z_turned = math.cos(turn) * z + math.sin(turn) * x
             lean = np.arccos(np.clip(z_turned @ approach, -1.0, 1.0))
             kept = np.flatnonzero(lean <= c.tilt + 1e-9)
-            kept = kept[kept < len(middles) - rims] if turn else kept
+            kept = kept[kept < len(middles) - rims] if turn or not less else kept
+            kept = kept if less else kept[widths[kept] > NARROW]
             T = np.tile(np.eye(4), (len(kept), 1, 1))
             T[:, :3, 1], T[:, :3, 2] = axes[kept], z_turned[kept]
             T[:, :3, 0] = np.cross(axes[kept], z_turned[kept])
@@ -245,22 +270,28 @@ class Antipodal(OpenLoop):
             rows.append(T)
             leans.append(lean[kept])
             pairs.append(kept)
-            deep.append(np.full(len(kept), extra > 0.0))
+            worth.append(np.full(len(kept), SHALLOW**less))
         hands = upright(np.concatenate(rows), gripper.yaw)
-        return hands, np.concatenate(leans), np.concatenate(pairs), np.concatenate(deep)
+        return hands, np.concatenate(leans), np.concatenate(pairs), np.concatenate(worth)
 
-    def _fit(self, T: Array, widths: Array, cloud: Array) -> tuple[Array, Array, Array]:
-        """Return poses centred on what lies between their pads, the openings it takes, and how many points it is."""
+    def _fit(
+        self, T: Array, widths: Array, cloud: Array, rims: NDArray[np.bool_]
+    ) -> tuple[Array, Array, Array]:
+        """Return poses centred on what lies between their pads, the openings it takes, and how many points it is.
+
+        A pad is 16 mm wide: one beside the middle of a round thing turns it out. So a thing that is no wider than a
+        hand is held in its middle across the fingers, too; a rim, or a long bar, where the pair is.
+        """
         local = in_hands(T, cloud)
+        before = (local[..., 2] < 0.0) & (local[..., 2] > -0.08)
         reach = 0.5 * widths[:, None] + 0.02
-        between = (np.abs(local[..., 0]) < 0.008) & (local[..., 2] < 0.0) & (local[..., 2] > -0.08)
-        between &= np.abs(local[..., 1]) < reach
+        low, high = _extent(local[..., 0], before & (np.abs(local[..., 1]) < reach))
+        off = np.where((high - low < COMPACT) & ~rims, 0.5 * (low + high), 0.0)
+        between = before & (np.abs(local[..., 0] - off[:, None]) < 0.008) & (np.abs(local[..., 1]) < reach)
         held = between.sum(axis=1)
-        low = np.where(held > 0, np.where(between, local[..., 1], np.inf).min(axis=1), 0.0)
-        high = np.where(held > 0, np.where(between, local[..., 1], -np.inf).max(axis=1), 0.0)
-        shift = 0.5 * (low + high)
+        low, high = _extent(local[..., 1], between)
         T = T.copy()
-        T[:, :3, 3] += shift[:, None] * T[:, :3, 1]
+        T[:, :3, 3] += off[:, None] * T[:, :3, 0] + 0.5 * (low + high)[:, None] * T[:, :3, 1]
         gaps = np.where(held > 0, high - low, widths) + 2.0 * self.config.room
         return T, gaps, held
 
@@ -280,59 +311,20 @@ class Antipodal(OpenLoop):
             for k in some[~collides(T[some], gaps[some], around)].tolist():
                 away = np.linalg.norm(T[kept, :3, 3] - T[k, :3, 3], axis=1)
                 turned = T[kept, :3, 2] @ T[k, :3, 2]
-                if not ((away < c.apart) & (turned > math.cos(c.alike))).any():
+                rolled = np.abs(T[kept, :3, 1] @ T[k, :3, 1])
+                if not ((away < c.apart) & (np.minimum(turned, rolled) > math.cos(c.alike))).any():
                     kept.append(k)
                 if len(kept) == c.most:
                     return kept
         return kept
 
 
-def _across(approach: Array) -> tuple[Array, Array]:
-    """Return two (3,) unit vectors across `approach` (3,) and each other."""
-    u = np.cross(approach, (0.0, 0.0, 1.0) if abs(approach[2]) < 0.7 else (1.0, 0.0, 0.0))
-    u /= np.linalg.norm(u)
-    return u, np.cross(approach, u)
-
-
-def outline(flat: Array) -> tuple[Array, Array]:
-    """Return points (n, 2) on the outer border of a cloud (m, 2) in a plane [m], and their outward normals (n, 2)."""
-    found = _borders(flat, cv2.RETR_EXTERNAL, 5)
-    return max(found, key=lambda one: len(one[0])) if found else (np.zeros((0, 2)), np.zeros((0, 2)))
-
-
-def borders(flat: Array) -> tuple[Array, Array]:
-    """Return the same of all borders of all pieces of a cloud, those of holes, too."""
-    found = _borders(flat, cv2.RETR_CCOMP, 3) if len(flat) else []
-    spots, normals = (
-        [np.zeros((0, 2)), *(one[0] for one in found)],
-        [np.zeros((0, 2)), *(one[1] for one in found)],
-    )
-    return np.concatenate(spots), np.concatenate(normals)
-
-
-def _borders(flat: Array, which: int, closing: int) -> list[tuple[Array, Array]]:
-    """Return points (n, 2) and outward normals (n, 2) of each border that OpenCV's mode `which` finds."""
-    low = flat.min(axis=0) - 4 * PIXEL
-    pixels = np.round((flat - low) / PIXEL).astype(int)
-    image = np.zeros(tuple(pixels.max(axis=0) + 5), np.uint8)
-    image[tuple(pixels.T)] = 1
-    image = cv2.morphologyEx(image, cv2.MORPH_CLOSE, np.ones((closing, closing), np.uint8))
-    rings, levels = cv2.findContours(image, which, cv2.CHAIN_APPROX_NONE)
-    return [
-        _smoothed(ring[:, 0, ::-1].astype(np.float64), low, hole=which == cv2.RETR_CCOMP and level[3] >= 0)
-        for ring, level in zip(rings, levels[0], strict=True)
-        if len(ring) >= 12
-    ]
-
-
-def _smoothed(ring: Array, low: Array, *, hole: bool) -> tuple[Array, Array]:
-    """Return a border (n, 2) in pixels as points [m], and their normals (n, 2), away from what it is the border of."""
-    smooth = np.mean([np.roll(ring, k, axis=0) for k in range(-2, 3)], axis=0)
-    along = np.roll(smooth, -3, axis=0) - np.roll(smooth, 3, axis=0)
-    normals = np.column_stack([along[:, 1], -along[:, 0]]) / (np.linalg.norm(along, axis=1)[:, None] + 1e-9)
-    # Which way round a border goes tells which side is out.
-    area = float(np.sum(smooth[:, 0] * np.roll(smooth[:, 1], -1) - np.roll(smooth[:, 0], -1) * smooth[:, 1]))
-    return smooth * PIXEL + low, normals if (area > 0.0) != hole else -normals
+def _extent(values: Array, counted: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Return the least and the greatest (n,) of those `values` (n, m) that are `counted`; 0 where none is."""
+    some = counted.any(axis=1)
+    low = np.where(counted, values, np.inf).min(axis=1)
+    high = np.where(counted, values, -np.inf).max(axis=1)
+    return np.where(some, low, 0.0), np.where(some, high, 0.0)
 
 
 def upright(T: Array, yaw: float) -> Array:

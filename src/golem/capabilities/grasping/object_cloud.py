@@ -21,6 +21,8 @@ TESTED = 800
 """Points that each of them is tried on."""
 CELL = 0.012
 """Points of neighbouring cells of this size belong to one piece [m]."""
+PIXEL = 0.003
+"""Size of a pixel of a silhouette [m]."""
 MIN_POINTS = 20
 """Fewer points are no object to grasp."""
 
@@ -76,13 +78,18 @@ def support_plane(points: Array, position: Array, seed: int = 0) -> tuple[Array,
     middle = on.mean(axis=0)
     normal = np.linalg.svd(on[:: max(1, len(on) // TESTED)] - middle, full_matrices=False)[2][2]
     offset = float(middle @ normal)
+    if abs(float(position @ normal) - offset) < 0.75 * PLANE:
+        return None
     return (normal, offset) if position @ normal > offset else (-normal, -offset)
 
 
 def piece(points: Array, position: Array) -> Array:
     """Return the connected piece of `points` (n, 3) that is nearest to `position` (3,)."""
-    if not len(points):
-        return points
+    return points[piece_at(points, position)] if len(points) else points
+
+
+def piece_at(points: Array, position: Array) -> NDArray[np.bool_]:
+    """Return which of `points` (n, 3), at least one, are of that piece."""
     cells = np.floor((points - points.min(axis=0)) / CELL).astype(int)
     taken = np.zeros(cells.max(axis=0) + 1, bool)
     taken[tuple(cells.T)] = True
@@ -90,7 +97,14 @@ def piece(points: Array, position: Array) -> Array:
     ndimage.label(taken, np.ones((3, 3, 3)), output=number)
     own = number[tuple(cells.T)]
     nearest = int(((points - position) ** 2).sum(axis=1).argmin())
-    return points[own == own[nearest]]
+    return own == own[nearest]
+
+
+def across(approach: Array) -> tuple[Array, Array]:
+    """Return two (3,) unit vectors across `approach` (3,) and each other."""
+    u = np.cross(approach, (0.0, 0.0, 1.0) if abs(approach[2]) < 0.7 else (1.0, 0.0, 0.0))
+    u /= np.linalg.norm(u)
+    return u, np.cross(approach, u)
 
 
 def thinned(points: Array, most: int, seed: int = 0) -> Array:

@@ -24,7 +24,7 @@ from golem.robots.worlds.tableware import KINDS
 from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import SkillResult
 from golem.skills.place import PlaceGoal
-from golem.skills.take import TakeGoal, TakeReport
+from golem.skills.take_config import TakeGoal, TakeReport
 from golem.types import Side
 
 AREA = ((0.44, 0.54), (-0.38, 0.38))
@@ -98,7 +98,8 @@ class CounterRung(KitchenRung[CounterOptions]):
         found = taken.value if isinstance(taken.value, TakeReport) else TakeReport()
         spot = np.linalg.inv(robot.truth.T_world_odom) @ (*place, 0.0, 1.0)
         side: Side = "left" if found.side == "left" else "right"
-        there = PlaceGoal(float(spot[0]), float(spot[1]), "odom", side, found.below, found.above)
+        aside, off = (found.aside_x, found.aside_y), (found.off_x, found.off_y)
+        there = PlaceGoal(float(spot[0]), float(spot[1]), "odom", side, found.below, found.above, aside, off)
         placed = running.execute("place", there, watch=watch)
         timings = {
             "detect_to_grasp": taken.timings.get("detect_to_grasp", 0.0),

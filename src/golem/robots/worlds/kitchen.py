@@ -32,6 +32,8 @@ APART = 0.04
 """Least distance between two things on the counter [m]."""
 LEAST_APART = 0.10
 """The same of things before the robot [m]: an open finger comes between them."""
+GRIP = 20.0
+"""How much stiffer friction is than contact (MuJoCo's `impratio`): at 1 a can creeps out of a hand in seconds."""
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
@@ -170,6 +172,10 @@ def add_kitchen(
         layout: as seen from where the robot should stand.
         at: that place in the world, x and y [m].
     """
+    # MuJoCo's native collision of convex shapes gives a can at a pad's edge a normal across the pad, which throws it
+    # out of the hand; libccd gives it the right one.
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
+    spec.option.impratio, spec.option.cone = GRIP, mujoco.mjtCone.mjCONE_ELLIPTIC
     _add_materials(spec, layout)
     sign = 1.0 if layout.fridge.handle_y < 0.0 else -1.0
     _add_room(spec, at)

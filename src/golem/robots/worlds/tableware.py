@@ -103,14 +103,9 @@ def _bowl(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str) -
     )
     parts.visual_mesh(body, mesh, material=material, name=f"{name}_shape")
     parts.collider(body, _CYLINDER, (foot, 0.005), (0.0, 0.0, 0.005), mass=0.3 * MASSES["bowl"])
-    lean = float(np.arctan2(radius - foot, height))
-    length = float(np.hypot(radius - foot, height)) / 2
-    middle = (radius + foot) / 2
-    for k in range(FACETS):
-        turn = 2 * np.pi * k / FACETS
-        size = (WALL / 2, np.pi * radius / FACETS, length)
-        pos = (middle * np.cos(turn), middle * np.sin(turn), height / 2)
-        parts.collider(body, _BOX, size, pos, quat=_turned(turn, lean), mass=0.7 * MASSES["bowl"] / FACETS)
+    # The wall in rings that follow its curve: a straight one leans by 34 deg, and no finger holds that by friction.
+    for low, high in zip(outer[0::2], outer[2::2], strict=False):
+        _leaning_ring(body, low, high, 0.7 * MASSES["bowl"] / 3)
     return (f"{name}_shape",)
 
 
@@ -150,6 +145,22 @@ def _bottle(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str)
         step = (share * radius, 0.035 * height)
         parts.collider(body, _CYLINDER, step, (0, 0, (low + 0.035) * height), mass=0.01 * MASSES["bottle"])
     return f"{name}_shape", f"{name}_cap", f"{name}_label"
+
+
+def _leaning_ring(
+    body: mujoco.MjsBody, low: tuple[float, float], high: tuple[float, float], mass: float
+) -> None:
+    """Add a wall of boxes around the z axis whose outer side goes from one (radius, height) to another."""
+    run, rise = high[0] - low[0], high[1] - low[1]
+    lean, length = float(np.arctan2(run, rise)), float(np.hypot(run, rise)) / 2
+    radius, height = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
+    # The box's own middle is half a wall behind its outer side.
+    radius, height = radius - 0.5 * WALL * np.cos(lean), height + 0.5 * WALL * np.sin(lean)
+    for k in range(FACETS):
+        turn = 2 * np.pi * k / FACETS
+        size = (WALL / 2, np.pi * high[0] / FACETS, length)
+        pos = (radius * np.cos(turn), radius * np.sin(turn), height)
+        parts.collider(body, _BOX, size, pos, quat=_turned(turn, lean), mass=mass / FACETS)
 
 
 def _ring(body: mujoco.MjsBody, radius: float, height: float, mass: float) -> None:
