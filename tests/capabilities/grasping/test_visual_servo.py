@@ -340,3 +340,18 @@ def test_a_doubtful_sighting_keeps_the_track_and_begins_none() -> None:
     doubtful = [thing(SCREW, score=0.16)]
     assert Chase(lambda t: doubtful).run(20.0).status is ServoStatus.LOST
     assert Chase(lambda t: steady(t) if t < 0.5 else doubtful).run(20.0).status is ServoStatus.CONVERGED
+
+
+def test_what_lies_far_below_the_tight_screw_is_no_neighbour() -> None:
+    deep = standing(NEIGHBOUR - (0.0, 0.0, 0.06), 0.0115)
+    assert Chase(lambda t: [standing(SCREW, 0.006), deep]).run(20.0).status is ServoStatus.TIGHT
+
+
+def test_a_head_camera_that_is_off_by_nine_centimetres_in_height_will_do() -> None:
+    chase = Chase(steady)
+    chase.law = VisualServo().servo(
+        thing(SCREW - (0.0, 0.0, 0.09)),
+        VisualServo().propose(thing(SCREW), NO_SCENE, Gripper("right", np.eye(4), -np.pi / 2))[0],
+        0.0,
+    )
+    assert chase.run(10.0).status is ServoStatus.CONVERGED

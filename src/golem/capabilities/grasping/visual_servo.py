@@ -32,8 +32,8 @@ class ServoLawConfig:
         first_score: least score of a first sighting; one that is where the object is expected may be doubtful.
         first_radius: how far from where the hand began the first sighting may be [m]: one pitch of the screws and half
             of one.
-        first_height: how far above or below where it is expected that may be [m].
-        left_radius: what is seen this near to an object that was left is that [m].
+        first_height: how far above or below where the head camera saw the object that may be [m].
+        left_radius: what is seen this near to an object that was left is that, and its neighbours are as high [m].
         confirm: sightings needed before the hand leaves its stand-off.
         standoff: height above the grasp at which the hand centres itself [m].
         slope: metres of height the hand keeps per metre of lateral error beyond `tolerance`.
@@ -62,7 +62,7 @@ class ServoLawConfig:
     gate: float = 16.3
     first_score: float = 0.3
     first_radius: float = 0.14
-    first_height: float = 0.05
+    first_height: float = 0.1
     left_radius: float = 0.035
     confirm: int = 3
     standoff: float = 0.07
@@ -174,11 +174,12 @@ class CentroidServo:
             middle, radius = (self._x[:2], c.again_radius) if self._found else (start, c.first_radius)
             away = [float(np.linalg.norm(s.position[:2] - middle)) for s in candidates]
             least = 0.0 if self._found else c.first_score
+            height = c.left_radius if self._left else c.first_height
             near = [
                 k
                 for k, s in enumerate(candidates)
                 if away[k] <= radius
-                and abs(s.position[2] - self._x[2]) <= c.first_height
+                and abs(s.position[2] - self._x[2]) <= height
                 and s.detection.score >= least
                 and not self._was_left(s)
             ]
