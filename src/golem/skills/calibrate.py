@@ -2,37 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from golem.capabilities.calibration.kinematic_fit import TagView, fit
-from golem.capabilities.calibration.tag_detector import TagDetector
 from golem.capabilities.calibration.view_postures import view_postures
-from golem.capabilities.collision.obstacles import Obstacle, World
-from golem.capabilities.planning.base import PlanRefused
-from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
-from golem.interfaces import topics
 from golem.options import require
-from golem.robots.model.spatial import skew, transform
-from golem.robots.model.tag_cuff import cuff_tags
 from golem.robots.sensors.calibration_file import read_calibration
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file
-from golem.skills.planned_motion import PlannedMotion
-from golem.types import SIDES, CameraInfo, Side
+from golem.skills.tag_looks import TagLooks
+from golem.types import SIDES
 
 CAMERA = "head"
-WORK_PLACE = World((Obstacle("box", transform((0.85, 0.0, -0.22)), (0.55, 1.3, 0.28), "work place"),))
-"""What the arms keep out of, in base_link [m]: whatever stands before the robot, up to 6 cm above its pelvis."""
-SPEED = 0.6
-"""How fast a hand goes from view to view [m/s]."""
-FRAMES = 2
-"""Frames that are looked at in one posture: the second one tells nothing new of a tag, but may show one at all."""
-FRAME_TIME = 1.0
-"""How long a frame is waited for [s]."""
+AHEAD = 1.0
+"""Distance ahead of the head camera at which its mount is judged [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,19 +94,19 @@ class Calibrate:
         """Calibrate; see `Skill`."""
         start = context.t
         file = kept_file(self.config.folder, goal.file, read_calibration) if goal.file else None
-        views, info = await self._views(context, goal)
-        if info is None:
+        looks, views = TagLooks(context, CAMERA), list[TagView]()
+        for side in SIDES:
+            postures = view_postures(side, goal.views, looks.free, looks.robot.model().placed, goal.seed)
+            views += await looks.views(postures, side, (side,), goal.settle, f"{side} hand")
+        if looks.info is None:
             raise StageFailed("look", "robot", "The head camera sends no images.")
         context.say("fit", f"Fitting {len(views)} views.")
-        found = fit(views, info)
-        ahead = np.array([0.0, 0.0, 1.0])
-        T, J = found.cameras[CAMERA], np.hstack([skew(-ahead), np.eye(3)])
-        spread = J @ found.covariances[CAMERA] @ J.T
+        found = fit(views, looks.info)
         report = CalibrateReport(
             found.views,
             found.residual,
-            float(np.linalg.norm(T[:3, :3] @ ahead + T[:3, 3] - ahead)),
-            math.sqrt(float(np.linalg.eigvalsh(spread).max())),
+            found.moved(CAMERA, AHEAD),
+            found.moved_sigma(CAMERA, AHEAD),
             float(np.abs(found.joint_offset).max()),
             float(found.joint_sigma.max()),
         )
@@ -132,58 +118,3 @@ class Calibrate:
         )
         context.say("done", text)
         return SkillResult(True, "done", None, f"{text}.", {"calibrate": context.t - start}, report)
-
-    async def _views(self, context: Context, goal: CalibrateGoal) -> tuple[list[TagView], CameraInfo | None]:
-        """Show the hands one after the other; return what was seen, and the camera."""
-        detector, motion = TagDetector(), PlannedMotion(context)
-        robot = PlanningRobot()
-        motion.world = WORK_PLACE
-        space = JointSpace(robot, context.joints, WORK_PLACE)
-        views: list[TagView] = []
-        info: CameraInfo | None = None
-        for side in SIDES:
-            home = context.commanded_joints.copy()
-            postures = view_postures(
-                side, goal.views, lambda q: space.verdict(q) == 0, robot.model().placed, goal.seed
-            )
-            for k, q in enumerate(postures):
-                context.say("look", f"{side} hand, view {k + 1} of {goal.views}.")
-                q[0] = home[0]
-                try:
-                    await motion.to_joints(q, (side,), SPEED)
-                except PlanRefused:
-                    continue
-                await context.sleep(goal.settle)
-                seen, info = await look_at_tags(context, detector, CAMERA, side, info)
-                if seen is not None:
-                    views.append(seen)
-            await motion.to_joints(home, (side,), SPEED)
-        return views, info
-
-
-async def look_at_tags(
-    context: Context, detector: TagDetector, camera: str, side: Side, info: CameraInfo | None
-) -> tuple[TagView | None, CameraInfo | None]:
-    """Look at a hand that rests; return what was seen with the joints of that moment, and the camera.
-
-    Args:
-        context: of the skill.
-        detector: of the tags.
-        camera: which camera looks.
-        side: the hand that is looked at.
-        info: the camera as far as it is known; returned where no image came.
-    """
-    own = cuff_tags(side)
-    with context.watch(camera, "screw") as stream:
-        for _ in range(FRAMES):
-            if await stream.look(FRAME_TIME) is None:
-                continue
-            frame = context.bus.latest(topics.rgbd_images(camera))
-            state = context.bus.latest(topics.LOW_STATE)
-            if frame is None or state is None:
-                continue
-            info = frame.info
-            corners = {n: c for n, c in detector.find(frame.rgb).items() if n in own}
-            if corners:
-                return TagView(side, state.q.copy(), corners), info
-    return None, info

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from golem.capabilities.calibration.hand_fit import OTHER, fit_hand
 from golem.capabilities.calibration.hand_view_postures import hand_view_postures
-from golem.capabilities.calibration.kinematic_fit import ZERO, TagView
-from golem.capabilities.calibration.tag_detector import TagDetector
-from golem.capabilities.planning.base import PlanRefused
-from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
+from golem.capabilities.calibration.kinematic_fit import ZERO
 from golem.options import require
-from golem.robots.model.spatial import skew
 from golem.robots.sensors.calibration_file import Calibration, read_calibration
 from golem.skills.base import SkillResult, StageFailed
-from golem.skills.calibrate import SPEED, WORK_PLACE, look_at_tags
 from golem.skills.context import Context
 from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file
-from golem.skills.planned_motion import PlannedMotion
-from golem.types import SIDES, CameraInfo, Side
+from golem.skills.tag_looks import TagLooks
+from golem.types import SIDES
 
 AHEAD = 0.1
 """Distance ahead of a palm camera at which its mount is judged [m]: where it looks at a part."""
@@ -101,16 +93,20 @@ class CalibrateHands:
         file = kept_file(self.config.folder, goal.file, read_calibration) if goal.file else None
         found: list[Calibration] = []
         for camera in SIDES:
-            views, info = await self._views(context, goal, camera)
-            if info is None:
+            looks = TagLooks(context, f"{camera}_hand")
+            postures = hand_view_postures(
+                camera, goal.views, looks.free, looks.robot.model().placed, goal.zero, goal.seed
+            )
+            views = await looks.views(postures, OTHER[camera], SIDES, goal.settle, f"{camera} palm camera")
+            if looks.info is None:
                 raise StageFailed("look", "robot", f"The {camera} palm camera sends no images.")
             context.say("fit", f"Fitting {len(views)} views of the {camera} palm camera.")
-            found.append(fit_hand(views, camera, info, goal.zero))
+            found.append(fit_hand(views, camera, looks.info, goal.zero))
         report = CalibrateHandsReport(
             tuple(each.views for each in found),
             tuple(each.residual for each in found),
-            tuple(_moved(each) for each in found),
-            tuple(_sigma(each) for each in found),
+            tuple(each.moved(camera, AHEAD) for each in found for camera in each.cameras),
+            tuple(each.moved_sigma(camera, AHEAD) for each in found for camera in each.cameras),
         )
         if file is not None:
             before = read_calibration(file) if file.exists() else Calibration()
@@ -126,44 +122,3 @@ class CalibrateHands:
         text = f"{sum(report.views)} views; of the palm cameras {said}, at {AHEAD:g} m"
         context.say("done", text)
         return SkillResult(True, "done", None, f"{text}.", {"calibrate": context.t - start}, report)
-
-    async def _views(
-        self, context: Context, goal: CalibrateHandsGoal, camera: Side
-    ) -> tuple[list[TagView], CameraInfo | None]:
-        """Show one palm camera the other hand; return what was seen, and the camera."""
-        detector, motion, robot = TagDetector(), PlannedMotion(context), PlanningRobot()
-        motion.world = WORK_PLACE
-        space = JointSpace(robot, context.joints, WORK_PLACE)
-        home = context.commanded_joints.copy()
-        postures = hand_view_postures(
-            camera, goal.views, lambda q: space.verdict(q) == 0, robot.model().placed, goal.zero, goal.seed
-        )
-        views: list[TagView] = []
-        info: CameraInfo | None = None
-        for k, q in enumerate(postures):
-            context.say("look", f"{camera} palm camera, view {k + 1} of {goal.views}.")
-            q[0] = home[0]
-            try:
-                await motion.to_joints(q, SIDES, SPEED)
-            except PlanRefused:
-                continue
-            await context.sleep(goal.settle)
-            seen, info = await look_at_tags(context, detector, f"{camera}_hand", OTHER[camera], info)
-            if seen is not None:
-                views.append(seen)
-        await motion.to_joints(home, SIDES, SPEED)
-        return views, info
-
-
-def _moved(found: Calibration) -> float:
-    """Return by how much the mount moves the point at which it is judged [m]."""
-    (T,) = found.cameras.values()
-    ahead = np.array([0.0, 0.0, AHEAD])
-    return float(np.linalg.norm(T[:3, :3] @ ahead + T[:3, 3] - ahead))
-
-
-def _sigma(found: Calibration) -> float:
-    """Return the standard deviation of that point, of its worst axis [m]."""
-    (covariance,) = found.covariances.values()
-    J = np.hstack([skew(np.array([0.0, 0.0, -AHEAD])), np.eye(3)])
-    return math.sqrt(float(np.linalg.eigvalsh(J @ covariance @ J.T).max()))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from golem.errors import ConfigError
+from golem.skills.detection_stream import SURE
 from golem.types import Side
 
 Hand = Literal["left", "right", "either"]
@@ -85,7 +86,7 @@ class PickConfig:
     yaw: float = -1.5707963267948966
     turns: tuple[float, ...] = (0.0, 0.4, -0.4)
     container_radius: float = 0.15
-    sure: float = 0.3
+    sure: float = SURE
     comfort: tuple[float, float] = (0.45, -0.12)
     attempts: int = 2
     candidates: int = 8

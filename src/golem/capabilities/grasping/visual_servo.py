@@ -122,10 +122,10 @@ class CentroidServo:
     def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
         """Advance; see `ServoLaw`."""
         c = self._config
-        self._start = T_odom_gripper[:2, 3].copy() if self._start is None else self._start
+        start = self._start = T_odom_gripper[:2, 3].copy() if self._start is None else self._start
         self._variance = self._variance + c.drift**2 * (t - self._t)
         self._t = t
-        seen = sightings is not None and self._update(t, sightings, T_odom_gripper)
+        seen = sightings is not None and self._update(t, sightings, start)
         status = ServoStatus.TRACKING
         if t - self._seen_at > c.lost_after:
             self._retreats += 1
@@ -147,11 +147,11 @@ class CentroidServo:
             if blind or self._inside >= c.dwell:
                 status = ServoStatus.CONVERGED
             if self._is_tight():
-                status = self._leave(t, ServoStatus.TIGHT)
+                status = self._leave(t, start, ServoStatus.TIGHT)
             if error < self._best - c.progress:
                 self._best, self._best_at = error, t
             elif t - self._best_at > c.stall_after and status is ServoStatus.TRACKING:
-                status = self._leave(t, ServoStatus.STALLED)
+                status = self._leave(t, start, ServoStatus.STALLED)
         else:
             self._best, self._best_at = np.inf, t
 
@@ -160,8 +160,11 @@ class CentroidServo:
         goal = grasp_pose(grasp + above * self._normal, self._yaw, self._normal)
         return ServoStep(goal, self._x.copy(), sigma, status)
 
-    def _update(self, t: float, sightings: list[LocalizedObject], T_odom_gripper: Array) -> bool:
-        """Fuse the sighting that belongs to the target; return whether there is one in this frame."""
+    def _update(self, t: float, sightings: list[LocalizedObject], start: Array) -> bool:
+        """Fuse the sighting that belongs to the target; return whether there is one in this frame.
+
+        `start` (2,) is where the hand began, in odom [m].
+        """
         c = self._config
         candidates = [s for s in sightings if s.label == self.label]
         if not candidates:
@@ -170,7 +173,6 @@ class CentroidServo:
         if self._sightings == 0:
             # The head camera may be off by as much as the pitch of the screws: take what is under the hand, and from it
             # go on to its neighbours. What was lost meanwhile is where it was; its neighbours are others.
-            start = T_odom_gripper[:2, 3] if self._start is None else self._start
             middle, radius = (self._x[:2], c.again_radius) if self._found else (start, c.first_radius)
             away = [float(np.linalg.norm(s.position[:2] - middle)) for s in candidates]
             least = 0.0 if self._found else c.first_score
@@ -219,13 +221,12 @@ class CentroidServo:
         self._lift = self._config.retreat * self._retreats
         self._variance = np.full(3, self._config.first_radius**2)
 
-    def _leave(self, t: float, status: ServoStatus) -> ServoStatus:
-        """Leave an object for its neighbour, from above where the hand began; `status` is said if there is none."""
-        assert self._start is not None  # set by the first step
+    def _leave(self, t: float, start: Array, status: ServoStatus) -> ServoStatus:
+        """Leave an object for its neighbour, from above `start`; `status` is said if there is none."""
         self._left.append(self._x[:2].copy())
         self._left_as = status
         self._found, self._heights = False, []
-        self._x[:2], self._normal = self._start, UP
+        self._x[:2], self._normal = start, UP
         self._retreats = max(self._config.retreats - 1, 0)
         self._look_again(t)
         return ServoStatus.TRACKING

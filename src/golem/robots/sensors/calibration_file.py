@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from golem.errors import ConfigError, OutputError
+from golem.robots.model.spatial import skew
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.types import NUM_JOINTS, Array
@@ -43,6 +45,16 @@ class Calibration:
     def merged(self, cameras: Mapping[str, Array]) -> dict[str, Array]:
         """Return `cameras`, poses as above, with those that were calibrated in the place of theirs."""
         return {name: self.cameras.get(name, T) for name, T in cameras.items()}
+
+    def moved(self, camera: str, ahead: float) -> float:
+        """Return by how much the mount of `camera` moves the point `ahead` [m] on its optical axis [m]."""
+        T, point = self.cameras[camera], np.array([0.0, 0.0, ahead])
+        return float(np.linalg.norm(T[:3, :3] @ point + T[:3, 3] - point))
+
+    def moved_sigma(self, camera: str, ahead: float) -> float:
+        """Return the standard deviation of that point, the largest of its axes [m]."""
+        J = np.hstack([skew(np.array([0.0, 0.0, -ahead])), np.eye(3)])
+        return math.sqrt(float(np.linalg.eigvalsh(J @ self.covariances[camera] @ J.T).max()))
 
     def save(self, path: Path) -> None:
         """Write it.
