@@ -9,6 +9,7 @@ from golem.capabilities.grasping.base import Grasp, GraspMethod, ServoLaw, Servo
 from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
+from golem.skills.finger_room import FingerRoom
 from golem.skills.force_guard import ForceGuard
 from golem.skills.pick_config import PickConfig, PickGoal
 from golem.skills.pick_place import look_after, place
@@ -159,7 +160,7 @@ class Pick:
                 if law is None:
                     await self._descend(context, attempt, grasp)
                 else:
-                    await self._servo(context, attempt, law)
+                    await self._servo(context, attempt, law, grasp.gap)
                 timings["detect_to_grasp"] = context.t - timings["start"]
                 await pull(context, self._config, self._travel, attempt, self._heights)
                 return
@@ -194,7 +195,7 @@ class Pick:
         await context.until(lambda: hand.status.state in CLOSED, self._config.close_timeout)
         self._check_grip(context, attempt)
 
-    async def _servo(self, context: Context, attempt: Attempt, law: ServoLaw) -> None:
+    async def _servo(self, context: Context, attempt: Attempt, law: ServoLaw, gap: float) -> None:
         """Closed loop: let the law bring the hand down, and let it follow the object while the fingers close."""
         arm, hand = context.arms[attempt.side], context.hands[attempt.side]
         end = context.t + self._config.servo_timeout
@@ -202,12 +203,14 @@ class Pick:
         below = await ForceGuard.at_rest(
             context, attempt.side, arm.commanded[:3, 2], self._config.press_force
         )
+        room = FingerRoom(context, attempt.side, gap)
         with context.watch(camera, attempt.label, doubtful=(attempt.label,)) as eye:
             while context.t < end and not (closing and hand.status.state in CLOSED):
                 fresh = eye.fresh()
                 step = law.step(context.t, None if fresh is None else list(fresh.objects), arm.pose)
                 if not closing:
                     if fresh is not None:
+                        room.look()
                         text = f"Servoing, sigma {step.sigma * 1e3:.1f} mm."
                         context.say("servo", text, target=step.target.tolist(), hand=arm.pose[:3, 3].tolist())
                     if step.status is ServoStatus.CONVERGED:
@@ -222,13 +225,18 @@ class Pick:
                         self._saw(step)
                         text = f"The {attempt.label} stands no higher than a tight one."
                         raise PickFailed(PickOutcome.TIGHT, "servo", "grasp_method", text)
+                    elif step.status is ServoStatus.STALLED and room.blocked:
+                        text = "Something stands where a finger is to go."
+                        raise PickFailed(PickOutcome.BLOCKED, "servo", "grasp_method", text)
                     elif step.status is ServoStatus.STALLED:
                         text = "The hand makes no progress towards the target."
                         raise PickFailed(PickOutcome.OUT_OF_REACH, "servo", "upper_body", text)
                 if not closing and below():
                     text = f"The hand presses on something with {below.largest:.0f} N."
                     raise PickFailed(PickOutcome.BLOCKED, "servo", "localizer", text)
-                if not closing or hand.status.state is GripState.CLOSING:
+                if not closing:
+                    arm.approach(*room.way(step.T_odom_gripper, arm.pose, self._config.servo_speed))
+                elif hand.status.state is GripState.CLOSING:
                     arm.approach(step.T_odom_gripper, self._config.servo_speed)
                 await context.tick()
         if not closing:

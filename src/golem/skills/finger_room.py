@@ -1,0 +1,145 @@
+"""What the palm camera shows below the fingertips: how far they can go down before they stand on something.
+
+Palm camera and fingers sit on one hand. What the head camera and the encoders are off by drops out, as for the servo.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from golem.capabilities.grasping.hand_volume import FINGER
+from golem.interfaces import topics
+from golem.robots.model.magpie_model import T_HAND_CAMERA, T_HAND_GRIPPER
+from golem.robots.sensors.cameras import rays
+from golem.skills.context import Context
+from golem.skills.poses import at_height, lifted, turned
+from golem.types import Array, RgbdImage, Side
+
+CELL = 0.004
+"""Side of a cell of the height map [m]."""
+HALF = 75
+"""Cells from the middle of the map to its edge."""
+STRIDE = 3
+"""Every so manieth row and column of the image is read."""
+TIPS: float = float(T_HAND_GRIPPER[2, 3] - T_HAND_CAMERA[2, 3]) + 0.004
+"""Depth up to which the image may show the fingers themselves [m]."""
+MARGIN = 0.003
+"""What is this near to a finger is in its way [m]: base and encoders move by that much on the way down."""
+STRAYS = 3
+"""So many cells may stand higher than what counts: noise of the depth comes alone."""
+ROUGH = 0.006
+"""How far the tips may seem to be within the ground at their goal [m]: tilt of hand and ground, noise of the depth."""
+KEPT, RAISED = 0.001, 0.002
+"""Room that the tips keep to the ground at their goal, and how far they are raised for that at most [m]."""
+ABOVE = 0.015
+"""How far the tips stay above what is in their way [m]."""
+TURNS = (0.2, -0.2, 0.4, -0.4, 0.6, -0.6)
+"""Turns about the vertical that are tried, in order, where the fingers have no room [rad]."""
+TURN_RATE = 0.6
+"""How fast the hand turns [rad/s]."""
+SLOW, GAIN = 0.03, 3.0
+"""Speed that an impact may have [m/s], and speed per metre of room down to it [1/s]."""
+
+
+class FingerRoom:
+    """A map of heights around where the hand began, filled by the palm camera from above, kept while it comes down.
+
+    The fingers hide what is straight below their tips from nearby; from further above it was seen.
+
+    Attributes:
+        blocked: whether something is in the way of the fingers at the last goal that was asked about, however the hand
+            turns.
+    """
+
+    def __init__(self, context: Context, side: Side, gap: float) -> None:
+        """Begin where the hand is now, with its fingers open by `gap` [m]."""
+        self._context, self._camera = context, f"{side}_hand"
+        self._middle = context.arms[side].commanded[:2, 3].copy()
+        self._heights = np.full((2 * HALF, 2 * HALF), np.nan)
+        self._tips = _fingertips(gap)
+        self._turn = self._wanted = 0.0
+        self.blocked = False
+
+    def look(self) -> None:
+        """Take over what the newest image of the palm camera shows; newer is nearer, and replaces what was there."""
+        frame = self._context.bus.latest(topics.rgbd_images(self._camera))
+        if frame is None:
+            return
+        points = _ground(frame)
+        cells = self._cells(points)
+        inside = (cells >= 0) & (cells < 2 * HALF)
+        kept = inside.all(axis=1)
+        flat = cells[kept] @ (2 * HALF, 1)
+        counts = np.bincount(flat, minlength=self._heights.size)
+        sums = np.bincount(flat, points[kept, 2], minlength=self._heights.size)
+        seen = counts > 0
+        self._heights.ravel()[seen] = sums[seen] / counts[seen]
+
+    def way(self, T_goal: Array, T_now: Array, speed: float) -> tuple[Array, float]:
+        """Return where a hand that is to go to `T_goal` shall go, and how fast it may [m/s].
+
+        Where something is in the way of the fingers at the goal, the hand turns until they have room, and stays above
+        until then; where no turn gives room, `blocked` is set.
+
+        Args:
+            T_goal: (4, 4) where the servo wants the hand, in odom.
+            T_now: (4, 4) where it is.
+            speed: limit of its speed [m/s].
+        """
+        if self._misses(T_goal, self._wanted) > ROUGH:
+            free = (turn for turn in (0.0, *TURNS) if self._misses(T_goal, turn) < 0.5 * ROUGH)
+            wanted = next(free, None)
+            self.blocked = wanted is None
+            self._wanted = self._wanted if wanted is None else wanted
+        else:
+            self.blocked = False
+        step = TURN_RATE * self._context.period
+        self._turn += min(max(self._wanted - self._turn, -step), step)
+        T = turned(T_goal, self._turn)
+        missing = -self.below(T)
+        up = ABOVE + missing if missing > ROUGH else min(max(KEPT + missing, 0.0), RAISED)
+        T = lifted(T, up)
+        room = min(self.below(T_now), self.below(at_height(T, T_now[2, 3])))
+        return T, min(max(GAIN * room, SLOW), speed)
+
+    def _misses(self, T_goal: Array, turn: float) -> float:
+        """Return by how much the fingers miss the room they need at a goal (4, 4) that is turned [m]."""
+        return -self.below(turned(T_goal, turn))
+
+    def below(self, T: Array) -> float:
+        """Return how far the fingertips of a hand at `T` (4, 4) in odom are above what is below them [m].
+
+        Negative: they would be within it. inf: nothing was seen there.
+        """
+        tips = self._tips @ T[:3, :3].T + T[:3, 3]
+        cells = self._cells(tips).clip(0, 2 * HALF - 1)
+        room = tips[:, 2] - self._heights[cells[:, 0], cells[:, 1]]
+        room = np.sort(room[np.isfinite(room)])
+        return float(room[STRAYS]) if len(room) > STRAYS else np.inf
+
+    def _cells(self, points: Array) -> NDArray[np.int64]:
+        """Return the (n, 2) cells of points (n, 3) in odom."""
+        return np.floor((points[:, :2] - self._middle) / CELL).astype(np.int64) + HALF
+
+
+def _fingertips(gap: float) -> Array:
+    """Return (n, 3) points that cover the ends of both open fingers, in the grasp frame [m]."""
+    x = np.arange(-FINGER[0] - MARGIN, FINGER[0] + MARGIN + 1e-9, CELL)
+    y = np.arange(0.5 * gap - MARGIN, 0.5 * gap + FINGER[1] + MARGIN + 1e-9, CELL)
+    xy = np.stack(np.meshgrid(x, np.concatenate((-y, y))), axis=-1).reshape(-1, 2)
+    return np.column_stack((xy, np.zeros(len(xy))))
+
+
+def _ground(frame: RgbdImage) -> Array:
+    """Return the (n, 3) points in odom beyond the fingertips, without those at the fingers' edges."""
+    depth = frame.depth[::STRIDE, ::STRIDE]
+    clear, fingers = depth > TIPS, (depth > 0.0) & (depth <= TIPS)
+    # At the edge of a finger a depth camera mixes finger and ground.
+    clear[1:] &= ~fingers[:-1]
+    clear[:-1] &= ~fingers[1:]
+    clear[:, 1:] &= ~fingers[:, :-1]
+    clear[:, :-1] &= ~fingers[:, 1:]
+    optical = rays(frame.info)[::STRIDE, ::STRIDE][clear] * depth[clear][:, None]
+    T = frame.T_odom_optical
+    return optical.astype(float) @ T[:3, :3].T + T[:3, 3]

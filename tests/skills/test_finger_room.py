@@ -1,0 +1,100 @@
+"""What stands under the fingertips is seen from above by the palm camera, and the hand stays above it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from golem.interfaces import topics
+from golem.robots.model.magpie_model import T_HAND_CAMERA, T_HAND_GRIPPER
+from golem.robots.sensors.cameras import RIGHT_HAND, rays
+from golem.skills.finger_room import ABOVE, RAISED, SLOW, TIPS, TURNS, FingerRoom
+from golem.skills.poses import lifted
+from golem.types import Array, RgbdImage
+
+GAP, HIGH, TOP = 0.05, 0.12, 0.02
+T_GRIPPER_CAMERA = np.linalg.inv(T_HAND_GRIPPER) @ T_HAND_CAMERA
+
+
+def room(
+    world: Any,
+    box: tuple[float, float] | None,
+    fingers: bool = False,
+    x: tuple[float, float] = (-1.0, 1.0),
+) -> tuple[FingerRoom, Array]:
+    """Return what a hand `HIGH` above a plate at z = 0 has seen, and its pose on the plate.
+
+    The plate has a box `TOP` high over `x`, and over `box` along y, in the frame of the hand [m].
+    """
+    info, T = RIGHT_HAND, world.context.arms["right"].pose
+    T_odom_optical = lifted(T, HIGH - T[2, 3]) @ T_GRIPPER_CAMERA
+    down = (rays(info) @ T_odom_optical[:3, :3].T)[..., 2]
+    heights = np.zeros(down.shape)
+    depth = (heights - T_odom_optical[2, 3]) / down
+    if box is not None:
+        points = rays(info) * ((TOP - T_odom_optical[2, 3]) / down)[..., None] @ T_odom_optical[:3, :3].T
+        local = (points + T_odom_optical[:3, 3] - T[:3, 3]) @ T[:3, :2]
+        on = (local > (x[0], box[0])).all(axis=-1) & (local < (x[1], box[1])).all(axis=-1)
+        depth[on] -= TOP
+    if fingers:
+        depth[:, :40] = TIPS - 0.02
+        depth[:, 40:42] = TIPS + 0.02  # the edge, mixed with the ground
+    frame = RgbdImage(0.0, info, np.zeros((1, 1, 3), np.uint8), depth.astype(np.float32), T_odom_optical)
+    seen = FingerRoom(world.context, "right", GAP)
+    world.bus.publish(topics.rgbd_images("right_hand"), frame, 0.0)
+    world.step()
+    seen.look()
+    return seen, lifted(T, -T[2, 3])
+
+
+def test_before_the_first_image_nothing_is_in_the_way(world: Any) -> None:
+    seen = FingerRoom(world.context, "right", GAP)
+    seen.look()
+    T = world.context.arms["right"].pose
+    goal, speed = seen.way(T, T, 0.15)
+    np.testing.assert_array_equal(goal, T)
+    assert speed == 0.15 and not seen.blocked
+
+
+@pytest.mark.parametrize("fingers", [False, True])
+def test_the_room_to_a_plate_is_the_height_above_it(world: Any, fingers: bool) -> None:
+    seen, T = room(world, None, fingers)
+    assert seen.below(lifted(T, 0.03)) == pytest.approx(0.03, abs=0.001)
+    goal, speed = seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)
+    np.testing.assert_array_equal(goal, lifted(T, 0.004))
+    assert speed == 0.15 and not seen.blocked
+    assert seen.way(T, lifted(T, 0.004), 0.15)[1] == SLOW
+
+
+def test_a_goal_that_scrapes_along_the_plate_is_raised_a_little(world: Any) -> None:
+    seen, T = room(world, None)
+    goal, _ = seen.way(lifted(T, -0.003), lifted(T, 0.10), 0.15)
+    assert goal[2, 3] == pytest.approx(-0.003 + RAISED, abs=1e-6) and not seen.blocked
+
+
+@pytest.mark.parametrize("box", [(0.03, 0.06), (-0.06, -0.03)])
+def test_a_hand_stays_above_what_is_under_either_finger(world: Any, box: tuple[float, float]) -> None:
+    seen, T = room(world, box)
+    goal, _ = seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)
+    assert seen.blocked and goal[2, 3] == pytest.approx(TOP + ABOVE, abs=0.001)
+    np.testing.assert_array_equal(goal[:3, :3], T[:3, :3])
+
+
+def test_a_hand_turns_where_that_gives_its_fingers_room(world: Any) -> None:
+    seen, T = room(world, (0.03, 0.06), x=(0.006, 0.03))
+    first, _ = seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)
+    assert not seen.blocked and first[2, 3] == pytest.approx(TOP + ABOVE, abs=0.001)
+    for _ in range(100):
+        goal, _ = seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)
+    np.testing.assert_allclose(goal[:3, 3], lifted(T, 0.004)[:3, 3], atol=RAISED)
+    turn = np.arccos(goal[:3, 0] @ T[:3, 0])
+    assert turn in [pytest.approx(t, abs=1e-6) for t in TURNS]
+
+
+def test_what_is_between_the_fingers_or_beside_them_is_in_nobodys_way(world: Any) -> None:
+    for box in ((-0.015, 0.015), (0.062, 0.09)):
+        seen, T = room(world, box)
+        seen.way(lifted(T, 0.004), lifted(T, 0.10), 0.15)
+        assert not seen.blocked
