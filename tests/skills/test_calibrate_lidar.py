@@ -59,5 +59,5 @@ def test_a_robot_finds_where_its_lidar_sits(tmp_path: Path) -> None:
     assert run_calibrate(CalibrateConfig("lidar", seed=3, file=str(file)))
     found, true = read_calibration(file), draw_mount("field", 3)
     assert found.lidar is not None and set(found.cameras) == {"head"}
-    left = LidarMount(np.linalg.solve(true, found.lidar.pose), found.lidar.covariance)
+    left = LidarMount(np.linalg.inv(true) @ found.lidar.pose, found.lidar.covariance)
     assert left.moved(3.0) < 0.010 < 0.020 < LidarMount(true, np.zeros((6, 6))).moved(3.0)
