@@ -153,6 +153,7 @@ SLOTS: dict[str, Slot] = {
         {
             "calibrate": "golem.skills.calibrate:Calibrate",
             "calibrate_hands": "golem.skills.calibrate_hands:CalibrateHands",
+            "calibrate_lidar": "golem.skills.calibrate_lidar:CalibrateLidar",
             "disassemble": "golem.skills.disassemble:Disassemble",
             "dock": "golem.skills.dock:Dock",
             "explore": "golem.skills.explore:Explore",

@@ -258,10 +258,12 @@ class StackNodes:
                 MemoryNode(bus, self.memory, calibration, hears_lidar(stack), epoch, pools.get("memory")),
             )
         )
+        lidar = stack.part("calibration").load().lidar
+        mount = None if lidar is None else lidar.pose
         if tuple(odometry.sources) != LEGS_ALONE or hears_lidar(stack):
-            self.nodes.append((Phase.PERCEIVE, OdometryNode(bus, odometry, odometry_contract)))
+            self.nodes.append((Phase.PERCEIVE, OdometryNode(bus, odometry, odometry_contract, mount)))
         if hears_lidar(stack):
-            self.nodes.append((Phase.PERCEIVE, ScanNode(bus)))
+            self.nodes.append((Phase.PERCEIVE, ScanNode(bus, mount)))
             self.nodes.append((Phase.PERCEIVE, MapperNode(bus, mapper, mapper_contract)))
         for side in SIDES:
             hand, hand_contract = make("hand", side=side)

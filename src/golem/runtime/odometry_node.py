@@ -13,8 +13,9 @@ from golem.interfaces.payloads import Odometry, OdometrySilence
 from golem.middleware.bus import Bus, News
 from golem.robots.base import HasLidar
 from golem.robots.model.imu_mount import TORSO, sensed_base_rate
+from golem.robots.sensors.lidar_mount import LidarCorrection
 from golem.runtime.contract_check import ContractCheck
-from golem.types import TICK
+from golem.types import TICK, Array
 
 PERIOD = 0.01
 """Time between two poses that are published [s]."""
@@ -25,9 +26,12 @@ class OdometryNode:
 
     period = TICK
 
-    def __init__(self, bus: Bus, odometry: LidarOdometry, contract: ContractCheck) -> None:
-        """Run `odometry`."""
+    def __init__(
+        self, bus: Bus, odometry: LidarOdometry, contract: ContractCheck, mount: Array | None = None
+    ) -> None:
+        """Run `odometry`, with the LiDAR at `mount` (4, 4) in the nominal lidar_link; None is there."""
         self._bus, self._odometry, self._contract = bus, odometry, contract
+        self._correction = LidarCorrection(mount)
         self._imu = News(bus, topics.LIDAR_IMU)
         self._scan = News(bus, topics.LIDAR_SCAN)
         self._external = News(bus, topics.EXTERNAL_ODOMETRY)
@@ -38,10 +42,10 @@ class OdometryNode:
         """Pass on what is new, and publish the pose that is due."""
         call, odometry = self._contract.call, self._odometry
         if (sample := self._imu.read()) is not None:
-            call(odometry.add_imu, sample)
+            call(odometry.add_imu, self._correction.imu(sample))
         self._add_legs(t)
         if (scan := self._scan.read()) is not None:
-            call(odometry.add_scan, scan)
+            call(odometry.add_scan, self._correction.scan(scan))
         if (external := self._external.read()) is not None:
             call(odometry.add_external, external)
         if t < self._next - 1e-9:

@@ -15,6 +15,7 @@ from golem.interfaces.lidar import LidarScan
 from golem.interfaces.nav_payloads import Scan
 from golem.interfaces.payloads import Odometry
 from golem.middleware.bus import Bus, News
+from golem.robots.sensors.lidar_mount import LidarCorrection
 from golem.types import TICK, Array
 
 MEMORY = 0.6
@@ -30,9 +31,9 @@ class ScanNode:
 
     period = TICK
 
-    def __init__(self, bus: Bus) -> None:
-        """Read scans and odometry from `bus`."""
-        self._bus = bus
+    def __init__(self, bus: Bus, mount: Array | None = None) -> None:
+        """Read scans and odometry from `bus`, with the LiDAR at `mount` (4, 4) in the nominal lidar_link."""
+        self._bus, self._correction = bus, LidarCorrection(mount)
         self._scans, self._poses = News(bus, topics.LIDAR_SCAN), News(bus, topics.ODOMETRY)
         self._track: deque[tuple[float, Array]] = deque()
         self._floor = FloorPlane()
@@ -47,7 +48,7 @@ class ScanNode:
         scan = self._scans.read()
         if scan is None or not self._track or _frozen(scan, self._before):
             return
-        in_odom = self._posed(scan)
+        in_odom = self._posed(self._correction.scan(scan))
         if in_odom is not None:
             self._before = scan
             self._bus.publish(topics.SCAN, in_odom, t)

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from golem.capabilities.calibration.kinematic_fit import pose
 from golem.errors import ConfigError
-from golem.robots.sensors.calibration_file import Calibration, CalibrationPart, read_calibration
+from golem.robots.sensors.calibration_file import Calibration, CalibrationPart, LidarMount, read_calibration
 from golem.types import NUM_JOINTS
 
 
@@ -60,3 +61,29 @@ def test_a_zero_that_cannot_be_one_is_refused(tmp_path: Path) -> None:
     path.write_text(json.dumps(rows))
     with pytest.raises(ConfigError, match="a camera is unknown"):
         read_calibration(path)
+
+
+def test_a_lidar_comes_back_and_a_wild_one_is_refused(tmp_path: Path) -> None:
+    path, mount = tmp_path / "lidar.json", LidarMount(pose(np.full(6, 0.01)), 1e-6 * np.eye(6))
+    replace(example(), lidar=mount).save(path)
+    back = read_calibration(path).lidar
+    assert (
+        back is not None and (back.pose == mount.pose).all() and (back.covariance == mount.covariance).all()
+    )
+    replace(example(), lidar=replace(mount, pose=pose(np.full(6, 0.5)))).save(path)
+    with pytest.raises(ConfigError, match=r"or is 0\.3 m off"):
+        read_calibration(path)
+
+
+def test_how_far_a_lidar_moves_what_it_sees_is_that_of_random_directions() -> None:
+    rng = np.random.default_rng(0)
+    x = np.array([0.010, -0.004, 0.020, 0.003, 0.006, -0.002])
+    along = rng.standard_normal((200_000, 3))
+    points = 3.0 * along / np.linalg.norm(along, axis=1)[:, None]
+    T = pose(x)
+    moved = np.sqrt((((points @ T[:3, :3].T + T[:3, 3]) - points) ** 2).sum(axis=1).mean())
+    assert LidarMount(T, np.zeros((6, 6))).moved(3.0) == pytest.approx(moved, rel=0.01)
+    sigma = LidarMount(np.eye(4), np.diag(x**2)).moved_sigma(3.0)
+    drawn = x * rng.standard_normal((200_000, 6))
+    error = np.cross(drawn[:, :3], points) + drawn[:, 3:]
+    assert sigma == pytest.approx(np.sqrt((error**2).sum(axis=1).mean()), rel=0.01)

@@ -220,6 +220,7 @@ def test_every_field_of_every_goal_in_json_at_its_edges(crowd: Crowd) -> None:
     sound = {
         "calibrate": {"file": ""},
         "calibrate_hands": {"file": ""},
+        "calibrate_lidar": {"file": "none.json"},
         "disassemble": {},
         "open": {},
         "pick": {},

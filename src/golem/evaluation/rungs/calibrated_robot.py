@@ -15,28 +15,21 @@ from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import episode_seed
+from golem.evaluation.rungs.after_head import apart, judge_hands, judge_lidar, sigma
 from golem.evaluation.rungs.pick_screw import SLOT, PickOptions, PickRung
 from golem.provenance import stack_facts
-from golem.robots.model.spatial import skew
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.sensors.calibration_file import Calibration, read_calibration
 from golem.runtime.lockstep import build, build_robot
 from golem.skills.base import SkillResult
 from golem.stack import Stack, load_stack
-from golem.types import SIDES, Array
+from golem.types import Array
 
 STACK = "tether"
 """The shipped stack whose robot is calibrated."""
 SKILL = "calibrate"
-AHEAD = np.array([0.0, 0.0, 1.0, 1.0])
-"""Point on the optical axis at which the head camera is judged [m], as in the realism profiles."""
 GOOD = 0.005
 """Error there that counts as calibrated [m]."""
-HAND_SKILL = "calibrate_hands"
-HAND_AHEAD = np.array([0.0, 0.0, 0.1, 1.0])
-"""Point on the optical axis at which a palm camera is judged [m], as in the realism profiles."""
-HAND_GOOD = 0.001
-"""Error there that counts as calibrated [m], of the worse of the two."""
 ERRORS = ("before", "after", "sigma", "joint_before", "joint_after", "views", "residual")
 """What is recorded: of the camera [m], of the arms' encoders, root mean square [rad]."""
 
@@ -45,8 +38,8 @@ ERRORS = ("before", "after", "sigma", "joint_before", "joint_after", "views", "r
 class CalibrationOptions:
     """What is calibrated, and how."""
 
-    what: tuple[Literal["head", "hand"], ...] = ("head",)
-    """head; or hand, the palm cameras of a robot whose head was calibrated."""
+    what: tuple[Literal["head", "hand", "lidar"], ...] = ("head",)
+    """head; or hand, the palm cameras, or lidar, of a robot whose head was calibrated."""
     views: int = 16
     """Postures of each hand."""
     keep: str = ""
@@ -66,7 +59,8 @@ class CalibratedPickOptions(PickOptions):
 class CalibrationRung(Rung[CalibrationOptions]):
     """Calibrate a robot that was never calibrated: success is a head camera within 5 mm at 1 m.
 
-    With `--what hand` it is two palm cameras within 1 mm at 0.1 m, after the head.
+    With `--what hand` it is two palm cameras within 1 mm at 0.1 m, with `--what lidar` a LiDAR within 10 mm at 3 m,
+    both after the head.
     """
 
     name = "calibration"
@@ -93,13 +87,15 @@ class CalibrationRung(Rung[CalibrationOptions]):
         if isinstance(found, SkillResult):
             return TrialOutcome(False, found.stage, found.slot, found.reason, found.timings)
         if spec.case["what"] == "hand":
-            return _hands(stack, seed, found, self.options.views, spec.method)
+            return judge_hands(stack, seed, found, self.options.views, spec.method)
+        if spec.case["what"] == "lidar":
+            return judge_lidar(stack, seed, found, spec.method)
         with closing(build_robot(stack, seed)) as robot:
             zeros = robot.true_joint_offset[13:], found.joint_offset[13:]
             values = (
-                _apart(robot.calibration["head"]),
-                _apart(found.cameras["head"]),
-                _sigma(found),
+                apart(robot.calibration["head"]),
+                apart(found.cameras["head"]),
+                sigma(found),
                 _rms(zeros[0]),
                 _rms(zeros[0] - zeros[1]),
                 float(found.views),
@@ -115,34 +111,6 @@ class CalibrationRung(Rung[CalibrationOptions]):
             {},
             series,
         )
-
-
-def _hands(stack: Stack, seed: int, head: Calibration, views: int, method: str) -> TrialOutcome:
-    """Calibrate the palm cameras of a robot whose head was calibrated, and judge them."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "calibration.json"
-        head.save(file)
-        corrected = stack.with_part("calibration", file=str(file)).with_skill(HAND_SKILL, folder=folder)
-        running, robot = build(corrected, seed)
-        with closing(robot):
-            goal = {"file": file.name, "views": views, "zero": float(head.joint_sigma.max())}
-            result = running.execute(HAND_SKILL, goal)
-            names = [f"{side}_hand" for side in SIDES]
-            before = max(_apart(robot.calibration[name], HAND_AHEAD) for name in names)
-        if not result.success:
-            return TrialOutcome(False, result.stage, result.slot, result.reason, result.timings)
-        found = read_calibration(file)
-    after = max(_apart(found.cameras[name], HAND_AHEAD) for name in names)
-    sigma = max(_sigma(found, name, HAND_AHEAD) for name in names)
-    good = after <= HAND_GOOD
-    return TrialOutcome(
-        good,
-        DONE if good else "fit",
-        None if good else f"skill: {method}",
-        f"Palm cameras {before * 1e3:.1f} -> {after * 1e3:.2f} mm at 0.1 m.",
-        result.timings,
-        {"before": before, "after": after, "sigma": sigma},
-    )
 
 
 class CalibratedTether(PickRung):
@@ -212,17 +180,6 @@ def tagged_stack(profile: str, overrides: Mapping[str, str]) -> Stack:
     if not issubclass(registry.load("robot", stack.choice("robot").use), MujocoRobot):
         raise ConfigError("This rung judges on the simulator's truth; leave out --use robot=...")
     return stack.with_options("robot", tags=True, world="open")
-
-
-def _apart(T: Array, ahead: Array = AHEAD) -> float:
-    """Return how far the pose `T` (4, 4) moves the point at which the camera is judged [m]; the truth moves nothing."""
-    return float(np.linalg.norm(T @ ahead - ahead))
-
-
-def _sigma(found: Calibration, camera: str = "head", ahead: Array = AHEAD) -> float:
-    """Return the standard deviation that the calibration claims for that point, of its worst axis [m]."""
-    J = np.hstack([skew(-ahead[:3]), np.eye(3)])
-    return float(np.sqrt(np.linalg.eigvalsh(J @ found.covariances[camera] @ J.T).max()))
 
 
 def _rms(v: Array) -> float:

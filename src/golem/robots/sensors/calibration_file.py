@@ -17,14 +17,40 @@ from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
 from golem.robots.sensors.calibration import OPTICAL_FRAMES
 from golem.types import NUM_JOINTS, Array
 
+FARTHEST = 0.3
+"""By how much the mount of a LiDAR can move what is 1 m away [m]: more is no mount's error."""
+
 
 def _none() -> Array:
     return np.zeros(NUM_JOINTS)
 
 
 @dataclass(frozen=True, slots=True)
+class LidarMount:
+    """Where the LiDAR sits.
+
+    Attributes:
+        pose: (4, 4) pose of lidar_link in that of the nominal model.
+        covariance: (6, 6) of that pose: rotation vector [rad], translation [m].
+    """
+
+    pose: Array
+    covariance: Array
+
+    def moved(self, away: float) -> float:
+        """Return by how much the mount moves points `away` from the sensor [m], RMS over all directions [m]."""
+        turn = 3.0 - float(np.trace(self.pose[:3, :3]))
+        return math.sqrt(turn * 2.0 / 3.0 * away**2 + float(self.pose[:3, 3] @ self.pose[:3, 3]))
+
+    def moved_sigma(self, away: float) -> float:
+        """Return the standard deviation of those points [m]."""
+        turn, place = (float(np.trace(part)) for part in (self.covariance[:3, :3], self.covariance[3:, 3:]))
+        return math.sqrt(turn * 2.0 / 3.0 * away**2 + place)
+
+
+@dataclass(frozen=True, slots=True)
 class Calibration:
-    """Where cameras sit and where encoders count from.
+    """Where cameras and LiDAR sit and where encoders count from.
 
     Attributes:
         cameras: by camera, the (4, 4) pose of its optical frame in that of the nominal model.
@@ -33,6 +59,7 @@ class Calibration:
         joint_sigma: (27,) standard deviation of that [rad]; 0 where it was not looked for.
         residual: what is left of the corners' errors, root mean square [px].
         views: how many it was found from.
+        lidar: where the LiDAR sits; None where it was not looked for.
     """
 
     cameras: dict[str, Array] = field(default_factory=dict[str, Array])
@@ -41,6 +68,7 @@ class Calibration:
     joint_sigma: Array = field(default_factory=_none)
     residual: float = 0.0
     views: int = 0
+    lidar: LidarMount | None = None
 
     def merged(self, cameras: Mapping[str, Array]) -> dict[str, Array]:
         """Return `cameras`, poses as above, with those that were calibrated in the place of theirs."""
@@ -62,7 +90,7 @@ class Calibration:
         Raises:
             OutputError: it cannot be written.
         """
-        rows = {
+        rows: dict[str, Any] = {
             "cameras": {
                 name: {"pose": T.tolist(), "covariance": self.covariances[name].tolist()}
                 for name, T in self.cameras.items()
@@ -75,6 +103,8 @@ class Calibration:
             "residual": self.residual,
             "views": self.views,
         }
+        if self.lidar is not None:
+            rows["lidar"] = {"pose": self.lidar.pose.tolist(), "covariance": self.lidar.covariance.tolist()}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
@@ -95,7 +125,13 @@ def read_calibration(path: Path) -> Calibration:
         offset, sigma = _none(), _none()
         for name, row in rows["joints"].items():
             offset[JOINT_INDEX[name]], sigma[JOINT_INDEX[name]] = row["offset"], row["sigma"]
-        found = Calibration(cameras, covariances, offset, sigma, float(rows["residual"]), int(rows["views"]))
+        row = rows.get("lidar")
+        lidar = None
+        if row is not None:
+            lidar = LidarMount(np.array(row["pose"], float), np.array(row["covariance"], float))
+        found = Calibration(
+            cameras, covariances, offset, sigma, float(rows["residual"]), int(rows["views"]), lidar
+        )
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise ConfigError(
             f"'{path}' is no calibration: {error!r}; golem calibrate head writes one."
@@ -103,6 +139,12 @@ def read_calibration(path: Path) -> Calibration:
     unknown = [name for name in cameras if name not in OPTICAL_FRAMES]
     if unknown or any(T.shape != (4, 4) or not np.isfinite(T).all() for T in cameras.values()):
         raise ConfigError(f"'{path}' is no calibration: a camera is unknown, or its pose no (4, 4) matrix.")
+    if lidar is not None and not (
+        lidar.pose.shape == (4, 4) and lidar.covariance.shape == (6, 6) and lidar.moved(1.0) < FARTHEST
+    ):
+        raise ConfigError(
+            f"'{path}' is no calibration: the LiDAR has no (4, 4) pose, no (6, 6) covariance, or is {FARTHEST:g} m off."
+        )
     if not np.isfinite(offset).all() or np.abs(offset).max() > 0.3:
         raise ConfigError(f"'{path}' shifts a joint by more than 0.3 rad: that is no encoder's zero.")
     return found
