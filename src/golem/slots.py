@@ -113,6 +113,7 @@ SLOTS: dict[str, Slot] = {
             "centroid": "golem.capabilities.grasping.centroid:Centroid",
             "graspgen": "golem.capabilities.grasping.graspgen:GraspGen",
             "reranked": "golem.capabilities.grasping.reranking:Reranking",
+            "scorer": "golem.capabilities.grasping.scorer:Scorer",
             "visual_servo": "golem.capabilities.grasping.visual_servo:VisualServo",
         },
     ),
