@@ -27,6 +27,7 @@ compile pyproject.toml --constraints "$together" --extra cluster --output-file r
 compile pyproject.toml --constraints "$together" --extra lidar --output-file requirements/lidar.txt "$@"
 compile pyproject.toml --constraints "$together" --extra physx --output-file requirements/physx.txt "$@"
 compile pyproject.toml --constraints "$together" --extra train --output-file requirements/train.txt "$@"
+compile pyproject.toml --constraints "$together" --extra vision --output-file requirements/vision.txt "$@"
 compile pyproject.toml --constraints "$together" --extra docs --output-file requirements/docs.txt "$@"
 compile pyproject.toml --constraints "$together" --extra dev --extra pink --extra dds --extra record --extra foxglove \
     --extra report --extra cluster --extra graspgen --extra lidar --extra hardware --extra realsense --extra physx \

@@ -124,7 +124,7 @@ BENCHES = {
 
 
 def _train(words: list[str]) -> int:
-    """Train a module from scratch: detector or legs."""
+    """Train a module from scratch: detector, grasps or legs."""
     what = _named(words, "train", "thing to train", TRAINERS)
     if what is None:
         return 0
@@ -139,7 +139,11 @@ def _train(words: list[str]) -> int:
     return 0
 
 
-TRAINERS = {"detector": "golem.training.detector.__main__", "legs": "golem.training.legs.__main__"}
+TRAINERS = {
+    "detector": "golem.training.detector.__main__",
+    "grasps": "golem.training.grasps.__main__",
+    "legs": "golem.training.legs.__main__",
+}
 """What can be trained, and the module that does it."""
 
 

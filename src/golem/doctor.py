@@ -41,6 +41,7 @@ EXTRAS = {
     "realsense": ("pyrealsense2",),
     "cluster": ("distributed",),
     "train": ("torch", "onnx"),
+    "vision": ("torch", "transformers"),
     "lidar": ("kiss_icp", "rko_lio"),
     "docs": ("mkdocs",),
     "dev": ("pytest",),

@@ -102,7 +102,9 @@ SLOTS: dict[str, Slot] = {
         {
             "clusters": "golem.capabilities.perception.plane_clusters:PlaneClusters",
             "gemini": "golem.capabilities.perception.gemini:Gemini",
+            "grounding_dino": "golem.capabilities.perception.grounding_dino:GroundingDino",
             "onnx": "golem.capabilities.perception.onnx_detector:OnnxDetector",
+            "owlv2": "golem.capabilities.perception.owlv2:Owlv2",
             "yolo_world": "golem.capabilities.perception.yolo_world:YoloWorld",
         },
     ),
@@ -113,6 +115,7 @@ SLOTS: dict[str, Slot] = {
             "centroid": "golem.capabilities.grasping.centroid:Centroid",
             "graspgen": "golem.capabilities.grasping.graspgen:GraspGen",
             "reranked": "golem.capabilities.grasping.reranking:Reranking",
+            "scorer": "golem.capabilities.grasping.scorer:Scorer",
             "visual_servo": "golem.capabilities.grasping.visual_servo:VisualServo",
         },
     ),

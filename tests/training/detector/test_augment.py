@@ -42,7 +42,7 @@ def test_decoding_the_targets_gives_the_labels_back() -> None:
         x, y = 30 + 45 * k + rng.uniform(-2, 2), rng.uniform(40, 200)
         labels.append([k % len(CLASSES), x, y, *(np.array([x, y]) - rng.uniform(3, 15, 2)), x + 6, y + 7, 0])
     labels = np.array(labels)
-    heat, weight, regression = augment.targets(labels)
+    heat, weight, regression = augment.targets(labels, len(CLASSES))
     logits = np.log(np.clip(heat, 1e-4, 1 - 1e-4) / (1 - np.clip(heat, 1e-4, 1 - 1e-4)))
     found = find_peaks(np.concatenate([logits, regression[:6]]), CLASSES, set(CLASSES), 0.99, augment.CROP)
     assert len(found) == len(labels) and (weight == 1).all()
@@ -54,7 +54,9 @@ def test_decoding_the_targets_gives_the_labels_back() -> None:
 
 
 def test_an_ignored_part_neither_counts_as_there_nor_as_absent() -> None:
-    heat, weight, regression = augment.targets(np.array([[2.0, 100.0, 80.0, 92.0, 72.0, 108.0, 88.0, 1.0]]))
+    heat, weight, regression = augment.targets(
+        np.array([[2.0, 100.0, 80.0, 92.0, 72.0, 108.0, 88.0, 1.0]]), len(CLASSES)
+    )
     assert heat.max() == 0 and regression.max() == 0
     assert weight[2, 80 // STRIDE, 100 // STRIDE] == 0 and weight[[0, 1, 3, 4]].min() == 1
 

@@ -58,7 +58,7 @@ def test_an_interrupted_run_ends_with_the_same_weights(splits: Path, tmp_path: P
 
 def test_the_exported_network_computes_what_the_trained_one_does(tmp_path: Path) -> None:
     torch.manual_seed(1)
-    model = PartNet()
+    model = PartNet(len(CLASSES))
     for (
         name,
         value,
@@ -66,7 +66,7 @@ def test_the_exported_network_computes_what_the_trained_one_does(tmp_path: Path)
         if "running" in name:
             value.uniform_(0.5, 1.5)
     model.eval()
-    torch.save({"average": model.state_dict(), "step": 7}, tmp_path / "x.pt")
+    torch.save({"average": model.state_dict(), "step": 7, "classes": list(CLASSES)}, tmp_path / "x.pt")
     path = export_onnx(tmp_path / "x.pt", tmp_path / "x.onnx")
     assert path.stat().st_size < 1_000_000
     assert OnnxDetector(OnnxDetectorConfig(weights=str(path))).classes == CLASSES
@@ -82,10 +82,13 @@ def test_the_exported_network_computes_what_the_trained_one_does(tmp_path: Path)
 
 def test_training_goes_on_from_an_exported_network(tmp_path: Path) -> None:
     torch.manual_seed(1)
-    torch.save({"average": PartNet().state_dict(), "step": 7}, tmp_path / "x.pt")
+    torch.save(
+        {"average": PartNet(len(CLASSES)).state_dict(), "step": 7, "classes": list(CLASSES)},
+        tmp_path / "x.pt",
+    )
     path = export_onnx(tmp_path / "x.pt", tmp_path / "x.onnx")
-    model = PartNet().eval()
-    load_onnx(model, path)
+    model = PartNet(len(CLASSES)).eval()
+    load_onnx(model, path, CLASSES)
     image = torch.randn(1, 3, 64, 96)
     session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
     with torch.inference_mode():

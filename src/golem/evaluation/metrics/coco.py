@@ -56,13 +56,19 @@ def read_coco(folder: Path) -> list[LabelledImage]:
         raise ConfigError(f"{folder} needs one JSON file of annotations in COCO format; it has {found}.")
     try:
         data = json.loads(files[0].read_text(encoding="utf-8"))
-        names = {int(c["id"]): str(c["name"]).lower().replace(" ", "_") for c in data["categories"]}
+        names = {int(c["id"]): label_of(str(c["name"])) for c in data["categories"]}
         images = {int(image["id"]): str(image["file_name"]) for image in data["images"]}
         rows: dict[int, list[tuple[str, list[float]]]] = {key: [] for key in images}
         for one in data["annotations"]:
             if not one.get("iscrowd"):
                 x, y, w, h = (float(v) for v in one["bbox"])
-                rows[int(one["image_id"])].append((names[int(one["category_id"])], [x, y, x + w, y + h]))
+                kind, image = int(one["category_id"]), int(one["image_id"])
+                if kind not in names:
+                    raise ConfigError(
+                        f"{files[0]}: an annotation is of class {kind}; the categories are "
+                        f"{', '.join(f'{key} ({name})' for key, name in sorted(names.items()))}."
+                    )
+                rows[image].append((names[kind], [x, y, x + w, y + h]))
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(f"{files[0]} is not in COCO format: {type(error).__name__} {error}.") from error
     return [
@@ -73,6 +79,11 @@ def read_coco(folder: Path) -> list[LabelledImage]:
         )
         for key in sorted(images)
     ]
+
+
+def label_of(name: str) -> str:
+    """Return the label of a class as others name it: in small letters, with `_` for a space."""
+    return name.lower().replace(" ", "_")
 
 
 def _image(folder: Path, name: str) -> Path:

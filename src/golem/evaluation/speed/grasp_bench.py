@@ -13,6 +13,7 @@ from rich.table import Table
 from golem import registry
 from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper
+from golem.capabilities.grasping.scorer import Scorer
 from golem.errors import ConfigError, GolemError
 from golem.evaluation.speed.bench import Figure, figure, timed
 from golem.robots.worlds.tableware import KINDS
@@ -27,6 +28,7 @@ AXIS = 0.015
 REFERENCES = {
     "antipodal": "60 ms wanted, 2000 points",
     "reranked": "150 ms wanted for 64, on top of its proposer",
+    "scorer alone": "20 ms wanted",
 }
 
 
@@ -34,7 +36,7 @@ REFERENCES = {
 class GraspBenchConfig:
     """Time grasp methods on clouds of tableware and of a handle, and count what they propose."""
 
-    methods: tuple[str, ...] = ("centroid", "antipodal", "reranked")
+    methods: tuple[str, ...] = ("centroid", "antipodal", "scorer", "reranked")
     """Which; those that need a server or weights say so."""
     points: int = 2000
     """Points of each cloud."""
@@ -73,6 +75,10 @@ def run_grasp_bench(config: GraspBenchConfig) -> list[Figure]:
             count = float(np.median([len(grasps) for grasps in answers]))
             table.add_row(use, thing, f"{1e3 * np.median(times):.1f}", f"{count:g}", f"{centred}/{config.n}")
             figures.append(figure(f"{use}, {thing}", times, 1e3, "ms", REFERENCES.get(use, "")))
+            if isinstance(method, Scorer):
+                times = _ranking_alone(method, given, answers)
+                table.add_row("scorer alone", thing, f"{1e3 * np.median(times):.1f}", f"{count:g}", "")
+                figures.append(figure(f"scorer alone, {thing}", times, 1e3, "ms", REFERENCES["scorer alone"]))
     console.print(table)
     if config.json:
         print(json.dumps([asdict(one) for one in figures]))
@@ -89,6 +95,11 @@ def _measure(
         answers.append(method.propose(given[i], given[i].points, gripper))
 
     return timed(propose, len(given)), answers
+
+
+def _ranking_alone(scorer: Scorer, given: Sequence[LocalizedObject], answers: Sequence[list[Grasp]]) -> Array:
+    """Return the times (n,) that the network takes for proposals that are there [s]."""
+    return timed(lambda i: scorer.scored(given[i], answers[i]), len(given))
 
 
 def _gripper(thing: str) -> Gripper:

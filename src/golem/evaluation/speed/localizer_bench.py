@@ -1,4 +1,4 @@
-"""`golem bench localizer FOLDER`: any localizer on the user's own labelled images, a folder in COCO format."""
+"""`golem bench localizer FOLDER`: any localizer on the user's own labelled images, a folder in COCO or YOLO format."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from golem import registry
 from golem.capabilities.perception.base import Localizer
 from golem.errors import ConfigError, unknown_name
 from golem.evaluation.conformance.examine import choice_of
-from golem.evaluation.metrics.coco import LabelScore, read_coco, score_label
+from golem.evaluation.metrics.coco import LabelScore, score_label
+from golem.evaluation.metrics.yolo_labels import read_labelled
 from golem.evaluation.speed.bench import timed
 from golem.types import CameraInfo, Detection, RgbdImage
 
@@ -27,10 +28,10 @@ DEPTH = 0.6
 
 @dataclass(frozen=True)
 class LocalizerBenchConfig:
-    """Score a localizer on labelled images in COCO format: average precision, centre error, latency."""
+    """Score a localizer on labelled images in COCO or YOLO format: average precision, centre error, latency."""
 
     folder: Annotated[Path, tyro.conf.Positional]
-    """Where the images and their one JSON file of annotations are."""
+    """Where the images are, with one JSON file of annotations (COCO), or a text file each and their names (YOLO)."""
     use: str = "onnx"
     """The localizer: a name, FILE.py:Class, or {use: NAME, option: value}."""
     labels: tuple[str, ...] = ()
@@ -49,7 +50,7 @@ def run_localizer_bench(config: LocalizerBenchConfig) -> dict[str, LabelScore]:
     """
     if not 0.0 < config.overlap <= 1.0:
         raise ConfigError(f"--overlap is a share above 0 and up to 1, not {config.overlap:g}.")
-    images = read_coco(config.folder)
+    images = read_labelled(config.folder)
     labelled = sorted({label for image in images for label in image.labels})
     for label in config.labels:
         if label not in labelled:

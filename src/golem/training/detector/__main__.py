@@ -1,13 +1,16 @@
-"""`python -m golem.training.detector render|train|export|evaluate|curve`."""
+"""`golem train detector render|train|export|evaluate|curve`, and `golem train detector --labels FOLDER`."""
 
 from __future__ import annotations
 
+import sys
 import time
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import tyro
 
+from golem.errors import ConfigError
 from golem.training.detector import dataset
 from golem.training.detector.train_detector import TrainDetectorConfig
 from golem.training.detector.train_detector import train as run_training
@@ -104,11 +107,67 @@ def evaluate(data: Path = RUNS / "data", weights: Path | None = None) -> None:
         print(f"{camera}: {np.median(taken):.1f} ms CPU per image (median of {len(taken)}, one thread)")
 
 
+def own(
+    labels: Path,
+    out: Path = RUNS / "own",
+    seed: int = 0,
+    steps: int = 2000,
+    width: int = 640,
+    start: Path | None = None,
+) -> None:
+    """Train the shipped network on your own labels; a run that was stopped is resumed.
+
+    Writes `detector.onnx` (for `localizer: {use: onnx, weights: ...}`), and `curve.csv`.
+
+    Args:
+        labels: folder in COCO format (one JSON file) or YOLO's (a text file for each image); its classes are learned.
+        out: folder of weights, checkpoints and curve.
+        seed: of weights, crops, and what is held out.
+        steps: gradient steps of 8 crops.
+        width: wider images are scaled down to it: the head camera's [px].
+        start: ONNX file of an earlier detector to begin with; the shipped one if absent.
+    """
+    from golem.capabilities.perception.onnx_detector import SHIPPED, OnnxDetector, OnnxDetectorConfig
+    from golem.training.detector.evaluate import THRESHOLD, evaluate, table
+    from golem.training.detector.export_detector import export_onnx
+    from golem.training.detector.own_labels import load_own
+    from golem.training.detector.train_detector import fit
+
+    if steps < 1 or width < 64 or seed < 0:
+        raise ConfigError("--steps must be 1 or more, --width 64 px or more, --seed 0 or more.")
+    data, held, classes = load_own(labels, seed, width)
+    print(
+        f"{len(data.images)} images to train on, {len(held.images)} held out; classes: {', '.join(classes)}"
+    )
+    shipped = resources.files("golem.capabilities.perception").joinpath(SHIPPED)
+    with resources.as_file(shipped) as default:
+        config = TrainDetectorConfig(
+            labels,
+            out,
+            seed,
+            steps,
+            check_every=min(250, steps),
+            workers=0,
+            start=start or default,
+            classes=classes,
+        )
+        best = fit(config, data, held)
+    path = export_onnx(best, out / "detector.onnx")
+    detector = OnnxDetector(OnnxDetectorConfig(str(path), THRESHOLD, {}))
+    print(table(evaluate(held, detector.detect, classes=classes)))
+    print(f"localizer: {{use: onnx, weights: {path}}}")
+
+
 def main(words: list[str] | None = None) -> None:
-    """Run one of the commands; `words` are the command line's by default."""
+    """Run one of the commands, or `own` where the first word is an option of it; `words` are by default the line's."""
+    words = sys.argv[1:] if words is None else words
+    if words and words[0].startswith("--") and words[0] != "--help":
+        tyro.cli(own, prog="golem train detector", args=words)
+        return
     tyro.extras.subcommand_cli_from_dict(
         {"render": render, "train": train, "export": export, "evaluate": evaluate, "curve": curve},
         prog="golem train detector",
+        description="Or: golem train detector --labels FOLDER, on your own images; --labels --help lists its options.",
         args=words,
     )
 

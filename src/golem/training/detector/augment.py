@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.perception.classes import CLASSES
 from golem.capabilities.perception.peaks import STRIDE
 from golem.types import Array
 
@@ -97,10 +96,12 @@ def corrupt(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.fl
     return np.ascontiguousarray(((x - np.array(MEAN)) / np.array(STD)).transpose(2, 0, 1), dtype=np.float32)
 
 
-def targets(labels: Array) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Return heatmap (5, h, w), its weight (5, h, w) and regression (7, h, w: the six channels and their weight)."""
+def targets(
+    labels: Array, classes: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Return heatmap (classes, h, w), its weight, and regression (7, h, w: the six channels and their weight)."""
     w, h = CROP[0] // STRIDE, CROP[1] // STRIDE
-    heat = np.zeros((len(CLASSES), h, w), np.float32)
+    heat = np.zeros((classes, h, w), np.float32)
     weight = np.ones_like(heat)
     regression = np.zeros((7, h, w), np.float32)
     rows, columns = np.mgrid[:h, :w]

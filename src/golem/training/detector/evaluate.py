@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,19 +42,22 @@ class Score:
     error_p95: float
 
 
-def evaluate(data: Dataset, detect: Detector, working_score: float = 0.3) -> dict[tuple[str, str], Score]:
+def evaluate(
+    data: Dataset, detect: Detector, working_score: float = 0.3, classes: Sequence[str] = CLASSES
+) -> dict[tuple[str, str], Score]:
     """Return the figures by (camera, class).
 
     Args:
         data: held-out images.
         detect: image RGB to detections of all classes at scores from `THRESHOLD`.
         working_score: for recall, precision and error.
+        classes: of the labels, in their order.
     """
     hits: dict[tuple[str, str], list[tuple[float, bool, float]]] = {}
     counts: dict[tuple[str, str], int] = {}
     for index, camera in enumerate(data.cameras):
         found = detect(data.images[index])
-        for kind, label in enumerate(CLASSES):
+        for kind, label in enumerate(classes):
             key = (camera, label)
             truth = data.labels[index][data.labels[index][:, 0] == kind]
             counts[key] = counts.get(key, 0) + int((truth[:, 7] == 0).sum())

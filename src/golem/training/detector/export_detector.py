@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 from torch import nn
 
-from golem.capabilities.perception.classes import CLASSES
 from golem.capabilities.perception.peaks import STRIDE
 from golem.training.detector.augment import MEAN, STD
 from golem.training.detector.part_net import MULTIPLE, REGRESSION, PartNet
@@ -85,7 +84,8 @@ class _Graph:
 def export_onnx(checkpoint: Path, out: Path) -> Path:
     """Write `out`, with dynamic height and width, from a checkpoint of `train`; returns `out`."""
     state = torch.load(checkpoint, weights_only=True)
-    model = PartNet()
+    classes: list[str] = state["classes"]
+    model = PartNet(len(classes))
     model.load_state_dict(state["average"])
     g = _Graph()
     f4 = g.blocks(g.blocks("image", model.stem), model.down4)
@@ -94,7 +94,7 @@ def export_onnx(checkpoint: Path, out: Path) -> Path:
     u8 = g.blocks(g.add("Add", f8, g.up(g.conv(f16, model.side8))), model.merge8)
     u4 = g.blocks(g.add("Add", f4, g.up(g.conv(u8, model.side4))), model.merge4)
     g.add("Concat", g.conv(u4, model.heat), g.conv(u4, model.regression), output="maps", axis=1)
-    channels = len(CLASSES) + len(REGRESSION)
+    channels = len(classes) + len(REGRESSION)
     graph = helper.make_graph(
         g.nodes,
         "part_detector",
@@ -106,7 +106,7 @@ def export_onnx(checkpoint: Path, out: Path) -> Path:
         graph, producer_name="golem", ir_version=IR_VERSION, opset_imports=[helper.make_opsetid("", OPSET)]
     )
     facts = {
-        "classes": CLASSES, "mean": MEAN, "std": STD, "stride": STRIDE, "multiple": MULTIPLE, "step": state["step"],
+        "classes": classes, "mean": MEAN, "std": STD, "stride": STRIDE, "multiple": MULTIPLE, "step": state["step"],
     }  # fmt: skip
     helper.set_model_props(network, {key: json.dumps(value) for key, value in facts.items()})
     onnx.checker.check_model(network, full_check=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import onnx
@@ -10,15 +11,19 @@ import torch
 from onnx import numpy_helper
 from torch import nn
 
-from golem.capabilities.perception.classes import CLASSES
 from golem.training.detector.part_net import PartNet
 
 
-def load_onnx(model: PartNet, path: Path) -> None:
+def load_onnx(model: PartNet, path: Path, classes: Sequence[str]) -> None:
     """Give `model` the weights of an ONNX file that `export_onnx` wrote.
 
     The normalisation is folded into the convolutions there: here it begins with mean 0 and variance 1. Classes that
     the file does not know keep their random weights; its classes that the network lacks are left out.
+
+    Args:
+        model: the network.
+        path: the ONNX file.
+        classes: what the heatmaps of `model` are.
 
     Raises:
         ValueError: the file is no such detector.
@@ -35,9 +40,9 @@ def load_onnx(model: PartNet, path: Path) -> None:
         for layer, (weight, bias) in zip(layers, folded, strict=True):
             if layer is model.heat:
                 for row, label in enumerate(known):
-                    if label in CLASSES:
-                        layer.weight[CLASSES.index(label)] = weight[row]
-                        model.heat.bias[CLASSES.index(label)] = bias[row]
+                    if label in classes:
+                        layer.weight[classes.index(label)] = weight[row]
+                        model.heat.bias[classes.index(label)] = bias[row]
                 continue
             layer.weight.copy_(weight)
             norm = norms.get(id(layer))

@@ -9,8 +9,6 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from golem.capabilities.perception.classes import CLASSES
-
 MULTIPLE = 16
 """Image sides must be multiples of this."""
 REGRESSION = ("dx", "dy", "left", "top", "right", "bottom")
@@ -29,11 +27,11 @@ def _block(inputs: int, outputs: int, stride: int = 1, dilation: int = 1) -> nn.
 class PartNet(nn.Module):
     """Images to heatmaps and regression maps.
 
-    Input (n, 3, height, width), normalised RGB, sides multiples of `MULTIPLE`. Output (n, 5 + 6, height / 4,
-    width / 4): logits of the classes, then `REGRESSION`.
+    Input (n, 3, height, width), normalised RGB, sides multiples of `MULTIPLE`. Output (n, classes + 6,
+    height / 4, width / 4): logits of the classes, then `REGRESSION`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, classes: int) -> None:
         """Build the network with random weights."""
         super().__init__()
         self.stem = _block(3, 16, 2)
@@ -44,7 +42,7 @@ class PartNet(nn.Module):
         self.merge8 = _block(40, 40)
         self.side4 = nn.Conv2d(40, 32, 1)
         self.merge4 = _block(32, 32)
-        self.heat = nn.Conv2d(32, len(CLASSES), 1)
+        self.heat = nn.Conv2d(32, classes, 1)
         self.regression = nn.Conv2d(32, len(REGRESSION), 1)
         self.up = nn.Upsample(scale_factor=2, mode="nearest")
         nn.init.constant_(self.heat.bias, -4.6)  # a prior of 1 % per cell, as in focal loss training

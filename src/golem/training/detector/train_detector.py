@@ -18,6 +18,7 @@ from torch.utils.data import Dataset as TorchDataset
 
 from golem.capabilities.perception.classes import CLASSES
 from golem.capabilities.perception.peaks import find_peaks, normalise
+from golem.errors import ConfigError
 from golem.robots.sensors.streams import stream
 from golem.training.detector import augment, dataset
 from golem.training.detector.augment import MEAN, STD
@@ -41,6 +42,7 @@ class TrainDetectorConfig:
         check_images: how many of its images.
         workers: processes that cut crops.
         start: ONNX file of an earlier detector to begin with; random weights if absent.
+        classes: of the labels, in their order.
         bfloat16: compute the convolutions in this type: 1.7 times faster where the processor has it.
     """
 
@@ -54,14 +56,18 @@ class TrainDetectorConfig:
     check_images: int = 80
     workers: int = 1
     start: Path | None = None
+    classes: tuple[str, ...] = CLASSES
     bfloat16: bool = True
 
 
 class _Batches(TorchDataset[tuple[Tensor, Tensor, Tensor, Tensor]]):
     """Batch number to batch, so that a resumed run continues with the crops it would have had."""
 
-    def __init__(self, data: dataset.Dataset, seed: int, batch: int, first: int, last: int) -> None:
+    def __init__(
+        self, data: dataset.Dataset, seed: int, batch: int, first: int, last: int, classes: int
+    ) -> None:
         self._data, self._seed, self._batch, self._first, self._last = data, seed, batch, first, last
+        self._classes = classes
 
     def __len__(self) -> int:
         return self._last - self._first
@@ -72,7 +78,7 @@ class _Batches(TorchDataset[tuple[Tensor, Tensor, Tensor, Tensor]]):
         for _ in range(self._batch):
             k = int(rng.integers(len(self._data.images)))
             piece, labels = augment.crop(self._data.images[k], self._data.labels[k], rng)
-            heat, weight, regression = augment.targets(labels)
+            heat, weight, regression = augment.targets(labels, self._classes)
             images.append(augment.corrupt(piece, rng))
             heats.append(heat)
             weights.append(weight)
@@ -88,7 +94,7 @@ def loss_terms(
     The focal loss is equation (1) of Zhou et al. (2019) with alpha 2 and beta 4, divided by the number of labelled
     parts of each class, so that one tray weighs as much as all screws.
     """
-    logits = output[:, : len(CLASSES)]
+    logits, guess = output[:, : heat.shape[1]], output[:, heat.shape[1] :]
     p = torch.sigmoid(logits).clamp(1e-5, 1 - 1e-5)
     positive = (heat >= 1.0).float()
     count = (positive * weight).sum(dim=(0, 2, 3)).clamp(min=1.0)
@@ -96,7 +102,6 @@ def loss_terms(
     focal = -((gain * weight).sum(dim=(0, 2, 3)) / count).sum() / 2
     mask = regression[:, 6:7]
     total = mask.sum().clamp(min=1.0)
-    guess = output[:, len(CLASSES) :]
     offset = (
         functional.smooth_l1_loss(guess[:, :2], regression[:, :2], reduction="none", beta=0.1) * mask
     ).sum()
@@ -106,7 +111,7 @@ def loss_terms(
     return focal, offset / total, box / total
 
 
-def detector_of(model: PartNet) -> Detector:
+def detector_of(model: PartNet, classes: tuple[str, ...] = CLASSES) -> Detector:
     """Return the trained network as a function from image to detections."""
 
     def detect(image: np.ndarray) -> list:
@@ -114,7 +119,7 @@ def detector_of(model: PartNet) -> Detector:
         with torch.inference_mode():
             x = torch.from_numpy(normalise(image, np.array(MEAN), np.array(STD), MULTIPLE))
             maps = model(x)[0].numpy()
-        return find_peaks(maps, CLASSES, set(CLASSES), THRESHOLD, (width, height))
+        return find_peaks(maps, classes, set(classes), THRESHOLD, (width, height))
 
     return detect
 
@@ -129,33 +134,46 @@ def train(config: TrainDetectorConfig, stop: int | None = None) -> Path:
     Returns:
         The path of the best checkpoint by mean AP on the held-out part.
     """
+    return fit(config, dataset.load(config.data, "train"), dataset.load(config.data, "held_out"), stop)
+
+
+def fit(
+    config: TrainDetectorConfig, data: dataset.Dataset, held: dataset.Dataset, stop: int | None = None
+) -> Path:
+    """Train or resume on images in memory; see `train`.
+
+    Raises:
+        ConfigError: the run that is there is of other classes.
+    """
     torch.set_num_threads(1)
     torch.manual_seed(config.seed)
     config.out.mkdir(parents=True, exist_ok=True)
-    data = dataset.load(config.data, "train")
-    held = dataset.load(config.data, "held_out")
     pick = np.linspace(0, len(held.images) - 1, min(config.check_images, len(held.images))).astype(int)
     held = held.only(pick.tolist())
-    model = PartNet().to(memory_format=torch.channels_last)
+    keys = [(camera, label) for camera in sorted(set(held.cameras)) for label in config.classes]
+    model = PartNet(len(config.classes)).to(memory_format=torch.channels_last)
     if config.start is not None:
-        load_onnx(model, config.start)
+        load_onnx(model, config.start, config.classes)
     average = copy.deepcopy(model).eval()
     optimiser = torch.optim.AdamW(model.parameters(), lr=config.rate, weight_decay=1e-3)
     step, best = 0, -1.0
     last_path, best_path, curve_path = (config.out / n for n in ("last.pt", "best.pt", "curve.csv"))
     if last_path.exists():
         state = torch.load(last_path, weights_only=True)
+        if state["classes"] != list(config.classes):
+            raise ConfigError(f"The run in {config.out} is of other classes; name another folder with --out.")
         model.load_state_dict(state["model"])
         average.load_state_dict(state["average"])
         optimiser.load_state_dict(state["optimiser"])
         step, best = state["step"], state["best"]
     else:
         with curve_path.open("w") as file:
-            names = [f"ap_{camera}_{label}" for camera in ("head", "palm") for label in CLASSES]
+            names = [f"ap_{camera}_{label}" for camera, label in keys]
             csv.writer(file).writerow(
                 ["step", "images", "cpu_s", "loss_heat", "loss_offset", "loss_box", *names]
             )
-    batches = _Batches(data, config.seed, config.batch, step, config.steps if stop is None else stop)
+    last = config.steps if stop is None else stop
+    batches = _Batches(data, config.seed, config.batch, step, last, len(config.classes))
     loader = DataLoader(
         batches, batch_size=None, num_workers=config.workers, prefetch_factor=8 if config.workers else None
     )
@@ -177,7 +195,7 @@ def train(config: TrainDetectorConfig, stop: int | None = None) -> Path:
         _blend(average, model, min(0.998, (1 + step) / (10 + step)))
         sums += [focal.item(), offset.item(), box.item()]
         if step % config.check_every == 0 or step == config.steps:
-            scores = evaluate(held, detector_of(average))
+            scores = evaluate(held, detector_of(average, config.classes), classes=config.classes)
             means = sums / config.check_every
             sums[:] = 0.0
             with curve_path.open("a") as file:
@@ -187,15 +205,17 @@ def train(config: TrainDetectorConfig, stop: int | None = None) -> Path:
                     round(time.process_time() - started, 1),
                     *np.round(means, 4),
                 ]
-                by_key = [scores[camera, label].ap for camera in ("head", "palm") for label in CLASSES]
+                by_key = [scores[key].ap for key in keys]
                 csv.writer(file).writerow([*row, *np.round(by_key, 4)])
             quality = float(np.mean(by_key))
             print(f"step {step}: loss {means.round(3)}, mean AP {quality:.3f}", flush=True)
-            if quality > best:
-                best = quality
-                _save(best_path, {"average": average.state_dict(), "step": step, "best": best})
-            state = {"model": model.state_dict(), "average": average.state_dict(), "step": step, "best": best}
-            _save(last_path, {**state, "optimiser": optimiser.state_dict()})
+            better, best = quality > best, max(best, quality)
+            kept: dict[str, object] = {
+                "average": average.state_dict(), "step": step, "best": best, "classes": list(config.classes),
+            }  # fmt: skip
+            if better:
+                _save(best_path, kept)
+            _save(last_path, {**kept, "model": model.state_dict(), "optimiser": optimiser.state_dict()})
     return best_path
 
 

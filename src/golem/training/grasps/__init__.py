@@ -1,0 +1,1 @@
+"""Training of the grasp scorer: simulated MAGPIE grasps on tableware, labels, network, curve."""
