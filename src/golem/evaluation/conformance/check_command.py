@@ -119,6 +119,8 @@ def _table(findings: list[Finding]) -> Table:
     for finding in findings:
         mark, style = _MARKS.get(finding.status, ("-", "dim"))
         said = finding.promise if finding.status == PASSED else finding.reason
+        numbers = [f"{name} {value:.3g}" for name, value in finding.figures.items() if isinstance(value, float)]
+        said += f" {'; '.join(numbers)}." if numbers else ""
         table.add_row(Text(mark, style=style), Text(finding.check.replace("_", " ")), Text(said, style=style))
     return table
 
