@@ -85,7 +85,7 @@ class LockstepRig:
         self._robot, self._at, self._t = robot, posture, 0.0
         gains = default_gains()
         self._kp, self._kd = gains.kp, gains.kd
-        self._hands = {side: HandCommand(0.0, OPEN, GRIP) for side in SIDES}
+        self._hands: dict[Side, HandCommand] = {side: HandCommand(0.0, OPEN, GRIP) for side in SIDES}
 
     def follow(self, path: Path, seconds: float) -> list[LowState]:
         """See `RobotRig`."""
