@@ -227,7 +227,11 @@ def _replay(words: list[str]) -> int:
 
 
 def _check(words: list[str]) -> int:
-    """Check modules against the contracts of their slots: `check`, `check SLOT`, `check SLOT USE`."""
+    """Check modules against their contracts: `check`, `check SLOT [USE]`; `check robot --domain N`: the robot there."""
+    if any(word.partition("=")[0] == "--domain" for word in words):
+        from golem.evaluation.conformance.domain_command import DomainCheckConfig, run_domain_check
+
+        return 0 if run_domain_check(_parse(DomainCheckConfig, "check", words)) else FAILED
     _prepare_graphics()
     from golem.evaluation.conformance.check_command import CheckConfig, run_check
 

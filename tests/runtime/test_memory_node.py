@@ -68,6 +68,19 @@ def test_what_was_looked_for_is_remembered_where_it_is() -> None:
     assert rig.status.looks == 1  # one look counts once
 
 
+def test_what_is_remembered_is_shown_with_its_age() -> None:
+    rig = Rig(epoch=1000.0)
+    for t in (1.0, 2.0):
+        rig.see(t)
+        rig.node.step(t)
+    rig.see(4.0, at=5.0)  # elsewhere: the first one is looked through, or not in view
+    rig.node.step(4.5)
+    shown = rig.bus.latest(topics.MEMORY_PLACES)
+    assert shown is not None and shown.frame == "odom"
+    ages = {round(place.age, 3) for place in shown.places}
+    assert ages <= {0.5, 2.5} and len(shown.places) >= 1
+
+
 def test_what_was_looked_for_and_is_not_there_is_doubted() -> None:
     rig = Rig()
     rig.see(1.0)

@@ -22,3 +22,34 @@ class MemoryStatus:
     epoch: float
     looks: int
     problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RememberedPlace:
+    """One place, for people.
+
+    Attributes:
+        label: what is or was there.
+        x, y: where [m].
+        age: time since it was seen last [s].
+        there: whether nothing speaks against it.
+    """
+
+    label: str
+    x: float
+    y: float
+    age: float
+    there: bool
+
+
+@dataclass(frozen=True, slots=True)
+class RememberedPlaces:
+    """What a memory would show.
+
+    Attributes:
+        frame: of the places: `map`, or `odom` without a map.
+        places: the ones seen last.
+    """
+
+    frame: str
+    places: tuple[RememberedPlace, ...]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from golem.interfaces.lidar import ExternalOdometry, LidarImu, LidarScan
-from golem.interfaces.memory_payloads import MemoryStatus
+from golem.interfaces.memory_payloads import MemoryStatus, RememberedPlaces
 from golem.interfaces.nav_payloads import (
     MapFile,
     MapPlace,
@@ -98,6 +98,8 @@ MAP_SAVED = Topic("map/saved", MapFile)
 """The answer, from whatever maps."""
 MEMORY_STATUS = Topic("memory/status", MemoryStatus)
 """From the memory, when it begins and after each look that it was given."""
+MEMORY_PLACES = Topic("memory/places", RememberedPlaces)
+"""After each look that it took, what a memory shows to people."""
 SCAN = Topic("scan", Scan)
 """From a LiDAR that an odometry locates; a robot without one never sends any."""
 NAV_GOAL = Topic("navigation/goal", NavGoal)

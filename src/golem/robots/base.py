@@ -102,6 +102,17 @@ class HasLivingSensors(Protocol):
 
 
 @runtime_checkable
+class Unmoved(Protocol):
+    """A robot that no command moves.
+
+    Attributes:
+        unmoved: why, in a few words, e.g. "it is a recording".
+    """
+
+    unmoved: str
+
+
+@runtime_checkable
 class HasLidar(Protocol):
     """A robot with a LiDAR on its torso."""
 

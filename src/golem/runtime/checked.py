@@ -11,7 +11,7 @@ import numpy as np
 from golem.capabilities.arms.base import check_pose
 from golem.capabilities.arms.trajectory import check_trajectory
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, ServoLaw, ServoStatus, ServoStep
-from golem.capabilities.memory.base import EVIDENCES, Memory, MemoryFault, Observation, Place, When
+from golem.capabilities.memory.base import EVIDENCES, HasPlaces, Memory, MemoryFault, Observation, Place, When
 from golem.capabilities.navigation.base import Navigator, NavInputs
 from golem.capabilities.planning.base import NUM_JOINTS, ArmPlanner, Plan, PlanRefused, PlanRequest
 from golem.interfaces.nav_payloads import NavStep
@@ -120,6 +120,14 @@ class CheckedMemory:
     def query(self, text: str, when: When = "now", at: float | None = None, limit: int = 5) -> list[Place]:
         """Return places; see `Memory`."""
         places = self._ask(lambda: list(self._memory.query(text, when, at, limit)))
+        for place in places:
+            check_place(self._contract, place)
+        return places
+
+    def places(self, limit: int) -> list[Place]:
+        """Return what is remembered; see `HasPlaces`. None of a memory that cannot say it."""
+        memory = self._memory
+        places = self._ask(lambda: list(memory.places(limit))) if isinstance(memory, HasPlaces) else []
         for place in places:
             check_place(self._contract, place)
         return places

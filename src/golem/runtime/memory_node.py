@@ -10,7 +10,7 @@ from dataclasses import replace
 from golem.capabilities.memory.base import MemoryFault, Observation
 from golem.errors import ModuleFault
 from golem.interfaces import topics
-from golem.interfaces.memory_payloads import MemoryStatus
+from golem.interfaces.memory_payloads import MemoryStatus, RememberedPlace, RememberedPlaces
 from golem.interfaces.payloads import Detections
 from golem.middleware.bus import Bus, News
 from golem.runtime.checked import CheckedMemory
@@ -18,6 +18,9 @@ from golem.types import TICK, Array, LocalizedObject
 
 SIGMA = 0.02
 """Standard deviation of a frame's position where nobody says [m]: the memory's own default."""
+
+SHOWN = 40
+"""Most places that are shown to people, those seen last."""
 
 
 class MemoryNode:
@@ -89,7 +92,24 @@ class MemoryNode:
     def _tell(self, of: float, problem: str, t: float, looks: int = 1) -> None:
         self._looks += 0 if problem else looks
         frame = "map" if self._in_map else "odom"
+        if not problem:
+            problem = self._show(frame, self._epoch + t, t)
         self._bus.publish(topics.MEMORY_STATUS, MemoryStatus(of, frame, self._epoch, self._looks, problem), t)
+
+    def _show(self, frame: str, now: float, t: float) -> str:
+        """Publish what is remembered at `now`, in the memory's time; return what was wrong with it."""
+        try:
+            known = self._memory.places(SHOWN)
+        except ModuleFault as fault:
+            return str(fault)
+        places = tuple(
+            RememberedPlace(
+                p.label, float(p.position[0]), float(p.position[1]), now - p.last_seen, p.evidence == "seen"
+            )
+            for p in known
+        )
+        self._bus.publish(topics.MEMORY_PLACES, RememberedPlaces(frame, places), t)
+        return ""
 
     def _observation(self, found: Detections) -> Observation | None:
         """Return a look with its places in the frame that stays; None while that is not known, or without a frame."""

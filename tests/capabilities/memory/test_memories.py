@@ -40,6 +40,30 @@ def test_they_are_memories_of_what_was_seen(make: Callable[[], Memory]) -> None:
     memory.close()
 
 
+@pytest.mark.parametrize("make", [*BOTH, Reranked])
+def test_what_makes_no_sense_is_refused_by_each_and_changes_nothing(make: Callable[[], Memory]) -> None:
+    memory = make()
+    for t in (1.0, 2.0):
+        memory.observe(look(t, {"mug": HERE}))
+    known = [place.last_seen for place in memory.query("mug", "anywhere")]
+    good = look(3.0, {"can": THERE})
+    lost = replace(good.objects[0], position=np.array([1.0, math.nan, 0.0]))
+    for bad in (
+        replace(good, frame=replace(good.frame, T_odom_optical=np.full((4, 4), math.nan))),
+        replace(good, frame=replace(good.frame, t=math.nan)),
+        replace(good, frame=replace(good.frame, t=1.5)),
+        replace(good, objects=[lost]),
+        replace(good, pose_sigma=math.nan),
+    ):
+        with pytest.raises(MemoryFault):
+            memory.observe(bad)
+    for text in ("", "x" * 10_000_000):
+        with pytest.raises(MemoryFault):
+            memory.query(text)
+    assert memory.query("harpsichord") == [] and memory.query("can", "anywhere") == []
+    assert memory.last == 2.0 and [p.last_seen for p in memory.query("mug", "anywhere")] == known
+
+
 def test_cells_answer_with_where_it_was_as_well() -> None:
     memory = TopDownMap()
     for t in range(6):

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from tests.capabilities.memory.room import T_LOOK, look
 
-from golem.capabilities.memory.base import Memory, MemoryFault
+from golem.capabilities.memory.base import HasPlaces, Memory, MemoryFault
 from golem.capabilities.memory.object_map import ObjectMap, ObjectMapConfig
 from golem.errors import ConfigError, GolemError
 
@@ -212,6 +212,41 @@ def test_a_full_disk_is_said_and_the_memory_is_as_it_was(tmp_path: Path) -> None
         memory.observe(replace(one, objects=cans))
     assert len(memory) == 1
     assert memory.query("mug")[0].last_seen == 1.0
+
+
+def test_a_disk_that_became_read_only_is_said_and_the_memory_is_as_it_was(tmp_path: Path) -> None:
+    memory = ObjectMap(ObjectMapConfig(str(tmp_path / "memory.db")))
+    memory.observe(look(1.0, {"mug": HERE}))
+    assert memory._file is not None
+    memory._file._base.execute("PRAGMA query_only=ON")  # permissions do not bind who tests as root
+    with pytest.raises(MemoryFault, match="readonly"):
+        memory.observe(look(2.0, {"can": THERE}))
+    with pytest.raises(MemoryFault, match="readonly"):
+        memory.forget("mug")
+    assert len(memory) == 1 and memory.last == 1.0
+    with pytest.raises(MemoryFault, match="cannot be used"):
+        ObjectMap(ObjectMapConfig(str(tmp_path / "memory.db" / "below_a_file.db")))
+
+
+@pytest.mark.slow
+def test_a_second_process_is_told_who_has_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "memory.db"
+    memory = ObjectMap(ObjectMapConfig(str(path)))
+    second = subprocess.run(
+        [sys.executable, "-c", WRITER, str(path)], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert second.returncode != 0 and "another process has it open" in second.stderr
+    memory.close()
+
+
+def test_everything_that_is_remembered_can_be_shown() -> None:
+    memory = ObjectMap()
+    assert isinstance(memory, HasPlaces) and memory.places(5) == []
+    memory.observe(look(1.0, {"mug": HERE, "can": THERE}))
+    memory.observe(look(2.0, {"can": THERE}))
+    shown = memory.places(5)
+    assert [(place.label, place.evidence) for place in shown] == [("can", "seen"), ("mug", "gone")]
+    assert len(memory.places(1)) == 1
 
 
 WRITER = """

@@ -127,3 +127,36 @@ def test_a_broken_module_is_in_the_table(tmp_path: Path) -> None:
     path.write_text(BROKEN)
     table = page_table([examine(candidate("grasp_method", f"{path}:Mine"))])
     assert "answers soundly" in table and "`replay`" in table
+
+
+def kept(path: Path, status: str, reason: str, **figures: object) -> Path:
+    finding = {"check": "answers_a_step", "status": status, "reason": reason, "figures": figures}
+    path.write_text(json.dumps([{"slot": "robot", "use": path.stem, "findings": [finding]}]))
+    return path
+
+
+def test_reports_of_robots_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = (
+        kept(tmp_path / "a.json", "passed", "", late=0.08, elbow=[0.0, 0.05, 0.1]),
+        kept(tmp_path / "b.json", "passed", "", late=0.09, elbow=[0.0, 0.048, 0.1]),
+        kept(tmp_path / "c.json", "failed", "it never came"),
+    )
+    assert run_check(CheckConfig(compare=files))
+    said = capsys.readouterr().out
+    assert "| promise | `a` | `b` | `c` |" in said
+    assert "| answers a step | kept; late 0.08 | kept; late 0.09 | **broken**: it never came |" in said
+    assert "| elbow, off `a` | - | 2 % | - |" in said
+    assert "| all | 1 kept, 0 broken | 1 kept, 0 broken | 0 kept, 1 broken |" in said
+    (tmp_path / "d.json").write_text("{}")
+    with pytest.raises(ConfigError, match="no report of one module"):
+        run_check(CheckConfig(compare=(tmp_path / "d.json",)))
+
+
+def test_only_a_robot_is_checked_on_a_domain(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("cyclonedds")
+    assert run(monkeypatch, "hand", "--domain", "9") == 2
+    assert "a robot is checked, not 'hand'" in capsys.readouterr().err
+    assert run(monkeypatch, "robot", "--domain", "0") == 2
+    assert "domain 0" in capsys.readouterr().err

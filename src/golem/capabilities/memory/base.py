@@ -110,6 +110,15 @@ class Memory(Protocol):
         ...
 
 
+@runtime_checkable
+class HasPlaces(Protocol):
+    """A memory that can be shown whole."""
+
+    def places(self, limit: int) -> list[Place]:
+        """Return what is remembered, gone ones included, the one seen last first; at most `limit`."""
+        ...
+
+
 def apart(places: Iterable[Place], spread: float, limit: int) -> list[Place]:
     """Return the first `limit` places that are farther than `spread` [m] from those before them."""
     kept: list[Place] = []

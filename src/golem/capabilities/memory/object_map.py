@@ -211,6 +211,15 @@ class ObjectMap:
         ]
         return sorted(places, key=lambda p: (-p.score, -p.last_seen))[:limit]
 
+    def places(self, limit: int) -> list[Place]:
+        """See `HasPlaces`."""
+        found = [
+            place
+            for label in self._records.labels
+            for place in self._places(label, 1.0, "anywhere", None, limit)
+        ]
+        return sorted(found, key=lambda p: -p.last_seen)[:limit]
+
     def _places(self, label: str, score: float, when: When, at: float | None, limit: int) -> list[Place]:
         """Return those of one label that fit, at most `limit`, the one seen last first."""
         records = self._records

@@ -11,7 +11,9 @@ from golem.types import Array, PlanarPose
 
 Colour = tuple[int, int, int]
 UNKNOWN, FREE, FULL = 150, 245, 40
+INK, FAINT = (20, 20, 20), (150, 150, 190)
 WAY, TRACK, GOAL, ROBOT, SCAN = (0, 120, 200), (220, 0, 0), (0, 150, 0), (255, 140, 0), (230, 0, 180)
+FONT, LETTERS = cv2.FONT_HERSHEY_SIMPLEX, 0.38
 EDGE = 8
 """Cells around what is known that are shown."""
 
@@ -31,6 +33,7 @@ class MapPicture:
         large = cv2.resize(shade, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
         self._image = np.ascontiguousarray(cv2.cvtColor(large, cv2.COLOR_GRAY2RGB))
         self._grid, self._low, self._scale = grid, low[::-1], scale
+        self._marks: list[tuple[Array, str, Colour]] = []
 
     def line(self, points: Array, colour: Colour) -> None:
         """Draw a line through places (n, 2) [m]."""
@@ -51,10 +54,23 @@ class MapPicture:
         cv2.arrowedLine(self._image, a.tolist(), b.tolist(), colour, 2, tipLength=0.4)
         cv2.circle(self._image, a.tolist(), 5, colour, -1)
 
+    def mark(self, place: Array, text: str, colour: Colour) -> None:
+        """Mark a place (2,) [m] with a few words beside it."""
+        self._marks.append((place, text, colour))
+
     def rgb(self) -> NDArray[np.uint8]:
         """Return the picture, (height, width, 3)."""
         turned = cv2.rotate(self._image, cv2.ROTATE_90_COUNTERCLOCKWISE)[:, ::-1]
-        return np.ascontiguousarray(turned, np.uint8)
+        picture = np.ascontiguousarray(turned, np.uint8)
+        height, width = picture.shape[:2]
+        for place, text, colour in self._marks:  # words are written upright, so after the turn
+            x, y = self._pixels(place[np.newaxis])[0].tolist()
+            column, row = width - 1 - y, height - 1 - x
+            cv2.circle(picture, (column, row), 4, colour, -1)
+            size, _ = cv2.getTextSize(text, FONT, LETTERS, 1)
+            left = column + 7 if column + 7 + size[0] < width else column - 7 - size[0]
+            cv2.putText(picture, text, (left, row + 4), FONT, LETTERS, colour, 1, cv2.LINE_AA)
+        return picture
 
     def _pixels(self, points: Array) -> NDArray[np.int32]:
         o = self._grid.origin

@@ -12,6 +12,8 @@ from golem.runtime.contract_check import ContractCheck
 
 PASSED, FAILED, SKIPPED = "passed", "failed", "skipped"
 F = TypeVar("F", bound=Callable[..., None])
+Figure = float | list[float]
+"""A number, or how one changed over time."""
 
 
 class Inapplicable(Exception):
@@ -27,12 +29,14 @@ class Candidate:
         use: what it is called.
         make: returns a new instance of it.
         memo: what the checks have found out and need not find out again.
+        figures: what the check that runs has measured, by name with unit; a list is a course over time.
     """
 
     slot: str
     use: str
     make: Callable[[], Any]
     memo: dict[str, Any] = field(default_factory=dict[str, Any])
+    figures: dict[str, Figure] = field(default_factory=dict[str, "Figure"])
 
     @property
     def contract(self) -> ContractCheck:
@@ -77,6 +81,7 @@ class Finding:
         status: `passed`, `failed` or `skipped`.
         reason: why it failed or was skipped, in one line.
         trace: see `ModuleFault`.
+        figures: what was measured, by name with unit.
     """
 
     check: str
@@ -84,6 +89,7 @@ class Finding:
     status: str
     reason: str = ""
     trace: str | None = None
+    figures: Mapping[str, Figure] = field(default_factory=dict[str, "Figure"])
 
 
 @dataclass(frozen=True, slots=True)

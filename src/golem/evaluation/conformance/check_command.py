@@ -18,6 +18,9 @@ from rich.text import Text
 from golem import registry
 from golem.errors import ConfigError, GolemError, OutputError
 from golem.evaluation.conformance.base import FAILED, PASSED, Finding, Report
+from golem.evaluation.conformance.engine_table import BEGIN as ENGINES_BEGIN
+from golem.evaluation.conformance.engine_table import END as ENGINES_END
+from golem.evaluation.conformance.engine_table import engine_table, read_reports
 from golem.evaluation.conformance.examine import SUITES, UNCHECKED, candidate, examine, suite_of
 
 BEGIN, END = "<!-- golem check: begin -->", "<!-- golem check: end -->"
@@ -25,8 +28,18 @@ BEGIN, END = "<!-- golem check: begin -->", "<!-- golem check: end -->"
 _MARKS = {PASSED: ("✓", "green"), FAILED: ("✗", "red")}
 
 
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """Where the findings go."""
+
+    json: bool = False
+    """Print JSON instead of the report."""
+    save: Path | None = None
+    """Keep the JSON in this file, too."""
+
+
 @dataclass(frozen=True)
-class CheckConfig:
+class CheckConfig(Output):
     """Check modules against the contracts of their slots.
 
     Exit code 0: all promises are kept. 1: one is broken. 2: the module cannot be found, or this machine lacks what it
@@ -37,10 +50,10 @@ class CheckConfig:
     """Which slot; default: all."""
     use: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="[USE]", help_behavior_hint="")] = ""
     """Module: a name, file.py:Class, package.module:Class or "{use: NAME, option: value}"; default: all shipped."""
-    json: bool = False
-    """Print JSON instead of the report."""
     page: Path | None = None
-    """Write the table of all modules into this page, between its two marks."""
+    """Write the table of all modules, or with --compare of those reports, into this page, between its two marks."""
+    compare: tuple[Path, ...] = ()
+    """Check nothing: put reports of --save side by side, for robots in several engines."""
 
 
 def run_check(config: CheckConfig) -> bool:
@@ -51,6 +64,13 @@ def run_check(config: CheckConfig) -> bool:
         GolemError: this machine lacks what the module needs.
         OutputError: the page cannot be written.
     """
+    if config.compare:
+        table = engine_table(read_reports(config.compare))
+        if config.page is None:
+            print(table)
+        else:
+            _write(config.page, table, ENGINES_BEGIN, ENGINES_END)
+        return True
     if config.slot:
         suite_of(config.slot)
     console = Console(stderr=config.json)
@@ -63,11 +83,33 @@ def run_check(config: CheckConfig) -> bool:
         reports.append(report)
         if not config.json:
             _print(console, report, whole=bool(config.use))
-    if config.json:
-        print(json.dumps([_plain(report) for report in reports], indent=2))
+    _keep(reports, config)
     if config.page is not None:
-        _write(config.page, reports)
+        _write(config.page, page_table(reports), BEGIN, END)
     return all(report.passed or report.lacks is not None for report in reports)
+
+
+def show(reports: list[Report], config: Output, whole: bool) -> None:
+    """Print `reports` as `config` says; `whole`: also what is kept.
+
+    Raises:
+        OutputError: they cannot be kept.
+    """
+    if not config.json:
+        for report in reports:
+            _print(Console(), report, whole)
+    _keep(reports, config)
+
+
+def _keep(reports: list[Report], config: Output) -> None:
+    text = json.dumps([_plain(report) for report in reports], indent=2)
+    if config.json:
+        print(text)
+    if config.save is not None:
+        try:
+            config.save.write_text(text + "\n", encoding="utf-8")
+        except OSError as error:
+            raise OutputError(f"'{config.save}' cannot be written: {error.strerror}.") from error
 
 
 @contextmanager
@@ -119,6 +161,10 @@ def _table(findings: list[Finding]) -> Table:
     for finding in findings:
         mark, style = _MARKS.get(finding.status, ("-", "dim"))
         said = finding.promise if finding.status == PASSED else finding.reason
+        numbers = [
+            f"{name} {value:.3g}" for name, value in finding.figures.items() if isinstance(value, float)
+        ]
+        said += f" {'; '.join(numbers)}." if numbers else ""
         table.add_row(Text(mark, style=style), Text(finding.check.replace("_", " ")), Text(said, style=style))
     return table
 
@@ -136,18 +182,18 @@ def page_table(reports: list[Report]) -> str:
     return "\n".join(rows)
 
 
-def _write(page: Path, reports: list[Report]) -> None:
+def _write(page: Path, table: str, begin: str, end: str) -> None:
     try:
         text = page.read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"The page {page} cannot be read: {error.strerror}.") from error
-    if BEGIN not in text or END not in text.partition(BEGIN)[2]:
+    if begin not in text or end not in text.partition(begin)[2]:
         raise ConfigError(
-            f"The page {page} lacks the lines '{BEGIN}' and '{END}', between which the table goes."
+            f"The page {page} lacks the lines '{begin}' and '{end}', between which the table goes."
         )
-    before, _, rest = text.partition(BEGIN)
-    _, _, after = rest.partition(END)
+    before, _, rest = text.partition(begin)
+    _, _, after = rest.partition(end)
     try:
-        page.write_text(f"{before}{BEGIN}\n{page_table(reports)}\n{END}{after}", encoding="utf-8")
+        page.write_text(f"{before}{begin}\n{table}\n{end}{after}", encoding="utf-8")
     except OSError as error:
         raise OutputError(f"The page {page} cannot be written: {error.strerror}.") from error

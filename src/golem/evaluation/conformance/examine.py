@@ -124,13 +124,18 @@ def choice_of(use: str) -> tuple[str, Mapping[str, object]]:
 
 
 def examine(subject: Candidate, on_check: Callable[[Check], None] = lambda check: None) -> Report:
-    """Run every check of the suite on `subject`; nothing that the module does is raised.
+    """Run every check of the suite of its slot on `subject`; nothing that the module does is raised.
 
     Args:
         subject: the module.
         on_check: called before each check.
     """
-    suite, findings, closed = suite_of(subject.slot), list[Finding](), ""
+    return run_suite(suite_of(subject.slot), subject, on_check)
+
+
+def run_suite(suite: object, subject: Candidate, on_check: Callable[[Check], None]) -> Report:
+    """Run every check of `suite` on `subject`; see `examine`."""
+    findings, closed = list[Finding](), ""
     for check in checks_of(type(suite)):
         on_check(check)
         if closed:
@@ -146,7 +151,8 @@ def examine(subject: Candidate, on_check: Callable[[Check], None] = lambda check
     return Report(subject.slot, subject.use, tuple(findings))
 
 
-def _ask(suite: Suite, check: Check, subject: Candidate) -> Finding:
+def _ask(suite: object, check: Check, subject: Candidate) -> Finding:
+    subject.figures = {}
     try:
         with _own_faults(subject):
             check.run(suite, subject)
@@ -155,8 +161,8 @@ def _ask(suite: Suite, check: Check, subject: Candidate) -> Finding:
     except ModuleFault as fault:
         if isinstance(fault.__cause__, Inapplicable):
             return Finding(check.name, check.promise, SKIPPED, str(fault.__cause__))
-        return Finding(check.name, check.promise, FAILED, fault.reason, fault.trace)
-    return Finding(check.name, check.promise, PASSED)
+        return Finding(check.name, check.promise, FAILED, fault.reason, fault.trace, subject.figures)
+    return Finding(check.name, check.promise, PASSED, figures=subject.figures)
 
 
 @contextmanager

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from golem.capabilities.arms.base import check_pose
 from golem.evaluation.conformance.base import Candidate, check
+from golem.evaluation.conformance.robot_measures import RobotMeasures
+from golem.evaluation.conformance.robot_rig import LockstepRig, RobotRig
 from golem.evaluation.conformance.suite import Suite
 from golem.robots.base import Robot
 from golem.runtime.contract_check import ContractCheck
@@ -34,10 +37,19 @@ class RobotAnswer(NamedTuple):
     hands: list[HandState]
 
 
-class RobotSuite(Suite):
+class RobotSuite(RobotMeasures, Suite):
     """Inputs are commands, answers reports. A robot is no passive module: clock and threads are its own business."""
 
     slot, contracts, forgets, refuses_nan = "robot", (Robot,), False, False
+
+    @contextmanager
+    def rig(self, candidate: Candidate) -> Iterator[RobotRig]:
+        """Return a new robot, at home."""
+        robot = candidate.contract.call(candidate.make)
+        try:
+            yield LockstepRig(robot, start_posture())
+        finally:
+            robot.close()
 
     def context(self) -> Mapping[str, object]:
         """Return the episode."""

@@ -20,6 +20,8 @@ HAND_SPEED = 0.2
 class StillRobot:
     """See `golem.robots.base.Robot`; cameras see a plate with dark spots, wherever they are."""
 
+    unmoved = "it has no physics"
+
     def __init__(self) -> None:
         """Stand, with open hands."""
         self.cameras = CAMERAS

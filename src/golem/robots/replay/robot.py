@@ -30,6 +30,8 @@ class ReplayRobot:
     Its first state is at time 0. Commands move nothing.
     """
 
+    unmoved = "it is a recording"
+
     def __init__(self, config: ReplayRobotConfig) -> None:
         """Open the bag.
 
