@@ -144,7 +144,8 @@ def test_reports_of_robots_stand_side_by_side(tmp_path: Path, capsys: pytest.Cap
     assert run_check(CheckConfig(compare=files))
     said = capsys.readouterr().out
     assert "| promise | `a` | `b` | `c` |" in said
-    assert "| answers a step | kept; late 0.08 | kept; late 0.09 | **broken**: it never came |" in said
+    assert "| **answers a step** | kept | kept | **broken**: it never came |" in said
+    assert "| late | 0.08 | 0.09 | - |" in said
     assert "| elbow, off `a` | - | 2 % | - |" in said
     assert "| all | 1 kept, 0 broken | 1 kept, 0 broken | 0 kept, 1 broken |" in said
     (tmp_path / "d.json").write_text("{}")

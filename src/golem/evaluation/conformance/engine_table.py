@@ -39,7 +39,7 @@ def read_reports(files: Sequence[Path]) -> dict[str, Findings]:
 
 
 def engine_table(reports: dict[str, Findings]) -> str:
-    """Return a table: a row per promise that measures something or is broken, a column per report."""
+    """Return a table: a row per promise that measures something or is broken, and per number."""
     first, *others = reports
     checks = list(dict.fromkeys(name for report in reports.values() for name in report))
     shown = [
@@ -51,7 +51,8 @@ def engine_table(reports: dict[str, Findings]) -> str:
     rows = [f"| promise | {' | '.join(f'`{name}`' for name in reports)} |", "|---" * (1 + len(reports)) + "|"]
     for check in shown:
         cells = [_cell(report.get(check)) for report in reports.values()]
-        rows.append(f"| {check.replace('_', ' ')} | {' | '.join(cells)} |")
+        rows.append(f"| **{check.replace('_', ' ')}** | {' | '.join(cells)} |")
+        rows += _figures(check, reports)
     for check in shown:
         for name, course in (reports[first].get(check, {}).get("figures") or {}).items():
             if isinstance(course, list):
@@ -70,10 +71,19 @@ def _cell(finding: dict[str, Any] | None) -> str:
         return f"**broken**: {finding['reason']}"
     if finding["status"] != PASSED:
         return f"not asked: {finding['reason']}"
-    numbers = [
-        f"{name} {value:.3g}" for name, value in finding["figures"].items() if isinstance(value, float)
+    return "kept"
+
+
+def _figures(check: str, reports: dict[str, Findings]) -> list[str]:
+    """Return a row for each number that a check measured in any report."""
+    measured = [(report.get(check) or {}).get("figures") or {} for report in reports.values()]
+    names = dict.fromkeys(
+        n for figures in measured for n, value in figures.items() if isinstance(value, float)
+    )
+    return [
+        f"| {name} | {' | '.join(f'{f[name]:.3g}' if name in f else '-' for f in measured)} |"
+        for name in names
     ]
-    return "kept; " + "; ".join(numbers) if numbers else "kept"
 
 
 def _apart(course: list[float], finding: dict[str, Any] | None, name: str) -> str:
