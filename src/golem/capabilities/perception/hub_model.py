@@ -25,7 +25,7 @@ def load_model(folder: Path, kind: str, model: str, processor: str) -> tuple[Any
     """
     try:
         import torch  # noqa: F401  (the library tells its absence late)
-        import transformers
+        import transformers  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise MissingExtra((error.name or "transformers").partition(".")[0], EXTRA) from error
     folder = folder.expanduser()
