@@ -103,7 +103,7 @@ class HasLivingSensors(Protocol):
 
 @runtime_checkable
 class Unmoved(Protocol):
-    """A robot that no command moves.
+    """A robot that no command moves as it moves a body: measured answers to commands say nothing about it.
 
     Attributes:
         unmoved: why, in a few words, e.g. "it is a recording".

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from golem.capabilities.calibration.kinematic_fit import pose
-from golem.capabilities.calibration.scan_fit import T_TORSO_LIDAR, SurfaceView, fit_lidar, planes_of
+from golem.capabilities.calibration.scan_fit import (
+    T_TORSO_LIDAR,
+    WINDOW,
+    SurfaceView,
+    fit_lidar,
+    planes_of,
+)
 from golem.errors import ConfigError
 from golem.robots.model.spatial import rotation_rpy, transform
 from golem.robots.model.table import T_TORSO_HEAD_OPTICAL
@@ -94,4 +100,5 @@ def test_planes_are_those_of_the_surfaces_and_none_crosses_an_edge() -> None:
     N = planes_of([depth], HEAD)
     np.testing.assert_allclose(N[100, 100], [0.0, 0.0, 1.0 / 1.5], atol=1e-6)
     np.testing.assert_allclose(N[100, 500], [0.0, 0.0, 1.0], atol=1e-6)
-    assert not N[:, 312:328].any() and not N[0].any()
+    half = WINDOW // 2
+    assert not N[:, 320 - half : 320 + half].any() and not N[0].any()
