@@ -3,6 +3,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -261,6 +262,25 @@ def test_nothing_is_planned_where_the_gate_does_not_let_the_arm_go(ik: DiffIK) -
         for _ in range(30):
             q = ik.step(goal, None, whole(ik.q), DT).q
             assert (q >= lower).all() and (q <= upper).all()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)  # 17 s of CPU time, on a machine that others use, too
+def test_a_hundred_thousand_targets_reachable_or_not_leave_the_gate_nothing_to_clip(ik: DiffIK) -> None:
+    gate = SafetyLimits.from_profile()
+    lower, upper = gate.lower[UPPER], gate.upper[UPPER]
+    rng, before = np.random.default_rng(0), ik.q.copy()
+    turns = rng.standard_normal((100_000, 4))
+    places = rng.uniform((-0.8, -1.2, -1.0), (1.2, 1.2, 1.2), (100_000, 3))
+    goal: dict[str, Array] = {}
+    for k, (turn, place) in enumerate(zip(turns, places, strict=True)):
+        # Every tick one hand gets a new target anywhere, turned anyhow; the other goes on to its own.
+        goal[SIDES[k % 2]] = pin.XYZQUATToSE3(np.append(place, turn / np.linalg.norm(turn))).homogeneous
+        q = ik.step(goal.get("left"), goal.get("right"), whole(before), DT).q
+        assert np.isfinite(q).all()
+        assert (q >= lower).all() and (q <= upper).all()
+        assert (np.abs(q - before) <= ik.speed * DT + 1e-12).all()
+        before = q
 
 
 def test_an_arm_beyond_the_gates_range_stays_until_it_has_a_target(ik: DiffIK) -> None:
