@@ -116,11 +116,10 @@ class DomainRig:
             if not finding.passed:
                 self._refused = f"not moved: {finding.text}"
                 raise Inapplicable(self._refused)
-        self.open()
-        return self.mover or self.take()
+        return self.open()
 
-    def open(self) -> None:
-        """Have the gate opened, and the joints go home as the gains rise.
+    def open(self) -> Mover:
+        """Have the gate opened, let the joints go home as the gains rise, and return what moves them.
 
         Raises:
             GolemError: the gate does not open.
@@ -141,6 +140,7 @@ class DomainRig:
         home = start_posture()
         seconds = max(0.5, float(np.abs(home - found).max()) / HOME_PACE)
         self.follow(lambda t: found + min(1.0, t / seconds) * (home - found), seconds + 0.5)
+        return mover
 
     def spin(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
         """Take what comes for `seconds`, or until `until()`; return whether that became true."""

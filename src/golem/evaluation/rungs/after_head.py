@@ -9,19 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from golem.evaluation.base import DONE, TrialOutcome
-from golem.robots.model.spatial import skew
-from golem.robots.sensors.calibration_file import Calibration, LidarMount, read_calibration
+from golem.robots.sensors.calibration_file import Calibration, LidarMount, point_moved, read_calibration
 from golem.robots.sensors.mid360 import draw_mount
 from golem.runtime.calibrate_command import lidar_stack
 from golem.runtime.lockstep import build
 from golem.stack import Stack
 from golem.types import SIDES, Array
 
-AHEAD = np.array([0.0, 0.0, 1.0, 1.0])
-"""Point on the optical axis at which the head camera is judged [m], as in the realism profiles."""
 HAND_SKILL = "calibrate_hands"
-HAND_AHEAD = np.array([0.0, 0.0, 0.1, 1.0])
-"""Point on the optical axis at which a palm camera is judged [m], as in the realism profiles."""
+HAND_AHEAD = 0.1
+"""Distance along the optical axis at which a palm camera is judged [m], as in the realism profiles."""
 HAND_GOOD = 0.001
 """Error there that counts as calibrated [m], of the worse of the two."""
 LIDAR_SKILL = "calibrate_lidar"
@@ -42,12 +39,12 @@ def judge_hands(stack: Stack, seed: int, head: Calibration, views: int, method: 
             goal = {"file": file.name, "views": views, "zero": float(head.joint_sigma.max())}
             result = running.execute(HAND_SKILL, goal)
             names = [f"{side}_hand" for side in SIDES]
-            before = max(apart(robot.calibration[name], HAND_AHEAD) for name in names)
+            before = max(point_moved(robot.calibration[name], HAND_AHEAD) for name in names)
         if not result.success:
             return TrialOutcome(False, result.stage, result.slot, result.reason, result.timings)
         found = read_calibration(file)
-    after = max(apart(found.cameras[name], HAND_AHEAD) for name in names)
-    deviation = max(sigma(found, name, HAND_AHEAD) for name in names)
+    after = max(found.moved(name, HAND_AHEAD) for name in names)
+    deviation = max(found.moved_sigma(name, HAND_AHEAD) for name in names)
     good = after <= HAND_GOOD
     return TrialOutcome(
         good,
@@ -95,14 +92,3 @@ def judge_lidar(stack: Stack, seed: int, head: Calibration, method: str) -> Tria
 def _angle(T: Array) -> float:
     """Return the angle by which the (4, 4) pose `T` turns [rad]."""
     return float(np.arccos(np.clip((np.trace(T[:3, :3]) - 1.0) / 2.0, -1.0, 1.0)))
-
-
-def apart(T: Array, ahead: Array = AHEAD) -> float:
-    """Return how far the pose `T` (4, 4) moves the point at which the camera is judged [m]; the truth moves nothing."""
-    return float(np.linalg.norm(T @ ahead - ahead))
-
-
-def sigma(found: Calibration, camera: str = "head", ahead: Array = AHEAD) -> float:
-    """Return the standard deviation that the calibration claims for that point, of its worst axis [m]."""
-    J = np.hstack([skew(-ahead[:3]), np.eye(3)])
-    return float(np.sqrt(np.linalg.eigvalsh(J @ found.covariances[camera] @ J.T).max()))

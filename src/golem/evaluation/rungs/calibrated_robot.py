@@ -15,11 +15,11 @@ from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import episode_seed
-from golem.evaluation.rungs.after_head import apart, judge_hands, judge_lidar, sigma
+from golem.evaluation.rungs.after_head import judge_hands, judge_lidar
 from golem.evaluation.rungs.pick_screw import SLOT, PickOptions, PickRung
 from golem.provenance import stack_facts
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.robots.sensors.calibration_file import Calibration, read_calibration
+from golem.robots.sensors.calibration_file import Calibration, point_moved, read_calibration
 from golem.runtime.lockstep import build, build_robot
 from golem.skills.base import SkillResult
 from golem.stack import Stack, load_stack
@@ -28,6 +28,8 @@ from golem.types import Array
 STACK = "tether"
 """The shipped stack whose robot is calibrated."""
 SKILL = "calibrate"
+AHEAD = 1.0
+"""Distance along the optical axis at which the head camera is judged [m], as in the realism profiles."""
 GOOD = 0.005
 """Error there that counts as calibrated [m]."""
 ERRORS = ("before", "after", "sigma", "joint_before", "joint_after", "views", "residual")
@@ -93,9 +95,9 @@ class CalibrationRung(Rung[CalibrationOptions]):
         with closing(build_robot(stack, seed)) as robot:
             zeros = robot.true_joint_offset[13:], found.joint_offset[13:]
             values = (
-                apart(robot.calibration["head"]),
-                apart(found.cameras["head"]),
-                sigma(found),
+                point_moved(robot.calibration["head"], AHEAD),
+                found.moved("head", AHEAD),
+                found.moved_sigma("head", AHEAD),
                 _rms(zeros[0]),
                 _rms(zeros[0] - zeros[1]),
                 float(found.views),

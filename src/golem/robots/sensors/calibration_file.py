@@ -48,6 +48,12 @@ class LidarMount:
         return math.sqrt(turn * 2.0 / 3.0 * away**2 + place)
 
 
+def point_moved(T: Array, ahead: float) -> float:
+    """Return by how much the pose `T` (4, 4) moves the point `ahead` [m] on the z axis [m]."""
+    point = np.array([0.0, 0.0, ahead])
+    return float(np.linalg.norm(T[:3, :3] @ point + T[:3, 3] - point))
+
+
 @dataclass(frozen=True, slots=True)
 class Calibration:
     """Where cameras and LiDAR sit and where encoders count from.
@@ -76,8 +82,7 @@ class Calibration:
 
     def moved(self, camera: str, ahead: float) -> float:
         """Return by how much the mount of `camera` moves the point `ahead` [m] on its optical axis [m]."""
-        T, point = self.cameras[camera], np.array([0.0, 0.0, ahead])
-        return float(np.linalg.norm(T[:3, :3] @ point + T[:3, 3] - point))
+        return point_moved(self.cameras[camera], ahead)
 
     def moved_sigma(self, camera: str, ahead: float) -> float:
         """Return the standard deviation of that point, the largest of its axes [m]."""
