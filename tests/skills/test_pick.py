@@ -310,10 +310,31 @@ def test_an_open_loop_method_is_not_tried_again(full: Any) -> None:
     assert_safe(full)
 
 
-def test_two_empty_grips_are_a_failure(full: Any) -> None:
-    full.grips = [False, False, True]
-    failed(picked(full), "grasp", "grasp_method", "hold nothing", "nothing_there")
+def test_empty_grips_are_a_failure_after_a_second_look(full: Any) -> None:
+    full.grips = [False] * 4 + [True]
+    result = picked(full)
+    failed(result, "grasp", "grasp_method", "hold nothing", "nothing_there")
+    assert [one.outcome for one in result.value.tried] == ["nothing_there"] * 2
+    assert full.stages.count("detect") >= 2
     assert_safe(full)
+
+
+def test_what_the_fingers_missed_is_taken_after_a_second_look(full: Any) -> None:
+    full.grips = [False, False, True]
+    result = picked(full)
+    assert result.success, result
+    assert [one.outcome for one in result.value.tried] == ["nothing_there", "picked"]
+
+
+def test_it_does_not_look_again_when_time_is_short(full: Any) -> None:
+    full.grips = [False, False, True]
+    result = picked(full, config=replace(CONFIG, look_again=0.0))
+    failed(result, "grasp", "grasp_method", "hold nothing", "nothing_there")
+
+
+def test_what_is_tight_is_left_alone_after_a_second_look(full: Any) -> None:
+    full.loses = lambda: full.stages[-1:] == ["extract"]
+    assert len(picked(full).value.tried) == 1
 
 
 def test_a_screw_that_slips_while_it_is_pulled(full: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -15,7 +16,7 @@ from golem.skills.pick_config import PickConfig, PickGoal
 from golem.skills.pick_place import look_after, place
 from golem.skills.pick_pull import pull
 from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight, outcome_of
-from golem.skills.pick_targets import Attempt, TargetChoice
+from golem.skills.pick_targets import SAME, Attempt, PickChoice, TargetChoice
 from golem.skills.poses import lifted
 from golem.skills.travel import LineTravel, PlannedTravel, Travel
 from golem.types import Side
@@ -25,6 +26,8 @@ CLOSED = (GripState.HOLDING, GripState.EMPTY)
 
 FINAL = (PickOutcome.TIGHT, PickOutcome.OUT_OF_REACH)
 """What a second try with the same hand would not change."""
+SETTLED = (*FINAL, PickOutcome.JAMMED)
+"""What a second look would not change either."""
 
 
 class Pick:
@@ -66,9 +69,7 @@ class Pick:
         result = SkillResult(True, "done", None, reason, timings)
         try:
             await self._travel.begin(self._config.travel_speed)
-            choice = await TargetChoice(self._config).look(context, goal)
-            self._travel.look([attempt.target.position for attempt in choice.attempts])
-            attempt = await self._take_one(context, choice.attempts, timings, tried)
+            choice, attempt = await self._look_and_take(context, goal, timings, tried)
             await place(context, self._config, self._travel, attempt, self._report.tried[-1], choice)
             self._report.outcome = self._report.tried[-1].outcome = PickOutcome.PICKED.value
         except StageFailed as failure:
@@ -92,6 +93,45 @@ class Pick:
         if self._report.tried:
             self._report.tried[-1].outcome = self._report.outcome
 
+    async def _look_and_take(
+        self, context: Context, goal: PickGoal, timings: dict[str, float], tried: list[Attempt]
+    ) -> tuple[PickChoice, Attempt]:
+        """Take the first object that comes out of what the head camera shows; `tried` gets all that were approached.
+
+        What the palm camera lost or the fingers missed may be found from a second look, since a base that stands moves
+        a little. What is tight or out of reach stays so, and is left out.
+        """
+        choice = await self._look(context, goal)
+        try:
+            return choice, await self._take_one(context, choice.attempts, timings, tried)
+        except StageFailed as failure:
+            if not self._looks_again or context.t - timings["start"] > self._config.look_again:
+                raise
+            self._note(failure)
+            context.say(failure.stage, f"{failure} Looking once more.")
+            for side in _hands(goal, tried):
+                context.hands[side].open(self._config.release_gap)
+                await self._travel.home(side, self._config.travel_speed)
+            choice = await self._look(context, goal)
+            left = [a for a in choice.attempts if not self._is_settled(a)]
+            if not left:
+                raise
+            return choice, await self._take_one(context, left, timings, tried)
+
+    def _is_settled(self, attempt: Attempt) -> bool:
+        """Return whether the hand has tried an object there, and another try would not change how it ended."""
+        x, y, _ = attempt.target.position
+        return any(
+            one.outcome in SETTLED and one.side == attempt.side and math.hypot(one.x - x, one.y - y) < SAME
+            for one in self._report.tried
+        )
+
+    async def _look(self, context: Context, goal: PickGoal) -> PickChoice:
+        """Look with the head camera for what to take, and for what is in the way."""
+        choice = await TargetChoice(self._config).look(context, goal)
+        self._travel.look([attempt.target.position for attempt in choice.attempts])
+        return choice
+
     async def _take_one(
         self, context: Context, attempts: list[Attempt], timings: dict[str, float], tried: list[Attempt]
     ) -> Attempt:
@@ -100,8 +140,9 @@ class Pick:
         A screw that is tight or jammed is left for the next one. An open-loop method has no next one: the error that
         made it miss, that of the head camera, is the same everywhere.
         """
+        left = list(attempts)
         while True:
-            attempt = attempts[len(tried)]
+            attempt = left.pop(0)
             tried.append(attempt)
             self._report.tried.append(attempt.first_seen)
             try:
@@ -110,14 +151,14 @@ class Pick:
                 return attempt
             except StageFailed as failure:
                 refused = failure.stage == "approach"
-                if len(tried) == len(attempts) or not (refused or self._looks_again):
+                if not left or not (refused or self._looks_again):
                     raise
                 self._note(failure)
                 context.say(failure.stage, f"{failure} Leaving it for the next {attempt.label}.")
                 if not refused:
                     context.hands[attempt.side].open(self._config.release_gap)
                     await self._back_off(context, attempt.side)
-                if attempts[len(tried)].side != attempt.side and context.arms[attempt.side].sent:
+                if left[0].side != attempt.side and context.arms[attempt.side].sent:
                     await self._travel.home(attempt.side, self._config.travel_speed)
 
     async def _approach(self, context: Context, attempt: Attempt) -> Grasp:

@@ -51,6 +51,7 @@ class PickConfig:
         comfort: x, y in base_link around which the arm works best [m]; the nearest object is taken first.
         attempts: how often a method that looks again may try to grasp and pull one object.
         candidates: how many objects it may try.
+        look_again: time within which it looks once more for what was lost, after all was tried [s]; 0: never.
         few: where fewer are seen that a hand can take, the torso turns for another look.
         slack: how far beside the reach of a hand the head camera may see what is tried all the same [m]; it is off by
             that much.
@@ -90,6 +91,7 @@ class PickConfig:
     comfort: tuple[float, float] = (0.45, -0.12)
     attempts: int = 2
     candidates: int = 8
+    look_again: float = 45.0
     few: int = 3
     slack: float = 0.04
     proud: float = 0.0115

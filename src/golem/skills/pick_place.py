@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from golem.capabilities.planning.base import PlanRefused, Refusal
@@ -13,7 +15,7 @@ from golem.skills.hand_reach import HandReach
 from golem.skills.pick_config import PickConfig
 from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight, Tried
 from golem.skills.pick_targets import Attempt, PickChoice, positions
-from golem.skills.poses import turned
+from golem.skills.poses import lifted, moved, turned
 from golem.skills.travel import Travel
 from golem.types import Array
 
@@ -23,11 +25,13 @@ CORRECTIONS = 2
 """Moves further inside that the palm camera may ask for: where its view is cut off, the middle is farther."""
 LOOKS = 3
 """Pictures of the palm camera in which it looks for the container."""
+HIGHER = 0.10
+"""How much higher a hand looks that does not see the container from where it lets go [m]."""
 INSIDE = 0.05
 """A hand this near to the container's middle lets go there [m]."""
 FARTHEST = 0.25
 """What is farther away than this is not the container that the hand was sent to [m]."""
-SHARES = (1.0, 0.75, 0.5)
+SHARES = (1.0, 0.75, 0.5, 0.25)
 """Shares of the way to the middle that are tried."""
 SAME = 0.035
 """Two looks of the head camera at one object differ by less [m]; screws stand 9 cm apart."""
@@ -88,9 +92,34 @@ async def place(
 async def _nearer(context: Context, config: PickConfig, travel: Travel, attempt: Attempt) -> bool:
     """Look down at the container with the palm camera, and go further inside if the hand is near its rim or beside it.
 
-    What head camera and encoders are off by does not count here. Returns whether the hand has moved.
+    What head camera and encoders are off by does not count here. Where the camera is too near to know the container, it
+    looks from higher up. Returns whether the hand is further inside now.
     """
-    arm, box = context.arms[attempt.side], None
+    hand = context.arms[attempt.side].commanded
+    away, raised = await _away(context, config, attempt), False
+    if away is None:
+        with suppress(StageFailed):
+            await travel.carry(attempt.side, [lifted(hand, HIGHER)], config.travel_speed)
+            raised = True
+            away = await _away(context, config, attempt)
+    goals = list[Array]()
+    if away is not None and INSIDE < np.linalg.norm(away) < FARTHEST:
+        inside = [moved(hand, np.append(share * away, 0.0)) for share in SHARES]
+        goals = [turned(T, turn) for T in inside for turn in config.turns]
+    inward = bool(goals)
+    if raised:
+        goals.append(hand)
+    if not goals:
+        return False
+    try:
+        await travel.carry(attempt.side, goals, config.travel_speed)
+    except StageFailed:
+        return False  # no nearer than it is
+    return inward
+
+
+async def _away(context: Context, config: PickConfig, attempt: Attempt) -> Array | None:
+    """Return (2,) where the palm camera sees the container's middle, from the hand, in odom [m]; None: nowhere."""
     with context.watch(f"{attempt.side}_hand", attempt.container, doubtful=(attempt.container,)) as eye:
         for _ in range(LOOKS):
             sightings = await eye.look(config.look_timeout)
@@ -98,22 +127,9 @@ async def _nearer(context: Context, config: PickConfig, travel: Travel, attempt:
             if seen:
                 best = max(seen, key=lambda o: o.detection.score)
                 box = Container.of(best, config.container_radius)
-                break
-    if box is None:
-        return False
-    hand = arm.commanded
-    middle = box.sighting.position[:2] if box.box is None else box.box.center
-    away = middle - hand[:2, 3]
-    if not INSIDE < np.linalg.norm(away) < FARTHEST:
-        return False
-    goals = [hand.copy() for _ in SHARES]
-    for T, share in zip(goals, SHARES, strict=True):
-        T[:2, 3] += share * away
-    try:
-        await travel.carry(attempt.side, goals, config.travel_speed)
-    except StageFailed:
-        return False  # no nearer than it is
-    return True
+                middle = box.sighting.position[:2] if box.box is None else box.box.center
+                return middle - context.arms[attempt.side].commanded[:2, 3]
+    return None
 
 
 async def look_after(

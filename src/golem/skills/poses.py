@@ -12,6 +12,13 @@ def lifted(T: Array, height: float) -> Array:
     return at_height(T, T[2, 3] + height)
 
 
+def moved(T: Array, by: Array) -> Array:
+    """Return pose `T` (4, 4) moved by `by` (3,) in odom [m]."""
+    there = T.copy()
+    there[:3, 3] += by
+    return there
+
+
 def retracted(T: Array, distance: float) -> Array:
     """Return pose `T` (4, 4) moved back by `distance` [m] against its approach axis, z."""
     back = T.copy()
