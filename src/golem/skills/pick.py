@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from golem.capabilities.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus, ServoStep
@@ -112,7 +113,8 @@ class Pick:
             for side in _hands(goal, tried):
                 context.hands[side].open(self._config.release_gap)
                 await self._travel.home(side, self._config.travel_speed)
-            choice = await self._look(context, goal)
+            with suppress(StageFailed):
+                choice = await self._look(context, goal)
             left = [a for a in choice.attempts if not self._is_settled(a)]
             if not left:
                 raise
