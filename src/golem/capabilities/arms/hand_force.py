@@ -10,12 +10,20 @@ from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.types import Array, Side
 
 
+TORQUE = 0.5
+"""Standard deviation of what a motor's torque is off by: friction, masses, encoder zeros [N m] [own]."""
+WRENCH: Array = np.repeat([30.0, 0.6], 3)
+"""Standard deviations of force and moment that a hand meets [N, N m] [own]: fingers touch things 2 cm from its grasp
+frame. Without them an arm that can hardly resist some moment has the errors of its torques taken for a large one, and
+for the force that goes with it."""
+
+
 class HandForce:
     """Estimates the force at a grasp frame of an arm that moves slowly.
 
-    What the motors do beyond carrying the arm is done at the hand: tau - g(q) = J(q)^T F, in least squares over the
-    seven joints. Errors of the masses, friction and what is held remain in it; the difference to a moment before has
-    them cancelled.
+    What the motors do beyond carrying the arm is done at the hand: tau - g(q) = J(q)^T F, the most likely F for
+    independent normal errors of `TORQUE` and a wrench of `WRENCH`. Errors of the masses, friction and what is held
+    remain in it; the difference to a moment before has them cancelled.
     """
 
     def __init__(self) -> None:
@@ -34,5 +42,6 @@ class HandForce:
         rest = tau - pin.computeGeneralizedGravity(arm.model, arm.data, q)
         arm.update(q)
         J = arm.jacobian(side)[:, columns]
-        wrench = np.linalg.lstsq(J.T, rest[columns], rcond=None)[0]
+        likely = J @ J.T + np.diag((TORQUE / WRENCH) ** 2)
+        wrench = np.linalg.solve(likely, J @ rest[columns])
         return np.asarray(arm.placement(side).rotation @ wrench[:3], dtype=np.float64)
