@@ -53,9 +53,9 @@ def clip(hub: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def siglip(hub: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    import tokenizers
     import torch
 
+    tokenizers = pytest.importorskip("tokenizers", reason="comes with transformers")
     folder = tmp_path_factory.mktemp("siglip")
     words = ["<unk>", "<pad>", "a", "photo", "of", "mug", "can"]
     level = tokenizers.models.WordLevel({word: k for k, word in enumerate(words)}, unk_token="<unk>")
