@@ -64,7 +64,7 @@ class RerankedConfig:
             raise ConfigError("The judge gemini looks at frames: it goes with the proposer frame_index.")
 
 
-class Judge(Protocol):
+class PlaceJudge(Protocol):
     """Puts proposed places into order."""
 
     @property
@@ -109,7 +109,7 @@ class ObjectJudge:
         return self._objects.last
 
     def observe(self, observation: Observation) -> None:
-        """See `Judge`."""
+        """See `PlaceJudge`."""
         self._objects.observe(observation)
 
     def order(
@@ -127,11 +127,11 @@ class ObjectJudge:
         return bool(np.linalg.norm(known.position[:2] - proposed.position[:2]) <= self._config.near)
 
     def forget(self, text: str) -> int:
-        """See `Judge`."""
+        """See `PlaceJudge`."""
         return self._objects.forget(text)
 
     def close(self) -> None:
-        """See `Judge`."""
+        """See `PlaceJudge`."""
         self._objects.close()
 
 
@@ -150,7 +150,7 @@ class Reranked:
             TopDownMap if c.proposer == "top_down_map" else lambda: FrameIndex(c.frames)
         )
         self._proposer = make()
-        self._judge: Judge = ObjectJudge(c) if c.judge == "objects" else PictureJudge(c.gemini, c.near)
+        self._judge: PlaceJudge = ObjectJudge(c) if c.judge == "objects" else PictureJudge(c.gemini, c.near)
         self.last = self._judge.last
 
     def observe(self, observation: Observation) -> None:

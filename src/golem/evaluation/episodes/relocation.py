@@ -19,7 +19,7 @@ from golem.evaluation.episodes.relocation_room import (
     AROUND,
     COUNTER,
     VIEWS,
-    Room,
+    RelocationRoom,
     Thing,
     compile_room,
     place_camera,
@@ -128,13 +128,13 @@ def relocation(rng: np.random.Generator, setting: Setting) -> Relocation:
     start = looks[-1].frame.t + PAUSE if looks else 0.0
     pause = PAUSE if setting.walks == 2 else HOUR
     for place in places:
-        room = Room((Thing(target, place), *others), clutter)
+        room = RelocationRoom((Thing(target, place), *others), clutter)
         looks += _walk(rng, room, setting, start)
         start = looks[-1].frame.t + pause
     split, moved_at = len(looks), start - pause / 2
     screens = (_before(spots[0][0], float(counters[0]) * np.pi / 2),) if setting.hidden else ()
     after = (Thing(target, spots[1][0]), *others)
-    looks += _walk(rng, Room(after, clutter, screens, setting.dusk), setting, start)
+    looks += _walk(rng, RelocationRoom(after, clutter, screens, setting.dusk), setting, start)
     before = (Thing(target, spots[0][0]), *others)
     return Relocation(target, before, after, absent, tuple(looks), split, moved_at)
 
@@ -179,7 +179,9 @@ def _before(place: Array, heading: float) -> Array:
     return place - 0.16 * np.array([np.cos(heading), np.sin(heading), 0.0])
 
 
-def _walk(rng: np.random.Generator, room: Room, setting: Setting, start: float) -> list[Observation]:
+def _walk(
+    rng: np.random.Generator, room: RelocationRoom, setting: Setting, start: float
+) -> list[Observation]:
     """Render the eight views of one walk, two of each counter."""
     rates = setting.rates
     model, owners = compile_room(room)

@@ -39,7 +39,7 @@ class Thing:
 
 
 @dataclass(frozen=True, slots=True)
-class Room:
+class RelocationRoom:
     """What stands where during one walk.
 
     Attributes:
@@ -72,7 +72,7 @@ def place_camera(data: mujoco.MjData, T_optical: Array) -> None:
     data.mocap_quat[0] = Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True)
 
 
-def compile_room(room: Room) -> tuple[mujoco.MjModel, Mapping[int, int]]:
+def compile_room(room: RelocationRoom) -> tuple[mujoco.MjModel, Mapping[int, int]]:
     """Compile a room, and return with it which geom belongs to which of its things."""
     spec = mujoco.MjSpec()
     add_materials(spec)
