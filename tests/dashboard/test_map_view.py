@@ -36,6 +36,19 @@ def test_words_stay_inside_the_picture_and_have_their_colour(y: float, colour: t
     assert (rgb == colour).all(axis=2).sum() > 40
 
 
+def test_words_of_things_side_by_side_do_not_cover_each_other() -> None:
+    def red(*colours: tuple[int, int, int]) -> int:
+        view = picture()
+        for colour in colours:
+            view.mark(np.array([0.5, 0.5]), "bottle 12 s", colour)
+        rgb = view.rgb().astype(int)
+        dot = np.argwhere((rgb == colours[-1]).all(axis=2))[:, 1].min()
+        return int((rgb[:, dot + 12 :, 0] > rgb[:, dot + 12 :, 2] + 40).sum())
+
+    first, last = (220, 0, 0), (0, 0, 220)
+    assert red(first) > 50 and red(first, last) >= 0.9 * red(first)
+
+
 @pytest.mark.parametrize(
     ("age", "there", "words"),
     [

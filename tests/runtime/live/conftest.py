@@ -98,10 +98,11 @@ class Live:
             self.clock += TICK
 
     def ask(self, what: str) -> tuple[bool, str]:
-        """Call one of the gate's services as an operator; return success and message."""
+        """Call one of the gate's services, or another by its whole name; return success and message."""
         _, node = self.member("operator")
         press = what in ("press", "release")
         name, kind = ("/estop/press", "SetBool") if press else (f"/safety/{what}", "Trigger")
+        name = what if what.startswith("/") else name
         request = SetBool_Request(what == "press") if press else Trigger_Request()
         answer = node.client(name, f"std_srvs/srv/{kind}").call(request)
         for _ in range(50):

@@ -1,12 +1,26 @@
-"""An encoder of whole frames and of words into one space, by whose angle a memory of frames compares them."""
+"""Encoders of whole frames and of words into one space, by whose angle a memory of frames compares them."""
 
 from __future__ import annotations
+
+from typing import Protocol
 
 import numpy as np
 
 from golem.capabilities.memory.base import Observation
 from golem.capabilities.memory.words import label_scores
 from golem.types import Array
+
+
+class FrameEncoder(Protocol):
+    """Turns frames and words into vectors of one length; the cosine of two says how well they fit."""
+
+    def frame(self, observation: Observation) -> Array:
+        """Return the (d,) unit vector of a frame; zero where nothing can be said of it."""
+        ...
+
+    def text(self, text: str) -> Array:
+        """Return the (d,) unit vector of words; zero where nothing can be said of them."""
+        ...
 
 
 class BagOfLabels:

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from golem.capabilities.memory.base import Observation, Place, When, apart, check_observation, check_query
-from golem.capabilities.memory.frame_encoder import BagOfLabels
-from golem.errors import ConfigError
+from golem.capabilities.memory.frame_encoder import BagOfLabels, FrameEncoder
+from golem.capabilities.memory.image_text_encoder import NETWORKS, ImageTextEncoder, Network
+from golem.errors import ConfigError, unknown_name
 from golem.types import Array
 
 WINDOW = 0.25
@@ -24,11 +27,15 @@ class FrameIndexConfig:
     """How frames are remembered.
 
     Attributes:
+        encoder: what compares frames with words: labels (of the localizer), or the images by siglip or clip.
+        weights: folder of that network, as `save_pretrained` of transformers writes it.
         spread: places closer to a better one than this are left out of an answer [m].
-        least: least similarity of an answer, 0 to 1.
+        least: least similarity of an answer, 0 to 1; what separates things that are not there differs by network.
         most: most frames; the oldest are forgotten first.
     """
 
+    encoder: Literal["labels"] | Network = "labels"
+    weights: Path | None = None
     spread: float = 0.5
     least: float = 0.05
     most: int = 100_000
@@ -43,6 +50,23 @@ class FrameIndexConfig:
             raise ConfigError(
                 "Of frame_index, spread is at least 0, least is from 0 to 1, and most is above 0."
             )
+        if self.encoder not in ("labels", *NETWORKS):
+            raise unknown_name("encoder", self.encoder, ("labels", *NETWORKS))
+        if (self.encoder == "labels") != (self.weights is None):
+            raise ConfigError(
+                f"The encoder labels has no weights, {' and '.join(NETWORKS)} need the folder of theirs: "
+                "memory: {use: frame_index, encoder: siglip, weights: FOLDER}."
+            )
+
+    def create(self) -> FrameEncoder:
+        """Return the encoder.
+
+        Raises:
+            MissingExtra, ConfigError: see `ImageTextEncoder`.
+        """
+        if self.encoder == "labels" or self.weights is None:
+            return BagOfLabels()
+        return ImageTextEncoder(self.encoder, self.weights)
 
 
 class FrameIndex:
@@ -51,7 +75,7 @@ class FrameIndex:
     def __init__(self, config: FrameIndexConfig | None = None) -> None:
         """Remember nothing yet."""
         self._config = config or FrameIndexConfig()
-        self._encoder = BagOfLabels()
+        self._encoder = self._config.create()
         self._vectors: list[Array] = []
         self._matrix: Array | None = None  # (n, d) of the vectors; None since the last change
         self._places: list[Array] = []
@@ -64,7 +88,7 @@ class FrameIndex:
         self.last = observation.frame.t
         self._vectors.append(self._encoder.frame(observation))
         self._matrix = None
-        self._places.append(_looked_at(observation))
+        self._places.append(looked_at(observation))
         self._times.append(observation.frame.t)
         over = len(self._times) - self._config.most
         if over > 0:
@@ -103,7 +127,7 @@ class FrameIndex:
         """See `Memory.close`."""
 
 
-def _looked_at(observation: Observation) -> Array:
+def looked_at(observation: Observation) -> Array:
     """Return the (3,) point at which the middle of a frame looks; the eye itself where there is no depth."""
     frame = observation.frame
     height, width = frame.depth.shape

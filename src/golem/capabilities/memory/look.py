@@ -10,7 +10,12 @@ from golem.robots.sensors.cameras import project
 from golem.types import Array, RgbdImage
 
 BEHIND = 0.05
-"""How far behind an object the surface has to be for the look to have gone through its place [m]."""
+"""How far behind an object's place, and its standard deviation, the surface of a look through it has to be [m].
+
+The place is the median of what was seen of the object: of itself no more than half is behind that.
+"""
+LEVEL = 0.3
+"""Sine of the angle off the vertical from which on a view has an upper half."""
 SHARE = 0.9
 """Share of the window that has to be seen through."""
 MARGIN = 1.5
@@ -43,7 +48,7 @@ def look_at(frame: RgbdImage, positions: Array, sizes: Array, sigmas: Array) -> 
     T = np.linalg.inv(frame.T_odom_optical)
     optical = np.asarray(positions, float) @ T[:3, :3].T + T[:3, 3]
     out = [Look.OUT_OF_VIEW] * len(optical)
-    depth = optical[:, 2]
+    depth, up = optical[:, 2], T[:2, 2]
     near = (depth > info.near) & (depth < info.far)
     for k in np.flatnonzero(near):
         x, y = project(info, optical[k])
@@ -52,10 +57,13 @@ def look_at(frame: RgbdImage, positions: Array, sizes: Array, sigmas: Array) -> 
         if half < SMALLEST or x0 < 0 or y0 < 0 or x1 >= info.width or y1 >= info.height:
             continue
         window = frame.depth[y0 : y1 + 1, x0 : x1 + 1]
+        if np.hypot(*up) > LEVEL:  # below its middle is what it stands on
+            right, down = np.arange(x0, x1 + 1) - x, np.arange(y0, y1 + 1) - y
+            window = window[up[0] * right[None, :] + up[1] * down[:, None] >= 0.0]
         valid = window[window > 0.0]
         if len(valid) < VALID * window.size:
             continue
-        behind = np.mean(valid > depth[k] + sizes[k] + BEHIND)
+        behind = np.mean(valid > depth[k] + sigmas[k] + BEHIND)
         before = np.mean(valid < depth[k] - sizes[k] - MARGIN * sigmas[k] - BEHIND)
         if behind >= SHARE:
             out[k] = Look.THROUGH

@@ -14,6 +14,11 @@ UNKNOWN, FREE, FULL = 150, 245, 40
 INK, FAINT = (20, 20, 20), (150, 150, 190)
 WAY, TRACK, GOAL, ROBOT, SCAN = (0, 120, 200), (220, 0, 0), (0, 150, 0), (255, 140, 0), (230, 0, 180)
 FONT, LETTERS = cv2.FONT_HERSHEY_SIMPLEX, 0.38
+HALO = (245, 245, 245)
+"""Behind words and dots, so that they can be read on walls and on what is not known."""
+STEPS = (0, 1, -1, 2, -2, 3, -3, 4, -4)
+"""Lines by which words give way to others, in this order."""
+Box = tuple[int, int, int, int]
 EDGE = 8
 """Cells around what is known that are shown."""
 
@@ -55,7 +60,7 @@ class MapPicture:
         cv2.circle(self._image, a.tolist(), 5, colour, -1)
 
     def mark(self, place: Array, text: str, colour: Colour) -> None:
-        """Mark a place (2,) [m] with a few words beside it."""
+        """Mark a place (2,) [m] with a few words beside it; those of the last one are nearest to their place."""
         self._marks.append((place, text, colour))
 
     def rgb(self) -> NDArray[np.uint8]:
@@ -63,13 +68,25 @@ class MapPicture:
         turned = cv2.rotate(self._image, cv2.ROTATE_90_COUNTERCLOCKWISE)[:, ::-1]
         picture = np.ascontiguousarray(turned, np.uint8)
         height, width = picture.shape[:2]
-        for place, text, colour in self._marks:  # words are written upright, so after the turn
+        taken: list[Box] = []
+        drawn: list[tuple[int, int, str, Colour]] = []
+        for place, text, colour in reversed(self._marks):  # words are written upright, so after the turn
             x, y = self._pixels(place[np.newaxis])[0].tolist()
             column, row = width - 1 - y, height - 1 - x
+            (wide, high), _ = cv2.getTextSize(text, FONT, LETTERS, 1)
+            left = column + 7 if column + 7 + wide < width else column - 7 - wide
+            rows = [row + 4 + step * (high + 4) for step in STEPS]
+            bottom = next(
+                (r for r in rows if high <= r < height and _free((left, r - high, left + wide, r), taken)),
+                rows[0],
+            )
+            taken.append((left, bottom - high, left + wide, bottom))
+            cv2.rectangle(picture, (left - 1, bottom - high - 1), (left + wide, bottom + 2), HALO, -1)
+            drawn.append((left, bottom, text, colour))
+            cv2.circle(picture, (column, row), 6, HALO, -1)
             cv2.circle(picture, (column, row), 4, colour, -1)
-            size, _ = cv2.getTextSize(text, FONT, LETTERS, 1)
-            left = column + 7 if column + 7 + size[0] < width else column - 7 - size[0]
-            cv2.putText(picture, text, (left, row + 4), FONT, LETTERS, colour, 1, cv2.LINE_AA)
+        for left, bottom, text, colour in reversed(drawn):
+            cv2.putText(picture, text, (left, bottom), FONT, LETTERS, colour, 1, cv2.LINE_AA)
         return picture
 
     def _pixels(self, points: Array) -> NDArray[np.int32]:
@@ -77,3 +94,9 @@ class MapPicture:
         c, s = np.cos(o.yaw), np.sin(o.yaw)
         local = (points - (o.x, o.y)) @ np.array([[c, -s], [s, c]]) / self._grid.resolution - self._low
         return (np.clip(local, -1e4, 1e4) * self._scale).astype(np.int32)
+
+
+def _free(box: Box, taken: list[Box]) -> bool:
+    """Return whether a box (left, top, right, bottom) [px] overlaps none of `taken`."""
+    left, top, right, bottom = box
+    return all(right < a or c < left or bottom < b or d < top for a, b, c, d in taken)

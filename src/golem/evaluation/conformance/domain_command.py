@@ -81,9 +81,8 @@ def run_domain_check(config: DomainCheckConfig) -> bool:
         still = not config.dds.robot and bool(frozen_groups([state for _, state in link.states]))
         words = ["safety", "--black-box", "None", *(["--still"] if still else [])]
         words += [*config.estop.words(), *config.dds.words()]
-        rig = DomainRig(
-            Workbench(link, _Beside(config), bringup, lambda: Process("safety", words)), participant
-        )
+        bench = Workbench(link, _Beside(config), bringup, lambda: Process("safety", words))
+        rig = DomainRig(bench, participant, lambda: Process("safety", [*words, "--strict"]))
         subject = Candidate("robot", str(config.dds), lambda: rig)
         try:
             report = run_suite(DomainSuite(rig), subject, lambda check: log_line(f"{check.promise}"))

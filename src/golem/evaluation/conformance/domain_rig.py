@@ -19,12 +19,15 @@ from golem.robots.sensors.calibration import calibrations
 from golem.robots.sensors.cameras import CAMERAS
 from golem.runtime.bringup.base import StepFinding, Workbench
 from golem.runtime.bringup.motor_checks import check_estop, check_hoist, check_release
+from golem.runtime.live.launch import Process
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.lockstep import start_posture
 from golem.types import SIDES, Array, HandCommand, HandState, LowState, Side
 
 HOME_PACE = 0.4
 """How fast the joints go home at first [rad/s]."""
+ARMED = 20.0
+"""How long a gate that was started is waited for [s]."""
 PATIENCE = 20.0
 """How many times as long as it should take a motion may take, on a busy machine [1]; and for a picture [s]."""
 
@@ -32,9 +35,15 @@ PATIENCE = 20.0
 class DomainRig:
     """See `RobotRig`. Every motion goes through the safety gate, which this starts after a confirmation."""
 
-    def __init__(self, bench: Workbench, participant: CycloneParticipant) -> None:
-        """Listen with the link of `bench`; its person confirms that the robot hangs."""
+    def __init__(
+        self, bench: Workbench, participant: CycloneParticipant, strict_gate: Callable[[], Process]
+    ) -> None:
+        """Listen with the link of `bench`; its person confirms that the robot hangs.
+
+        `strict_gate` starts a gate that stops a simulated robot as early as a real one.
+        """
         self.bench, self.participant = bench, participant
+        self._strict_gate = strict_gate
         self.cameras = {n: c for n, c in CAMERAS.items() if f"{n} camera" not in bench.config.without}
         self.calibration: dict[str, Array] = {name: np.eye(4) for name in self.cameras}
         self.mover: Mover | None = None
@@ -118,19 +127,29 @@ class DomainRig:
                 raise Inapplicable(self._refused)
         return self.open()
 
+    def guard_strictly(self) -> Mover:
+        """Open a strict gate in place of the one that runs, or was killed; return what moves the robot, damped so far.
+
+        Raises:
+            GolemError: it is not armed, or does not open.
+        """
+        self.take().close()
+        if self.bench.gate is not None:
+            self.bench.gate.end()
+        self.bench.gate, link = self._strict_gate(), self.bench.link
+        link.gate = None
+        if not link.spin(ARMED, lambda: link.gate is not None and link.gate.state is GateState.ARMED):
+            raise GolemError(f"The gate is not armed: {_why(self.bench)}")
+        return self._activate()
+
     def open(self) -> Mover:
         """Have the gate opened, let the joints go home as the gains rise, and return what moves them.
 
         Raises:
             GolemError: the gate does not open.
         """
-        mover, link = Mover(self.bench.config.dds), self.bench.link
-        self.mover = mover
-        link.pass_time(0.5)
-        answer = link.ask("activate")
-        if not link.spin(5.0, lambda: link.gate is not None and link.gate.state is GateState.ACTIVE):
-            raise GolemError(f"The gate does not open: {answer}")
-        found = link.states[-1][1].q.copy()
+        mover = self._activate()
+        found = self.bench.link.states[-1][1].q.copy()
 
         def rise(t: float) -> Array:
             mover.level = min(1.0, t / RISE)
@@ -141,6 +160,15 @@ class DomainRig:
         seconds = max(0.5, float(np.abs(home - found).max()) / HOME_PACE)
         self.follow(lambda t: found + min(1.0, t / seconds) * (home - found), seconds + 0.5)
         return mover
+
+    def _activate(self) -> Mover:
+        """Have the armed gate let commands through, and return what sends them: joints stay, without stiffness."""
+        self.mover, link = Mover(self.bench.config.dds), self.bench.link
+        link.pass_time(0.5)
+        answer = link.ask("activate")
+        if not link.spin(5.0, lambda: link.gate is not None and link.gate.state is GateState.ACTIVE):
+            raise GolemError(f"The gate does not open: {answer}")
+        return self.mover
 
     def spin(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
         """Take what comes for `seconds`, or until `until()`; return whether that became true."""
@@ -197,4 +225,4 @@ def reaction(rig: DomainRig, act: Callable[[], None], patience: float) -> tuple[
     link.spin(patience, lambda: link.stopped_at is not None)
     if link.stopped_at is None or link.gate is None or link.gate.reason is None:
         return float("inf"), _why(rig.bench)
-    return link.states[-1][1].t - began, str(link.gate.reason)
+    return max(state.t for _, state in link.states) - began, str(link.gate.reason)

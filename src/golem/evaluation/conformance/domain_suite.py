@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
 
-from golem.errors import GolemError
-from golem.evaluation.conformance.base import Candidate, Inapplicable, check, gate
-from golem.evaluation.conformance.domain_rig import DomainRig, reaction
+from golem.evaluation.conformance.base import Candidate, check, gate
+from golem.evaluation.conformance.domain_rig import DomainRig
+from golem.evaluation.conformance.domain_stops import DomainStops, judge
 from golem.evaluation.conformance.robot_measures import RobotMeasures
 from golem.evaluation.conformance.robot_rig import RobotRig
 from golem.interfaces import public
-from golem.interfaces.payloads import GateState, Reason
 from golem.interfaces.ros_convert import seconds
 from golem.interfaces.rows import TopicRow
 from golem.middleware.dds import discovery
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import dds_name
-from golem.runtime.bringup.base import Act, StepFinding, Task, Workbench
+from golem.runtime.bringup.base import Workbench
 from golem.runtime.bringup.listening_checks import check_domain, check_state
 from golem.runtime.bringup.sensor_checks import check_sensors
 
@@ -31,12 +29,6 @@ DISCOVERY = 30.0
 STALE, EARLY = 0.5, 0.05
 """How old a stamp may be when its message comes, and how far ahead of the robot's time it may be [s]."""
 STAMPED = ("/livox/imu", "/left/gripper/state", "/right/gripper/state", "/realsense/head/color/camera_info")
-RESETS = 8
-"""How often a stopped gate is asked to arm again."""
-PRESS, SILENCE = 0.5, 0.5
-"""Within what robot time a pressed button, and a stack that fell silent, have to stop the robot [s]."""
-LIMP, LIMP_TIME = 1.0, 0.6
-"""Torque below which a motor is limp [N m], and when all have to be after the gate died [s]."""
 
 
 class DomainListening:
@@ -54,7 +46,7 @@ class DomainListening:
     @gate
     def is_alone(self, candidate: Candidate) -> None:
         """One robot is on the domain, and neither gate nor stack commands it."""
-        _judge(candidate, check_domain(self.bench))
+        judge(candidate, check_domain(self.bench))
 
     @gate
     def offers_its_topics(self, candidate: Candidate) -> None:
@@ -86,7 +78,7 @@ class DomainListening:
         link.spin(
             DISCOVERY, lambda: len(link.states) > 100
         )  # a simulation stands still while its cameras start
-        _judge(candidate, check_state(self.bench))
+        judge(candidate, check_state(self.bench))
         steps = np.diff([state.t for _, state in link.states])
         candidate.figures["longest step of the stamps [s]"] = float(steps.max())
         if steps.min() < 0.0015:
@@ -95,7 +87,7 @@ class DomainListening:
     @check
     def devices_deliver(self, candidate: Candidate) -> None:
         """Cameras, LiDAR and hands deliver images, points and openings of their size and at their rate."""
-        _judge(candidate, check_sensors(self.bench))
+        judge(candidate, check_sensors(self.bench))
 
     @check
     def stamps_by_its_own_time(self, candidate: Candidate) -> None:
@@ -119,87 +111,13 @@ class DomainListening:
                 raise candidate.fault(f"{name} is stamped {np.median(ages):+.3f} s before the robot's time")
 
 
-class DomainSuite(RobotMeasures, DomainListening):
+class DomainSuite(DomainStops, RobotMeasures, DomainListening):
     """The promises of a robot on a domain. The last ones end its gate."""
 
     @contextmanager
     def rig(self, candidate: Candidate) -> Iterator[RobotRig]:
         """Return the robot; it moves where somebody confirms that it may."""
         yield self.session
-
-    @check
-    def button_was_heard(self, candidate: Candidate) -> None:
-        """Before the motors were had, the gate heard the emergency stop pressed, and released."""
-        self.session.take()
-        assert self.session.estop is not None
-        _judge(candidate, self.session.estop)
-
-    @check
-    def button_stops_it(self, candidate: Candidate) -> None:
-        """The emergency stop, pressed while the robot moves, stops it."""
-        self.session.rest(0.5)
-        self._stops(
-            candidate, lambda: self.bench.person.act(Task(Act.PRESS, "Press the emergency stop.")), PRESS,
-            Reason.ESTOP_PRESSED,
-        )  # fmt: skip
-        self.bench.person.act(Task(Act.RELEASE, "Release it again."))
-
-    @check
-    def silence_stops_it(self, candidate: Candidate) -> None:
-        """A stack that falls silent stops it."""
-        self._reopen()
-        assert self.session.mover is not None
-        self._stops(candidate, self.session.mover.fall_silent, SILENCE, Reason.COMMAND_STALE)
-
-    @check
-    def motors_go_limp_alone(self, candidate: Candidate) -> None:
-        """Motors that hear no gate any more go limp."""
-        self._reopen()
-        gate, link = self.bench.gate, self.bench.link
-        assert gate is not None
-        died = link.states[-1][1].t
-        gate.kill()
-        limp = math.inf
-
-        def loose() -> bool:
-            nonlocal limp
-            limp = next(
-                (s.t - died for _, s in link.states if s.t > died and np.abs(s.tau).max() < LIMP), math.inf
-            )
-            return limp < math.inf
-
-        link.spin(20.0 * LIMP_TIME, loose)
-        candidate.figures["limp after the gate died [s]"] = limp
-        if limp > LIMP_TIME:
-            raise candidate.fault(f"the motors hold on for {limp:.2f} s after the last command")
-
-    def _stops(self, candidate: Candidate, act: Callable[[], None], within: float, why: Reason) -> None:
-        took, reason = reaction(self.session, act, 5.0)
-        candidate.figures["stopped after [s]"] = took
-        if reason != why:
-            raise candidate.fault(f"the gate gives the reason '{reason}', not '{why}'")
-        if took > within:
-            raise candidate.fault(f"it was stopped after {took:.2f} s, later than {within} s")
-
-    def _reopen(self) -> None:
-        """Arm the stopped gate again, open it, and go home."""
-        self.session.take().close()
-        link = self.bench.link
-        try:
-            for _ in range(RESETS):  # the motors damp for a while first, and the robot has to come to rest
-                link.pass_time(1.0)
-                link.ask("reset")
-                if link.spin(2.0, lambda: link.gate is not None and link.gate.state is GateState.ARMED):
-                    break
-            self.session.open()
-        except GolemError as error:
-            raise Inapplicable(f"it could not be set going again: {error}") from error
-
-
-def _judge(candidate: Candidate, finding: StepFinding) -> None:
-    candidate.figures |= {name: v for name, v in finding.figures.items() if isinstance(v, float)}
-    if not finding.passed:
-        raise candidate.fault(finding.text)
 
 
 def _needed(row: TopicRow) -> bool:

@@ -128,8 +128,8 @@ class RobotMeasures:
         with self.rig(candidate) as rig:
             for sign in (1.0, -1.0):
                 away = home + sign * aside
-                rig.follow(_between(home, away, 0.3), 0.3 + SETTLE)
-                reached += rig.follow(_between(away, home, 0.3), 0.3 + 1.5 * SETTLE)[-50:]
+                rig.follow(between(home, away, 0.3), 0.3 + SETTLE)
+                reached += rig.follow(between(away, home, 0.3), 0.3 + 1.5 * SETTLE)[-50:]
         arms = slice(UPPER.start + 1, UPPER.stop)
         tau, q, quat = (
             np.mean(v, axis=0) for v in zip(*((s.tau, s.q, s.imu.quat) for s in reached), strict=True)
@@ -153,8 +153,8 @@ class RobotMeasures:
                 home = start_posture()
                 away = home.copy()
                 away[joint] += STEP
-                states = rig.follow(_between(home, away, STEP / STEP_PACE), STEP_TIME)
-                rig.follow(_between(away, home, 0.3), 0.3)
+                states = rig.follow(between(home, away, STEP / STEP_PACE), STEP_TIME)
+                rig.follow(between(away, home, 0.3), 0.3)
                 t, moved = np.array([s.t for s in states]), np.array([s.q[joint] for s in states])
                 moved = np.interp(np.arange(0.0, STEP_TIME, 0.01), t, moved - moved[0])
                 half = float(np.argmax(moved > 0.5 * STEP) * 0.01) if moved.max() > 0.5 * STEP else np.inf
@@ -180,10 +180,10 @@ class RobotMeasures:
         with self.rig(candidate) as rig:
             if "head" not in rig.cameras:
                 raise Inapplicable("it has no head camera")
-            states = rig.follow(_between(home, shown, seconds), seconds + SETTLE)
+            states = rig.follow(between(home, shown, seconds), seconds + SETTLE)
             _, depth = rig.picture("head")
             nearer = gap_to_own_arm(states[-1].q, depth, rig.cameras["head"], rig.calibration["head"])
-            rig.follow(_between(shown, home, seconds), seconds + SETTLE)
+            rig.follow(between(shown, home, seconds), seconds + SETTLE)
         candidate.figures["nearer than the arm's axis [m]"] = nearer
         if not NEARER[0] <= nearer <= NEARER[1]:
             raise candidate.fault(
@@ -235,7 +235,7 @@ class RobotMeasures:
             raise candidate.fault(f"the {side} hand was sent to {gap} m and reports {found:.4f}")
 
 
-def _between(a: Array, b: Array, seconds: float) -> Path:
+def between(a: Array, b: Array, seconds: float) -> Path:
     """Return the straight path from `a` to `b` that takes `seconds`."""
     return lambda t: a + min(1.0, t / seconds) * (b - a)
 
@@ -246,8 +246,8 @@ def _there_and_back(rig: RobotRig, joint: int, by: float) -> list[LowState]:
     away = home.copy()
     away[joint] += by
     seconds = abs(by) / PACE
-    there = rig.follow(_between(home, away, seconds), seconds + STAY)
-    rig.follow(_between(away, home, seconds), seconds + STAY)
+    there = rig.follow(between(home, away, seconds), seconds + STAY)
+    rig.follow(between(away, home, seconds), seconds + STAY)
     return there
 
 

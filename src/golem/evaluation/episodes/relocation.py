@@ -5,7 +5,7 @@ The counters, objects and rates are ours: the paper names its objects, views and
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -14,27 +14,38 @@ from scipy.spatial.transform import Rotation
 
 from golem.capabilities.memory.base import Observation
 from golem.capabilities.perception.lift import unproject
+from golem.capabilities.perception.plane_clusters import PlaneClusters, PlaneClustersConfig
+from golem.evaluation.episodes.relocation_room import (
+    AROUND,
+    COUNTER,
+    VIEWS,
+    RelocationRoom,
+    Thing,
+    compile_room,
+    place_camera,
+    view,
+)
 from golem.robots.mujoco.camera import CameraRig
-from golem.robots.sensors.cameras import HEAD, T_MUJOCO_OPTICAL
+from golem.robots.sensors.cameras import HEAD
 from golem.robots.worlds.tableware import KINDS
 from golem.types import Array, Detection, LocalizedObject, Mask, RgbdImage
 
-COUNTER = (0.3, 0.6, 0.45)
-"""Half the depth, width and height of a counter [m]."""
-AROUND = 1.7
-"""Distance of the counters' middles from the middle of the room [m]."""
-EYE = 1.55
-"""Height of the camera [m]."""
 EVERY = 4.0
 """Time between two views [s]."""
-PAUSE = 600.0
-"""Time between the two walks [s]."""
+PAUSE, HOUR = 600.0, 3600.0
+"""Time between two walks, and between those of a day [s]."""
 LEAST_PIXELS = 40
 """Of an object in an image, from which on a localizer can find it."""
 DEPTH_NOISE = 0.004
 """Standard deviation of depth at 1 m, growing with its square [m]."""
-SPOT = 0.2
+SPOT = 0.25
 """Least distance of two objects on one counter [m]."""
+SHIPPED = PlaneClustersConfig(far=2.6, wide=0.03, thick=0.003)
+"""Options of the shipped localizer: counters are farther than doors, depth is better than `field`."""
+STRANGE = 40
+"""Kinds of the things in other rooms."""
+PER_LOOK = 10
+"""Of those things in one look."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +68,26 @@ class Rates:
 
 
 @dataclass(frozen=True, slots=True)
-class Thing:
-    """An object of the room: what it is and where it stands, in the room's frame [m]."""
+class Setting:
+    """What an episode is made with.
 
-    kind: str
-    position: Array
+    Attributes:
+        rates: of a localizer that is drawn from the renderer's masks, and of the poses.
+        clusters: whether the shipped localizer of tableware looks at the images instead.
+        twins: a second object of the target's kind stands elsewhere all the time.
+        hidden: something stands before the target's old place in the last walk.
+        dusk: the light is bad in the last walk.
+        walks: how many there are in all. The target is moved before the last, and of more than two before every sixth.
+        distractors: things of other kinds in other rooms, seen before the first walk.
+    """
+
+    rates: Rates = Rates()
+    clusters: bool = False
+    twins: bool = False
+    hidden: bool = False
+    dusk: bool = False
+    walks: int = 2
+    distractors: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +96,11 @@ class Relocation:
 
     Attributes:
         target: kind of what is moved.
-        before, after: what stands where in the two walks; `before[0]` and `after[0]` are the target.
+        before, after: what stands where before and after it was moved last; `before[0]` and `after[0]` are the target.
         absent: kinds of which there is none.
-        observations: the two walks' looks, in the order of time.
-        moved_at: time at which the target was moved [s].
+        observations: the looks, in the order of time.
+        split: how many of them are from before it was moved last.
+        moved_at: time at which the target was moved last [s].
     """
 
     target: str
@@ -81,35 +108,59 @@ class Relocation:
     after: tuple[Thing, ...]
     absent: tuple[str, ...]
     observations: tuple[Observation, ...]
+    split: int
     moved_at: float
 
 
-def relocation(
-    rng: np.random.Generator, rates: Rates, twins: bool = False, hidden: bool = False
-) -> Relocation:
-    """Draw and render one episode.
-
-    Args:
-        rng: the same state gives the same episode.
-        rates: of the localizer and the poses.
-        twins: a second object of the target's kind stands elsewhere all the time.
-        hidden: something stands before the target's old place in the second walk.
-    """
+def relocation(rng: np.random.Generator, setting: Setting) -> Relocation:
+    """Draw and render one episode; the same state of `rng` gives the same one."""
     kinds = [str(kind) for kind in rng.permutation(list(KINDS))]
     target, bystander, absent = kinds[0], kinds[1], tuple(kinds[2:])
     counters = rng.permutation(4)
     spots = [_spots(rng, counter, 3) for counter in counters]
     others = [Thing(bystander, spots[2][0])]
-    if twins:
+    if setting.twins:
         others.append(Thing(target, spots[3][0]))
-    before = (Thing(target, spots[0][0]), *others)
+    clutter = tuple([spots[k][1] for k in range(4)] + [spots[0][2]])
+    # The target goes to and fro, so that it comes from the first counter to the second at last.
+    places = [spots[0 if (setting.walks - 2 - k) // 6 % 2 == 0 else 1][0] for k in range(setting.walks - 1)]
+    looks = _elsewhere(rng, setting.distractors, tuple(KINDS))
+    start = looks[-1].frame.t + PAUSE if looks else 0.0
+    pause = PAUSE if setting.walks == 2 else HOUR
+    for place in places:
+        room = RelocationRoom((Thing(target, place), *others), clutter)
+        looks += _walk(rng, room, setting, start)
+        start = looks[-1].frame.t + pause
+    split, moved_at = len(looks), start - pause / 2
+    screens = (_before(spots[0][0], float(counters[0]) * np.pi / 2),) if setting.hidden else ()
     after = (Thing(target, spots[1][0]), *others)
-    clutter = [spots[k][1] for k in range(4)] + [spots[0][2]]
-    screens = [_before(spots[0][0], float(counters[0]) * np.pi / 2)] if hidden else []
-    first = _walk(rng, before, clutter, [], rates, 0.0)
-    moved_at = first[-1].frame.t + PAUSE / 2
-    second = _walk(rng, after, clutter, screens, rates, first[-1].frame.t + PAUSE)
-    return Relocation(target, before, after, absent, (*first, *second), moved_at)
+    looks += _walk(rng, RelocationRoom(after, clutter, screens, setting.dusk), setting, start)
+    before = (Thing(target, spots[0][0]), *others)
+    return Relocation(target, before, after, absent, tuple(looks), split, moved_at)
+
+
+def _elsewhere(rng: np.random.Generator, count: int, labels: Sequence[str]) -> list[Observation]:
+    """Return looks at `count` things of other kinds in other rooms; their images are not rendered."""
+    info = replace(HEAD, width=32, height=24)
+    looks: list[Observation] = []
+    for k in range(0, count, PER_LOOK):
+        far = rng.uniform(8.0, 40.0)
+        frame = RgbdImage(
+            EVERY * len(looks),
+            info,
+            np.zeros((24, 32, 3), np.uint8),
+            np.zeros((24, 32), np.float32),
+            np.eye(4),
+        )
+        found: list[LocalizedObject] = []
+        for _ in range(min(PER_LOOK, count - k)):
+            position = np.array([far, 0.0, 0.9]) + rng.uniform(-3.0, 3.0, 3) * (1.0, 1.0, 0.0)
+            box = np.array([10.0, 10.0, 16.0, 16.0])
+            detection = Detection(f"thing {rng.integers(STRANGE)}", 0.9, box, (box[:2] + box[2:]) / 2)
+            mask = Mask(np.ones((6, 6), bool), 10, 10)
+            found.append(LocalizedObject(detection, frame.t, position, position[None], mask))
+        looks.append(Observation(frame, found, (*labels, *(f"thing {i}" for i in range(STRANGE)))))
+    return looks
 
 
 def _spots(rng: np.random.Generator, counter: int, count: int) -> list[Array]:
@@ -129,83 +180,33 @@ def _before(place: Array, heading: float) -> Array:
 
 
 def _walk(
-    rng: np.random.Generator,
-    things: Sequence[Thing],
-    clutter: Sequence[Array],
-    screens: Sequence[Array],
-    rates: Rates,
-    start: float,
+    rng: np.random.Generator, room: RelocationRoom, setting: Setting, start: float
 ) -> list[Observation]:
     """Render the eight views of one walk, two of each counter."""
-    model, owners = _model(things, clutter, screens)
+    rates = setting.rates
+    model, owners = compile_room(room)
     data = mujoco.MjData(model)
     drift = rates.drift * rng.standard_normal(3) * (1.0, 1.0, 0.0)
+    shipped = PlaneClusters(SHIPPED) if setting.clusters else None
     looks: list[Observation] = []
     with CameraRig(model, [HEAD]) as rig:
-        for k in range(8):
-            T = _view(k)
-            _place_camera(data, T)
+        for k in range(VIEWS):
+            T = view(k)
+            place_camera(data, T)
             mujoco.mj_forward(model, data)
             rgb, depth = rig.render(data, HEAD.name)
-            segments = rig.segment(data, HEAD.name)
             depth += (DEPTH_NOISE * depth**2 * rng.standard_normal(depth.shape)).astype(np.float32)
             depth[(depth < HEAD.near) | (depth > HEAD.far)] = 0.0
             believed = T.copy()
             believed[:3, 3] += drift + rates.jitter * rng.standard_normal(3)
             frame = RgbdImage(start + EVERY * k, HEAD, rgb, depth, believed)
-            found = _localize(rng, frame, segments, things, owners, rates)
+            if shipped is None:
+                found = _localize(rng, frame, rig.segment(data, HEAD.name), room.things, owners, rates)
+            else:
+                found = shipped.locate(frame, tuple(KINDS))
             sigma = float(np.hypot(rates.drift, rates.jitter))
             looks.append(Observation(frame, found, tuple(KINDS), sigma))
     return looks
-
-
-def _view(k: int) -> Array:
-    """Return the (4, 4) pose of the camera's optical frame in view k: from the middle, to each side of a counter."""
-    heading = (k // 2) * np.pi / 2 + (0.17 if k % 2 else -0.17)
-    R = Rotation.from_euler("ZY", [heading, 0.55]).as_matrix()
-    T = np.eye(4)
-    T[:3, :3] = R @ np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-    T[:3, 3] = (-0.1 * np.cos(heading), -0.1 * np.sin(heading), EYE)
-    return T
-
-
-def _place_camera(data: mujoco.MjData, T_optical: Array) -> None:
-    T = T_optical @ T_MUJOCO_OPTICAL
-    data.mocap_pos[0] = T[:3, 3]
-    data.mocap_quat[0] = Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True)
-
-
-def _model(
-    things: Sequence[Thing], clutter: Sequence[Array], screens: Sequence[Array]
-) -> tuple[mujoco.MjModel, list[int]]:
-    """Compile the room, and return the geoms of `things` with it."""
-    spec = mujoco.MjSpec()
-    box, cylinder = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER
-    world = spec.worldbody
-    world.add_light(pos=[0, 0, 3], dir=[0, 0, -1])
-    world.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[4, 4, 0.1], rgba=[0.5, 0.5, 0.5, 1])
-    for side in range(4):
-        turn = Rotation.from_euler("z", side * np.pi / 2)
-        quat = turn.as_quat(scalar_first=True).tolist()
-        at = turn.apply([AROUND, 0.0, COUNTER[2]]).tolist()
-        world.add_geom(type=box, size=list(COUNTER), pos=at, quat=quat, rgba=[0.7, 0.65, 0.6, 1])
-        wall = turn.apply([AROUND + 0.5, 0.0, 1.25]).tolist()
-        world.add_geom(type=box, size=[0.05, 2.2, 1.25], pos=wall, quat=quat, rgba=[0.9, 0.9, 0.85, 1])
-    for at in clutter:
-        place = (at + (0.0, 0.0, 0.05)).tolist()
-        world.add_geom(type=box, size=[0.05, 0.06, 0.05], pos=place, rgba=[0.4, 0.3, 0.2, 1])
-    for at in screens:
-        place = (at + (0.0, 0.0, 0.15)).tolist()
-        world.add_geom(type=cylinder, size=[0.09, 0.15, 0], pos=place, rgba=[0.2, 0.4, 0.3, 1])
-    for k, thing in enumerate(things):
-        radius, height = KINDS[thing.kind]
-        place = (thing.position + (0.0, 0.0, height / 2)).tolist()
-        world.add_geom(
-            name=f"thing_{k}", type=cylinder, size=[radius, height / 2, 0], pos=place, rgba=[0.8, 0.2, 0.2, 1]
-        )
-    world.add_body(name="eye", mocap=True).add_camera(name=HEAD.name)
-    model = spec.compile()
-    return model, [model.geom(f"thing_{k}").id for k in range(len(things))]
 
 
 def _localize(
@@ -213,16 +214,17 @@ def _localize(
     frame: RgbdImage,
     segments: np.ndarray,
     things: Sequence[Thing],
-    owners: Sequence[int],
+    owners: Mapping[int, int],
     rates: Rates,
 ) -> list[LocalizedObject]:
     """Return what a localizer with these rates finds."""
     found: list[LocalizedObject] = []
-    for thing, geom in zip(things, owners, strict=True):
+    for k, thing in enumerate(things):
         label, luck, swap = thing.kind, float(rng.random()), float(rng.random())
         wrong = str(rng.choice([kind for kind in KINDS if kind != label]))
-        pixels = (segments == geom) & (frame.depth > 0.0)
-        if luck < rates.missed or np.count_nonzero(segments == geom) < LEAST_PIXELS or not pixels.any():
+        shown = np.isin(segments, [geom for geom, owner in owners.items() if owner == k])
+        pixels = shown & (frame.depth > 0.0)
+        if luck < rates.missed or np.count_nonzero(shown) < LEAST_PIXELS or not pixels.any():
             continue
         found.append(_located(frame, pixels, wrong if swap < rates.confused else label))
     for _ in range(int(rng.poisson(rates.invented))):

@@ -165,6 +165,19 @@ def mean_interval(values: Sequence[float], confidence: float = 0.95) -> Interval
     return Interval(mean - half, mean + half)
 
 
+def bootstrap_interval(values: Sequence[float], confidence: float = 0.95, draws: int = 2000) -> Interval:
+    """Return the percentile bootstrap interval of the mean of shares, one per cluster, such as an episode.
+
+    Where all of n shares are 0 or all are 1 no resample differs: that is Wilson's interval of 0 or n of n.
+    """
+    x = np.array(values, dtype=np.float64)
+    if len(set(values)) == 1 and x[0] in (0.0, 1.0):
+        return wilson(round(float(x.sum())), len(x), confidence)
+    means = x[np.random.default_rng(0).integers(len(x), size=(draws, len(x)))].mean(axis=1)
+    low, high = np.quantile(means, (0.5 - confidence / 2, 0.5 + confidence / 2)).tolist()
+    return Interval(low, high)
+
+
 def _median_interval(ordered: Sequence[float], confidence: float = 0.95) -> Interval | None:
     """Return the interval of the median between two order statistics (Conover, Practical Nonparametric Statistics)."""
     n = len(ordered)

@@ -34,7 +34,7 @@ def load_sapien() -> Any:
             warnings.simplefilter("ignore")  # that there is no Vulkan: nothing is rendered with it
             return importlib.import_module("sapien")
     except ImportError as error:
-        raise MissingExtra("PhysX", "physx") from error
+        raise MissingExtra("sapien", "physx") from error
 
 
 @dataclass(frozen=True)

@@ -160,15 +160,22 @@ class RobotLink:
         Raises:
             RosError: there is none, or it does not answer.
         """
-        name = f"/safety/{what}"
-        client = self._clients.get(name)
+        return self.call(f"/safety/{what}", f"start it with: {self._dds.command('safety')}", every)
+
+    def call(self, service: str, remedy: str, every: Callable[[], None] | None = None) -> str:
+        """Call a service without arguments and return its answer; `remedy` is what helps where nobody offers it.
+
+        Raises:
+            RosError: nobody does, or it does not answer.
+        """
+        client = self._clients.get(service)
         if client is None:
-            client = self._clients[name] = self._node.client(name, public.TRIGGER)
+            client = self._clients[service] = self._node.client(service, public.TRIGGER)
         if not self.spin(SEARCH, client.ready, every):
-            raise RosError(f"Nobody offers '{name}'; start it with: {self._dds.command('safety')}.")
+            raise RosError(f"Nobody offers '{service}'; {remedy}.")
         answer = client.call(Trigger_Request())
         if not self.spin(ANSWER, lambda: answer.done, every):
-            raise RosError(f"'{name}' does not answer.")
+            raise RosError(f"'{service}' does not answer.")
         return str(answer.result().message)
 
     def command(self, q: Array, kp: Array, kd: Array) -> None:

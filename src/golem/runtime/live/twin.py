@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from golem.interfaces import public
+from golem.interfaces import public, topics
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant
 from golem.middleware.ros.base import RosNode
@@ -32,6 +33,8 @@ from golem.stack import Stack
 
 FOREVER = 1e9
 """A time nobody sees [s]."""
+JUMP = 1.0
+"""How far back the stamp of one state goes when somebody asks for a jump of the clock [s]."""
 
 
 class Twin:
@@ -95,7 +98,8 @@ class Twin:
             estimator = nodes.EstimatorNode(bus, *ModuleFactory(stack).make("estimator"))
             placed.append((Phase.ESTIMATE, estimator))
         incoming(bus, endpoints, lambda: self.executor.t, tell)
-        endpoints.serve({"/elastic_band/release": self._release})
+        jump = partial(self._jump, bus, endpoints)
+        endpoints.serve({"/elastic_band/release": self._release, "/lowstate/jump": jump})
         describe(endpoints, robot.calibration)
         self.executor = Executor(bus, in_order(placed))
 
@@ -109,3 +113,10 @@ class Twin:
             return Trigger_Response(False, "There is no band to let go: this robot hangs, or stands already.")
         robot.release()
         return Trigger_Response(True, "The band is let go.")
+
+    def _jump(self, bus: Bus, endpoints: RoleEndpoints, request: Any) -> Trigger_Response:
+        state = bus.latest(topics.LOW_STATE)
+        if state is None or state.t < JUMP:
+            return Trigger_Response(False, "The robot's time has just begun.")
+        endpoints.send("/lowstate", replace(state, t=state.t - JUMP))
+        return Trigger_Response(True, f"One state was stamped {JUMP:g} s early.")
