@@ -59,6 +59,7 @@ class IsaacLabRobot(OtherEngineRobot):
 
         Raises:
             ConfigError: the profile or an option does not exist, Isaac Lab has no such world, or does not run.
+            MissingEnvironment: there is no environment with Isaac Lab.
         """
         config = config or IsaacLabConfig()
         python = isaac_python(config.python)
@@ -109,6 +110,6 @@ class IsaacLabRobot(OtherEngineRobot):
         self.truth.see(reply["force"])
 
     def close(self) -> None:
-        """Release the worker, the rendering context and the LiDAR."""
+        """Leave the worker to the next robot, and release the rendering context and the LiDAR."""
         self._worker.close()
         super().close()
