@@ -2,7 +2,7 @@
 # the first suitable one: make PYTHON=/path/to/python3.12 ...
 BIN := .venv/bin
 
-.PHONY: help demo test test-slow lint format docs lock venv clean
+.PHONY: help demo test test-slow lint format docs lock venv venv-isaac clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | expand -t 12
@@ -34,6 +34,9 @@ lock: venv-dev  ## resolve the requirements again (UPGRADE=--upgrade takes newer
 
 venv:  ## create .venv with what `golem` needs to run and to write reports
 	@PYTHON="$(PYTHON)" scripts/bootstrap.sh core report
+
+venv-isaac:  ## create .venv-isaac with Isaac Lab for the robot `isaaclab` (PYTHON: a Python 3.12)
+	@PYTHON="$(PYTHON)" scripts/venv_isaac.sh
 
 venv-%:
 	@PYTHON="$(PYTHON)" scripts/bootstrap.sh $*

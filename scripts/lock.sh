@@ -33,3 +33,6 @@ compile pyproject.toml --constraints "$together" --extra dev --extra pink --extr
     --extra report --extra cluster --extra graspgen --extra lidar --extra hardware --extra realsense --extra physx \
     --output-file requirements/dev.txt "$@"
 echo "uv>=0.13,<0.14" | compile - --output-file requirements/uv.txt "$@"
+# Isaac Lab runs apart, under Python 3.12 on Linux: its lock need not fit the others.
+uv pip compile --quiet --no-config --python-version 3.12 --python-platform x86_64-manylinux_2_35 --generate-hashes \
+    --no-annotate --custom-compile-command "make lock" requirements/isaaclab.in --output-file requirements/isaaclab.lock "$@"

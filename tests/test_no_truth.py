@@ -33,6 +33,7 @@ SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
 # Who may name the simulator and what is in its world: the twin itself, those who judge, teach, show and check it.
 INSIDERS = (
     "robots/mujoco",
+    "robots/isaaclab",
     "robots/physx",
     "robots/worlds",
     "evaluation",

@@ -31,6 +31,14 @@ class MissingExtra(GolemError):
         )
 
 
+class MissingEnvironment(MissingExtra):
+    """An environment of its own, in which an optional dependency is installed, is absent."""
+
+    def __init__(self, sentence: str) -> None:
+        """Say in one `sentence` what is absent and how to get it."""
+        GolemError.__init__(self, sentence)
+
+
 class MissingSystemLibrary(GolemError):
     """A shared library of the operating system is absent."""
 

@@ -45,6 +45,7 @@ SLOTS: dict[str, Slot] = {
         "golem.robots.base:Robot",
         {
             "mujoco": "golem.robots.mujoco.engine:MujocoRobot",
+            "isaaclab": "golem.robots.isaaclab.isaac_robot:IsaacLabRobot",
             "physx": "golem.robots.physx.physx_robot:PhysxRobot",
             "replay": "golem.robots.replay.robot:ReplayRobot",
         },

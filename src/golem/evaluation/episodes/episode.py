@@ -143,8 +143,8 @@ class Episode:
         self.running, robot = build(stack, seed, limits)
         if not isinstance(robot, MujocoRobot):
             raise ConfigError(
-                f"Balance is judged on a simulator's truth; robot: {stack.choice('robot').use} is neither mujoco nor "
-                "physx."
+                f"Balance is judged on a simulator's truth; robot: {stack.choice('robot').use} is none of mujoco, "
+                "physx and isaaclab."
             )
         self.robot = robot
         if onlooker is not None:
