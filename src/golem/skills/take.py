@@ -161,7 +161,7 @@ class Take:
         grasps = await context.propose(method, target, side, yaw, (way[0], way[1], way[2]), scene)
         if not grasps:
             raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {target.label}.")
-        grasp = await self._reach_before(motion, side, grasps)
+        grasp = await self._reach_before(context, motion, side, grasps)
         if c.look_again:
             try:
                 grasp, view = await look.before(target, scene, grasp)
@@ -182,13 +182,19 @@ class Take:
         level, down = math.cos(self._config.lean), -math.sin(self._config.lean)
         return np.array([level * math.cos(heading), level * math.sin(heading), down])
 
-    async def _reach_before(self, motion: PlannedMotion, side: Side, grasps: list[Grasp]) -> Grasp:
-        """Bring the hand before the first grasp that it gets to, and on to; returns that grasp."""
+    async def _reach_before(
+        self, context: Context, motion: PlannedMotion, side: Side, grasps: list[Grasp]
+    ) -> Grasp:
+        """Bring the hand before the first grasp that it gets to, and on to; returns that grasp.
+
+        Those that the arm alone reaches from where it is are tried first: a planner takes longer to refuse.
+        """
+        from golem.skills.grasp_order import reached_first
         from golem.skills.planned_motion import Then
         from golem.skills.travel import APPROACH, failed
 
         c, refused = self._config, list[PlanRefused]()
-        for grasp in grasps[: c.attempts]:
+        for grasp in reached_first(context, side, grasps, c.before)[: c.attempts]:
             T = grasp.T_odom_gripper
             then = [Then(side, T, c.reach_speed, APPROACH)]
             try:
