@@ -28,7 +28,7 @@ from golem.capabilities.grasping.object_cloud import (
     thinned,
 )
 from golem.capabilities.grasping.outlines import outline
-from golem.capabilities.grasping.rims import rim_pairs
+from golem.capabilities.grasping.rims import THIN, rim_pairs
 from golem.finite import check_finite
 from golem.options import require
 from golem.types import Array, LocalizedObject
@@ -180,7 +180,11 @@ class Antipodal(OpenLoop):
         size = float(np.linalg.norm(cloud.std(axis=0))) + 1e-6
         off = np.linalg.norm(middle - cloud.mean(axis=0), axis=1) / size
         best = np.argsort(-quality * np.exp(-(off**2)), kind="stable")[: c.laid]
-        drawn, rim = (middle[best], way[best], width[best], quality[best]), rim_pairs(cloud, gripper.approach)
+        rim = rim_pairs(cloud, gripper.approach)
+        if (np.abs(rim[1] @ gripper.approach) > SLANTED).any():
+            # Other pairs across a leaning wall are by its curve or by noise, and turn out of the hand.
+            best = best[width[best] > THIN]
+        drawn = (middle[best], way[best], width[best], quality[best])
         middle, way, width, quality = (np.concatenate(pair) for pair in zip(drawn, rim, strict=True))
         return middle, way, width, quality, len(rim[0])
 

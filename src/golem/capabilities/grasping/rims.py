@@ -36,6 +36,8 @@ LEANING = 0.15
 """A wall that leans less is upright to the eye [rad]."""
 FURTHER, MOST = 0.17, 0.50
 """How much further than its wall the hand leans, and how far at most [rad]."""
+LESS = 0.7
+"""What a hand counts that leans no further than the wall, and its share of the lean at most."""
 
 
 def rim_pairs(cloud: Array, approach: Array) -> tuple[Array, Array, Array, Array]:
@@ -65,11 +67,15 @@ def rim_pairs(cloud: Array, approach: Array) -> tuple[Array, Array, Array, Array
     axes = (way[thin, :1] * u + way[thin, 1:] * v) / width[:, None]
     middles = level + (first + DEEPER) * approach
     outward = axes * np.sign(np.einsum("ij,ij->i", axes, level - cloud.mean(axis=0)))[:, None]
-    for k, axis in enumerate(outward):
-        lean = wall_lean(cloud - level[k], axis, approach, first)
-        lean = min(lean + FURTHER, MOST) if lean > LEANING else 0.0
-        axes[k] = math.cos(lean) * axis + math.sin(lean) * approach
-    return middles, axes, width, np.full(len(thin), QUALITY)
+    walls = np.array([wall_lean(cloud - level[k], axis, approach, first) for k, axis in enumerate(outward)])
+    slanted = walls > LEANING
+    leans = np.where(slanted, np.minimum(walls + FURTHER, MOST), 0.0)
+    # A wrist that cannot lean so far leans with the wall.
+    index = np.concatenate([np.arange(len(walls)), np.flatnonzero(slanted)])
+    leans = np.concatenate([leans, np.minimum(walls[slanted], LESS * MOST)])[:, None]
+    leaning = np.cos(leans) * outward[index] + np.sin(leans) * approach
+    quality = np.where(np.arange(len(index)) < len(walls), QUALITY, LESS * QUALITY)
+    return middles[index], leaning, width[index], quality
 
 
 def wall_lean(points: Array, outward: Array, approach: Array, first: float) -> float:
