@@ -115,6 +115,7 @@ SLOTS: dict[str, Slot] = {
             "antipodal": "golem.capabilities.grasping.antipodal:Antipodal",
             "centroid": "golem.capabilities.grasping.centroid:Centroid",
             "graspgen": "golem.capabilities.grasping.graspgen:GraspGen",
+            "look_and_move": "golem.capabilities.grasping.look_and_move:LookAndMove",
             "reranked": "golem.capabilities.grasping.reranking:Reranking",
             "scorer": "golem.capabilities.grasping.scorer:Scorer",
             "visual_servo": "golem.capabilities.grasping.visual_servo:VisualServo",

@@ -25,6 +25,7 @@ class Scripted(OpenLoop):
     """Proposes one grasp, and follows it with a law that says the same."""
 
     label = "screw"
+    patience = 20.0
     latency = 0.0
 
     def __init__(self, T: Array) -> None:

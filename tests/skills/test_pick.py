@@ -24,7 +24,7 @@ from golem.types import Array, CameraInfo, LocalizedObject, RgbdImage, Side
 SCREW = np.array([0.43, -0.14, -0.03])
 TRAY = np.array([0.48, -0.31, -0.03])
 HEAD_ERROR = np.array([0.02, -0.015, 0.01])
-CONFIG = PickConfig(travel="lines", turn=0.0, look_timeout=0.5, servo_timeout=8.0, close_timeout=0.5)
+CONFIG = PickConfig(travel="lines", turn=0.0, look_timeout=0.5, close_timeout=0.5)
 
 
 def stocked(world: Any, thing: Any, screw: Array = SCREW, tray: Array = TRAY) -> Any:

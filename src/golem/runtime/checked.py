@@ -61,6 +61,7 @@ class CheckedServoLaw:
         """Watch `law`."""
         self._law, self._contract = law, contract
         self.label = law.label
+        self.patience = contract.number("patience", law.patience, minimum=0.0)
 
     def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
         """Return the law's step; see `ServoLaw`."""

@@ -241,7 +241,7 @@ class Pick:
     async def _servo(self, context: Context, attempt: Attempt, law: ServoLaw, gap: float) -> None:
         """Closed loop: let the law bring the hand down, and let it follow the object while the fingers close."""
         arm, hand = context.arms[attempt.side], context.hands[attempt.side]
-        end = context.t + self._config.servo_timeout
+        end = context.t + law.patience
         closing, camera = False, f"{attempt.side}_hand"
         below = await ForceGuard.at_rest(
             context, attempt.side, arm.commanded[:3, 2], self._config.press_force
@@ -283,9 +283,7 @@ class Pick:
                     arm.approach(step.T_odom_gripper, self._config.servo_speed)
                 await context.tick()
         if not closing:
-            raise StageFailed(
-                "servo", "grasp_method", f"No convergence within {self._config.servo_timeout:g} s."
-            )
+            raise StageFailed("servo", "grasp_method", f"No convergence within {law.patience:g} s.")
         self._check_grip(context, attempt)
 
     def _saw(self, step: ServoStep) -> float:

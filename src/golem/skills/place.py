@@ -39,6 +39,8 @@ ROOM = 0.03
 """Height above such things at which what is held passes [m]."""
 STRAIGHT = (0.02, 0.1)
 """How far a hand that carries may leave its line, and turn [m, rad]."""
+LEANS = 0.7
+"""How far a hand that came from above may lean: over a bowl's rim by 0.5 [rad]."""
 TILT = 0.4
 """How far what is held may lean on the way [rad]."""
 
@@ -266,7 +268,8 @@ class SetDown:
         from golem.capabilities.planning.rules import HandUpright
 
         z = context.arms[side].commanded[:3, 2]
-        return [HandUpright(side, TILT)] if z[2] < -0.9 else []
+        lean = math.acos(min(-float(z[2]), 1.0)) if z[2] < 0.0 else math.pi
+        return [HandUpright(side, TILT + lean)] if lean < LEANS else []
 
     async def _lower(self, context: Context, goal: PlaceGoal, side: Side, level: float) -> None:
         """Lower it until it stands: where the surface is felt, or a little deeper than where it was seen."""

@@ -34,6 +34,8 @@ SPARE = 0.024
 """How much wider than the grasp asks for the hand arrives [m]: encoders and palm camera are off by a centimetre."""
 CENTRED = 0.02
 """Distance along the closing axis within which a thing's middle comes between the fingers as they close [m]."""
+OVER_IT = 0.75
+"""Cosine of the lean up to which a hand counts as above what it takes."""
 HEARD = 0.06
 """Time in which a hand begins what it was told [s]."""
 TOP, FORWARD = "top", "forward"
@@ -161,7 +163,7 @@ class Take:
         grasps = await context.propose(method, target, side, yaw, (way[0], way[1], way[2]), scene)
         if not grasps:
             raise StageFailed("approach", "grasp_method", f"No grasp was proposed for the {target.label}.")
-        grasp = await self._reach_before(motion, side, grasps)
+        grasp = await self._reach_before(context, motion, side, grasps)
         if c.look_again:
             try:
                 grasp, view = await look.before(target, scene, grasp)
@@ -182,13 +184,19 @@ class Take:
         level, down = math.cos(self._config.lean), -math.sin(self._config.lean)
         return np.array([level * math.cos(heading), level * math.sin(heading), down])
 
-    async def _reach_before(self, motion: PlannedMotion, side: Side, grasps: list[Grasp]) -> Grasp:
-        """Bring the hand before the first grasp that it gets to, and on to; returns that grasp."""
+    async def _reach_before(
+        self, context: Context, motion: PlannedMotion, side: Side, grasps: list[Grasp]
+    ) -> Grasp:
+        """Bring the hand before the first grasp that it gets to, and on to; returns that grasp.
+
+        Those that the arm alone reaches from where it is are tried first: a planner takes longer to refuse.
+        """
+        from golem.skills.grasp_order import reached_first
         from golem.skills.planned_motion import Then
         from golem.skills.travel import APPROACH, failed
 
         c, refused = self._config, list[PlanRefused]()
-        for grasp in grasps[: c.attempts]:
+        for grasp in reached_first(context, side, grasps, c.before)[: c.attempts]:
             T = grasp.T_odom_gripper
             then = [Then(side, T, c.reach_speed, APPROACH)]
             try:
@@ -209,7 +217,12 @@ class Take:
         middle = 0.5 * (np.quantile(cloud, 0.02, axis=0) + np.quantile(cloud, 0.98, axis=0))
         self._report.x, self._report.y, self._report.z = (float(v) for v in middle)
         T = grasp.T_odom_gripper
-        self._report.aside_x, self._report.aside_y = ((middle - T[:3, 3]) @ T[:3, :2]).tolist()
+        off = middle - T[:3, 3]
+        # A hand that leans over a rim has what hangs on it below its palm, too; of what is seen from ahead the middle
+        # along the approach is not known.
+        above = T[2, 2] < -OVER_IT
+        aside = np.linalg.solve(T[:2, :2], off[:2]) if above else off @ T[:3, :2]
+        self._report.aside_x, self._report.aside_y = aside.tolist()
         # What the closing fingers do not hold in their middle they bring there, or go to.
         if abs(self._report.aside_y) < CENTRED:
             self._report.aside_y = 0.0

@@ -15,45 +15,36 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from golem.capabilities.grasping.base import Grasp, Gripper, OpenLoop
 from golem.capabilities.grasping.centroid import ACROSS, UP
 from golem.capabilities.grasping.hand_volume import collides, in_hands
 from golem.capabilities.grasping.object_cloud import (
     MIN_POINTS,
-    PIXEL,
     across,
     normals_of,
     object_points,
     spaced,
     thinned,
 )
-from golem.capabilities.grasping.outlines import borders, outline
+from golem.capabilities.grasping.outlines import outline
+from golem.capabilities.grasping.rims import THIN, rim_pairs
 from golem.finite import check_finite
 from golem.options import require
 from golem.types import Array, LocalizedObject
 
 BETWEEN = 600
 """Points of the object on which hands are fitted."""
-RIM = 0.018
-"""Thickness of the layer nearest to the hand that is a rim, if it is thin [m]; a wrong tilt of the camera leans it."""
-THIN = 0.020
-"""Widest rim [m], as the layer's image shows it."""
-STRAIGHT = 0.97
-"""Cosine of the angle at which a pair may cross a rim."""
-RIMS = 40
-"""Pairs across a rim along which hands are laid at most."""
 DEPTHS = (0.045, 0.025, 0.0)
 """How much deeper than need be the fingertips go where that is free [m]: what is held by its edge turns and slips."""
 NARROW = 0.045
 """Width up to which fingers do not go deepest [m]."""
 SHALLOW = 0.8
 """What a grasp counts that goes one of these less deep."""
+SLANTED = 0.1
+"""Sine of the angle from which on a pair across a rim lies aslant."""
 LEANS = (0.0, 0.3, -0.3, 0.6, -0.6)
 """How far hands lean about the closing axis [rad]."""
-DEEPER = 0.015
-"""How much further than elsewhere the fingertips go on both sides of a rim [m]: what hangs on it turns the less."""
 ROUND = 0.03
 """Greatest half width for which a thing that is seen across is taken to be round [m]: half of the hand's."""
 TWISTS: Array = np.array([2.0, 0.5])
@@ -189,7 +180,11 @@ class Antipodal(OpenLoop):
         size = float(np.linalg.norm(cloud.std(axis=0))) + 1e-6
         off = np.linalg.norm(middle - cloud.mean(axis=0), axis=1) / size
         best = np.argsort(-quality * np.exp(-(off**2)), kind="stable")[: c.laid]
-        drawn, rim = (middle[best], way[best], width[best], quality[best]), self._rim_pairs(cloud, gripper)
+        rim = rim_pairs(cloud, gripper.approach)
+        if (np.abs(rim[1] @ gripper.approach) > SLANTED).any():
+            # Other pairs across a leaning wall are by its curve or by noise, and turn out of the hand.
+            best = best[width[best] > THIN]
+        drawn = (middle[best], way[best], width[best], quality[best])
         middle, way, width, quality = (np.concatenate(pair) for pair in zip(drawn, rim, strict=True))
         return middle, way, width, quality, len(rim[0])
 
@@ -223,46 +218,29 @@ class Antipodal(OpenLoop):
         quality = (cosine[held] - cone) / (1.0 - cone) * 0.4 + 0.5
         return middle, axes, width[held], quality
 
-    def _rim_pairs(self, cloud: Array, gripper: Gripper) -> tuple[Array, Array, Array, Array]:
-        """Return the same of pairs across the rim of a hollow thing: its nearest layer, where that is thin."""
-        u, v = across(gripper.approach)
-        along = cloud @ gripper.approach
-        first = float(np.quantile(along, 0.01))
-        spots, normals = borders(cloud[along < first + RIM] @ np.column_stack([u, v]))
-        pairs = (
-            KDTree(spots).query_pairs(THIN, output_type="ndarray") if len(spots) else np.zeros((0, 2), int)
-        )
-        a, b = pairs[:, 0], pairs[:, 1]
-        way = spots[b] - spots[a]
-        width = np.linalg.norm(way, axis=1)
-        cosine = np.minimum(-np.einsum("ij,ij->i", normals[a], way), np.einsum("ij,ij->i", normals[b], way))
-        thin = np.flatnonzero((width > PIXEL) & (cosine > STRAIGHT * width))
-        thin = thin[np.linspace(0, len(thin) - 1, min(RIMS, len(thin))).astype(int)]
-        a, b, width = a[thin], b[thin], width[thin]
-        flat = 0.5 * (spots[a] + spots[b])
-        middle = flat[:, :1] * u + flat[:, 1:] * v + (first + DEEPER) * gripper.approach
-        axes = (way[thin, :1] * u + way[thin, 1:] * v) / width[:, None]
-        return middle, axes, width, np.full(len(thin), 0.7)
-
     def _hands(
         self, middles: Array, axes: Array, widths: Array, gripper: Gripper, rims: int
     ) -> tuple[Array, Array, NDArray[np.intp], Array]:
         """Return poses (m, 4, 4), how far each leans (m,) [rad], its pair (m,), and what its depth is worth (m,).
 
-        A hand on one of the last `rims` pairs does not lean: the finger that leans over a bowl tips it. Nor does it go
-        deepest: there is a bottom; and what is narrow stands on something wider, such as a bottle's neck.
+        A hand on one of the last `rims` pairs leans with the pair and no further: the finger that leans over a bowl
+        tips it. Nor does it go deepest: there is a bottom; and what is narrow stands on something wider, such as a
+        bottle's neck.
         """
         c, approach = self.config, gripper.approach
         z = approach - (axes @ approach)[:, None] * axes
         z /= np.linalg.norm(z, axis=1, keepdims=True)
         x = np.cross(axes, z)
         rows, leans, pairs, worth = [], [], [], []
+        # Where a wall leans, the bottom comes towards the hand.
+        shallow = (np.arange(len(middles)) >= len(middles) - rims) & (np.abs(axes @ approach) > SLANTED)
         for (less, extra), turn in product(enumerate(DEPTHS), LEANS):
             z_turned = math.cos(turn) * z + math.sin(turn) * x
             lean = np.arccos(np.clip(z_turned @ approach, -1.0, 1.0))
             kept = np.flatnonzero(lean <= c.tilt + 1e-9)
             kept = kept[kept < len(middles) - rims] if turn or not less else kept
             kept = kept if less else kept[widths[kept] > NARROW]
+            kept = kept[~shallow[kept]] if extra else kept
             T = np.tile(np.eye(4), (len(kept), 1, 1))
             T[:, :3, 1], T[:, :3, 2] = axes[kept], z_turned[kept]
             T[:, :3, 0] = np.cross(axes[kept], z_turned[kept])

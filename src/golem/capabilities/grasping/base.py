@@ -100,9 +100,11 @@ class ServoLaw(Protocol):
 
     Attributes:
         label: what it follows.
+        patience: time from its first step after which the skill gives it up if the fingers do not close [s].
     """
 
     label: str
+    patience: float
 
     def step(self, t: float, sightings: list[LocalizedObject] | None, T_odom_gripper: Array) -> ServoStep:
         """Advance to time `t` [s].

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.grasping.object_cloud import PIXEL, across
+from golem.capabilities.grasping.object_cloud import MIN_POINTS, PIXEL, across
 from golem.types import Array
 
 SEARCH = 0.06
@@ -27,7 +27,7 @@ def shift_between(before: View, after: View, axis: Array) -> Array:
     """Return by how much (3,) a thing has moved from one view to another [m], both along about `axis` (3,).
 
     Across the axis, it is the shift at which the silhouettes differ in the fewest pixels; pixels of which one view
-    knows nothing do not count. Along it, it is how much nearer or farther the first layer is.
+    knows nothing do not count. Along it, it is how much nearer or farther what both show is.
     """
     flat = np.column_stack(across(axis))
     low = np.minimum((before.thing @ flat).min(axis=0), (after.thing @ flat).min(axis=0)) - SEARCH
@@ -44,8 +44,26 @@ def shift_between(before: View, after: View, axis: Array) -> Array:
     differ = np.where(shared > 0.5 * shared.max(), differ / np.maximum(shared, 1.0), np.inf)
     i, j = np.unravel_index(int(differ.argmin()), differ.shape)
     best = np.array([i + _vertex(differ[:, j], int(i)), j + _vertex(differ[i], int(j))]) - edge
-    along = float(np.quantile(after.thing @ axis, 0.1) - np.quantile(before.thing @ axis, 0.1))
-    return flat @ (best * PIXEL) + along * axis
+    aside = flat @ (best * PIXEL)
+    return aside + _farther(before.thing + aside, after.thing, flat, axis) * axis
+
+
+def _farther(before: Array, after: Array, flat: Array, axis: Array) -> float:
+    """Return how much farther along `axis` (3,) a thing is after than before [m], where both views show it.
+
+    Both are points (n, 3) of it, across the axis in the same place; a hand above a rim shows the other side of a bowl.
+    """
+    low = np.minimum((before @ flat).min(axis=0), (after @ flat).min(axis=0))
+    size = np.ceil(
+        (np.maximum((before @ flat).max(axis=0), (after @ flat).max(axis=0)) - low) / PIXEL
+    ).astype(int)
+    layers = np.full((2, *(size + 2)), np.inf)
+    for layer, points in zip(layers, (before, after), strict=True):
+        np.minimum.at(layer, tuple(np.round((points @ flat - low) / PIXEL).astype(int).T), points @ axis)
+    shared = np.isfinite(layers).all(axis=0)
+    if shared.sum() < MIN_POINTS:
+        return float(np.quantile(after @ axis, 0.1) - np.quantile(before @ axis, 0.1))
+    return float(np.median(layers[1][shared] - layers[0][shared]))
 
 
 def _vertex(values: Array, k: int) -> float:

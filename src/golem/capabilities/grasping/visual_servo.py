@@ -53,6 +53,7 @@ class ServoLawConfig:
         looks: frames in which the ground was seen before an object is called tight.
         stall_after: time without progress until it gives up [s].
         progress: what counts as progress [m].
+        patience: time until it is given up in any case [s].
     """
 
     normal_gain: float = 0.2
@@ -80,6 +81,7 @@ class ServoLawConfig:
     looks: int = 8
     stall_after: float = 3.0
     progress: float = 0.003
+    patience: float = 20.0
 
 
 class CentroidServo:
@@ -97,7 +99,7 @@ class CentroidServo:
             yaw: heading of the gripper's x axis [rad].
             t: start time [s].
         """
-        self.label = target.label
+        self.label, self.patience = target.label, config.patience
         self._config = config
         self._centroid = centroid
         self._x = np.array(target.position, dtype=float)

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from golem.errors import ConfigError
+from golem.errors import ConfigError, unknown_name
 from golem.evaluation.base import Case, Results, TrialSpec
 from golem.evaluation.episodes.counter_watch import CounterWatch
 from golem.evaluation.episodes.oracle import Oracle
@@ -45,6 +45,8 @@ class CounterOptions:
     """nominal: the counter always has one height and one colour. varied: drawn from the trial's seed."""
     approach: Literal["top", "forward", "either"] = "either"
     """How the hand is to come."""
+    thing: tuple[str, ...] = ()
+    """Kinds that are asked for, case by case, each with the hand on its side; else the trial's seed draws one."""
     each: bool = False
     """Whether every kind of thing is tried with each hand, case by case; else the trial's seed draws both."""
 
@@ -65,9 +67,13 @@ class CounterRung(KitchenRung[CounterOptions]):
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return the things and hands that are tried one by one; see `Rung`."""
+        kinds = self.options.thing
+        for kind in kinds:
+            if kind not in KINDS:
+                raise unknown_name("thing", kind, KINDS)
         if not self.options.each:
-            return ({},)
-        return [{"thing": kind, "hand": hand} for kind in KINDS for hand in ("left", "right")]
+            return [{"thing": kind} for kind in kinds] or ({},)
+        return [{"thing": kind, "hand": hand} for kind in kinds or KINDS for hand in ("left", "right")]
 
     def errand(
         self,

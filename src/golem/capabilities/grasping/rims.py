@@ -1,0 +1,95 @@
+"""Pairs of points across the rim of a hollow thing, and how far its wall leans: a hand has to lean with it.
+
+What hangs on its rim turns about the fingers, its bottom outwards. Two pads are against that if the outer one touches
+below the inner one. So the hand leans a little further than the wall does; an upright hand on a bowl's leaning wall has
+its outer pad at the rim, and the bowl turns out of it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from golem.capabilities.grasping.object_cloud import PIXEL, across
+from golem.capabilities.grasping.outlines import borders
+from golem.types import Array
+
+RIM = 0.018
+"""Thickness of the layer nearest to the hand that is a rim, if it is thin [m]; a wrong tilt of the camera leans it."""
+THIN = 0.020
+"""Widest rim [m], as the layer's image shows it."""
+STRAIGHT = 0.97
+"""Cosine of the angle at which a pair may cross a rim."""
+RIMS = 40
+"""Pairs across a rim that are returned at most."""
+DEEPER = 0.015
+"""How much further than elsewhere the fingertips go on both sides of a rim [m]: what hangs on it turns the less."""
+QUALITY = 0.7
+"""What a pair across a rim is worth."""
+SLICE, WALL, HIGH = 0.010, 0.025, (0.003, 0.030)
+"""A wall is what lies within so much beside the pair, inside of it, and below the rim [m]."""
+SEEN = 12
+"""Points that a wall has to have: one that is upright is not seen from above."""
+LEANING = 0.15
+"""A wall that leans less is upright to the eye [rad]."""
+FURTHER, MOST = 0.17, 0.50
+"""How much further than its wall the hand leans, and how far at most [rad]."""
+LESS = 0.7
+"""What a hand counts that leans no further than the wall, and its share of the lean at most."""
+
+
+def rim_pairs(cloud: Array, approach: Array) -> tuple[Array, Array, Array, Array]:
+    """Return pairs across the rim of the nearest layer of a cloud, where that is thin.
+
+    Args:
+        cloud: (n, 3) points of the thing [m].
+        approach: (3,) unit vector along which the hand comes.
+
+    Returns:
+        middles (m, 3), closing axes (m, 3) that lean with the wall, widths (m,) [m], and quality (m,).
+    """
+    u, v = across(approach)
+    along = cloud @ approach
+    first = float(np.quantile(along, 0.01))
+    spots, normals = borders(cloud[along < first + RIM] @ np.column_stack([u, v]))
+    pairs = KDTree(spots).query_pairs(THIN, output_type="ndarray") if len(spots) else np.zeros((0, 2), int)
+    a, b = pairs[:, 0], pairs[:, 1]
+    way = spots[b] - spots[a]
+    width = np.linalg.norm(way, axis=1)
+    cosine = np.minimum(-np.einsum("ij,ij->i", normals[a], way), np.einsum("ij,ij->i", normals[b], way))
+    thin = np.flatnonzero((width > PIXEL) & (cosine > STRAIGHT * width))
+    thin = thin[np.linspace(0, len(thin) - 1, min(RIMS, len(thin))).astype(int)]
+    a, b, width = a[thin], b[thin], width[thin]
+    flat = 0.5 * (spots[a] + spots[b])
+    level = flat[:, :1] * u + flat[:, 1:] * v
+    axes = (way[thin, :1] * u + way[thin, 1:] * v) / width[:, None]
+    middles = level + (first + DEEPER) * approach
+    outward = axes * np.sign(np.einsum("ij,ij->i", axes, level - cloud.mean(axis=0)))[:, None]
+    walls = np.array([wall_lean(cloud - level[k], axis, approach, first) for k, axis in enumerate(outward)])
+    slanted = walls > LEANING
+    leans = np.where(slanted, np.minimum(walls + FURTHER, MOST), 0.0)
+    # A wrist that cannot lean so far leans with the wall.
+    index = np.concatenate([np.arange(len(walls)), np.flatnonzero(slanted)])
+    leans = np.concatenate([leans, np.minimum(walls[slanted], LESS * MOST)])[:, None]
+    leaning = np.cos(leans) * outward[index] + np.sin(leans) * approach
+    quality = np.where(np.arange(len(index)) < len(walls), QUALITY, LESS * QUALITY)
+    return middles[index], leaning, width[index], quality
+
+
+def wall_lean(points: Array, outward: Array, approach: Array, first: float) -> float:
+    """Return how far the wall below a rim leans outwards [rad]; 0 where too little of it is seen.
+
+    Args:
+        points: (n, 3) of the thing, from a point of the rim that is at depth 0 [m].
+        outward: (3,) unit vector across the rim, away from the thing's middle.
+        approach: (3,) unit vector across it, into the thing.
+        first: depth of the rim [m].
+    """
+    inside, depth = -points @ outward, points @ approach - first
+    near = (np.abs(points @ np.cross(outward, approach)) < SLICE) & (np.abs(inside) < WALL)
+    near &= (depth > HIGH[0]) & (depth < HIGH[1])
+    if near.sum() < SEEN:
+        return 0.0
+    return math.atan(float(np.polyfit(depth[near], inside[near], 1)[0]))
