@@ -32,7 +32,7 @@ LOST = 0.35
 """Time after which a blob that is not seen is forgotten [s]."""
 BODY = 0.25
 """Radius of a person [m]; a scan shows one side alone."""
-HISTORY, ENOUGH = 8, 5
+HISTORY, ENOUGH = 6, 4
 """Places of a blob that are kept, and from how many on it has a velocity."""
 WALKS = (0.3, 2.5)
 """Speeds of somebody who walks [m/s]: less is noise, more is a mistake."""
