@@ -17,7 +17,7 @@ from golem.skills.disassemble import Disassemble, DisassembleGoal
 from golem.skills.dock import Dock, DockGoal, DockReport
 from golem.skills.pick import Pick
 from golem.skills.pick_config import PickGoal
-from golem.skills.pick_report import PickOutcome, PickReport, Tried
+from golem.skills.pick_report import PickOutcome, PickReport, Sight, Tried
 from golem.skills.runner import SkillRun
 
 GONE = PickOutcome.OUT_OF_REACH
@@ -77,8 +77,9 @@ def test_it_docks_again_where_nothing_is_within_reach() -> None:
 
 
 def test_it_ends_where_another_stance_would_not_help_or_none_is_left() -> None:
-    result, docks, picks = work(DisassembleGoal(), [docked()], [picked(PickOutcome.SLIPPED)])
-    assert not result.success and (docks, picks) == (1, 1) and result.value.picks[0].outcome == "slipped"
+    for outcome in (PickOutcome.TRAY_FULL, PickOutcome.NOTHING_THERE):
+        result, docks, picks = work(DisassembleGoal(), [docked()], [picked(outcome)])
+        assert not result.success and (docks, picks) == (1, 1) and result.value.picks[0].outcome == outcome
     result, docks, picks = work(DisassembleGoal(docks=2), [docked()] * 2, [picked(GONE)] * 2)
     assert not result.success and (docks, picks) == (2, 2)
     result, docks, picks = work(DisassembleGoal(docks=0), [], [picked(GONE)])
@@ -98,6 +99,24 @@ def test_what_was_tight_is_avoided_at_the_next_stance() -> None:
         run.step()
     assert run.result is not None and run.result.success
     assert [goal.avoid for goal in skills["dock"].goals] == [(), (0.4, -0.1)]
+    assert [goal.avoid for goal in skills["pick"].goals] == [(), (0.4, -0.1)]
+
+
+@pytest.mark.parametrize("outcome", [PickOutcome.SLIPPED, PickOutcome.BLOCKED, PickOutcome.NOTHING_THERE])
+def test_what_was_tried_in_vain_is_tried_from_another_stance(outcome: PickOutcome) -> None:
+    vain = picked(outcome)
+    vain.value.tried = [Tried("right", 0.4, -0.1, 0.0, outcome)]
+    result, docks, picks = work(DisassembleGoal(), [docked()] * 2, [vain, picked(PickOutcome.PICKED)])
+    assert result.success and (docks, picks) == (2, 2)
+
+
+def test_what_is_not_seen_in_the_container_does_not_count() -> None:
+    beside = picked(PickOutcome.PICKED)
+    beside.value.in_tray = Sight.NO.value
+    result, docks, picks = work(DisassembleGoal(), [docked()] * 2, [beside, picked(PickOutcome.PICKED)])
+    assert result.success and (docks, picks, result.value.picked) == (2, 2, 1)
+    result, _, picks = work(DisassembleGoal(docks=1), [docked()], [beside])
+    assert not result.success and (result.stage, picks) == ("place", 1)
 
 
 def test_a_docking_that_fails_ends_it_unless_something_is_within_reach() -> None:

@@ -13,6 +13,7 @@ import pytest
 from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, OpenLoop
 from golem.capabilities.grasping.centroid import Centroid, CentroidConfig
 from golem.capabilities.grasping.visual_servo import VisualServo
+from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.interfaces.payloads import DetectionRequest
 from golem.robots.model.magpie_model import MAX_GAP
@@ -46,11 +47,15 @@ def full(world: Any, thing: Any) -> Any:
 
 
 def picked(
-    world: Any, method: GraspMethod | None = None, side: Side = "right", config: PickConfig = CONFIG
+    world: Any,
+    method: GraspMethod | None = None,
+    side: Side = "right",
+    config: PickConfig = CONFIG,
+    avoid: tuple[float, ...] = (),
 ) -> SkillResult:
     """Run a pick to its end."""
     world.method = method or VisualServo()
-    run = world.run(Pick(config).run(world.context, PickGoal(side=side)))
+    run = world.run(Pick(config).run(world.context, PickGoal(side=side, avoid=avoid)))
     assert run.result is not None
     return run.result
 
@@ -428,6 +433,21 @@ def test_a_screw_that_does_not_come_is_left_for_the_next(world: Any, thing: Any)
     assert result.success, result
     assert world.stages.count("approach") == 2
     assert_safe(world)
+
+
+def test_what_is_to_be_avoided_is_tried_only_where_there_is_no_other(world: Any, thing: Any) -> None:
+    two_screws(world, thing)
+    first, second = SCREW[:2] + 0.01, SCREW[:2] + (0.0, 0.09)
+    for avoid, taken in ((first, second), (second, SCREW[:2]), ((*first, *second), SCREW[:2])):
+        result = picked(world, avoid=tuple(float(v) for v in avoid))
+        assert result.success
+        assert np.hypot(*(np.array((result.value.tried[0].x, result.value.tried[0].y)) - taken)) < 0.02
+
+
+def test_places_to_avoid_are_pairs_of_numbers() -> None:
+    for wrong in ((0.4,), (0.4, float("nan"))):
+        with pytest.raises(ConfigError, match="a pick is to avoid are pairs of finite numbers"):
+            PickGoal(avoid=wrong)
 
 
 def test_an_open_loop_method_leaves_no_screw_for_the_next(world: Any, thing: Any) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -137,6 +137,8 @@ class NavStep:
         failure: one sentence why the goal cannot be reached; None while it may.
         path: (n, 2) places of the way that it means to go, in the frame of the goal [m]; None where it has none.
         note: what it does, in a word or two, for people: `follow`, `wait`.
+        people: (k, 5) those it takes to walk about: place [m] and velocity [m/s] in the frame of the goal, and the
+            radius that it keeps from [m].
     """
 
     twist: Twist
@@ -145,6 +147,7 @@ class NavStep:
     failure: str | None = None
     path: Array | None = None
     note: str = ""
+    people: Array = field(default_factory=lambda: np.zeros((0, 5)))
 
     @classmethod
     def failed(cls, reason: str, left: PlanarPose) -> NavStep:

@@ -9,12 +9,18 @@ from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.dock import DockGoal, DockReport
 from golem.skills.pick_config import PickGoal
-from golem.skills.pick_report import PickOutcome, PickReport
+from golem.skills.pick_report import PickOutcome, PickReport, Sight
 
-AGAIN = (PickOutcome.OUT_OF_REACH, PickOutcome.TRAY_MISSING, PickOutcome.TIGHT, PickOutcome.JAMMED)
-"""What a pick says where another stance may help: others are within reach there."""
-LEFT = (PickOutcome.TIGHT.value, PickOutcome.JAMMED.value)
-"""What is said of a fastener that is not tried again."""
+LEFT = (PickOutcome.TIGHT, PickOutcome.JAMMED, PickOutcome.SLIPPED, PickOutcome.NOTHING_THERE)
+"""What is said of a fastener that is tried again only where there is no other."""
+AGAIN = (
+    *LEFT,
+    PickOutcome.OUT_OF_REACH,
+    PickOutcome.BLOCKED,
+    PickOutcome.TRAY_MISSING,
+    PickOutcome.TRAY_OUT_OF_REACH,
+)
+"""What a pick says where another stance may help: others are within reach there, or it is free."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +91,9 @@ class Disassemble:
             result = await context.run("pick", goal.pick)
             found = result.value if isinstance(result.value, PickReport) else PickReport()
             report.picks.append(found)
+            if result.success and found.in_tray == Sight.NO:
+                text = f"The {goal.pick.label} that was let go is not in the {goal.pick.container}."
+                result = replace(result, success=False, stage="place", slot="localizer", reason=text)
             report.picked += result.success
             timings = {"total": context.t - start, **result.timings}
             if report.picked >= goal.count:
@@ -93,11 +102,10 @@ class Disassemble:
                 return SkillResult(True, "done", None, text, timings, report)
             if result.success:
                 continue
-            if found.outcome not in AGAIN or not docks:
+            if not docks or not _worth_another(found):
                 return SkillResult(False, result.stage, result.slot, result.reason, timings, report)
             context.say(result.stage, f"{result.reason} Looking for another stance.")
-            left = [place for one in found.tried if one.outcome in LEFT for place in (one.x, one.y)]
-            goal = replace(goal, dock=replace(goal.dock, avoid=(*goal.dock.avoid, *left)))
+            goal = _without(goal, found)
             await self._dock(context, goal, report)
             docks -= 1
 
@@ -105,3 +113,16 @@ class Disassemble:
         docked = await context.run("dock", goal.dock)
         report.docks.append(docked.value if isinstance(docked.value, DockReport) else DockReport())
         return docked
+
+
+def _worth_another(found: PickReport) -> bool:
+    """Return whether another stance may help: not where nothing was seen, unless something was tried before."""
+    seen = found.tried or found.outcome != PickOutcome.NOTHING_THERE
+    return bool(seen) and found.outcome in (*AGAIN, PickOutcome.PICKED)
+
+
+def _without(goal: DisassembleGoal, found: PickReport) -> DisassembleGoal:
+    """Return the goal that leaves what a pick has tried in vain for later."""
+    left = [place for one in found.tried if one.outcome in LEFT for place in (one.x, one.y)]
+    avoid = (*goal.dock.avoid, *left)
+    return replace(goal, dock=replace(goal.dock, avoid=avoid), pick=replace(goal.pick, avoid=avoid))

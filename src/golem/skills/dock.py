@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from golem.capabilities.navigation.edge_fit import NearEdge
 from golem.capabilities.navigation.goto import GoTo
 from golem.errors import ConfigError
@@ -15,6 +13,7 @@ from golem.options import require
 from golem.skills.approach import APPROACH, TIMEOUT, approach
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
+from golem.skills.floor_places import floor_places
 from golem.skills.pack_view import CAMERA, LOOK, see_edge, see_fasteners
 from golem.skills.pose_goal import FIRST_REPORT, MARGIN
 from golem.skills.stance_choice import PackStance, best_stance, stance_here
@@ -75,8 +74,7 @@ class DockGoal:
             ("turned", self.turned, 0.0 < self.turned <= 0.5, angle),
             ("approaches", self.approaches, 1 <= self.approaches <= 10, "from 1 to 10"),
         )
-        if len(self.avoid) % 2 or not all(map(math.isfinite, self.avoid)):
-            raise ConfigError("What docking is to avoid are pairs of finite numbers, x and y of each place.")
+        floor_places("docking", self.avoid)
         if not (self.label and self.container):
             raise ConfigError("Docking names the class of the fasteners and that of their container.")
 
@@ -177,7 +175,7 @@ class Dock:
         view = _View(edge.pose @ PlanarPose(-goal.standoff, goal.lateral, 0.0), edge)
         across = edge.pose.to(PlanarPose(0.0, 0.0, 0.0))
         if goal.stance == "reach" and -across.x < goal.standoff + IN_VIEW:
-            avoid = np.array(goal.avoid).reshape(-1, 2)
+            avoid = floor_places("docking", goal.avoid)
             known = self._tray is not None
             seen = await see_fasteners(context, goal.label, goal.container, avoid, not known)
             tray, T = seen.tray, context.legs.pose

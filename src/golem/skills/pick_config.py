@@ -7,6 +7,7 @@ from typing import Literal
 
 from golem.errors import ConfigError
 from golem.skills.detection_stream import SURE
+from golem.skills.floor_places import floor_places
 from golem.types import Side
 
 Hand = Literal["left", "right", "either"]
@@ -20,20 +21,23 @@ class PickGoal:
         label: class of the object.
         container: class of what it is dropped into.
         side: which hand; `either` takes the one that reaches the object and the container.
+        avoid: x, y in odom of objects that are tried only where there is no other, one after the other [m].
     """
 
     label: str = "screw"
     container: str = "tray"
     side: Hand = "right"
+    avoid: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that there is something to look for.
 
         Raises:
-            ConfigError: a class is empty.
+            ConfigError: a class is empty, or a place is none.
         """
         if not (self.label and self.container):
             raise ConfigError("A pick names the class of the object and that of its container.")
+        floor_places("a pick", self.avoid)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from golem.capabilities.planning.base import PlanRefused
 from golem.interfaces.payloads import Detections
 from golem.skills.container import Container
 from golem.skills.context import Context
+from golem.skills.floor_places import floor_places
 from golem.skills.hand_reach import HandReach
 from golem.skills.pick_config import PickConfig, PickGoal
 from golem.skills.pick_report import PickFailed, PickOutcome, Tried
@@ -187,7 +188,9 @@ class TargetChoice:
         places = container.places(self._config.drop_margin)
         left = [a for a in attempts if reach.drops(a.side, places, slack=True).any()]
         if left:
-            return _View(objects, container, left)
+            avoid = floor_places("a pick", goal.avoid)
+            others = [a for a in left if not (np.hypot(*(avoid - a.target.position[:2]).T) < SAME).any()]
+            return _View(objects, container, others or left)
         text = f"No hand that reaches a {goal.label} reaches any place in the {goal.container}."
         problem = PickFailed(PickOutcome.TRAY_OUT_OF_REACH, "detect", "upper_body", text)
         return _View(objects, container, [], problem)

@@ -59,3 +59,20 @@ def test_who_walks_has_a_place_now_a_velocity_and_a_radius() -> None:
     assert np.hypot(*((vx, vy) - velocity)) < 0.3
     assert 0.2 < radius < 0.4
     assert movers.people(1.3).shape == (1, 5) and watch(np.zeros(2))[0].people(1.3).shape == (0, 5)
+
+
+def test_what_shows_another_part_in_every_scan_is_nobody() -> None:
+    rng, movers = np.random.default_rng(1), Movers()
+    for k in range(12):
+        # A box that the robot walks around: one edge stays, the other comes into view. Its middle goes 0.4 m/s.
+        box = np.column_stack([rng.uniform(1.0, 1.1 + 0.08 * k, 60), np.full(60, 2.0)])
+        movers.update(0.1 * k, box + 0.01 * rng.standard_normal((60, 2)), (0.0, 0.0))
+        assert len(movers.people(0.1 * k)) == 0
+
+
+def test_what_jumps_about_more_than_it_goes_is_nobody() -> None:
+    rng, movers = np.random.default_rng(2), Movers()
+    for k in range(12):
+        at = np.array([1.0 + 0.05 * k + (0.12 if k % 3 == 0 else -0.06), 2.0])
+        movers.update(0.1 * k, person(rng, at), (0.0, 0.0))
+        assert len(movers.people(0.1 * k)) == 0

@@ -9,7 +9,8 @@ import pytest
 from golem.evaluation.base import TrialSpec, make_rung, rung_class
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode
-from golem.evaluation.rungs.navigate_hall import NavigateOptions, NavigateRung, Walked, judge
+from golem.evaluation.episodes.hall_walk import HallWalk
+from golem.evaluation.rungs.navigate_hall import NavigateOptions, NavigateRung, judge
 from golem.interfaces import topics
 from golem.interfaces.payloads import Odometry
 from golem.robots.model.spatial import transform
@@ -52,7 +53,7 @@ def outcome(
     contacts = ContactWatch(episode.robot)
     contacts.touched |= how.pop("touched", {})
     spec = how.pop("spec", SPEC)
-    found = judge(spec, Ended(episode, result, **how), goal, Walked(), contacts)  # pyright: ignore
+    found = judge(spec, Ended(episode, result, **how), goal, HallWalk(), contacts)  # pyright: ignore
     return found.stage, found.module
 
 

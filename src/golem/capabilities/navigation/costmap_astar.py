@@ -6,7 +6,7 @@ Close to the goal `goto` takes over, which measures every stop and corrects what
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -134,6 +134,9 @@ class CostmapAstar:
 
     def step(self, inputs: NavInputs, dt: float) -> NavStep:
         """Return the twist of this step; see `Navigator`."""
+        return replace(self._step(inputs, dt), people=self._people)
+
+    def _step(self, inputs: NavInputs, dt: float) -> NavStep:
         pose = self._pose = inputs.pose
         check_finite("the pose", np.array([pose.x, pose.y, pose.yaw]))
         left = pose.to(self._goal)

@@ -2,10 +2,14 @@
 
 Points are put together to blobs, blobs of the size of a person are followed from scan to scan, and each gets the
 velocity of the line through its last places. Nothing is known of whom they mean to go to: straight on is assumed.
+
+Of what stands, a moving robot sees another part in every scan. Such a blob grows at one edge, or shrinks at the other,
+while both edges of somebody who walks go along; and it jumps about more than it goes.
 """
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 
@@ -28,10 +32,14 @@ LOST = 0.35
 """Time after which a blob that is not seen is forgotten [s]."""
 BODY = 0.25
 """Radius of a person [m]; a scan shows one side alone."""
-HISTORY, ENOUGH = 8, 5
+HISTORY, ENOUGH = 6, 4
 """Places of a blob that are kept, and from how many on it has a velocity."""
 WALKS = (0.3, 2.5)
 """Speeds of somebody who walks [m/s]: less is noise, more is a mistake."""
+EDGES = 0.7
+"""Share of the speed of a blob's middle with which the slower of its edges has to go along."""
+SURE = 5.0
+"""Standard errors of the speed by which it has to be above zero."""
 
 
 @dataclass
@@ -39,30 +47,26 @@ class _Blob:
     """Something that is followed.
 
     Attributes:
-        places: time and middle [s], [m], the newest last.
+        places: time [s], lowest and highest x, y of it [m], the newest last.
         points: (n, 2) of the newest scan that showed it [m].
         velocity: (2,) [m/s]; zero while it is not known.
     """
 
-    places: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=HISTORY))
+    places: deque[tuple[float, ...]] = field(default_factory=lambda: deque(maxlen=HISTORY))
     points: Array = field(default_factory=lambda: np.zeros((0, 2)))
     velocity: Array = field(default_factory=lambda: np.zeros(2))
 
     def take(self, t: float, points: Array) -> None:
         """Take what a scan at time `t` showed of it."""
-        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        self.places.append((t, float(middle[0]), float(middle[1])))
+        self.places.append((t, *points.min(axis=0).tolist(), *points.max(axis=0).tolist()))
         self.points = points
         if len(self.places) >= ENOUGH:
-            rows = np.array(self.places)
-            slope = np.polyfit(rows[:, 0] - rows[-1, 0], rows[:, 1:], 1)[0]
-            speed = float(np.hypot(*slope))
-            self.velocity = slope if WALKS[0] < speed < WALKS[1] else np.zeros(2)
+            self.velocity = _velocity(np.array(self.places))
 
     def expected(self, t: float) -> Array:
         """Return the (2,) place at time `t` [m]."""
-        then, x, y = self.places[-1]
-        return np.array([x, y]) + (t - then) * self.velocity
+        then, *edges = self.places[-1]
+        return np.array(edges).reshape(2, 2).mean(axis=0) + (t - then) * self.velocity
 
 
 class Movers:
@@ -112,6 +116,27 @@ class Movers:
         times = np.arange(step, horizon + 1e-9, step)
         swept = [blob.points + dt * blob.velocity for blob in walking for dt in times]
         return np.concatenate(swept) if swept else np.zeros((0, 2))
+
+
+def _velocity(rows: Array) -> Array:
+    """Return the (2,) velocity of what walks [m/s]; zero where something only shows another part of itself.
+
+    Args:
+        rows: (n, 5) time, lowest and highest x, y; see `_Blob.places`.
+    """
+    t = rows[:, 0] - rows[:, 0].mean()
+    spread = float(t @ t)
+    slopes = (t @ rows[:, 1:] / spread).reshape(2, 2)
+    velocity: Array = slopes.mean(axis=0)
+    speed = float(np.hypot(*velocity))
+    if not WALKS[0] < speed < WALKS[1]:
+        return np.zeros(2)
+    way = velocity / speed
+    along = 0.5 * (rows[:, 1:3] + rows[:, 3:]) @ way
+    rest = along - along.mean() - speed * t
+    error = math.sqrt(float(rest @ rest) / (len(t) - 2) / spread)
+    walks = float((slopes @ way).min()) > EDGES * speed and speed > SURE * error
+    return velocity if walks else np.zeros(2)
 
 
 def _blobs(points: Array) -> list[Array]:

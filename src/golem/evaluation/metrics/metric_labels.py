@@ -75,6 +75,8 @@ METRICS: dict[str, Metric] = {
     "approaches": Metric("approaches of all dockings"),
     "screws_served": Metric("loose screws within reach at the end"),
     "recoveries": Metric("recoveries"),
+    "stood": Metric("stood on its way", "s"),
+    "nobody": Metric("walkers that are nobody, of all at all steps", "%", 100.0),
     "goal_yaw": Metric("heading error at the goal", "deg", _DEG),
     "base_range": Metric("largest distance between two places of the base", "mm", 1e3),
     "share_not_negative": Metric("share of time with the CoM margin not negative", "%", 100.0),

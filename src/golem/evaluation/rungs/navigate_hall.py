@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal
@@ -18,13 +18,14 @@ from golem.capabilities.navigation.map_picture import GOAL, TRACK, WAY, MapPictu
 from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, legs_stack
+from golem.evaluation.episodes.hall_walk import HallWalk, true_pose
 from golem.evaluation.episodes.survey import survey
 from golem.interfaces import topics
 from golem.provenance import stack_facts
 from golem.runtime.lockstep import build_robot
 from golem.skills.navigate import NavigateGoal
 from golem.stack import Stack
-from golem.types import Array, PlanarPose, Twist, wrap
+from golem.types import Array, PlanarPose, wrap
 
 MapKind = Literal["survey", "none"]
 SLOT = "navigator"
@@ -57,25 +58,6 @@ class NavigateOptions:
     """The lower body that walks."""
     odometry: str = "lio"
     """The odometry by which the map is made."""
-
-
-@dataclass
-class Walked:
-    """What was seen of one walk from outside.
-
-    Attributes:
-        track: true places on the floor, in odom [m].
-        moving: whether the navigator's newest twist moved the robot.
-        stopped: true pose when the legs were last told to stand; None while they never were.
-        recoveries: how often the navigator began to recover.
-        note: what it did last.
-    """
-
-    track: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
-    moving: bool = False
-    stopped: PlanarPose | None = None
-    recoveries: int = 0
-    note: str = ""
 
 
 class NavigateRung(Rung[NavigateOptions]):
@@ -126,11 +108,11 @@ class NavigateRung(Rung[NavigateOptions]):
         """Let the robot walk, and say what became of it."""
         off = spec.rng("start").uniform(-1.0, 1.0, 3) * SPREAD
         goal = PlanarPose(DISTANCE + float(off[0]), float(off[1]), float(off[2]))
-        walked, contacts = Walked(), ContactWatch(episode.robot)
+        walked, contacts = HallWalk(), ContactWatch(episode.robot)
 
         def look() -> bool:
             contacts(episode.t)
-            watch(episode, walked)
+            walked(episode)
             return episode.result is not None
 
         episode.stand(SETTLE)
@@ -147,30 +129,8 @@ class NavigateRung(Rung[NavigateOptions]):
         return legs_stack(options.legs, profile, use, plant).with_choice(SLOT, method)
 
 
-def true_pose(episode: Episode) -> PlanarPose:
-    """Return where the robot really is in odom."""
-    truth = episode.robot.truth
-    return PlanarPose.of(np.linalg.inv(truth.T_world_odom) @ truth.base().T_world_base)
-
-
-def watch(episode: Episode, walked: Walked) -> None:
-    """Note what happens at one tick."""
-    step = episode.running.bus.latest(topics.NAV_STEP)
-    if step is None:
-        return
-    moving = step.twist != Twist()
-    if walked.moving and not moving:
-        walked.stopped = true_pose(episode)
-    walked.moving = moving
-    walked.recoveries += step.note == "recover" != walked.note
-    walked.note = step.note
-    if not walked.track or episode.t - 0.2 * len(walked.track) > SETTLE:
-        pose = true_pose(episode)
-        walked.track.append((pose.x, pose.y))
-
-
 def judge(
-    spec: TrialSpec, episode: Episode, goal: PlanarPose, walked: Walked, contacts: ContactWatch
+    spec: TrialSpec, episode: Episode, goal: PlanarPose, walked: HallWalk, contacts: ContactWatch
 ) -> TrialOutcome:
     """Say where the robot ended, and which module lost it."""
     bus, result, loss = episode.running.bus, episode.result, episode.loss
@@ -186,7 +146,7 @@ def judge(
         "goal_yaw": turned,
         "distance": gone,
         "contacts": float(len(contacts.touched)),
-        "recoveries": float(walked.recoveries),
+        **walked.series(),
     }
     drift, believed = 0.0, bus.latest(topics.ODOMETRY)
     if believed is not None:
