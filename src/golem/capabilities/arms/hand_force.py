@@ -9,7 +9,6 @@ from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.types import Array, Side
 
-
 TORQUE = 0.5
 """Standard deviation of what a motor's torque is off by: friction, masses, encoder zeros [N m] [own]."""
 WRENCH: Array = np.repeat([30.0, 0.6], 3)
