@@ -24,8 +24,8 @@ PRESS, SILENCE, JUMP = 0.5, 0.2, 0.2
 
 The gate's limit for silence is 0.1 s after the state that the last command answers; the rest is the way of its verdict.
 """
-TRIES = 5
-"""How often a strict gate is opened: where one was killed before, its services are seen for 10 s more."""
+TRIES = 3
+"""How often a strict gate is opened."""
 STEPPED, STEP, STEP_TIME, STEP_ERROR = JOINT_INDEX["right_elbow_joint"], 0.1, 1.0, 0.03
 """What a robot that was set going again is sent: which joint, how far [rad], for how long [s], how far off [rad]."""
 LIMP, LIMP_TIME = 1.0, 0.6
