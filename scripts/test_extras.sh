@@ -16,7 +16,7 @@ probe() {
     case $1 in
         pink) echo "from golem.registry import create; create('upper_body', 'pink_ik', {})" ;;
         dds) echo "from golem.middleware.dds.library import cyclone; cyclone(); from golem.middleware.ros.definitions import load; load('humble')" ;;
-        train) echo "from pathlib import Path; from golem.capabilities.legs.network import TorchScriptNetwork; TorchScriptNetwork(Path('none.pt'), 1)" ;;
+        train) echo "from golem.cli import _dispatch; _dispatch(['train', 'detector', '--help'])" ;;
         record) echo "from golem.middleware.bags import reader, writer" ;;
         foxglove) echo "from golem.middleware.bags import foxglove_server" ;;
         report) echo "from golem.figures import blank_figure; blank_figure(90.0, 90.0); from golem.evaluation.report.svg_figure import styled; styled()" ;;
@@ -43,6 +43,8 @@ except MissingExtra as error:
     print(f"missing: {error}")
 except GolemError as error:
     print(f"ok ({error})")
+except SystemExit as end:
+    print("ok" if not end.code else f"exit code {end.code}")
 except Exception as error:
     print(f"{type(error).__name__}: {error}")
 PYTHON

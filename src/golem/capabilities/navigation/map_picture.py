@@ -69,7 +69,7 @@ class MapPicture:
         picture = np.ascontiguousarray(turned, np.uint8)
         height, width = picture.shape[:2]
         taken: list[Box] = []
-        drawn: list[tuple[int, int, str, Colour]] = []
+        drawn: list[tuple[tuple[int, int], tuple[int, int], str, Colour]] = []
         for place, text, colour in reversed(self._marks):  # words are written upright, so after the turn
             x, y = self._pixels(place[np.newaxis])[0].tolist()
             column, row = width - 1 - y, height - 1 - x
@@ -82,11 +82,11 @@ class MapPicture:
             )
             taken.append((left, bottom - high, left + wide, bottom))
             cv2.rectangle(picture, (left - 1, bottom - high - 1), (left + wide, bottom + 2), HALO, -1)
-            drawn.append((left, bottom, text, colour))
+            drawn.append(((column, row), (left, bottom), text, colour))
             cv2.circle(picture, (column, row), 6, HALO, -1)
-            cv2.circle(picture, (column, row), 4, colour, -1)
-        for left, bottom, text, colour in reversed(drawn):
-            cv2.putText(picture, text, (left, bottom), FONT, LETTERS, colour, 1, cv2.LINE_AA)
+        for dot, corner, text, colour in reversed(drawn):
+            cv2.circle(picture, dot, 4, colour, -1)
+            cv2.putText(picture, text, corner, FONT, LETTERS, colour, 1, cv2.LINE_AA)
         return picture
 
     def _pixels(self, points: Array) -> NDArray[np.int32]:

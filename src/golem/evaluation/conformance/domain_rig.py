@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ HOME_PACE = 0.4
 """How fast the joints go home at first [rad/s]."""
 ARMED = 20.0
 """How long a gate that was started is waited for [s]."""
+REQUESTS = 4
+"""How often a strict gate is asked to let commands through."""
 PATIENCE = 20.0
 """How many times as long as it should take a motion may take, on a busy machine [1]; and for a picture [s]."""
 
@@ -133,13 +136,19 @@ class DomainRig:
         Raises:
             GolemError: it is not armed, or does not open.
         """
-        self.take().close()
+        self.take()
         if self.bench.gate is not None:
             self.bench.gate.end()
         self.bench.gate, link = self._strict_gate(), self.bench.link
         link.gate = None
-        if not link.spin(ARMED, lambda: link.gate is not None and link.gate.state is GateState.ARMED):
+        if not link.spin(ARMED, lambda: link.offered("/safety/activate")) or not link.spin(
+            ARMED, lambda: link.gate is not None and link.gate.state is GateState.ARMED
+        ):
             raise GolemError(f"The gate is not armed: {_why(self.bench)}")
+        for _ in range(REQUESTS - 1):
+            with suppress(GolemError):  # a gate that was just held up asks to be asked again
+                return self._activate()
+            link.pass_time(1.0)
         return self._activate()
 
     def open(self) -> Mover:
@@ -163,6 +172,8 @@ class DomainRig:
 
     def _activate(self) -> Mover:
         """Have the armed gate let commands through, and return what sends them: joints stay, without stiffness."""
+        if self.mover is not None:
+            self.mover.close()
         self.mover, link = Mover(self.bench.config.dds), self.bench.link
         link.pass_time(0.5)
         answer = link.ask("activate")

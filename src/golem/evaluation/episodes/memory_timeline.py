@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -24,16 +25,16 @@ class ObjectTimeline:
     Attributes:
         name: for a person.
         thing: its kind and place.
-        present: the looks during which it stands there, first and one past the last.
+        present: whether it stands there, at each look.
         beliefs: one after each look.
-        told: whether "where is it now?" was answered rightly after each look while it stands there; None where no look
-            had shown it so far.
+        told: whether "where is it now?" was answered rightly after each look; None where it does not stand there, or no
+            look had shown it so far.
         seen: the looks in which the localizer found one of its kind there.
     """
 
     name: str
     thing: Thing
-    present: tuple[int, int]
+    present: tuple[bool, ...]
     beliefs: list[Belief] = field(default_factory=list["Belief"])
     told: list[bool | None] = field(default_factory=list["bool | None"])
     seen: list[int] = field(default_factory=list[int])
@@ -45,14 +46,14 @@ def hits(place: Place, thing: Thing) -> bool:
 
 
 def timeline(memory: Memory, episode: Relocation) -> list[ObjectTimeline]:
-    """Show an episode of two walks to a new memory, which is asked after each look, and return a row per object."""
-    end, split = len(episode.observations), episode.split
+    """Show an episode to a new memory, which is asked after each look, and return a row per object."""
+    old, always = episode.at_old, (True,) * len(episode.observations)
     rows = [
-        ObjectTimeline(f"{episode.target}, old place", episode.before[0], (0, split)),
-        ObjectTimeline(f"{episode.target}, new place", episode.after[0], (split, end)),
+        ObjectTimeline(f"{episode.target}, old place", episode.before[0], old),
+        ObjectTimeline(f"{episode.target}, new place", episode.after[0], tuple(not there for there in old)),
         *(
             ObjectTimeline(
-                f"{thing.kind}{', another' if thing.kind == episode.target else ''}", thing, (0, end)
+                f"{thing.kind}{', another' if thing.kind == episode.target else ''}", thing, always
             )
             for thing in episode.before[1:]
         ),
@@ -67,9 +68,11 @@ def timeline(memory: Memory, episode: Relocation) -> list[ObjectTimeline]:
             known = [p for p in memory.query(kind, "anywhere", None, 20) if hits(p, row.thing)]
             there = any(p.evidence in ("seen", "similar") for p in known)
             row.beliefs.append("there" if there else "gone" if known else "")
-            first, last = row.present
-            if first <= k < last:
-                now = memory.query(kind, "now", None, 1)
-                right = bool(now) and now[0].evidence != "moved" and hits(now[0], row.thing)
-                row.told.append(right if row.seen else None)
+            now = memory.query(kind, "now", None, 1) if row.present[k] and row.seen else None
+            row.told.append(None if now is None else _right(now, row.thing))
     return rows
+
+
+def _right(now: Sequence[Place], thing: Thing) -> bool:
+    """Return whether the first place of an answer, which is not told as moved, is that of the thing."""
+    return bool(now) and now[0].evidence != "moved" and hits(now[0], thing)

@@ -100,6 +100,7 @@ class Relocation:
         absent: kinds of which there is none.
         observations: the looks, in the order of time.
         split: how many of them are from before it was moved last.
+        at_old: whether the target stood at its old place, `before[0]`, at each look; else it stood at `after[0]`.
         moved_at: time at which the target was moved last [s].
     """
 
@@ -109,6 +110,7 @@ class Relocation:
     absent: tuple[str, ...]
     observations: tuple[Observation, ...]
     split: int
+    at_old: tuple[bool, ...]
     moved_at: float
 
 
@@ -123,12 +125,14 @@ def relocation(rng: np.random.Generator, setting: Setting) -> Relocation:
         others.append(Thing(target, spots[3][0]))
     clutter = tuple([spots[k][1] for k in range(4)] + [spots[0][2]])
     # The target goes to and fro, so that it comes from the first counter to the second at last.
-    places = [spots[0 if (setting.walks - 2 - k) // 6 % 2 == 0 else 1][0] for k in range(setting.walks - 1)]
+    olds = [(setting.walks - 2 - k) // 6 % 2 == 0 for k in range(setting.walks - 1)]
     looks = _elsewhere(rng, setting.distractors, tuple(KINDS))
+    at_old = [olds[0]] * len(looks)
     start = looks[-1].frame.t + PAUSE if looks else 0.0
     pause = PAUSE if setting.walks == 2 else HOUR
-    for place in places:
-        room = RelocationRoom((Thing(target, place), *others), clutter)
+    for old in olds:
+        room = RelocationRoom((Thing(target, spots[0 if old else 1][0]), *others), clutter)
+        at_old += [old] * VIEWS
         looks += _walk(rng, room, setting, start)
         start = looks[-1].frame.t + pause
     split, moved_at = len(looks), start - pause / 2
@@ -136,7 +140,8 @@ def relocation(rng: np.random.Generator, setting: Setting) -> Relocation:
     after = (Thing(target, spots[1][0]), *others)
     looks += _walk(rng, RelocationRoom(after, clutter, screens, setting.dusk), setting, start)
     before = (Thing(target, spots[0][0]), *others)
-    return Relocation(target, before, after, absent, tuple(looks), split, moved_at)
+    at_old += [False] * VIEWS
+    return Relocation(target, before, after, absent, tuple(looks), split, tuple(at_old), moved_at)
 
 
 def _elsewhere(rng: np.random.Generator, count: int, labels: Sequence[str]) -> list[Observation]:

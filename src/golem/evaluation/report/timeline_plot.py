@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from golem.evaluation.episodes.memory_timeline import ObjectTimeline
 from golem.evaluation.report.svg_figure import COLOUR
 
@@ -20,7 +22,7 @@ def timeline_plot(episodes: Mapping[str, tuple[Sequence[ObjectTimeline], int]], 
         figure: of matplotlib; its height is set.
     """
     rows = sum(len(found) for found, _ in episodes.values())
-    figure.set_figheight(ROW * rows + 0.75 * len(episodes) + 0.5)
+    figure.set_figheight(ROW * rows + 0.75 * len(episodes) + 0.7)
     ratios = [len(found) + 0.6 for found, _ in episodes.values()]
     every = figure.subplots(len(episodes), squeeze=False, gridspec_kw={"height_ratios": ratios})[:, 0]
     for axes, (title, (found, split)) in zip(every, episodes.items(), strict=True):
@@ -35,21 +37,21 @@ def timeline_plot(episodes: Mapping[str, tuple[Sequence[ObjectTimeline], int]], 
         every[-1].plot([], [], "o", ms=4, color=COLOUR["won"], label="told where it is")[0],
         every[-1].plot([], [], "x", ms=5, color=COLOUR["lost"], label="told wrongly")[0],
     ]
-    figure.legend(handles=marks, loc="outside lower center", ncols=6, labelcolor=COLOUR["ink"], fontsize=9)
+    figure.legend(handles=marks, loc="outside lower center", ncols=3, labelcolor=COLOUR["ink"], fontsize=9)
 
 
 def _draw(axes: Any, rows: Sequence[ObjectTimeline], split: int) -> None:
     looks = len(rows[0].beliefs)
     for y, row in enumerate(rows):
-        first, last = row.present
-        axes.barh(y, last - first, left=first, height=0.8, color=COLOUR["track"])
+        there = np.flatnonzero(row.present)
+        axes.barh([y] * len(there), 1, left=there, height=0.8, color=COLOUR["track"], linewidth=0)
         for k, belief in enumerate(row.beliefs):
             if belief:
                 alpha = 1.0 if belief == "there" else 0.3
                 axes.barh(y + 0.18, 1, left=k, height=0.3, color=COLOUR["m0"], alpha=alpha, linewidth=0)
         axes.plot([k + 0.5 for k in row.seen], [y + 0.18] * len(row.seen), "|", ms=8, color=COLOUR["ink"])
         for right, mark, colour in ((True, "o", "won"), (False, "x", "lost")):
-            at = [first + k + 0.5 for k, told in enumerate(row.told) if told is right]
+            at = [k + 0.5 for k, told in enumerate(row.told) if told is right]
             axes.plot(at, [y - 0.2] * len(at), mark, ms=4 if right else 5, color=COLOUR[colour])
     axes.axvline(split, color=COLOUR["muted"], lw=1, ls="--")
     axes.set(xlim=(0, looks), ylim=(len(rows) - 0.45, -0.55))

@@ -114,7 +114,7 @@ class MemoryRung(Rung[Any]):
             f"{n} episodes each; in brackets the 95 % bootstrap interval over episodes, Wilson's where all are alike. "
             "The paper's are of another room, other queries and other networks."
         )
-        paper = tuple(("the paper, RoboCasa", *row, "-") for row in PAPER)
+        paper = tuple(("the paper", *row, "-") for row in PAPER)
         heads = ("condition", "memory", *METRICS.values())
         return (TextTable("Answers [%]", heads, (*rows, *paper), note),)
 
@@ -139,7 +139,7 @@ class MemoryRung(Rung[Any]):
 
 def _share(values: Sequence[float]) -> str:
     interval = bootstrap_interval(values)
-    return f"{100 * float(np.mean(values)):.1f} [{100 * interval.low:.1f}, {100 * interval.high:.1f}]"
+    return f"{100 * float(np.mean(values)):.1f} [{100 * interval.low:.3g}, {100 * interval.high:.3g}]"
 
 
 def _make(method: str) -> Memory:

@@ -168,15 +168,23 @@ class RobotLink:
         Raises:
             RosError: nobody does, or it does not answer.
         """
-        client = self._clients.get(service)
-        if client is None:
-            client = self._clients[service] = self._node.client(service, public.TRIGGER)
+        client = self._client(service)
         if not self.spin(SEARCH, client.ready, every):
             raise RosError(f"Nobody offers '{service}'; {remedy}.")
         answer = client.call(Trigger_Request())
         if not self.spin(ANSWER, lambda: answer.done, every):
             raise RosError(f"'{service}' does not answer.")
         return str(answer.result().message)
+
+    def offered(self, service: str) -> bool:
+        """Return whether somebody is seen to offer a service without arguments."""
+        return self._client(service).ready()
+
+    def _client(self, service: str) -> Client:
+        client = self._clients.get(service)
+        if client is None:
+            client = self._clients[service] = self._node.client(service, public.TRIGGER)
+        return client
 
     def command(self, q: Array, kp: Array, kd: Array) -> None:
         """Send the gate a command that answers the newest state: (27,) each [rad], [N m/rad], [N m s/rad]."""
