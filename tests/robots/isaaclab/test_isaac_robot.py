@@ -64,6 +64,15 @@ def test_every_motor_turns_its_own_joint_against_the_same_weight(
     assert np.abs(reports[1][0] - start).min() > 0.01
 
 
+def test_it_hangs_for_a_minute_as_in_mujoco(hanging: tuple[MujocoRobot, IsaacLabRobot]) -> None:
+    mine, other = hanging
+    for _ in range(60):
+        for robot in hanging:
+            run(robot, held(start_posture()), 1.0)
+        np.testing.assert_allclose(other.joints()[0], mine.joints()[0], atol=0.002)
+    np.testing.assert_allclose(other.joints()[2], mine.joints()[2], atol=0.05)
+
+
 def test_it_stands_on_its_soles_with_its_weight_and_the_same_seed_gives_the_same_motion() -> None:
     ends = []
     for _ in range(2):

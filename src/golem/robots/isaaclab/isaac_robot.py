@@ -11,8 +11,8 @@ import numpy as np
 
 from golem.errors import unknown_name
 from golem.robots.isaaclab.isaac_truth import IsaacTruth
-from golem.robots.isaaclab.stage import robot_layer, world_layer
-from golem.robots.isaaclab.worker import Scene
+from golem.robots.isaaclab.isaac_worker import WorkerScene
+from golem.robots.isaaclab.usd_layers import robot_layer, world_layer
 from golem.robots.isaaclab.worker_link import Layers, WorkerLink, isaac_python
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.other_engine import Motion, OtherEngineConfig, OtherEngineRobot, follower_names
@@ -74,7 +74,7 @@ class IsaacLabRobot(OtherEngineRobot):
         self._cranks_at = np.array([names.index(crank) for _, crank in followers])
         self._links = np.flatnonzero(model.body_rootid == model.body_rootid[model.body(BASE_LINK).id])
         links = [model.body(b).name for b in self._links]
-        scene: Scene = {
+        scene: WorkerScene = {
             "backend": config.backend,
             "dt": COARSE_STEP,
             "robot": "",

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.errors import ConfigError, MissingEnvironment, ServiceUnavailable, shorten
-from golem.robots.isaaclab import worker
-from golem.robots.isaaclab.worker import Scene, reply_type, request_type
+from golem.robots.isaaclab import isaac_worker
+from golem.robots.isaaclab.isaac_worker import WorkerScene, reply_type, request_type
 
 VARIABLE = "GOLEM_ISAACLAB_PYTHON"
 """Environment variable that names the Python of Isaac Lab's environment where the option does not."""
@@ -67,7 +67,7 @@ class WorkerProcess:
         versions: of the packages that it uses, by name.
     """
 
-    def __init__(self, key: Key, python: Path, scene: Scene, layers: Layers) -> None:
+    def __init__(self, key: Key, python: Path, scene: WorkerScene, layers: Layers) -> None:
         """Start a worker under `python` and have it build `scene` from `layers`, which takes up to minutes.
 
         Raises:
@@ -86,7 +86,7 @@ class WorkerProcess:
         self._request, self._reply_type = np.zeros((), request_type(*sizes)), reply_type(*sizes)
         with self._log.open("wb") as log:
             self._process = subprocess.Popen(
-                [python, "-I", worker.__file__, folder / "scene.json"],
+                [python, "-I", isaac_worker.__file__, folder / "scene.json"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=log,
@@ -158,7 +158,7 @@ class WorkerLink:
         versions: of the packages that the worker uses, by name.
     """
 
-    def __init__(self, python: Path, scene: Scene, layers: Layers) -> None:
+    def __init__(self, python: Path, scene: WorkerScene, layers: Layers) -> None:
         """Take an idle worker that simulates the same, or start one, which takes up to minutes.
 
         Args:

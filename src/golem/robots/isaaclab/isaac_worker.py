@@ -1,10 +1,10 @@
 """The process that holds the articulation in Isaac Lab: runs in Isaac Lab's own environment, without `golem`.
 
-    python -I worker.py SCENE
+    python -I isaac_worker.py SCENE
 
-SCENE is a JSON file, see `Scene`. Once the world is built the worker writes one line of JSON to its standard output:
-`{"versions": {name: version}}`, or `{"error": sentence}`. Then it answers requests on its standard input with replies,
-see `request_type` and `reply_type`, until its input ends. What libraries print goes to its standard error.
+SCENE is a JSON file, see `WorkerScene`. Once the world is built the worker writes one line of JSON to its standard
+output: `{"versions": {name: version}}`, or `{"error": sentence}`. Then it answers requests on its standard input with
+replies, see `request_type` and `reply_type`, until its input ends. What libraries print goes to its standard error.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ CONSTRAINTS, CONTACTS = 300, 100
 """Room for rows and contacts in Newton's solver."""
 
 
-class Scene(TypedDict):
+class WorkerScene(TypedDict):
     """What is to be simulated.
 
     Attributes:
@@ -88,7 +88,7 @@ def reply_type(joints: int, bodies: int) -> np.dtype[np.void]:
 class Simulation:
     """One robot in one world of Isaac Lab."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: WorkerScene) -> None:
         """Build the world.
 
         Raises:
@@ -219,7 +219,7 @@ def _versions() -> dict[str, str]:
     return found
 
 
-def _serve(scene: Scene, requests: BinaryIO, replies: BinaryIO) -> None:
+def _serve(scene: WorkerScene, requests: BinaryIO, replies: BinaryIO) -> None:
     """Build `scene`, say how that went, and answer requests until there are no more."""
     sizes = len(scene["joints"]), len(scene["bodies"])
     request, reply = np.zeros((), request_type(*sizes)), np.zeros((), reply_type(*sizes))
@@ -241,7 +241,7 @@ def _serve(scene: Scene, requests: BinaryIO, replies: BinaryIO) -> None:
 def main() -> None:
     """Serve the scene that the command line names, over the standard streams."""
     warnings.simplefilter("ignore")
-    scene: Scene = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
+    scene: WorkerScene = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
     with os.fdopen(os.dup(1), "wb") as replies:
         os.dup2(2, 1)
         _serve(scene, sys.stdin.buffer, replies)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError
-from golem.robots.isaaclab.stage import robot_layer, world_layer
+from golem.robots.isaaclab.usd_layers import robot_layer, world_layer
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.other_engine import FINGER_DRIVE, follower_names
 from golem.robots.mujoco.scene import build_scene
