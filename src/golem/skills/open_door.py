@@ -17,6 +17,7 @@ from golem.interfaces.payloads import GripState
 from golem.options import require
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
+from golem.skills.handle_look import seen_before
 from golem.skills.poses import retracted
 from golem.types import Array, LocalizedObject, Side
 
@@ -31,8 +32,6 @@ EVERY = 0.08
 """Distance of those points [m]."""
 PART = 0.07
 """Half the length of the part of a handle that is grasped [m]."""
-LOOKS = 4
-"""Frames of the palm camera that a correction is made of."""
 MOST = 0.06
 """How far the hand may give way [m]."""
 SAMPLE = 0.010
@@ -78,7 +77,9 @@ class OpenConfig:
         attempts: how many of the proposed grasps are tried to be reached.
         arrive_gap: least opening to arrive with [m].
         look_again: whether the palm camera corrects the grasp from before the handle; without, all is open loop.
-        trust: how far from where the head camera has the handle the palm camera may see it [m].
+        trust: how far from where it is expected the palm camera may see the handle [m].
+        looks: how often the hand is brought before the handle at most, each time by what its camera saw before.
+        centred: distance from where it was expected below which one look was enough [m].
         height: of the grasp above base_link, where the handle is as long [m].
         turn: share of the door's turn that the hand takes part in.
         follow: rate at which the hand gives way to a handle that is not in the middle of its fingers [1/s].
@@ -100,6 +101,8 @@ class OpenConfig:
     arrive_gap: float = 0.095
     look_again: bool = True
     trust: float = 0.10
+    looks: int = 3
+    centred: float = 0.03
     height: float = 0.14
     turn: float = 0.7
     follow: float = 2.0
@@ -157,7 +160,7 @@ class OpenDoor:
             self._report.side = side
             grasp = await self._approach(context, motion, whole, handle, door, side)
             if self._config.look_again:
-                grasp = await self._look_again(context, handle, grasp, side)
+                grasp = await seen_before(context, motion, self._config, handle, grasp, side)
             await self._grasp(context, motion, grasp, side)
             timings["detect_to_grasp"] = context.t - timings["start"]
             await self._pull(context, door, goal, side)
@@ -261,41 +264,6 @@ class OpenDoor:
                 refused = refused or refusal
         assert refused is not None
         raise failed("approach", refused) from refused
-
-    async def _look_again(self, context: Context, handle: LocalizedObject, grasp: Grasp, side: Side) -> Grasp:
-        """Return the grasp moved to where the palm camera sees the handle; as it is where it sees none.
-
-        Camera and fingers sit on one hand: what the head camera's calibration and the joints are off by drops out. The
-        hand is moved across the handle only: how much of its length each camera shows differs.
-        """
-        c = self._config
-        context.say("approach", "Looking again with the palm camera.")
-        places: list[Array] = []
-        with context.watch(f"{side}_hand", handle.label) as eye:
-            end = context.t + c.look_timeout
-            while len(places) < LOOKS and context.t < end:
-                sightings = await eye.look(end - context.t)
-                near = (
-                    []
-                    if sightings is None
-                    else [self._nearest(o, handle.position) for o in sightings.objects]
-                )
-                near = [p for p in near if np.linalg.norm((p - handle.position)[:2]) < c.trust]
-                if near:
-                    places.append(min(near, key=lambda p: float(np.linalg.norm((p - handle.position)[:2]))))
-        if not places:
-            return grasp
-        off = np.median(places, axis=0) - handle.position
-        T = grasp.T_odom_gripper.copy()
-        T[:2, 3] += off[:2]
-        context.say("approach", f"The handle is {1e3 * np.hypot(*off[:2]):.0f} mm from where it seemed.")
-        return replace(grasp, T_odom_gripper=T)
-
-    @staticmethod
-    def _nearest(seen: LocalizedObject, position: Array) -> Array:
-        """Return the middle of that part of `seen` (3,) that is at the height of `position`."""
-        level = np.abs(seen.points[:, 2] - position[2]) < PART
-        return np.median(seen.points[level], axis=0) if level.any() else seen.position
 
     async def _grasp(self, context: Context, motion: PlannedMotion, grasp: Grasp, side: Side) -> None:
         """Go straight to the handle and close."""

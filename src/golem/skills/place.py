@@ -31,6 +31,8 @@ TURNS = (0.0, 0.35, -0.35, 0.7, -0.7, 1.05, -1.05)
 """Turns about the vertical in which the hand may set down, in this order [rad]."""
 IN_HAND = 0.16
 """Radius around a hand within which the head camera shows what it holds [m]."""
+IN_BOWL = 0.10
+"""The same around the middle of what hangs beside the fingers [m]: a bowl is 80 mm in radius."""
 PROUD = 0.025
 """Height above a surface from which on something stands there [m]: the head camera is not sure of less."""
 IN_WAY = 0.12
@@ -190,7 +192,7 @@ class SetDown:
             spot = T[:3, :3] @ spot + T[:3, 3]
         context.say("detect", "Looking at the place.", target=spot.tolist())
         motion.look([(hand, IN_HAND)])
-        scene = self._scene(context, goal, hand)
+        scene = self._scene(context, goal, context.arms[side].pose)
         level = surface_below(scene, spot)
         if level is None:
             raise StageFailed("detect", "localizer", "The head camera shows no surface at that place.")
@@ -213,7 +215,7 @@ class SetDown:
         held = Held(side, _column(arm.pose, below, goal.above))
         at = np.array([spot[0], spot[1], spot[2] + below + c.hover])
         context.say("carry", "Carrying it there.", target=at.tolist(), side=side)
-        over = self._tallest(self._scene(context, goal, arm.pose[:3, 3]), arm.pose[:3, 3], at) + below + ROOM
+        over = self._tallest(self._scene(context, goal, arm.pose), arm.pose[:3, 3], at) + below + ROOM
         goals = [self._turned(arm.commanded, turn, at, goal.aside or (0.0, 0.0)) for turn in TURNS]
         for T in goals:
             # Straight there and down, as long as the arm can: planned ways of a hand are long ways for a thing.
@@ -236,14 +238,17 @@ class SetDown:
         raise failed("carry", refused) from refused
 
     @staticmethod
-    def _scene(context: Context, goal: PlaceGoal, hand: Array) -> Array:
+    def _scene(context: Context, goal: PlaceGoal, T: Array) -> Array:
         """Return the points (n, 3) in odom that the head camera shows, as this hand finds them, less what it holds."""
         scene = context.scene("head")
         scene = scene + (*goal.off, 0.0) if goal.off else scene
-        # Distance from hand and what hangs below it.
-        away = scene - hand
-        away[:, 2] -= np.clip(away[:, 2], -goal.below, 0.0)
-        return scene[np.linalg.norm(away, axis=1) > IN_HAND]
+        beside = np.append(T[:2, :2] @ (goal.aside or (0.0, 0.0)), 0.0)
+        for middle, radius in ((T[:3, 3], IN_HAND), (T[:3, 3] + beside, IN_BOWL)):
+            # Distance from what is there and from what hangs below it.
+            away = scene - middle
+            away[:, 2] -= np.clip(away[:, 2], -goal.below, 0.0)
+            scene = scene[np.linalg.norm(away, axis=1) > radius]
+        return scene
 
     @staticmethod
     def _tallest(scene: Array, here: Array, there: Array) -> float:
