@@ -28,7 +28,7 @@ def test_every_option_of_a_pick_can_be_set() -> None:
     pick, gentle = table.make("pick"), table.make("gentle")
     assert isinstance(pick, Pick) and isinstance(gentle, Pick)
     assert (pick._config.force, gentle._config.force) == (8.0, 4.0)
-    assert (pick.timeout(PickGoal()), gentle.timeout(PickGoal())) == (5.0, 90.0)
+    assert (pick.timeout(PickGoal()), gentle.timeout(PickGoal())) == (5.0, 240.0)
 
 
 @pytest.mark.parametrize(
