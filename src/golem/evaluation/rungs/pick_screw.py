@@ -167,8 +167,9 @@ class PickRung(Rung[PickOptions]):
 
     @property
     def _goal(self) -> PickGoal:
-        """Either hand in a varied work place, whose tray is on either side."""
-        return PickGoal() if self.options.layout == "nominal" else PickGoal(side="either")
+        """Either hand, but at the nominal place, whose tray is on the right."""
+        nominal = self.options.layout == "nominal" and not self.options.sweep
+        return PickGoal() if nominal else PickGoal(side="either")
 
     @property
     def balances(self) -> bool:
