@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections import defaultdict
 from pathlib import Path
 
-from golem.evaluation.metrics.statistics import wilson
+from golem.evaluation.harness.records import read_records
+from golem.evaluation.report.condition_plot import draw_share
 from golem.figures import blank_figure
 
 COLUMNS = 3
@@ -17,10 +17,9 @@ def counts(run: Path) -> tuple[str, dict[str, list[bool]]]:
     """Return the condition that a run swept, and by its values whether each trial succeeded."""
     found: dict[str, list[bool]] = defaultdict(list)
     condition = ""
-    for line in (run / "trials.jsonl").read_text(encoding="utf-8").splitlines():
-        record = json.loads(line)
-        ((condition, value),) = record["case"].items()
-        found[f"{value:.3g}" if isinstance(value, float) else str(value)].append(record["success"])
+    for record in read_records(run / "trials.jsonl"):
+        ((condition, value),) = record.case.items()
+        found[f"{value:.3g}" if isinstance(value, float) else str(value)].append(record.success)
     return condition, found
 
 
@@ -35,9 +34,7 @@ def main(out: Path, runs: list[Path]) -> None:
         panel.grid(axis="y", alpha=0.3)
         condition, found = counts(run)
         for x, trials in enumerate(found.values()):
-            interval = wilson(sum(trials), len(trials))
-            panel.plot([x, x], [100.0 * interval.low, 100.0 * interval.high], color="C0", lw=2)
-            panel.plot(x, 100.0 * sum(trials) / len(trials), "o", ms=4, color="C0")
+            draw_share(panel, x, sum(trials), len(trials), "C0")
         labels = [f"{name}\nn = {len(trials)}" for name, trials in found.items()]
         panel.set_xticks(range(len(found)), [label.replace("_", " ") for label in labels], fontsize=7)
         panel.set(title=condition.replace("_", " "), ylim=(0, 104))

@@ -24,3 +24,8 @@ def floor_places(what: str, numbers: Sequence[float]) -> Array:
     if len(numbers) % 2 or not all(map(math.isfinite, numbers)):
         raise ConfigError(f"What {what} is to avoid are pairs of finite numbers, x and y of each place.")
     return np.array(numbers, float).reshape(-1, 2)
+
+
+def stands_at(position: Array, places: Array, within: float) -> bool:
+    """Return whether `position` (2,) or (3,) is, over the floor, less than `within` [m] from one of `places` (n, 2)."""
+    return bool((np.linalg.norm(places - position[:2], axis=1) < within).any())

@@ -10,7 +10,7 @@ import numpy as np
 from golem.capabilities.grasping.base import Grasp
 from golem.capabilities.planning.base import PlanRefused
 from golem.skills.context import Context
-from golem.skills.poses import retracted
+from golem.skills.poses import moved, retracted
 from golem.types import Array, LocalizedObject, Side
 
 if TYPE_CHECKING:
@@ -45,8 +45,7 @@ async def seen_before(
         if seen is None:
             break
         off = np.append((seen - handle.position)[:2], 0.0)
-        T = grasp.T_odom_gripper.copy()
-        T[:3, 3] += off
+        T = moved(grasp.T_odom_gripper, off)
         motion.displace(off)
         handle, grasp = replace(handle, position=handle.position + off), replace(grasp, T_odom_gripper=T)
         away = float(np.hypot(*off[:2]))

@@ -14,6 +14,7 @@ from golem.interfaces import topics
 from golem.middleware.bus import News
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
+from golem.skills.floor_places import stands_at
 from golem.skills.pick_targets import TORSO
 from golem.skills.planned_motion import PlannedMotion
 from golem.skills.stance_choice import LOOK_TURN
@@ -134,7 +135,7 @@ async def _look(
                 place = T[:3, :3].T @ (o.position - T[:3, 3])
                 if o.label == container:
                     trays.append((float(o.detection.score), place))
-                elif o.label == label and not (np.hypot(*(avoid - o.position[:2]).T) < SAME).any():
+                elif o.label == label and not stands_at(o.position, avoid, SAME):
                     _add(seen, place, _weight(o))
 
 

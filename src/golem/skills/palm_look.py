@@ -18,7 +18,7 @@ from golem.capabilities.grasping.centroid import UP, grasp_pose
 from golem.capabilities.grasping.view_shift import View, shift_between
 from golem.skills.context import Context
 from golem.skills.planned_motion import PlannedMotion
-from golem.skills.poses import retracted
+from golem.skills.poses import moved, retracted
 from golem.skills.take_config import TakeThingConfig
 from golem.skills.ware_sight import palm_view, seen_again
 from golem.types import Array, LocalizedObject, Side
@@ -121,9 +121,7 @@ class PalmLook:
             shift = 0.5 * (np.min(shifts, axis=0) + np.max(shifts, axis=0))
             if k and float(np.linalg.norm(shift)) > STRAYED:
                 break
-            T = grasp.T_odom_gripper.copy()
-            T[:3, 3] += shift
-            view, grasp = seen, replace(grasp, T_odom_gripper=T)
+            view, grasp = seen, replace(grasp, T_odom_gripper=moved(grasp.T_odom_gripper, shift))
             target = replace(target, position=np.median(seen.thing, axis=0), points=seen.thing)
             self._context.say("approach", f"The grasp moves by {1e3 * float(np.linalg.norm(shift)):.0f} mm.")
         return grasp, view

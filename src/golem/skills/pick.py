@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+
+import numpy as np
 
 from golem.capabilities.grasping.base import Grasp, GraspMethod, ServoLaw, ServoStatus, ServoStep
 from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.finger_room import FingerRoom
+from golem.skills.floor_places import stands_at
 from golem.skills.force_guard import ForceGuard
 from golem.skills.pick_config import PickConfig, PickGoal
 from golem.skills.pick_place import look_after, place
@@ -122,11 +124,9 @@ class Pick:
 
     def _is_settled(self, attempt: Attempt) -> bool:
         """Return whether the hand has tried an object there, and another try would not change how it ended."""
-        x, y, _ = attempt.target.position
-        return any(
-            one.outcome in SETTLED and one.side == attempt.side and math.hypot(one.x - x, one.y - y) < SAME
-            for one in self._report.tried
-        )
+        mine = [one for one in self._report.tried if one.side == attempt.side and one.outcome in SETTLED]
+        places = np.array([(one.x, one.y) for one in mine]).reshape(-1, 2)
+        return stands_at(attempt.target.position, places, SAME)
 
     async def _look(self, context: Context, goal: PickGoal) -> PickChoice:
         """Look with the head camera for what to take, and for what is in the way."""

@@ -7,7 +7,7 @@ from golem.skills.force_guard import ForceGuard
 from golem.skills.pick_config import PickConfig
 from golem.skills.pick_report import PickFailed, slipped
 from golem.skills.pick_targets import Attempt
-from golem.skills.poses import lifted, retracted
+from golem.skills.poses import lifted, moved, retracted
 from golem.skills.travel import Travel
 
 
@@ -28,9 +28,8 @@ async def pull(
     """
     arm, hand = context.arms[attempt.side], context.hands[attempt.side]
     # Off centre, one finger leans on its stop and the other pushes the object against its bore.
-    centred = arm.commanded.copy()
-    centred[:3, 3] += hand.status.offset * centred[:3, 1]
-    await arm.move(centred, config.pull_speed)
+    commanded = arm.commanded
+    await arm.move(moved(commanded, hand.status.offset * commanded[:3, 1]), config.pull_speed)
     context.say("extract", "Pulling straight out.")
     guard = await ForceGuard.at_rest(
         context, attempt.side, -arm.commanded[:3, 2], config.guard_force, config.guard_length

@@ -12,7 +12,7 @@ from golem.capabilities.planning.base import PlanRefused
 from golem.interfaces.payloads import Detections
 from golem.skills.container import Container
 from golem.skills.context import Context
-from golem.skills.floor_places import floor_places
+from golem.skills.floor_places import floor_places, stands_at
 from golem.skills.hand_reach import HandReach
 from golem.skills.pick_config import PickConfig, PickGoal
 from golem.skills.pick_report import PickFailed, PickOutcome, Tried
@@ -189,7 +189,7 @@ class TargetChoice:
         left = [a for a in attempts if reach.drops(a.side, places, slack=True).any()]
         if left:
             avoid = floor_places("a pick", goal.avoid)
-            others = [a for a in left if not (np.hypot(*(avoid - a.target.position[:2]).T) < SAME).any()]
+            others = [a for a in left if not stands_at(a.target.position, avoid, SAME)]
             return _View(objects, container, others or left)
         text = f"No hand that reaches a {goal.label} reaches any place in the {goal.container}."
         problem = PickFailed(PickOutcome.TRAY_OUT_OF_REACH, "detect", "upper_body", text)

@@ -21,9 +21,7 @@ def moved(T: Array, by: Array) -> Array:
 
 def retracted(T: Array, distance: float) -> Array:
     """Return pose `T` (4, 4) moved back by `distance` [m] against its approach axis, z."""
-    back = T.copy()
-    back[:3, 3] -= distance * T[:3, 2]
-    return back
+    return moved(T, -distance * T[:3, 2])
 
 
 def at_height(T: Array, z: float) -> Array:

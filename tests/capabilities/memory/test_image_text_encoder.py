@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,23 +24,13 @@ SMALL = {"hidden_size": 16, "intermediate_size": 16, "num_hidden_layers": 1, "nu
 
 
 @pytest.fixture(scope="module")
-def hub() -> Any:
-    pytest.importorskip("torch", reason="needs the extra 'vision'")
-    library = pytest.importorskip("transformers", reason="needs the extra 'vision'")
-    library.logging.disable_progress_bar()
-    return library
-
-
-@pytest.fixture(scope="module")
-def clip(hub: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def clip(
+    hub: Any, letter_tokenizer: Callable[[Path, int], Any], tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     import torch
 
     folder = tmp_path_factory.mktemp("clip")
-    letters = [chr(k) for k in range(97, 123)]
-    words = [*letters, *(f"{a}</w>" for a in letters), "<|startoftext|>", "<|endoftext|>"]
-    (folder / "vocab.json").write_text(json.dumps({word: k for k, word in enumerate(words)}))
-    (folder / "merges.txt").write_text("#version: 0.2\n")
-    tokenizer = hub.CLIPTokenizer(str(folder / "vocab.json"), str(folder / "merges.txt"), model_max_length=24)
+    tokenizer = letter_tokenizer(folder, 24)
     pictures = hub.CLIPImageProcessor(size={"shortest_edge": 32}, crop_size={"height": 32, "width": 32})
     hub.CLIPProcessor(pictures, tokenizer).save_pretrained(folder)
     text = {**SMALL, "vocab_size": 80, "max_position_embeddings": 24, "bos_token_id": 52, "eos_token_id": 53}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,23 +22,13 @@ SIZE = FRAME.rgb.shape[:2]
 
 
 @pytest.fixture(scope="module")
-def hub() -> Any:
-    pytest.importorskip("torch", reason="needs the extra 'vision'")
-    library = pytest.importorskip("transformers", reason="needs the extra 'vision'")
-    library.logging.disable_progress_bar()
-    return library
-
-
-@pytest.fixture(scope="module")
-def owl(hub: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def owl(
+    hub: Any, letter_tokenizer: Callable[[Path, int], Any], tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     import torch
 
     folder = tmp_path_factory.mktemp("owlv2")
-    letters = [chr(k) for k in range(97, 123)]
-    words = [*letters, *(f"{a}</w>" for a in letters), "<|startoftext|>", "<|endoftext|>"]
-    (folder / "vocab.json").write_text(json.dumps({word: k for k, word in enumerate(words)}))
-    (folder / "merges.txt").write_text("#version: 0.2\n")
-    tokenizer = hub.CLIPTokenizer(str(folder / "vocab.json"), str(folder / "merges.txt"), model_max_length=16)
+    tokenizer = letter_tokenizer(folder, 16)
     pictures = hub.Owlv2ImageProcessor(size={"height": 64, "width": 64})
     hub.Owlv2Processor(image_processor=pictures, tokenizer=tokenizer).save_pretrained(folder)
     small = {"hidden_size": 16, "intermediate_size": 16, "num_hidden_layers": 1, "num_attention_heads": 2}

@@ -53,13 +53,13 @@ def _farther(before: Array, after: Array, flat: Array, axis: Array) -> float:
 
     Both are points (n, 3) of it, across the axis in the same place; a hand above a rim shows the other side of a bowl.
     """
-    low = np.minimum((before @ flat).min(axis=0), (after @ flat).min(axis=0))
-    size = np.ceil(
-        (np.maximum((before @ flat).max(axis=0), (after @ flat).max(axis=0)) - low) / PIXEL
-    ).astype(int)
+    views = before @ flat, after @ flat
+    both = np.concatenate(views)
+    low = both.min(axis=0)
+    size = np.ceil((both.max(axis=0) - low) / PIXEL).astype(int)
     layers = np.full((2, *(size + 2)), np.inf)
-    for layer, points in zip(layers, (before, after), strict=True):
-        np.minimum.at(layer, tuple(np.round((points @ flat - low) / PIXEL).astype(int).T), points @ axis)
+    for layer, spots, points in zip(layers, views, (before, after), strict=True):
+        np.minimum.at(layer, tuple(np.round((spots - low) / PIXEL).astype(int).T), points @ axis)
     shared = np.isfinite(layers).all(axis=0)
     if shared.sum() < MIN_POINTS:
         return float(np.quantile(after @ axis, 0.1) - np.quantile(before @ axis, 0.1))

@@ -74,11 +74,16 @@ def condition_plot(grouped: Mapping[str, Sequence[Placed]], figure: Any) -> None
         for panel, name in zip(panels, names, strict=False):
             mine = [part for part in by_condition if part.condition == name]
             for x, part in enumerate(mine):
-                interval, at = wilson(part.won, part.n), x + 0.15 * m
-                panel.plot([at, at], [100 * interval.low, 100 * interval.high], color=method_colour(m), lw=2)
                 label = short[method] if panel is panels[0] and x == 0 else None
-                panel.plot(at, 100 * part.won / part.n, "o", ms=4, color=method_colour(m), label=label)
+                draw_share(panel, x + 0.15 * m, part.won, part.n, method_colour(m), label)
             labels = [part.name.replace(" to ", "\nto ").replace("_", "\n") for part in mine]
             panel.set_xticks(range(len(mine)), labels, fontsize=6)
             panel.set(title=name.replace("_", " "), ylim=(0, 103))
     figure.legend(loc="outside lower center", ncols=3)
+
+
+def draw_share(panel: Any, x: float, won: int, n: int, colour: str, label: str | None = None) -> None:
+    """Draw `won` of `n` at `x` as a point in percent, with its Wilson interval."""
+    interval = wilson(won, n)
+    panel.plot([x, x], [100 * interval.low, 100 * interval.high], color=colour, lw=2)
+    panel.plot(x, 100 * won / n, "o", ms=4, color=colour, label=label)

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import mujoco
 import numpy as np
 
 from golem.errors import ConfigError
 from golem.robots.isaaclab.usda import Prim, layer, numbers, placed
-from golem.robots.model.spatial import quat_of
+from golem.robots.model.spatial import quat_to_axis
 from golem.robots.model.table import BASE_LINK
-from golem.robots.mujoco.other_engine import FINGER_DRIVE, follower_names
-from golem.types import Array
+from golem.robots.mujoco.other_engine import (
+    CONTACT_OFFSET,
+    FINGER_DRIVE,
+    POSITION_ITERATIONS,
+    VELOCITY_ITERATIONS,
+    follower_names,
+    touchable,
+)
 
 ROBOT, HALL = "Robot", "Hall"
 """Names of the two layers' default prims."""
-CONTACT_OFFSET = 0.004
-"""Distance from which PhysX looks at a pair of shapes [m]."""
-POSITION_ITERATIONS, VELOCITY_ITERATIONS = 16, 4
-"""Iterations of PhysX's solver, as in `robots.physx.bodies`."""
 
 
 def robot_layer(model: mujoco.MjModel) -> str:
@@ -53,14 +53,14 @@ def robot_layer(model: mujoco.MjModel) -> str:
     mujoco.mj_kinematics(model, place)
     origin = place.xpos[root]
     sliding = {
-        float(model.geom_friction[g, 0]) for body in np.flatnonzero(mine) for g in _touchable(model, body)
+        float(model.geom_friction[g, 0]) for body in np.flatnonzero(mine) for g in touchable(model, body)
     }
     joints = Prim("Scope", "joints")  # apart, since a finger's link and its hinge have one name
     for body in np.flatnonzero(mine):
         name = model.body(body).name
         shapes = [
             _shape(model, g, _material(ROBOT, float(model.geom_friction[g, 0])))
-            for g in _touchable(model, body)
+            for g in touchable(model, body)
         ]
         prim.children.append(
             Prim(
@@ -100,19 +100,12 @@ def world_layer(model: mujoco.MjModel, friction: float) -> str:
     root = model.body(BASE_LINK).id
     hall = Prim("Xform", HALL, children=[_materials({friction})])
     for body in np.flatnonzero(model.body_rootid != model.body_rootid[root]):
-        shapes = [_shape(model, g, _material(HALL, friction)) for g in _touchable(model, body)]
+        shapes = [_shape(model, g, _material(HALL, friction)) for g in touchable(model, body)]
         if shapes:
             hall.children.append(
                 Prim("Xform", f"body_{body}", (), placed(place.xpos[body], place.xquat[body]), shapes)
             )
     return layer(hall)
-
-
-def _touchable(model: mujoco.MjModel, body: int | np.integer[Any]) -> list[int]:
-    """Return the geoms of a body that can touch anything."""
-    first = int(model.body_geomadr[body])
-    geoms = range(first, first + int(model.body_geomnum[body]))
-    return [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
 
 
 def _material(root: str, friction: float) -> str:
@@ -181,7 +174,7 @@ def _joint(model: mujoco.MjModel, body: int) -> Prim:
     j = int(model.body_jntadr[body])
     v = int(model.jnt_dofadr[j])
     name = model.joint(j).name
-    turn, inside = _to_axis(model.jnt_axis[j]), np.empty(4)
+    turn, inside = quat_to_axis(model.jnt_axis[j]), np.empty(4)
     mujoco.mju_mulQuat(inside, quat, turn)
     stiffness, damping = (
         FINGER_DRIVE if name in follower_names() else (0.0, float(model.dof_damping[v].sum()))
@@ -208,12 +201,3 @@ def _joint(model: mujoco.MjModel, body: int) -> Prim:
             "float physxJoint:jointFriction": "0",
         },
     )
-
-
-def _to_axis(axis: Array) -> Array:
-    """Return the quaternion, wxyz, of a frame whose x axis is `axis` (3,)."""
-    x = axis / np.linalg.norm(axis)
-    other = np.eye(3)[int(np.argmin(np.abs(x)))]
-    y = np.cross(x, other)
-    y /= np.linalg.norm(y)
-    return quat_of(np.column_stack([x, y, np.cross(x, y)]).astype(np.float64))

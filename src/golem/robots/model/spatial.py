@@ -48,6 +48,15 @@ def quat_of(rotation: Array) -> Array:
     return q if q[0] >= 0 else -q
 
 
+def quat_to_axis(axis: Array) -> Array:
+    """Return the (4,) quaternion, wxyz, of a frame whose x axis has the direction of `axis` (3,)."""
+    x = axis / np.linalg.norm(axis)
+    other = np.eye(3)[int(np.argmin(np.abs(x)))]
+    y = np.cross(x, other)
+    y /= np.linalg.norm(y)
+    return quat_of(np.column_stack([x, y, np.cross(x, y)]).astype(np.float64))
+
+
 def transform(xyz: Sequence[float] | Array, rotation: Array | None = None) -> Array:
     """Return the (4, 4) transform with translation `xyz` [m] and the (3, 3) `rotation` (default: none)."""
     out = np.eye(4)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
@@ -18,6 +18,10 @@ WORLDS = ("open", "slope", "step", "rubble", "furnished", "corridor")
 """Those in which only the robot moves."""
 FINGER_DRIVE = 20.0, 0.2
 """Stiffness [N m/rad] and damping [N m s/rad] with which a finger's hinge follows its crank, as its rocker has it."""
+CONTACT_OFFSET = 0.004
+"""Distance from which PhysX looks at a pair of shapes [m]."""
+POSITION_ITERATIONS, VELOCITY_ITERATIONS = 16, 4
+"""Iterations of PhysX's solver [own: with fewer a standing robot sinks into its knees between two steps]."""
 SLIP = 0.05
 """Speed of a joint from which its dry friction is whole [rad/s] [own: without a slope it would chatter]."""
 
@@ -26,6 +30,13 @@ def follower_names() -> dict[str, str]:
     """Return hinge of a finger -> hinge of the crank that it follows, turning the other way."""
     pairs = [finger_names(side, finger) for side in SIDES for finger in FINGERS]
     return {finger: crank for crank, finger, _ in pairs}
+
+
+def touchable(model: mujoco.MjModel, body: int | np.integer[Any]) -> list[int]:
+    """Return the geoms of a body that can touch anything."""
+    first = int(model.body_geomadr[body])
+    geoms = range(first, first + int(model.body_geomnum[body]))
+    return [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
 
 
 @dataclass(frozen=True)

@@ -11,16 +11,18 @@ import mujoco
 import numpy as np
 
 from golem.errors import ConfigError, MissingExtra
-from golem.robots.model.spatial import quat_of
+from golem.robots.model.spatial import quat_to_axis
 from golem.robots.model.table import BASE_LINK
+from golem.robots.mujoco.other_engine import (
+    CONTACT_OFFSET,
+    POSITION_ITERATIONS,
+    VELOCITY_ITERATIONS,
+    touchable,
+)
 from golem.types import Array
 
 _ALONG_X = np.array([np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0])
 """Quaternion, wxyz, that turns x into z: PhysX's capsules, cylinders and planes go by x, MuJoCo's by z."""
-CONTACT_OFFSET = 0.004
-"""Distance from which PhysX looks at a pair of shapes [m]."""
-POSITION_ITERATIONS, VELOCITY_ITERATIONS = 16, 4
-"""Iterations of the solver [own: with fewer a standing robot sinks into its knees between two steps]."""
 
 
 def load_sapien() -> Any:
@@ -138,7 +140,7 @@ class _Maker:
             joint.set_pose_in_parent(inside)
             return entity, link
         j = int(model.body_jntadr[body])
-        turn = self.pose(np.zeros(3), _to_axis(model.jnt_axis[j]))
+        turn = self.pose(np.zeros(3), quat_to_axis(model.jnt_axis[j]))
         joint.set_type("revolute_unwrapped")
         joint.set_name(model.joint(j).name)
         joint.set_pose_in_parent(inside * turn)
@@ -175,11 +177,8 @@ class _Maker:
     def _shapes(self, component: Any, body: int, foreign: bool) -> bool:
         """Attach what of a body can be touched; return whether there is anything."""
         model = self._model
-        found = False
-        first = int(model.body_geomadr[body])
-        for g in range(first, first + int(model.body_geomnum[body])):
-            if not (model.geom_contype[g] or model.geom_conaffinity[g]):
-                continue
+        geoms = touchable(model, body)
+        for g in geoms:
             sliding = float(model.geom_friction[g, 0])
             material = self._world if foreign else self._physx.PhysxMaterial(sliding, sliding, 0.0)
             shape, turned = self._shape(g, material)
@@ -189,8 +188,7 @@ class _Maker:
             shape.set_rest_offset(0.0)
             shape.set_collision_groups([int(model.geom_contype[g]), int(model.geom_conaffinity[g]), 0, 0])
             component.attach(shape)
-            found = True
-        return found
+        return bool(geoms)
 
     def _shape(self, g: int, material: Any) -> tuple[Any, bool]:
         """Return a shape, and whether it goes by x where MuJoCo's goes by z."""
@@ -212,12 +210,3 @@ class _Maker:
             points = model.mesh_vert[start : start + int(model.mesh_vertnum[mesh])]
             return physx.PhysxCollisionShapeConvexMesh(points, np.ones(3, np.float32), material), False
         raise ConfigError(f"PhysX has no shape for the geom '{model.geom(g).name}', a {kind.name}.")
-
-
-def _to_axis(axis: Array) -> Array:
-    """Return the quaternion, wxyz, of a frame whose x axis is `axis` (3,)."""
-    x = axis / np.linalg.norm(axis)
-    other = np.eye(3)[int(np.argmin(np.abs(x)))]
-    y = np.cross(x, other)
-    y /= np.linalg.norm(y)
-    return quat_of(np.column_stack([x, y, np.cross(x, y)]).astype(np.float64))
