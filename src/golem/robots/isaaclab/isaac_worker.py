@@ -71,7 +71,7 @@ def reply_type(joints: int, bodies: int) -> np.dtype[np.void]:
     """Return the layout of a reply.
 
     `root`: position [m] and quaternion, wxyz, of the base. `base` and `torso`: linear velocity of the link's origin
-    [m/s] and angular velocity [rad/s], both in the world. `q`, `dq`: joints. `force`: of the world on each body [N].
+    [m/s] and angular velocity [rad/s], both in the world. `q`: joints. `force`: of the world on each body [N].
     """
     return np.dtype(
         [
@@ -79,7 +79,6 @@ def reply_type(joints: int, bodies: int) -> np.dtype[np.void]:
             ("base", "<f8", (6,)),
             ("torso", "<f8", (6,)),
             ("q", "<f8", (joints,)),
-            ("dq", "<f8", (joints,)),
             ("force", "<f8", (bodies, 3)),
         ]
     )
@@ -139,7 +138,6 @@ class Simulation:
         reply["base"] = data.root_link_vel_w.torch[0].numpy()
         reply["torso"] = data.body_link_vel_w.torch[0, self._torso].numpy()
         reply["q"] = data.joint_pos.torch[0].numpy()[self._joints]
-        reply["dq"] = data.joint_vel.torch[0].numpy()[self._joints]
         reply["force"] = self._contact.data.net_forces_w.torch[0].numpy()[self._sensed]
 
     def _place(self, request: NDArray[np.void]) -> None:

@@ -80,7 +80,7 @@ class Motion:
     Attributes:
         pos, quat: (3,) [m] and (4,) wxyz of base_link in the world.
         base, torso: linear velocity of the link's origin [m/s] and angular velocity [rad/s] in the world, (3,) each.
-        q, dq: (n,) joints [rad, rad/s], in the order of `JointMap`.
+        q: (n,) joints [rad], in the order of `JointMap`.
     """
 
     pos: Array
@@ -88,7 +88,6 @@ class Motion:
     base: tuple[Array, Array]
     torso: tuple[Array, Array]
     q: Array
-    dq: Array
 
 
 class JointMap:
@@ -124,11 +123,16 @@ class OtherEngineRobot(MujocoRobot):
         self._imu_velocity = np.zeros(3)
 
     def _follow(self, motion: Motion, dt: float) -> None:
-        """Put the model where `motion` says, and take the specific force at the IMU over the step of `dt` [s]."""
+        """Put the model where `motion` says, and take the specific force at the IMU over the step of `dt` [s].
+
+        The speed of a joint is how far it went, as its encoder has it: PhysX moves bodies out of each other without a
+        speed that says so.
+        """
         data, site = self.data, self._site.id
         base, v = self._base.qposadr[0], self._base.dofadr[0]
         data.qpos[base : base + 3], data.qpos[base + 3 : base + 7] = motion.pos, motion.quat
-        data.qpos[self._joint_map.q], data.qvel[self._joint_map.v] = motion.q, motion.dq
+        data.qvel[self._joint_map.v] = (motion.q - data.qpos[self._joint_map.q]) / dt
+        data.qpos[self._joint_map.q] = motion.q
         R = np.empty(9)
         mujoco.mju_quat2Mat(R, data.qpos[base + 3 : base + 7])
         data.qvel[v : v + 3], data.qvel[v + 3 : v + 6] = motion.base[0], R.reshape(3, 3).T @ motion.base[1]

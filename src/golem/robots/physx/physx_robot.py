@@ -87,8 +87,8 @@ class PhysxRobot(OtherEngineRobot):
         bodies.system.step()
         data.time += dt
         pose = self._root.entity_pose
-        q, dq = bodies.articulation.get_qpos(), bodies.articulation.get_qvel()
-        self._follow(Motion(pose.p, pose.q, _motion_of(self._root), _motion_of(self._torso_link), q, dq), dt)
+        q = bodies.articulation.get_qpos().astype(float)
+        self._follow(Motion(pose.p, pose.q, _motion_of(self._root), _motion_of(self._torso_link), q), dt)
 
 
 def _motion_of(link: Any) -> tuple[Array, Array]:
