@@ -46,6 +46,15 @@ def test_what_is_compared_is_not_replaced_as_well() -> None:
         legs_stack("almi", "ideal", {"lower_body": "hold"})
 
 
+@pytest.mark.parametrize(
+    ("robot", "options"), [("physx", {}), ("{use: isaaclab, backend: newton}", {"backend": "newton"})]
+)
+def test_another_twin_keeps_the_options_and_brings_its_own(robot: str, options: dict[str, str]) -> None:
+    choice = legs_stack("almi", "ideal", {"robot": robot}).choice("robot")
+    assert choice.use in robot
+    assert choice.options == {"support": "ground", "world": "open", **options}
+
+
 def test_a_robot_that_never_carries_its_weight_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(episodes, "READY", 1.0)
     robot = episode("Limp")

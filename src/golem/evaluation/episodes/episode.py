@@ -74,7 +74,8 @@ def legs_stack(
     stack = with_legs(load_stack(STACK, profile=profile), method)
     stack = stack.with_options("robot", **{"world": "open", **(robot or {})})
     twin = stack.choice("robot")
-    stack = stack.with_choice("robot", Choice(others.pop("robot", twin.use), twin.options))
+    other = stack.with_choice("robot", others.pop("robot", twin)).choice("robot")
+    stack = stack.with_choice("robot", Choice(other.use, {**twin.options, **other.options}))
     for slot, use in others.items():
         stack = stack.with_choice(slot, use)
     return stack

@@ -103,9 +103,7 @@ class IsaacLabRobot(OtherEngineRobot):
         )
         data.time += dt
         root, base, torso = reply["root"], reply["base"], reply["torso"]
-        self._follow(
-            Motion(root[:3], root[3:], (base[:3], base[3:]), (torso[:3], torso[3:]), reply["q"]), dt
-        )
+        self._follow(Motion(root[:3], root[3:], (base[:3], base[3:]), (torso[:3], torso[3:]), reply["q"]), dt)
         self.truth.see(reply["force"])
 
     def close(self) -> None:
