@@ -28,8 +28,6 @@ from golem.interfaces.payloads import LegCommand
 from golem.types import LEGS, BaseEstimate, LowState, Twist
 
 ZERO = Twist()
-CATCH_TIME = 0.1
-"""Time over which the targets go over to those of the controller that catches a robot [s] [own]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +59,7 @@ class HandoverConfig:
             degrees].
         shoved: deviation of the base's horizontal velocity from the twist beyond which the standing controller catches
             a robot that walks [m/s]; None never does.
-        catch: time over which the targets go over then [s].
+        catch: time over which the targets go over then [s] [own].
     """
 
     walk: HandoverPart
@@ -73,7 +71,7 @@ class HandoverConfig:
     calm: float = 0.1
     blend: float = 0.8
     shoved: float | None = None
-    catch: float = CATCH_TIME
+    catch: float = 0.1
 
 
 class Handover:

@@ -34,7 +34,7 @@ def run(
     Args:
         out: folder of checkpoint and curve.
         seed: of weights, episodes and noise.
-        task: what is learned: to walk as told, to stand against pushes, or to catch a robot that walked.
+        task: what is learned: to walk as told, or to stand against pushes.
         steps: actions of all robots together, those of `start` included.
         adversary: who works against the legs through arms, waist and payloads: none, motions (a curriculum), or learned
             (motions, then a policy as well).
@@ -94,7 +94,6 @@ def shove(
     seed: int = 0,
     threads: int = 2,
     speed: float = 0.0,
-    caught: bool = False,
 ) -> None:
     """Shove robots in the training's own world, eight directions: which of two networks stands more, in seconds.
 
@@ -105,11 +104,10 @@ def shove(
         seed: of the robots.
         threads: of the physics.
         speed: at which the robots walk ahead [m/s]; 0 stands.
-        caught: let the shipped network walk, and this one catch who is shoved, as the robot does.
     """
     from golem.training.legs.shove_networks import shove_all
 
-    rows = shove_all(network, impulse, n, seed, threads, speed, caught)
+    rows = shove_all(network, impulse, n, seed, threads, speed)
     table = Table(
         "direction",
         "survived",

@@ -256,7 +256,8 @@ class BatchWorld:
 
     def shim(self, feet: NDArray[np.bool_]) -> None:
         """Draw new ground under the `feet` (n, 2) that are in the air."""
-        robots, side = np.nonzero(feet & (self._rough > 0.0)[:, None])
+        even = self.config.roughness == self.config.ledge == 0.0
+        robots, side = np.nonzero(feet & (self._rough > 0.0)[:, None] & (not even))
         if not len(robots):
             return
         rng, m = self._rng, len(robots)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -16,18 +16,14 @@ from golem.capabilities.legs.swing import swing_offset
 from golem.hardware.safety.base import SafetyLimits
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.training.legs.batch_world import BatchWorld, Rows, WorldConfig
-from golem.training.legs.catches import Catches
 from golem.training.legs.disturbances import Difficulty, Quarters, RandomPushes, UpperBodyMotion
 from golem.training.legs.placement import landing_errors
-from golem.training.legs.ppo import Actor
 from golem.training.legs.rewards import Rewards, RewardWeights
 from golem.training.legs.training_model import FEET_APART, KD, KP, STANCE, STEP
 from golem.types import LEGS, Array
 
 PERIOD = 0.02
 """Time between two actions [s]: 50 Hz, as ALMI."""
-RECOVERS = 4.0
-"""Time that is left of the episode of a robot that was just caught [s]."""
 LAYOUT = (
     Term("base_velocity", 2.0),
     Term("base_rate", 0.25),
@@ -64,8 +60,6 @@ class EnvConfig:
         impulse: largest push at full difficulty [N s].
         quarters: shares of the straight pushes ahead, to the left, back and to the right.
         recovery: time after the beginning of a push in which the command need not be followed [s].
-        caught: share of the episodes in which a walking network walks the robot until a shove throws it off its
-            twist. Only then the network in training has the legs, and its twist is zero.
         fall: what a fall costs beside the rewards it forgoes, which are worth as much: without, the less noise there
             was the better the robot stood and the more often it fell.
         gait: clock and gate.
@@ -86,38 +80,36 @@ class EnvConfig:
     impulse: float = 90.0
     quarters: Quarters = (0.2, 0.3, 0.2, 0.3)
     recovery: float = 1.2
-    caught: float = 0.0
     fall: float = 5.0
     gait: GaitConfig = field(default_factory=lambda: GaitConfig(period=0.64))
     world: WorldConfig = field(default_factory=WorldConfig)
     weights: RewardWeights = field(default_factory=RewardWeights)
 
 
-Task = Literal["walk", "stand", "catch"]
-_STAND = EnvConfig(
-    standing=1.0,
-    calm=0.3,
-    impulse=100.0,
-    quarters=(0.2, 0.2, 0.4, 0.2),
-    recovery=0.0,
-    world=WorldConfig(delay=4),
-    weights=RewardWeights(feet=-4.0, toes=0.0, dragged=0.0),
-)
+Task = Literal["walk", "stand"]
 TASKS: dict[Task, EnvConfig] = {
     "walk": EnvConfig(
         impulse=60.0,
         world=WorldConfig(friction=(0.15, 1.1), payload=5.0, slope=0.15, roughness=0.03, ledge=0.05),
         weights=RewardWeights(clearance=0.1),
     ),
-    "stand": _STAND,
-    "catch": replace(_STAND, caught=0.7, impulse=110.0, quarters=(0.2, 0.3, 0.2, 0.3)),
+    "stand": EnvConfig(
+        standing=1.0,
+        calm=0.3,
+        impulse=100.0,
+        quarters=(0.2, 0.2, 0.4, 0.2),
+        recovery=0.0,
+        world=WorldConfig(delay=4),
+        weights=RewardWeights(feet=-4.0, toes=0.0, dragged=0.0),
+    ),
 }
 """A network for each. One for both learned neither well: shoves of 90 N s teach a robot that walks to shuffle, and one
 that is praised for standing to the millimetre, or has learned to walk, is slow to step. Who only stands steps after a
 push, to wherever that is good: it pays less for where its feet are. Its delays go further, because legs of high gain
 sway at 2 Hz from some delay on: of four networks trained to 30 ms two moved at 20 mm/s there, left alone, and those two
 swayed by 7 mm in the twin at 22 ms. Its pushes are twice as often back: with a quarter each, legs that had stood 20 of
-20 shoves of 80 N s backward stood 14. A walking robot is weakest to its sides."""
+20 shoves of 80 N s backward stood 14. A walking robot is weakest to its sides; of a push that
+throws it off its twist the standing network takes care. Its ground is as hard as that of rung `walk-rough`."""
 
 
 @dataclass
@@ -128,14 +120,12 @@ class Step:
         reward: of the legs.
         ended: fallen, or stopped by the safety gate.
         truncated: the episode's time was over.
-        own: whether the network in training had the legs.
         terms: mean of each reward term.
     """
 
     reward: Array
     ended: NDArray[np.bool_]
     truncated: NDArray[np.bool_]
-    own: NDArray[np.bool_]
     terms: dict[str, float]
 
 
@@ -150,10 +140,8 @@ class LegsEnv:
         age: (n,) time since each episode began [s].
     """
 
-    def __init__(
-        self, n: int, config: EnvConfig, seed: int, threads: int, walker: Actor | None = None
-    ) -> None:
-        """Build the world and start every robot; with a `walker`, a share `config.caught` of them walks at first."""
+    def __init__(self, n: int, config: EnvConfig, seed: int, threads: int) -> None:
+        """Build the world and start every robot."""
         self.n, self.config = n, config
         self._rng = np.random.default_rng(seed)
         self.world = BatchWorld(n, config.world, self._rng, threads)
@@ -164,7 +152,6 @@ class LegsEnv:
         self._pushes = RandomPushes(n, config.impulse, config.quarters, self._rng)
         self._limits = SafetyLimits.from_profile()
         self._rewards = Rewards(n, config.weights, config.gait, self._limits)
-        self.catches = Catches(n, walker) if walker else None
         self.twist: Array = np.zeros((n, 3))
         self._goal: Array = np.zeros((n, 3))
         self._left: Array = np.zeros(n)
@@ -199,10 +186,6 @@ class LegsEnv:
         if not len(where):
             return
         calm = self._rng.random(len(where)) < self.config.calm
-        if self.catches:
-            walks = self._rng.random(len(where)) < self.config.caught
-            self.catches.reset(where, walks)
-            calm &= ~walks
         self.upper.reset(where, self.difficulty.amplitude, calm)
         self.world.reset(where, self.upper.target[where], self.difficulty.payload)
         self._pushes.reset(where, self.difficulty.push, calm)
@@ -226,6 +209,18 @@ class LegsEnv:
     def observe(self) -> tuple[Array, Array]:
         """Return what the policy sees (n, layout.size), and beside it what only the critic knows (n, m)."""
         sensed, truth = self.world.sensed, self.world.truth
+        R = sensed.R
+        signals = Signals(
+            q=sensed.q,
+            dq=sensed.dq,
+            gyro=sensed.rate,
+            gravity=-R[:, 2],
+            velocity=np.einsum("nji,nj->ni", R, sensed.velocity),
+            twist=self.twist,
+            action=self._action,
+            phase=self.gait.phases,
+            stepping=self.gait.stepping.astype(np.float64),
+        )
         velocity = np.einsum("nji,nj->ni", truth.R, truth.velocity)
         force = np.einsum("nji,nj->ni", truth.R, self._pushes.force)
         known = [
@@ -244,23 +239,7 @@ class LegsEnv:
             self.gait.stepping[:, None],
             self.recovers[:, None],
         ]
-        return self._see(self._action), np.concatenate(known, axis=1)
-
-    def _see(self, last: Array) -> Array:
-        """Return what a policy sees whose last action was `last` (n, 12)."""
-        sensed = self.world.sensed
-        signals = Signals(
-            q=sensed.q,
-            dq=sensed.dq,
-            gyro=sensed.rate,
-            gravity=-sensed.R[:, 2],
-            velocity=np.einsum("nji,nj->ni", sensed.R, sensed.velocity),
-            twist=self.twist,
-            action=last,
-            phase=self.gait.phases,
-            stepping=self.gait.stepping.astype(np.float64),
-        )
-        return self.layout.observe(signals)
+        return self.layout.observe(signals), np.concatenate(known, axis=1)
 
     def step(self, action: Array, steered: Rows, speeds: Array) -> Step:
         """Act for one period.
@@ -276,14 +255,9 @@ class LegsEnv:
             self.upper.steer(steered, speeds, self.difficulty, dt)
         self._pushes.step(self.difficulty.push, heading_frame(self.world.truth.R), dt)
         action = np.clip(action, -10.0, 10.0)
-        own, used = np.ones(self.n, dtype=bool), action
-        if self.catches:
-            own = ~self.catches.walked
-            action = np.where(own[:, None], action, 0.0)
-            used = self.catches.mix(self._see(self.catches.last), action)
         gait = config.gait
         swing = swing_offset(self.gait.phases, gait.period, gait.stance, config.swing, KD / KP)
-        target = STANCE + config.action_scale * used + swing
+        target = STANCE + config.action_scale * action + swing
         target = np.clip(target, self._limits.lower[LEGS], self._limits.upper[LEGS])
         self.world.step(
             target, self.upper.target, self._pushes.force, self._pushes.on_torso, round(dt / STEP)
@@ -316,19 +290,8 @@ class LegsEnv:
         self.twist = self.twist + np.clip(self._goal - self.twist, -maximum, maximum)
         stopped = ~self._goal.any(axis=1) & (np.linalg.norm(self.twist, axis=1) < 0.1)
         self.twist[stopped] = 0.0
-        if self.catches:
-            self._catch(self.catches, dt)
         self._advance_gait(dt)
-        return Step(reward, ended, truncated, own, terms)
-
-    def _catch(self, catches: Catches, dt: float) -> None:
-        """Take the twist from robots that a shove threw off it, and leave them as long as it takes to recover."""
-        sensed = self.world.sensed
-        velocity = np.einsum("nji,nj->ni", heading_frame(sensed.R), sensed.velocity[:, :2])
-        caught = catches.step(np.linalg.norm(velocity - self.twist[:, :2], axis=1), dt)
-        self.twist[caught] = 0.0
-        self._goal[caught], self._left[caught] = 0.0, np.inf
-        self.age[caught] = self.config.episode - RECOVERS
+        return Step(reward, ended, truncated, terms)
 
     def restart(self, where: Rows) -> None:
         """Start the robots `where` anew after a step, and make their measurements current."""
@@ -370,7 +333,5 @@ class LegsEnv:
         slow = rng.random((m, 1)) < self.config.creeping
         twist = np.where(slow, twist * rng.uniform(0.05, 0.3, (m, 1)), twist)
         still = (rng.random(m) < self.config.standing) | (np.linalg.norm(twist, axis=1) < 0.02)
-        if self.catches:
-            still &= ~self.catches.walked[where]
         self._goal[where] = np.where(still[:, None], 0.0, twist)
         self._left[where] = rng.uniform(*self.config.hold, m)

@@ -18,9 +18,7 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 from torch import nn
 
-from golem.capabilities.legs.almi import WALK
 from golem.capabilities.legs.base import Envelope
-from golem.capabilities.legs.description import SHIPPED
 from golem.capabilities.legs.observation import ObservationLayout
 from golem.errors import ConfigError
 from golem.training.legs.checkpoint import read_checkpoint
@@ -48,11 +46,6 @@ def load_actor(path: Path) -> Actor:
     if path.suffix == ".onnx":
         return _exported_actor(path)
     return _trained_actor(read_checkpoint(path))
-
-
-def shipped_walker() -> Actor:
-    """Return the walking network that the package brings."""
-    return load_actor(SHIPPED / f"{WALK}.onnx")
 
 
 def _trained_actor(saved: dict[str, Any]) -> Actor:

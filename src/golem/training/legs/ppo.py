@@ -104,7 +104,6 @@ class Ppo:
         self._act = torch.zeros(*shape, actions)
         self._logp, self._value = torch.zeros(shape), torch.zeros(shape)
         self._reward, self._cut = torch.zeros(shape), torch.zeros(shape)
-        self._own = torch.ones(shape, dtype=torch.bool)
         self._mean = torch.zeros(*shape, actions)
         self._k = 0
 
@@ -121,17 +120,13 @@ class Ppo:
         self._value[k] = self._evaluate(self._obs[k], self._known[k])
         return self._act[k].double().numpy()
 
-    def learn_of(self, reward: Array, ended: Bools, truncated: Bools, own: Bools | None = None) -> None:
-        """Remember what the last actions led to; an episode that was merely cut goes on in the critic's eyes.
-
-        Nothing is learned of a robot that somebody else moved, where `own` is false.
-        """
+    def learn_of(self, reward: Array, ended: Bools, truncated: Bools) -> None:
+        """Remember what the last actions led to; an episode that was merely cut goes on in the critic's eyes."""
         k = self._k
         cut = torch.from_numpy(ended | truncated)
         bonus = self.config.gamma * self._value[k] * torch.from_numpy(truncated)
         self._reward[k] = torch.from_numpy(reward) + bonus
         self._cut[k] = cut.float()
-        self._own[k] = True if own is None else torch.from_numpy(own)
         self._k += 1
 
     def update(self, observation: Array, known: Array, policy: bool = True) -> dict[str, float]:
@@ -153,11 +148,10 @@ class Ppo:
                 running = delta + c.gamma * c.lam * going * running
                 advantage[k], value = running, self._value[k]
             target = advantage + self._value
-            learned = advantage[self._own]
-            advantage = (advantage - learned.mean()) / (learned.std() + 1e-8)
+            advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
             old_std = self.actor.log_std.exp().clone()
         flat = [
-            x[self._own]
+            x.reshape(-1, *x.shape[2:])
             for x in (self._obs, self._known, self._act, self._logp, advantage, target, self._mean)
         ]
         total, stats = len(flat[0]), {"value_loss": 0.0, "kl": 0.0}

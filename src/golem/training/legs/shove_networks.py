@@ -6,7 +6,7 @@ the figures compare networks, and say little by themselves.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ import torch
 from golem.errors import ConfigError
 from golem.robots.mujoco.shoves import DIRECTIONS, SHOVE_TIME
 from golem.training.legs.env import PERIOD, TASKS, LegsEnv
-from golem.training.legs.export_policy import load_actor, shipped_walker
+from golem.training.legs.export_policy import load_actor
 
 SETTLE, PATIENCE = 2.0, 3.0
 """Time of standing or walking before the shove, and time after its begin [s]; both have to be survived."""
@@ -38,7 +38,7 @@ class Shoved:
 
 
 def shove_all(
-    network: Path, impulse: float, n: int, seed: int, threads: int, speed: float = 0.0, caught: bool = False
+    network: Path, impulse: float, n: int, seed: int, threads: int, speed: float = 0.0
 ) -> list[Shoved]:
     """Shove `n` robots in each direction once, arms at rest, without exploration.
 
@@ -50,7 +50,6 @@ def shove_all(
         threads: of the physics.
         speed: at which the robots walk ahead in the world of the walking task, shoved at any moment of their gait; 0
             stands in that of the standing task [m/s].
-        caught: whether the shipped network walks until the shove, and `network` only catches the robot.
 
     Raises:
         ConfigError: it is neither, or a number is not positive.
@@ -62,9 +61,7 @@ def shove_all(
     torch.set_num_threads(1)
     actor = load_actor(network)
     task = TASKS["walk" if speed else "stand"]
-    if caught:
-        task = replace(TASKS["catch"], caught=1.0)
-    env = LegsEnv(n * len(DIRECTIONS), task, seed, threads, shipped_walker() if caught else None)
+    env = LegsEnv(n * len(DIRECTIONS), task, seed, threads)
     env.difficulty.amplitude = env.difficulty.speed = env.difficulty.payload = 0.0
     env.restart(np.arange(env.n))
     angle = np.repeat(np.arange(len(DIRECTIONS)) * np.pi / 4.0, n)

@@ -19,7 +19,7 @@ from golem.training.legs.batch_world import Rows
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, cut_curve, read_checkpoint
 from golem.training.legs.disturbances import NUM_UPPER
 from golem.training.legs.env import PERIOD, TASKS, EnvConfig, LegsEnv, Task
-from golem.training.legs.export_policy import load_actor, shipped_walker
+from golem.training.legs.export_policy import load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror, upper_mirror
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
 from golem.types import Array
@@ -120,9 +120,7 @@ class _Run:
         self.steps = 0
         self.updates = 0
         self._cpu = 0.0
-        task = TASKS[config.task]
-        walker = shipped_walker() if task.caught else None
-        self.env = LegsEnv(config.robots, task, config.seed, config.threads, walker)
+        self.env = LegsEnv(config.robots, TASKS[config.task], config.seed, config.threads)
         self._harden()
         seen = Mirror(self.env.layout.components)
         obs, known = self.env.observe()
@@ -153,7 +151,7 @@ class _Run:
                 speeds = self.upper.act(self._obs[steered], self._known[steered])
             step = env.step(action, steered, speeds)
             meter.add(env, step.reward, step.ended, step.truncated, step.terms)
-            self.legs.learn_of(step.reward, step.ended, step.truncated, step.own)
+            self.legs.learn_of(step.reward, step.ended, step.truncated)
             if learned:
                 cut = step.ended[steered], step.truncated[steered]
                 self.upper.learn_of(-step.reward[steered], *cut)
