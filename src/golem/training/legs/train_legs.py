@@ -46,7 +46,8 @@ class TrainLegsConfig:
         steps: actions of all robots together, e.g. 38e6.
         robots: how many are simulated at once.
         threads: of the physics; they change nothing of the result.
-        start: what this run begins with, exploring with `noise`, or at most `EXPORTED_NOISE`: networks and steps of another run's checkpoint, or a
+        start: what this run begins with, exploring with `noise` or, from an exported one,
+            with `EXPORTED_NOISE`: networks and steps of another run's checkpoint, or a
             network that was exported. A run from an exported network counts its steps from none, is at full difficulty
             at once, learned adversary included, but for pushes, which grow from `EXPORTED_PUSH`, and changes the
             network after `VALUES_FIRST` steps only: until then it has no critic worth the name.
@@ -257,11 +258,11 @@ class _Run:
     def _largest_noise(self) -> float:
         """Bound of the standard deviation of the legs' actions."""
         start, end = self.config.noise
-        bound = EXPORTED_NOISE if self._exported else np.inf
         begins, ends = self.config.noise_ramp
-        if (left := self.config.steps - self.steps) <= begins:
-            bound = min(bound, float(np.interp(left, (ends, begins), (end, start))))
-        return bound
+        left = self.config.steps - self.steps
+        if left > begins:
+            return np.inf
+        return float(np.interp(left, (ends, begins), (end, EXPORTED_NOISE if self._exported else start)))
 
     @property
     def _progress(self) -> float:
