@@ -7,8 +7,9 @@ import pytest
 from tests.capabilities.legs.floor_plant import STEP, FloorPlant
 from tests.capabilities.legs.test_network import write_onnx
 
-from golem.capabilities.legs.almi import STAND, WALK, Almi, AlmiConfig
+from golem.capabilities.legs.almi import NETWORKS, STAND, WALK, Almi, AlmiConfig, Ground
 from golem.capabilities.legs.base import STANDING, LocomotionCommand, LowerBody
+from golem.capabilities.legs.description import SHIPPED
 from golem.capabilities.legs.locomotion import Locomotion
 from golem.capabilities.legs.policy import BadAction, Policy, PolicyConfig
 from golem.capabilities.legs.swing import swing_offset
@@ -103,20 +104,27 @@ def test_almi_without_weights_says_so(tmp_path: Path, monkeypatch: pytest.Monkey
         Almi()
 
 
-def test_almi_stands_with_one_shipped_policy_and_walks_with_the_other() -> None:
-    legs = Almi()
+@pytest.mark.parametrize("ground", NETWORKS)
+def test_almi_stands_with_one_shipped_policy_and_walks_with_another(ground: Ground) -> None:
+    legs = Almi(AlmiConfig(ground))
     assert isinstance(legs, LowerBody)
     legs.reset(state())
-    for motion, name in ((STANDING, STAND), (walking(0.3), WALK)):
+    walker = str(SHIPPED / NETWORKS[ground])
+    for motion, name, network in ((STANDING, STAND, None), (walking(0.3), WALK, walker)):
         for _ in range(60):  # the other one takes over after a while
             q = legs.step(state(), BASE, motion, 0.02).q
-        alone = Policy(PolicyConfig(name))
+        alone = Policy(PolicyConfig(name, network))
         alone.reset(state())
         for _ in range(60):
             expected = alone.step(state(), BASE, motion, 0.02).q
         np.testing.assert_allclose(q, expected, atol=1e-3)
+
+
+def test_networks_that_are_absent_are_named() -> None:
     with pytest.raises(ConfigError, match="no network"):
         Almi(AlmiConfig(stand="absent.onnx"))
+    with pytest.raises(ConfigError, match="'icy'; valid: even, rough"):
+        AlmiConfig(ground="icy")  # type: ignore[arg-type]
 
 
 def peer(name: str, network: str) -> Policy:

@@ -17,18 +17,25 @@ from golem.errors import ConfigError
 from golem.training.legs.average import average
 
 ROOT = Path(__file__).parents[3]
-SHIPPED = ROOT / "src/golem/capabilities/legs/policies/almi_stand.onnx"
+SHIPPED = ROOT / "src/golem/capabilities/legs/policies"
 PARTS = [ROOT / "artefacts/legs" / f"stand_{name}.onnx" for name in ("seventh", "gate", "back")]
+ROUGH = [SHIPPED / "almi_walk.onnx", ROOT / "artefacts/legs/walk_rough_seed0.onnx"]
 
 
 def weights(path: Path) -> dict[str, np.ndarray]:
     return {w.name: numpy_helper.to_array(w) for w in onnx.load(str(path)).graph.initializer}
 
 
-def test_the_shipped_standing_network_is_the_mean_that_the_docs_say(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "parts", "shares"),
+    [("almi_stand", PARTS, (2.0, 1.0, 1.0)), ("almi_walk_rough", ROUGH, (1.0, 1.0))],
+)
+def test_a_shipped_network_is_the_mean_that_the_docs_say(
+    name: str, parts: list[Path], shares: tuple[float, ...], tmp_path: Path
+) -> None:
     out = tmp_path / "mean.onnx"
-    average(PARTS, (2.0, 1.0, 1.0), out)
-    assert out.read_bytes() == SHIPPED.read_bytes()
+    average(parts, shares, out)
+    assert out.read_bytes() == (SHIPPED / f"{name}.onnx").read_bytes()
 
 
 def test_the_mean_is_weighted_and_says_of_what(tmp_path: Path) -> None:

@@ -114,7 +114,7 @@ def test_who_was_pushed_need_not_follow_the_command_and_pays_for_feet_that_drag(
 
 def test_a_robot_that_walks_lands_its_feet_where_the_capture_point_says() -> None:
     actor = load_actor(SHIPPED / "almi_walk.onnx")
-    env = LegsEnv(8, TASKS["walk"], 0, 1)
+    env = LegsEnv(8, EnvConfig(), 0, 1)
     env.difficulty = Difficulty(amplitude=0.0, speed=0.0, push=0.0)
     env.restart(np.arange(8))
     env.command(np.array([0.4, 0.0, 0.0]))

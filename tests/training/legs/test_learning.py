@@ -31,7 +31,14 @@ from golem.training.legs.export_policy import TRAINED, command_of, export, load_
 from golem.training.legs.learning_curve import draw_curves
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
-from golem.training.legs.train_legs import EXPORTED_PUSH, Adversary, TrainLegsConfig, _Run, train
+from golem.training.legs.train_legs import (
+    EXPORTED_NOISE,
+    EXPORTED_PUSH,
+    Adversary,
+    TrainLegsConfig,
+    _Run,
+    train,
+)
 from golem.training.legs.training_model import STANCE
 
 QUARTERS = TASKS["stand"].quarters
@@ -127,7 +134,9 @@ def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(
         run.legs.actor.net.parameters(), load_actor(network).net.parameters(), strict=True
     ):
         assert torch.equal(mine, exported)
-    assert run.steps == 0 and float(run.legs.actor.log_std.exp().detach().mean()) == pytest.approx(0.45)
+    assert run.steps == 0 and float(run.legs.actor.log_std.exp().detach().mean()) == pytest.approx(
+        EXPORTED_NOISE
+    )
     assert run.env.difficulty.strictness == run.env.difficulty.amplitude == 1.0
     assert run.env.difficulty.push == EXPORTED_PUSH
     before = [w.detach().clone() for w in run.legs.critic.parameters()]

@@ -6,13 +6,17 @@ One walks, the other stands: a network for both was worse at both (docs/how-to/t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 from golem.capabilities.legs.description import SHIPPED
 from golem.capabilities.legs.handover import Handover, HandoverConfig, HandoverPart
-from golem.errors import ConfigError
+from golem.errors import ConfigError, unknown_name
 
 WALK, STAND = "almi_walk", "almi_stand"
 """Their descriptions and networks in `SHIPPED`; `golem train legs` writes them."""
+Ground = Literal["even", "rough"]
+NETWORKS: dict[Ground, str] = {"even": f"{WALK}.onnx", "rough": f"{WALK}_rough.onnx"}
+"""Walking networks in `SHIPPED`, for the same description."""
 
 SHOVED = 0.55
 """Deviation from the twist beyond which a robot that walks is caught [m/s] [own: without a shove it is up to 0.45 at
@@ -24,11 +28,23 @@ class AlmiConfig:
     """Options of `Almi`.
 
     Attributes:
+        ground: what the shipped walking network is for: `even` floors, on which it takes the larger shoves, or `rough`
+            ones, with stones and steps of 5 cm.
         walk, stand: other networks for the same descriptions, as `golem train legs export` writes them.
     """
 
+    ground: Ground = "even"
     walk: str | None = None
     stand: str | None = None
+
+    def __post_init__(self) -> None:
+        """Check the options.
+
+        Raises:
+            ConfigError: there is no such ground.
+        """
+        if self.ground not in get_args(Ground):
+            raise unknown_name("ground", self.ground, get_args(Ground))
 
 
 class Almi(Handover):
@@ -44,6 +60,7 @@ class Almi(Handover):
         for name in (WALK, STAND):
             if not (SHIPPED / f"{name}.yaml").is_file():
                 raise ConfigError(f"This installation has no trained legs ({SHIPPED / name}.yaml is absent).")
-        walk = HandoverPart("policy", {"file": WALK, "network": config.walk})
+        walker = config.walk or str(SHIPPED / NETWORKS[config.ground])
+        walk = HandoverPart("policy", {"file": WALK, "network": walker})
         stand = HandoverPart("policy", {"file": STAND, "network": config.stand})
         super().__init__(HandoverConfig(walk, stand, shoved=SHOVED))

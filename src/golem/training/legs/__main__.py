@@ -34,7 +34,7 @@ def run(
     Args:
         out: folder of checkpoint and curve.
         seed: of weights, episodes and noise.
-        task: what is learned: to walk as told, or to stand against pushes.
+        task: what is learned: to walk as told, on even or on rough ground, or to stand against pushes.
         steps: actions of all robots together, those of `start` included.
         adversary: who works against the legs through arms, waist and payloads: none, motions (a curriculum), or learned
             (motions, then a policy as well).

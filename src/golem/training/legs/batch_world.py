@@ -37,6 +37,7 @@ class WorldConfig:
             20 ms of the robot: trained with those, legs that stood most precisely swayed by 6 mm at 2 Hz in the twin.
         slope: largest slope [rad].
         roughness: largest height of the ground under a corner of a sole [m].
+        ledge: largest height of one foothold above another, on rough ground [m].
         leg_offset, arm_offset: encoder zeros, standard deviation [rad]; as in the twin's field profile.
         tilt: error of the IMU's roll and pitch, standard deviation [rad].
         foot_noise: noise of a foot's measured velocity [m/s].
@@ -50,6 +51,7 @@ class WorldConfig:
     delay: int = 3
     slope: float = 0.1
     roughness: float = 0.02
+    ledge: float = 0.0
     leg_offset: float = 0.01
     arm_offset: float = 0.03
     tilt: float = 0.006
@@ -254,7 +256,8 @@ class BatchWorld:
 
     def shim(self, feet: NDArray[np.bool_]) -> None:
         """Draw new ground under the `feet` (n, 2) that are in the air."""
-        robots, side = np.nonzero(feet & (self._rough > 0.0)[:, None])
+        even = self.config.roughness == self.config.ledge == 0.0
+        robots, side = np.nonzero(feet & (self._rough > 0.0)[:, None] & (not even))
         if not len(robots):
             return
         rng, m = self._rng, len(robots)
@@ -264,9 +267,10 @@ class BatchWorld:
         height = (
             0.4 * plane[:, :1] + 0.6 * (plane[:, 1:2] * x + plane[:, 2:] * y) + rng.uniform(-0.3, 0.3, (m, 4))
         )
+        raised = self.config.roughness * height + self.config.ledge * rng.random((m, 1))
         corners = self.ids.soles.reshape(2, 4)[side]
         nominal = self._model.geom_pos[corners, 2]
-        self._corners[robots[:, None], corners, 2] = nominal - self._rough[robots, None] * height
+        self._corners[robots[:, None], corners, 2] = nominal - self._rough[robots, None] * raised
 
     def _randomise(self, where: Rows, payload: float) -> None:
         c, rng, m, model = self.config, self._rng, len(where), self._model
@@ -284,7 +288,7 @@ class BatchWorld:
         self._offset[where, : LEGS.stop] = rng.normal(0.0, c.leg_offset, (m, LEGS.stop))
         self._offset[where, LEGS.stop :] = rng.normal(0.0, c.arm_offset, (m, NUM_JOINTS - LEGS.stop))
         self._force_scale[where] = 1.0 + rng.normal(0.0, c.force_noise, (m, 2))
-        self._rough[where] = np.where(rng.random(m) < 0.5, 0.0, c.roughness * rng.random(m))
+        self._rough[where] = np.where(rng.random(m) < 0.5, 0.0, rng.random(m))
         self._corners[where] = model.geom_pos
         sloped = rng.random((m, 1)) < 0.4
         self.slope[where] = np.where(sloped, rng.uniform(-c.slope, c.slope, (m, 2)), 0.0)

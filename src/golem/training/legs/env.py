@@ -86,9 +86,14 @@ class EnvConfig:
     weights: RewardWeights = field(default_factory=RewardWeights)
 
 
-Task = Literal["walk", "stand"]
+Task = Literal["walk", "rough", "stand"]
 TASKS: dict[Task, EnvConfig] = {
     "walk": EnvConfig(),
+    "rough": EnvConfig(
+        impulse=60.0,
+        world=WorldConfig(friction=(0.15, 1.1), payload=5.0, slope=0.15, roughness=0.03, ledge=0.05),
+        weights=RewardWeights(clearance=0.1),
+    ),
     "stand": EnvConfig(
         standing=1.0,
         calm=0.3,
@@ -104,7 +109,8 @@ that is praised for standing to the millimetre, or has learned to walk, is slow 
 push, to wherever that is good: it pays less for where its feet are. Its delays go further, because legs of high gain
 sway at 2 Hz from some delay on: of four networks trained to 30 ms two moved at 20 mm/s there, left alone, and those two
 swayed by 7 mm in the twin at 22 ms. Its pushes are twice as often back: with a quarter each, legs that had stood 20 of
-20 shoves of 80 N s backward stood 14. A walking robot is weakest to its sides."""
+20 shoves of 80 N s backward stood 14. A walking robot is weakest to its sides. `rough` is
+`walk` on ground as hard as that of rung `walk-rough`."""
 
 
 @dataclass

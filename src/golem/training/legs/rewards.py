@@ -22,8 +22,6 @@ from golem.types import LEGS, Array
 _YAW = np.array([0, 6])
 _YAW_ROLL = np.array([0, 2, 6, 8])
 _ANKLES = np.array([4, 5, 10, 11])
-CLEARANCE = 0.08
-"""Height of the sole in the middle of its swing [m]."""
 _PENDULUM = float(np.sqrt(STAND_HEIGHT / GRAVITY))
 """Time constant of the robot as an inverted pendulum [s]: velocity times this is how far the capture point is ahead."""
 LOW = 0.02
@@ -44,6 +42,7 @@ class RewardWeights:
             as `fast`: else a robot that keeps both feet down after a push loses nothing by it.
         placement: in the second half of a swing, the foot above where the capture point says that it belongs,
             exp(-error^2 / 0.12^2), after a push; see `placement`.
+        clearance: height of the sole in the middle of its swing [m]; no weight.
         swing_height: error of the height of a swinging sole [m^2].
         flat: tilt of the soles to the ground, 1 - cos. A foot that lands on an edge slaps down faster than the gate
             allows, and one that rolls over its heel under load misleads the odometry: when that was not punished, the
@@ -86,6 +85,7 @@ class RewardWeights:
     contact: float = 1.0
     dragged: float = -1.5
     placement: float = 1.5
+    clearance: float = 0.08
     swing_height: float = -60.0
     flat: float = -50.0
     upright: float = -20.0
@@ -194,7 +194,7 @@ class Rewards:
         swing = swing_share(phase, gait.config.stance)
         lifted = rise(swing)
         near = np.exp(-np.square(landing / 0.12)) * (~stance & (swing > 0.5))
-        high = CLEARANCE * lifted - truth.clearance
+        high = w.clearance * lifted - truth.clearance
         legs, speed = truth.q[:, LEGS], truth.dq[:, LEGS]
         torque = np.square(truth.torque[:, LEGS])
         level = truth.height - truth.clearance.min(axis=1)

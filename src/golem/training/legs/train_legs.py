@@ -29,6 +29,8 @@ VALUES_FIRST = 5e5
 """Steps in which a critic that begins from nothing learns what an exported network is worth: 40 updates [own]."""
 EXPORTED_PUSH = 0.5
 """Share of the largest push with which the training of an exported network begins: what it has met before."""
+EXPORTED_NOISE = 0.2
+"""Largest exploration noise of such a run: 0.45 undoes what the network can."""
 EXPORTED_RAMP = (5e5, 4e6)
 """Steps between which its pushes grow to their full range."""
 
@@ -44,7 +46,8 @@ class TrainLegsConfig:
         steps: actions of all robots together, e.g. 38e6.
         robots: how many are simulated at once.
         threads: of the physics; they change nothing of the result.
-        start: what this run begins with, exploring with `noise`: networks and steps of another run's checkpoint, or a
+        start: what this run begins with, exploring with `noise` or, from an exported one,
+            with `EXPORTED_NOISE`: networks and steps of another run's checkpoint, or a
             network that was exported. A run from an exported network counts its steps from none, is at full difficulty
             at once, learned adversary included, but for pushes, which grow from `EXPORTED_PUSH`, and changes the
             network after `VALUES_FIRST` steps only: until then it has no critic worth the name.
@@ -140,9 +143,7 @@ class _Run:
         began, config, env = time.process_time(), self.config, self.env
         learned = config.adversary == "learned" and self._progress >= config.learned_from
         steered: Rows = self._steered if learned else self._steered[:0]
-        begins, ends = config.noise_ramp
-        if (left := config.steps - self.steps) <= begins:
-            self.legs.bound_noise(float(np.interp(left, (ends, begins), config.noise[::-1])))
+        self.legs.bound_noise(self._largest_noise)
         meter = _Meter()
         for _ in range(config.ppo.steps):
             action = self.legs.act(self._obs, self._known)
@@ -240,7 +241,7 @@ class _Run:
                     f"From an exported network --steps is more than {VALUES_FIRST:g}: until then only a critic learns."
                 )
             self.legs.actor.load_state_dict(load_actor(path).state_dict())
-            self.legs.set_noise(self.config.noise[0])
+            self.legs.set_noise(EXPORTED_NOISE)
             return
         saved = read_checkpoint(path)
         self.steps = saved["steps"]
@@ -252,6 +253,16 @@ class _Run:
         self.upper.take_networks(saved["upper"])
         self.legs.set_noise(self.config.noise[0])
         self._harden()
+
+    @property
+    def _largest_noise(self) -> float:
+        """Bound of the standard deviation of the legs' actions."""
+        start, end = self.config.noise
+        begins, ends = self.config.noise_ramp
+        left = self.config.steps - self.steps
+        if left > begins:
+            return np.inf
+        return float(np.interp(left, (ends, begins), (end, EXPORTED_NOISE if self._exported else start)))
 
     @property
     def _progress(self) -> float:
