@@ -16,6 +16,7 @@ from golem.evaluation.metrics.tables import comparisons, metric_differences, met
 from golem.evaluation.metrics.text_table import short_names
 from golem.evaluation.report.html_page import render_page
 from golem.evaluation.report.ladder_plots import failure_plot, own_plot, rate_plot, time_plot
+from golem.evaluation.report.margin_box import MarginBox, margin_box, margin_boxes
 from golem.evaluation.report.margin_plot import MAX_CURVES, MarginCurve, margin_plot
 from golem.evaluation.report.svg_figure import styled
 from golem.robots.mujoco.balance import TRACE, BalanceTrace
@@ -58,6 +59,7 @@ def render(result: LadderResult) -> str:
             metrics=[]
             if rung.adaptive
             else [t for t in (metrics(summary), metric_differences(summary)) if t],
+            margin_boxes=margin_boxes(_boxes(grouped, result.out)),
             margin_plots=_margins(grouped, result.out),
             max_curves=MAX_CURVES,
             pictures=_pictures(grouped, result.out),
@@ -91,6 +93,12 @@ def _map(records: Sequence[TrialRecord], summary: Summary) -> dict[str, list[tup
             cells = [(r.success, _says(r)) for r in records if (r.method, r.case) == (method, case)]
             found[" ".join(part for part in (short[method], case_name(case)) if part)] = cells
     return found
+
+
+def _boxes(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> list[MarginBox]:
+    short = short_names(grouped)
+    found = [margin_box(short[method], rows, folder, i) for i, (method, rows) in enumerate(grouped.items())]
+    return [box for box in found if box is not None]
 
 
 def _margins(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> list[tuple[str, str]]:
