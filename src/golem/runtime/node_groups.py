@@ -26,7 +26,13 @@ from golem.robots.model.kinematics import Kinematics
 from golem.robots.unitree import motion_switcher
 from golem.robots.unitree.motion_switcher import MotionSwitcher
 from golem.runtime import nodes, perception_nodes
-from golem.runtime.checked import CheckedGraspMethod, CheckedMemory, CheckedNavigator, CheckedPlanner
+from golem.runtime.checked import (
+    CheckedGraspMethod,
+    CheckedMemory,
+    CheckedNavigator,
+    CheckedPlanner,
+    CheckedProperties,
+)
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Phase, Placed
 from golem.runtime.gantry_release import GantryReleaseNode
@@ -224,6 +230,7 @@ class StackNodes:
             grasp_method=lambda: CheckedGraspMethod(*make("grasp_method")),
             skill=self.skills.make,
             planner=functools.cache(lambda: CheckedPlanner(*make("planner"))),
+            properties=functools.cache(lambda: CheckedProperties(*make("properties"))),
             worker=pools.get("grasp_method"),
         )
         self.context = Context(bus, Kinematics(), nodes.SkillNode.period, modules)
