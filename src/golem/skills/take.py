@@ -46,6 +46,9 @@ class Take:
     """Grasp a thing by its name where it stands, lift it, and hold it.
 
     Stages: `detect`, `approach`, `reach`, `grasp`, `lift`, `done`.
+
+    Attributes:
+        force: what each finger is told to press with [N].
     """
 
     Goal, Result = TakeGoal, TakeReport
@@ -54,7 +57,7 @@ class Take:
         """Take distances, speeds and forces from `config`."""
         self._config = config or TakeThingConfig()
         self._report = TakeReport()
-        self._force = self._config.force
+        self.force = self._config.force
 
     def timeout(self, goal: TakeGoal) -> float:
         """Return the time it may take [s]; see `Skill`."""
@@ -68,7 +71,7 @@ class Take:
         start, motion, home = context.t, PlannedMotion(context), context.commanded_joints.copy()
         timings: dict[str, float] = {}
         side: Side | None = None
-        self._force = await self._tuned(context, goal.label)
+        self.force = await self._tuned(context, goal.label)
         try:
             target = await self._look(context, motion, goal)
             side, grasp = await self._approach(context, motion, goal, target)
@@ -251,16 +254,16 @@ class Take:
         except PlanRefused as refusal:
             raise failed("reach", refusal) from refusal
         await arm.settle(c.tolerance, 2.0)
-        context.say("grasp", f"Closing with {self._force:.3g} N per finger.", side=side)
+        context.say("grasp", f"Closing with {self.force:.3g} N per finger.", side=side)
         # Softly first: the finger that touches first waits for the other instead of pushing the thing over.
-        for force in (c.touch, self._force):
+        for force in (c.touch, self.force):
             hand.close(force)
             await context.sleep(HEARD)
             await context.until(lambda: hand.status.state in CLOSED, c.close_timeout)
         if not hand.status.holding:
             text = f"The fingers hold nothing (gap {hand.status.gap * 1e3:.0f} mm)."
             raise StageFailed("grasp", "grasp_method", text)
-        self._report.width, self._report.force = float(hand.status.gap), self._force
+        self._report.width, self._report.force = float(hand.status.gap), self.force
 
     async def _lift(self, context: Context, motion: PlannedMotion, side: Side, grasp: Grasp) -> None:
         """Lift it, back along the approach: up at once, so that it is not dragged."""
