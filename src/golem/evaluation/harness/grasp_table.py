@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import product
 from pathlib import Path
 from typing import Annotated, TypeVar
 
@@ -36,7 +36,7 @@ class TableConfig:
     """
 
     rung: tuple[str, ...] = ()
-    """Rows, by their rungs. Default: all."""
+    """Rows, by their rungs; those with the simulator's masks are called RUNG-truth. Default: all."""
     method: tuple[str, ...] = ()
     """Columns, by their grasp methods. Default: all."""
     n: Annotated[int, arg(aliases=("-n",))] = 30
@@ -109,16 +109,16 @@ class GraspTable:
         return next((_figure(r.successes, r.n) for r in found), EMPTY)
 
     def _levels(self) -> Summary:
-        """Return the paired tests of each method between one level and the next of the same task."""
+        """Return the paired tests of each method between a level and the one before it."""
         pairs: list[tuple[list[TrialRecord], list[TrialRecord]]] = []
-        for (one, a), (other, b) in pairwise(self.rows):
-            if a is None or b is None or one.task != other.task:
+        for (one, a), (other, b) in product(self.rows, self.rows):
+            if a is None or b is None or (one.task, one.level) != (other.task, other.after):
                 continue
             for column in self.columns:
-                easier, harder = (_trials(column, *side) for side in ((one, a), (other, b)))
-                both = sorted(easier.keys() & harder.keys())
+                before, after = (_trials(column, *side) for side in ((one, a), (other, b)))
+                both = sorted(before.keys() & after.keys())
                 if both:
-                    pairs.append(([easier[i] for i in both], [harder[i] for i in both]))
+                    pairs.append(([before[i] for i in both], [after[i] for i in both]))
         return Summary(tuple(row(side) for pair in pairs for side in pair), comparisons_of(pairs))
 
 
@@ -130,7 +130,7 @@ def run_table(config: TableConfig) -> GraspTable:
         golem.errors.GolemError: see `run_ladder`.
         OutputError: the folder cannot be written.
     """
-    lines = _chosen("row", config.rung, {line.rung: line for line in ROWS})
+    lines = _chosen("row", config.rung, {line.key: line for line in ROWS})
     columns = _chosen("column", config.method, {column.method: column for column in COLUMNS})
     empty = {column.method: absence(column) for column in columns}
     rows: list[tuple[TableRow, LadderResult | None]] = []
@@ -151,12 +151,12 @@ def run_table(config: TableConfig) -> GraspTable:
 
 
 def _ladder(config: TableConfig, line: TableRow, methods: tuple[str, ...]) -> LadderResult:
-    print(f"{line.name} (rung {line.rung}): {', '.join(methods)}", flush=True)
+    print(f"{line.name} ({line.key}): {', '.join(methods)}", flush=True)
     options = fill(f"option of rung {line.rung}", rung_class(line.rung).Options, line.options)
     return run_ladder(
         LadderConfig(
-            line.rung, methods, config.n, config.profile, config.seed, config.out / line.rung, config.j,
-            options=options,
+            line.rung, methods, config.n, config.profile, config.seed, config.out / line.key, config.j,
+            use=line.use, options=options,
         )
     )  # fmt: skip
 
@@ -194,7 +194,7 @@ def _trials(column: TableColumn, line: TableRow, ladder: LadderResult) -> dict[i
 
 
 def _published(line: TableRow, column: TableColumn, label: str) -> str:
-    figures = PAPER.get((line.rung, column.method), ())
+    figures = PAPER.get((line.key, column.method), ())
     return next((_figure(f.successes, f.n) for f in figures if f.label == label), EMPTY)
 
 

@@ -25,12 +25,21 @@ class TableRow:
         task, level: in words.
         rung: the rung that tries it.
         options: of the rung.
+        after: level of the same task that this one adds a difficulty to, or takes one from; empty of the first.
+        use: what else is replaced in its stacks, as `golem ladder --use` has it.
     """
 
     task: str
     level: str
     rung: str
     options: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    after: str = ""
+    use: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """What a command calls it, and its folder."""
+        return f"{self.rung}-truth" if self.use else self.rung
 
     @property
     def name(self) -> str:
@@ -55,13 +64,17 @@ class TableColumn:
     paper: str = ""
 
 
+TRUTH = ("localizer=truth",)
+"""The simulator's masks in the localizer's place: so perception and grasping are told apart."""
 VARIED: Mapping[str, Any] = {"layout": "varied"}
 ROWS: tuple[TableRow, ...] = (
     TableRow(FRIDGE, "tether", "fridge-tether", VARIED),
-    TableRow(FRIDGE, "stand", "fridge-stand", VARIED),
+    TableRow(FRIDGE, "stand", "fridge-stand", VARIED, "tether"),
+    TableRow(FRIDGE, "stand, true masks", "fridge-stand", VARIED, "stand", TRUTH),
     TableRow(SCREW, "tether", "tether", VARIED),
-    TableRow(SCREW, "stand", "stand", VARIED),
-    TableRow(SCREW, "var. stand", "var-stand", {**VARIED, "start": ["placed"], "dock": ["no"]}),
+    TableRow(SCREW, "stand", "stand", VARIED, "tether"),
+    TableRow(SCREW, "stand, true masks", "stand", VARIED, "stand", TRUTH),
+    TableRow(SCREW, "var. stand", "var-stand", {**VARIED, "start": ["placed"], "dock": ["no"]}, "stand"),
 )
 COLUMNS: tuple[TableColumn, ...] = (
     TableColumn("centroid", "centroid", paper="Cent."),

@@ -37,7 +37,7 @@ def render_table(table: GraspTable) -> str:
             ],
             paired=table.paired(),
             reports=[
-                (line.name, f"{line.rung}/{ladder.report.name}", sum(not r.success for r in ladder.records))
+                (line.name, f"{line.key}/{ladder.report.name}", sum(not r.success for r in ladder.records))
                 for line, ladder in measured
                 if ladder.report is not None
             ],
