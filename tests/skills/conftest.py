@@ -42,7 +42,7 @@ def modules(**given: Any) -> Modules:
         "grasp_method": VisualServo,
         "skill": SkillTable(Stack()).make,
         "planner": Straight,
-        "properties": PropertyTable,
+        "properties": PropertyTable(),
         "memory": ObjectMap(),
     }
     return Modules(**default | given)

@@ -51,7 +51,7 @@ class Rig:
         self.q, self.sag = posture("home") if q is None else q, np.zeros(15)
         self.node = UpperBodyNode(self.bus, DiffIK(), ContractCheck("upper_body", "diff_ik"))
         modules = Modules(
-            lambda: pytest.fail(), lambda name: pytest.fail(), lambda: planner, ObjectMap(), PropertyTable
+            lambda: pytest.fail(), lambda name: pytest.fail(), lambda: planner, ObjectMap(), PropertyTable()
         )
         self.context = Context(self.bus, Kinematics(), PERIOD, modules)
         self.step()

@@ -234,7 +234,7 @@ class StackNodes:
             grasp_method=lambda: CheckedGraspMethod(*make("grasp_method")),
             skill=self.skills.make,
             planner=functools.cache(lambda: CheckedPlanner(*make("planner"))),
-            properties=functools.cache(lambda: CheckedProperties(*make("properties"))),
+            properties=CheckedProperties(*make("properties")),
             worker=pools.get("grasp_method"),
         )
         self.context = Context(bus, Kinematics(), nodes.SkillNode.period, modules)

@@ -40,7 +40,7 @@ class Modules:
         skill: makes a new skill, by its name in the stack.
         planner: the planner, made when it is first asked for.
         memory: where things are and were.
-        properties: what knows of things by their names, made when it is first asked for.
+        properties: what things are like, by their names.
         worker: where slow modules think; None is on the clock, at the price of the latency that they declare.
     """
 
@@ -48,7 +48,7 @@ class Modules:
     skill: Callable[[str], Skill[Context, Any]]
     planner: Callable[[], ArmPlanner]
     memory: Memory
-    properties: Callable[[], PropertySource]
+    properties: PropertySource
     worker: Executor | None = None
 
 
@@ -325,7 +325,7 @@ class Context:
         Raises:
             ConfigError: it knows nothing of that name.
         """
-        source = self.modules.properties()
+        source = self.modules.properties
         return await self.think(lambda: source.properties(label), source.latency)
 
     def scene(self, camera: str) -> Array:
