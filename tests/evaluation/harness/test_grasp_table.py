@@ -54,6 +54,8 @@ def test_one_command_makes_table_page_and_ladders(out: Path, capsys: pytest.Capt
 def test_a_row_and_a_column_are_named_by_rung_and_method(out: Path) -> None:
     table = run_table(TableConfig(method=("good",), n=2, out=out))
     assert [column.method for column in table.columns] == ["good"]
+    empty = run_table(TableConfig(method=("graspgen",), out=out.with_name("empty")))
+    assert empty.rows[0][1] is None and len(empty.absent) == 1
     with pytest.raises(ConfigError, match="Unknown row 'kitchen'; valid: fake"):
         run_table(TableConfig(rung=("kitchen",), out=out))
     with pytest.raises(ConfigError, match="Unknown column 'luck'"):

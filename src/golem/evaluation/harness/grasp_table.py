@@ -76,12 +76,8 @@ class GraspTable:
         lines: list[tuple[str, ...]] = []
         for line, ladder in self.rows:
             lines.append((line.name, *(self._cell(ladder, column) for column in self.columns)))
-            labels = dict.fromkeys(
-                figure.label
-                for column in self.columns
-                for figure in PAPER.get((line.rung, column.method), ())
-            )
-            for label in labels:
+            published = [f for column in self.columns for f in PAPER.get((line.key, column.method), ())]
+            for label in dict.fromkeys(figure.label for figure in published):
                 cells = (_published(line, column, label) for column in self.columns)
                 lines.append((f"the paper, {label}", *cells))
         heads = (f"{c.head} ({c.paper})" if c.paper else c.head for c in self.columns)
@@ -134,18 +130,18 @@ def run_table(config: TableConfig) -> GraspTable:
     columns = _chosen("column", config.method, {column.method: column for column in COLUMNS})
     empty = {column.method: absence(column) for column in columns}
     rows: list[tuple[TableRow, LadderResult | None]] = []
-    absent = dict.fromkeys(why for why in empty.values() if why)
+    absent = [why for why in empty.values() if why]
     for line in lines:
         methods: list[str] = []
         for column in columns:
             if line.task not in column.tasks:
-                absent[f"{column.head} on the {line.task}: `open` follows no servo law, as in the paper."] = (
-                    None
+                absent.append(
+                    f"{column.head} on the {line.task}: `open` follows no servo law, as in the paper."
                 )
             elif empty[column.method] is None:
                 methods.append(column.method)
         rows.append((line, _ladder(config, line, tuple(methods)) if methods else None))
-    table = GraspTable(config, columns, tuple(rows), tuple(absent))
+    table = GraspTable(config, columns, tuple(rows), tuple(dict.fromkeys(absent)))
     _write(table)
     return table
 
@@ -170,6 +166,7 @@ def _write(table: GraspTable) -> None:
     except MissingExtra as missing:
         print(f"No page was written: {missing}")
     try:
+        table.config.out.mkdir(parents=True, exist_ok=True)
         (table.config.out / "table.md").write_text(text, encoding="utf-8")
         if page is not None:
             (table.config.out / "table.html").write_text(page, encoding="utf-8")
