@@ -8,14 +8,14 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.navigation.goto import GoTo
 from golem.errors import ConfigError
-from golem.evaluation.base import Case, Results, TrialOutcome, TrialSpec
+from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, lost
 from golem.evaluation.episodes.hall_walk import true_pose
@@ -115,7 +115,7 @@ class VarStandRung(PickRung):
         """Run one trial; see `Rung`."""
         seed, walks = episode_seed(spec.seed, spec.index), spec.case["start"] == "walked"
         stance = drawn_stance(spec, walks)
-        conditions = {k: v for k, v in spec.case.items() if k not in ("start", "dock")}
+        conditions = dict(_conditions(spec.case))
         stack = self._stack(spec.method, spec.profile, spec.overrides).with_options(
             "robot",
             layout=self.options.layout,
@@ -136,6 +136,14 @@ class VarStandRung(PickRung):
                 if artefacts is not None and trial.recorder is not None:
                     trial.recorder.trace().save(artefacts / TRACE)
                 return outcome
+
+    def plot(self, outcomes: Outcomes, figure: Any) -> str | None:
+        """Draw success by condition of the place; how the robot came there is none. See `Rung`."""
+        placed = {
+            method: [(replace(spec, case=_conditions(spec.case)), outcome) for spec, outcome in rows]
+            for method, rows in outcomes.items()
+        }
+        return super().plot(placed, figure)
 
     def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
         if "robot" in overrides or "grasp_method" in overrides:
@@ -288,6 +296,11 @@ class _Trial:
 
     def _name(self, slot: str) -> str:
         return f"{slot}: {self._stack.choice(slot).use}"
+
+
+def _conditions(case: Case) -> Case:
+    """Return what of a case the place is drawn from."""
+    return {k: v for k, v in case.items() if k not in ("start", "dock")}
 
 
 def drawn_stance(spec: TrialSpec, walks: bool) -> PlanarPose:
