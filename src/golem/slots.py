@@ -121,6 +121,13 @@ SLOTS: dict[str, Slot] = {
             "visual_servo": "golem.capabilities.grasping.visual_servo:VisualServo",
         },
     ),
+    "properties": Slot(
+        "golem.capabilities.properties.base:PropertySource",
+        {
+            "gemini": "golem.capabilities.properties.gemini_estimate:GeminiEstimate",
+            "table": "golem.capabilities.properties.property_table:PropertyTable",
+        },
+    ),
     "odometry": Slot(
         "golem.capabilities.odometry.base:LidarOdometry",
         {
@@ -187,6 +194,7 @@ KEYS: dict[str, StackKey] = {
     "planner": StackKey("planner", "rrt_connect"),
     "localizer": StackKey("localizer", "onnx"),
     "grasp_method": StackKey("grasp_method", "visual_servo"),
+    "properties": StackKey("properties", "table"),
     "odometry": StackKey("odometry", "legs"),
     # Runs where the stack listens to the LiDAR.
     "mapper": StackKey("mapper", "grid"),

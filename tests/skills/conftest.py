@@ -12,6 +12,7 @@ from golem.capabilities.grasping.base import GraspMethod
 from golem.capabilities.grasping.visual_servo import VisualServo
 from golem.capabilities.memory.object_map import ObjectMap
 from golem.capabilities.planning.straight import Straight
+from golem.capabilities.properties.property_table import PropertyTable
 from golem.interfaces import topics
 from golem.interfaces.payloads import Detections, GripState, HandStatus
 from golem.middleware.bus import Bus
@@ -41,6 +42,7 @@ def modules(**given: Any) -> Modules:
         "grasp_method": VisualServo,
         "skill": SkillTable(Stack()).make,
         "planner": Straight,
+        "properties": PropertyTable(),
         "memory": ObjectMap(),
     }
     return Modules(**default | given)

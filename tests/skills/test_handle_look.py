@@ -10,7 +10,7 @@ import pytest
 
 from golem.capabilities.grasping.base import Grasp
 from golem.capabilities.planning.base import PlanRefused, Refusal
-from golem.skills.handle_look import seen_before
+from golem.skills.handle_look import VIEWS, seen_before
 from golem.skills.open_door import OpenConfig
 from golem.types import Array, Side
 
@@ -51,3 +51,29 @@ def test_the_hand_goes_before_the_handle_that_it_saw(world: Any, thing: Any, ref
     true = AT_THE_EDGE if refuses else HANDLE
     np.testing.assert_allclose(found[0].T_odom_gripper[:3, 3], true + (0.02, 0.0, 0.0), atol=1e-9)
     assert len(motion.went) == (0 if refuses else 2)
+
+
+@pytest.mark.parametrize("shown_from", [0, 1, 2, None])
+def test_a_handle_that_is_not_seen_is_looked_for_from_elsewhere(
+    world: Any, thing: Any, shown_from: int | None
+) -> None:
+    motion, config, found = Motion(False), OpenConfig(), list[Grasp]()
+    world.objects["left_hand"] = lambda: (
+        [thing("handle", HANDLE, world.t)] if shown_from is not None and len(motion.went) > shown_from else []
+    )
+    T = np.eye(4)
+    T[:3, 3] = SAID
+
+    async def look() -> None:
+        handle, grasp = thing("handle", SAID, 0.0), Grasp(T, 0.06, 1.0)
+        found.append(await seen_before(world.context, motion, config, handle, grasp, "left"))  # pyright: ignore
+
+    world.run(look())
+    ends = SAID if shown_from is None else HANDLE
+    np.testing.assert_allclose(found[0].T_odom_gripper[:2, 3], ends[:2], atol=1e-9)
+    back = SAID[2] - config.before
+    looked = VIEWS if shown_from is None else VIEWS[: shown_from + 1]
+    views = [(SAID[0], SAID[1] + across, back - further) for across, further in looked]
+    np.testing.assert_allclose(motion.went[:-1], views, atol=1e-9)
+    # From wherever it looked, it ends before the handle.
+    np.testing.assert_allclose(motion.went[-1], (*ends[:2], back), atol=1e-9)

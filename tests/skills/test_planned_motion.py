@@ -19,6 +19,7 @@ from golem.capabilities.planning.escape import FARTHEST, apart
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.plan_kernel import ITSELF
 from golem.capabilities.planning.rrt_connect import RrtConnect
+from golem.capabilities.properties.property_table import PropertyTable
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, GateStatus
 from golem.middleware.bus import Bus
@@ -49,7 +50,9 @@ class Rig:
         self.bus, self.t, self.stops = Bus(), 0.0, np.full(15, np.inf)
         self.q, self.sag = posture("home") if q is None else q, np.zeros(15)
         self.node = UpperBodyNode(self.bus, DiffIK(), ContractCheck("upper_body", "diff_ik"))
-        modules = Modules(lambda: pytest.fail(), lambda name: pytest.fail(), lambda: planner, ObjectMap())
+        modules = Modules(
+            lambda: pytest.fail(), lambda name: pytest.fail(), lambda: planner, ObjectMap(), PropertyTable()
+        )
         self.context = Context(self.bus, Kinematics(), PERIOD, modules)
         self.step()
 

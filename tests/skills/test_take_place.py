@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.navigation.edge_fit import NearEdge
+from golem.capabilities.properties.base import holding_force
+from golem.capabilities.properties.property_table import PropertyTable
 from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.interfaces.payloads import GripState, HandStatus
@@ -63,6 +65,33 @@ def test_the_palm_camera_finds_it_beside_where_it_seemed() -> None:
     assert seen.points[:, 2].min() > TOP + 0.008
     assert seen_again(table, can_at(can), trust=0.15) is None
     assert seen_again(np.zeros((0, 3)), can_at(can), trust=0.15) is None
+
+
+def test_of_what_stands_there_that_of_the_right_size_is_taken() -> None:
+    table, can = table_with_can()
+    rng = np.random.default_rng(2)
+    turn, height = rng.uniform(0, 2 * np.pi, 3000), rng.uniform(0.0, 0.06, 3000)
+    bowl = np.column_stack([0.5 + 0.08 * np.cos(turn), 0.02 + 0.08 * np.sin(turn), TOP + height])
+    points = np.concatenate([table, can, bowl])
+    expected = can_at(can + (0.0, 0.12, 0.0))  # the head camera is off, and has it beside the bowl
+    for size, y in ((None, 0.02), ((0.07, 0.12), -0.2), ((0.16, 0.06), 0.02), ((0.3, 0.4), 0.02)):
+        found = seen_again(points, expected, 0.15, size)
+        assert found is not None
+        assert np.median(found[0].points, axis=0)[1] == pytest.approx(y, abs=0.03)
+
+
+def test_a_tuned_force_is_what_the_thing_asks_for(world: Any) -> None:
+    at_home(world)
+    world.objects["head"] = lambda: []
+    force: dict[bool, float] = {}
+    for tuned in (False, True):
+        skill = Take(TakeThingConfig(turn=0.0, tuned=tuned))
+        world.run(skill.run(world.context, TakeGoal("mug")))
+        force[tuned] = skill.force
+    thing = PropertyTable().properties("mug")
+    assert force == {False: 16.0, True: pytest.approx(holding_force(thing, 2.0, 0.004))}
+    refused = world.run(Take(TakeThingConfig(tuned=True)).run(world.context, TakeGoal("teapot"))).result
+    assert refused.stage == "refused" and "Unknown thing 'teapot'; valid: " in refused.reason
 
 
 def test_a_hand_whose_encoders_are_off_sees_what_is_upright() -> None:

@@ -176,7 +176,7 @@ class Rung(ABC, Generic[O]):
         provokes: whether it shoves or harms robots until they are lost, so that a stop may be right.
         timed: whether it measures the machine, so that nothing may run at the same time as a trial.
         options: the options of this one.
-        onlooker: who is shown the stacks of its trials; None on a ladder.
+        onlooker: who is shown the stacks of its trials: a viewer, or on a ladder what films the lost ones.
     """
 
     name: str

@@ -14,6 +14,8 @@ from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, ServoL
 from golem.capabilities.memory.base import EVIDENCES, HasPlaces, Memory, MemoryFault, Observation, Place, When
 from golem.capabilities.navigation.base import Navigator, NavInputs
 from golem.capabilities.planning.base import NUM_JOINTS, ArmPlanner, Plan, PlanRefused, PlanRequest
+from golem.capabilities.properties.base import Properties, PropertySource
+from golem.errors import ConfigError
 from golem.interfaces.nav_payloads import NavStep
 from golem.interfaces.payloads import JointTrajectory
 from golem.runtime.contract_check import ContractCheck
@@ -96,6 +98,24 @@ class CheckedPlanner:
             self._contract.array(name, getattr(plan, name), n, NUM_JOINTS)
         self._contract.call(check_trajectory, JointTrajectory(0.0, plan.times, plan.q, plan.dq), request.q)
         return plan
+
+
+class CheckedProperties:
+    """A `PropertySource` whose faults name the module; a name that it does not know is the user's error.
+
+    Attributes:
+        latency: see `PropertySource`.
+    """
+
+    def __init__(self, source: PropertySource, contract: ContractCheck) -> None:
+        """Watch `source`."""
+        self._source, self._contract = source, contract
+        self.latency = contract.number("latency", source.latency, minimum=0.0)
+
+    def properties(self, label: str) -> Properties:
+        """Return what the source says; see `PropertySource`."""
+        said = passing(self._contract, ConfigError, lambda: self._source.properties(label))
+        return self._contract.kind("what it says", said, Properties)
 
 
 class CheckedMemory:

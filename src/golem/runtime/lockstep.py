@@ -13,6 +13,7 @@ from golem import registry
 from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.hold import STANCES
+from golem.capabilities.perception.base import Localizer
 from golem.errors import ConfigError, ModuleFault, RobotGone
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
@@ -43,13 +44,20 @@ class LockstepRunner:
         estop: the virtual emergency stop, to be pressed.
     """
 
-    def __init__(self, stack: Stack, robot: Robot, limits: SafetyLimits | None = None) -> None:
+    def __init__(
+        self,
+        stack: Stack,
+        robot: Robot,
+        limits: SafetyLimits | None = None,
+        localizer: Localizer | None = None,
+    ) -> None:
         """Wire the modules of `stack` to `robot`.
 
         Args:
             stack: what to run.
             robot: its robot.
             limits: what the safety gate enforces instead of the stack's profile: for studies of the gate.
+            localizer: what sees instead of the stack's own: for studies of what perception costs.
 
         Raises:
             ConfigError: a name or an option of the stack is wrong.
@@ -76,7 +84,9 @@ class LockstepRunner:
             limits = limits.still()
         standing = StandingLegs if stack.on_ground else None
         self._safety = SafetyNodes(self.bus, limits, self.estop, standing)
-        self._stack = StackNodes(self.bus, stack, calibration.merged(robot.calibration), gantry, LATENCY)
+        self._stack = StackNodes(
+            self.bus, stack, calibration.merged(robot.calibration), gantry, LATENCY, localizer=localizer
+        )
         placed = self._robot.nodes + self._safety.nodes + self._stack.nodes
         self.executor = Executor(self.bus, in_order(placed))
         self.request(OperatorRequest.ACTIVATE)
@@ -199,8 +209,15 @@ def build_robot(stack: Stack, seed: int) -> Any:
     return robot
 
 
-def build(stack: Stack, seed: int, limits: SafetyLimits | None = None) -> tuple[LockstepRunner, Any]:
+def build(
+    stack: Stack,
+    seed: int,
+    limits: SafetyLimits | None = None,
+    eyes: Callable[[Any], Localizer] | None = None,
+) -> tuple[LockstepRunner, Any]:
     """Build the robot of `stack` for episode `seed`, and the stack around it; `limits` as in `LockstepRunner`.
+
+    `eyes` makes of the robot what sees instead of the stack's localizer.
 
     Returns:
         The running stack, and the robot: for evaluation and viewers, never for modules.
@@ -209,4 +226,4 @@ def build(stack: Stack, seed: int, limits: SafetyLimits | None = None) -> tuple[
         ConfigError, ModuleFault: see `build_robot`; so for every other module.
     """
     robot = build_robot(stack, seed)
-    return LockstepRunner(stack, robot, limits), robot
+    return LockstepRunner(stack, robot, limits, None if eyes is None else eyes(robot)), robot

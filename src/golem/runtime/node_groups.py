@@ -14,6 +14,7 @@ from typing import Any
 
 from golem import registry
 from golem.capabilities.legs.base import Envelope
+from golem.capabilities.perception.base import Localizer
 from golem.errors import GolemError
 from golem.hardware.estop.base import EmergencyStop
 from golem.hardware.safety.base import OperatorRequest, SafetyLimits
@@ -26,7 +27,13 @@ from golem.robots.model.kinematics import Kinematics
 from golem.robots.unitree import motion_switcher
 from golem.robots.unitree.motion_switcher import MotionSwitcher
 from golem.runtime import nodes, perception_nodes
-from golem.runtime.checked import CheckedGraspMethod, CheckedMemory, CheckedNavigator, CheckedPlanner
+from golem.runtime.checked import (
+    CheckedGraspMethod,
+    CheckedMemory,
+    CheckedNavigator,
+    CheckedPlanner,
+    CheckedProperties,
+)
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Phase, Placed
 from golem.runtime.gantry_release import GantryReleaseNode
@@ -186,6 +193,7 @@ class StackNodes:
         pools: Mapping[str, ThreadPoolExecutor] | None = None,
         real: bool = False,
         epoch: float = 0.0,
+        localizer: Localizer | None = None,
     ) -> None:
         """Build the modules of `stack` around `bus`.
 
@@ -198,6 +206,7 @@ class StackNodes:
             pools: where the modules of the slots `POOLED` run; None is on the clock, see `LocalizerNode`.
             real: whether the robot is none of ours: no module can then call its on-board controller.
             epoch: when the robot's clock was at 0, in Unix time [s]: what is remembered outlives that clock.
+            localizer: what sees instead of the stack's own, for studies.
 
         Raises:
             ConfigError: a name or an option of the stack is wrong, or a module is to call a real robot's controller.
@@ -212,7 +221,8 @@ class StackNodes:
         estimator, estimator_contract = make("estimator")
         odometry, odometry_contract = make("odometry")
         mapper, mapper_contract = make("mapper")
-        localizer, contract = make("localizer")
+        own, contract = make("localizer")
+        eyes: Localizer = localizer or own
         legs, reserve = (
             CheckedLowerBody(*make(key, onboard=None if real else BusOnboard(bus)), stack.on_ground)
             for key in ("lower_body", "fallback")
@@ -224,6 +234,7 @@ class StackNodes:
             grasp_method=lambda: CheckedGraspMethod(*make("grasp_method")),
             skill=self.skills.make,
             planner=functools.cache(lambda: CheckedPlanner(*make("planner"))),
+            properties=CheckedProperties(*make("properties")),
             worker=pools.get("grasp_method"),
         )
         self.context = Context(bus, Kinematics(), nodes.SkillNode.period, modules)
@@ -234,7 +245,7 @@ class StackNodes:
             *(
                 (
                     Phase.PERCEIVE,
-                    perception_nodes.LocalizerNode(bus, localizer, name, contract, pools.get("localizer")),
+                    perception_nodes.LocalizerNode(bus, eyes, name, contract, pools.get("localizer")),
                 )
                 for name in calibration
             ),

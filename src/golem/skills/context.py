@@ -15,12 +15,9 @@ from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper
 from golem.capabilities.memory.base import Memory
 from golem.capabilities.perception.lift import scene_of
 from golem.capabilities.planning.base import ArmPlanner
+from golem.capabilities.properties.base import Properties, PropertySource
 from golem.interfaces import topics
-from golem.interfaces.payloads import (
-    Feedback,
-    HandGoal,
-    HandStatus,
-)
+from golem.interfaces.payloads import Feedback, HandGoal, HandStatus
 from golem.middleware.bus import Bus, Topic
 from golem.robots.model.kinematics import Kinematics
 from golem.skills.base import Skill, SkillResult, StageFailed, Tick, expect
@@ -43,6 +40,7 @@ class Modules:
         skill: makes a new skill, by its name in the stack.
         planner: the planner, made when it is first asked for.
         memory: where things are and were.
+        properties: what things are like, by their names.
         worker: where slow modules think; None is on the clock, at the price of the latency that they declare.
     """
 
@@ -50,6 +48,7 @@ class Modules:
     skill: Callable[[str], Skill[Context, Any]]
     planner: Callable[[], ArmPlanner]
     memory: Memory
+    properties: PropertySource
     worker: Executor | None = None
 
 
@@ -319,6 +318,15 @@ class Context:
         gripper = Gripper(side, self.arms[side].pose, yaw, np.array(approach), q, self.T_odom_base)
         around = self.scene("head") if scene is None else scene
         return await self.think(lambda: method.propose(target, around, gripper), method.latency)
+
+    async def properties(self, label: str) -> Properties:
+        """Return what a thing of class `label` is like, as the stack's source of properties has it.
+
+        Raises:
+            ConfigError: it knows nothing of that name.
+        """
+        source = self.modules.properties
+        return await self.think(lambda: source.properties(label), source.latency)
 
     def scene(self, camera: str) -> Array:
         """Return the (n, 3) points in odom that the newest frame of `camera` shows [m]; n is 0 before the first."""

@@ -15,12 +15,13 @@ from scipy.spatial.transform import Rotation
 from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.grasping.base import Grasp
 from golem.capabilities.grasping.centroid import UP, grasp_pose
+from golem.capabilities.grasping.object_cloud import MIN_POINTS
 from golem.capabilities.grasping.view_shift import View, shift_between
 from golem.skills.context import Context
 from golem.skills.planned_motion import PlannedMotion
 from golem.skills.poses import moved, retracted
 from golem.skills.take_config import TakeThingConfig
-from golem.skills.ware_sight import palm_view, seen_again
+from golem.skills.ware_sight import PROUD, palm_view, seen_again, width
 from golem.types import Array, LocalizedObject, Side
 
 NEAR = 0.03
@@ -70,11 +71,12 @@ class PalmLook:
         """
         c, context = self._config, self._context
         scene, seen_way = context.scene("head"), way
+        size = _size(target.points)
         for k in range(c.looks):
             T = self._watching(target, way, yaw)
             await self._motion.to({self._side: T}, c.travel_speed, near=NEAR)
             palm = await palm_view(context, self._side, target.label, c.look_timeout)
-            found = seen_again(palm, target, c.trust)
+            found = seen_again(palm, target, c.trust, size)
             if found is None:
                 context.say("approach", f"The palm camera does not show the {target.label}.")
                 break
@@ -156,6 +158,14 @@ class PalmLook:
         shares = np.linspace(0.0, 1.0, 11)
         there = next((s for s in shares if reach.serves(self._side, local + s * (best - local))), 1.0)
         return grasp_pose(T[:3, :3] @ (local + there * (best - local)) + T[:3, 3], yaw, -way)
+
+
+def _size(points: Array) -> tuple[float, float] | None:
+    """Return width and height of what stands on a surface, as the head camera's points (n, 3) of it show them [m]."""
+    if len(points) < MIN_POINTS:
+        return None
+    low, high = np.quantile(points[:, 2], (0.02, 0.98))
+    return width(points), float(high - low) + PROUD
 
 
 def _middle(points: Array) -> Array:

@@ -33,6 +33,13 @@ IN_HAND = 0.16
 """Radius around a hand within which the head camera shows what it holds [m]."""
 IN_BOWL = 0.10
 """The same around the middle of what hangs beside the fingers [m]: a bowl is 80 mm in radius."""
+BESIDE: Array = np.array(
+    [
+        (0.0, 0.0),
+        *((r * math.cos(a), r * math.sin(a)) for r in (0.015, 0.03) for a in np.arange(8) * math.pi / 4),
+    ]
+)
+"""Places (17, 2) beside the one that is asked for that will do where something stands there, nearest first [m]."""
 PROUD = 0.025
 """Height above a surface from which on something stands there [m]: the head camera is not sure of less."""
 IN_WAY = 0.12
@@ -197,11 +204,12 @@ class SetDown:
         if level is None:
             raise StageFailed("detect", "localizer", "The head camera shows no surface at that place.")
         spot[2] = level
-        off = np.hypot(scene[:, 0] - spot[0], scene[:, 1] - spot[1])
-        stands = (off < self._config.room) & (scene[:, 2] > level + PROUD) & (scene[:, 2] < level + 0.4)
-        if np.count_nonzero(stands) > MIN_POINTS:
-            raise StageFailed("detect", "localizer", "Something else stands at that place.")
-        return spot
+        proud = scene[(scene[:, 2] > level + PROUD) & (scene[:, 2] < level + 0.4), :2]
+        for beside in BESIDE:
+            near = np.linalg.norm(proud - spot[:2] - beside, axis=1) < self._config.room
+            if np.count_nonzero(near) <= MIN_POINTS:
+                return spot + (*beside, 0.0)
+        raise StageFailed("detect", "localizer", "Something else stands at that place.")
 
     async def _carry(
         self, context: Context, motion: PlannedMotion, goal: PlaceGoal, side: Side, spot: Array

@@ -12,6 +12,7 @@ from golem.capabilities.arms.postures import posture
 from golem.capabilities.grasping.base import Grasp, GraspMethod
 from golem.capabilities.grasping.object_cloud import spaced
 from golem.capabilities.planning.base import PlanRefused
+from golem.capabilities.properties.base import holding_force
 from golem.interfaces.payloads import GripState
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
@@ -45,6 +46,9 @@ class Take:
     """Grasp a thing by its name where it stands, lift it, and hold it.
 
     Stages: `detect`, `approach`, `reach`, `grasp`, `lift`, `done`.
+
+    Attributes:
+        force: what each finger is told to press with [N].
     """
 
     Goal, Result = TakeGoal, TakeReport
@@ -53,6 +57,7 @@ class Take:
         """Take distances, speeds and forces from `config`."""
         self._config = config or TakeThingConfig()
         self._report = TakeReport()
+        self.force = self._config.force
 
     def timeout(self, goal: TakeGoal) -> float:
         """Return the time it may take [s]; see `Skill`."""
@@ -66,6 +71,7 @@ class Take:
         start, motion, home = context.t, PlannedMotion(context), context.commanded_joints.copy()
         timings: dict[str, float] = {}
         side: Side | None = None
+        self.force = await self._tuned(context, goal.label)
         try:
             target = await self._look(context, motion, goal)
             side, grasp = await self._approach(context, motion, goal, target)
@@ -87,6 +93,14 @@ class Take:
         text = f"The {side} hand holds the {goal.label}."
         context.say("done", text)
         return SkillResult(True, "done", None, text, timings, self._report)
+
+    async def _tuned(self, context: Context, label: str) -> float:
+        """Return the force that a finger holds the thing with [N]."""
+        c = self._config
+        if not c.tuned:
+            return c.force
+        thing = await context.properties(label)
+        return float(np.clip(holding_force(thing, c.safety, c.squeeze), min(c.touch, c.force), c.force))
 
     async def _look(self, context: Context, motion: PlannedMotion, goal: TakeGoal) -> LocalizedObject:
         """Return the thing as the head camera sees it, ahead or with the torso turned."""
@@ -240,16 +254,16 @@ class Take:
         except PlanRefused as refusal:
             raise failed("reach", refusal) from refusal
         await arm.settle(c.tolerance, 2.0)
-        context.say("grasp", f"Closing with {c.force:g} N per finger.", side=side)
+        context.say("grasp", f"Closing with {self.force:.3g} N per finger.", side=side)
         # Softly first: the finger that touches first waits for the other instead of pushing the thing over.
-        for force in (c.touch, c.force):
+        for force in (c.touch, self.force):
             hand.close(force)
             await context.sleep(HEARD)
             await context.until(lambda: hand.status.state in CLOSED, c.close_timeout)
         if not hand.status.holding:
             text = f"The fingers hold nothing (gap {hand.status.gap * 1e3:.0f} mm)."
             raise StageFailed("grasp", "grasp_method", text)
-        self._report.width = float(hand.status.gap)
+        self._report.width, self._report.force = float(hand.status.gap), self.force
 
     async def _lift(self, context: Context, motion: PlannedMotion, side: Side, grasp: Grasp) -> None:
         """Lift it, back along the approach: up at once, so that it is not dragged."""

@@ -55,6 +55,10 @@ class TakeThingConfig:
         reach_speed: straight to the thing, and up with it [m/s].
         touch: force of each finger until both touch [N]; less than what moves the thing or tips it.
         force: of each finger [N].
+        tuned: whether that force is what friction needs to hold the thing, by the stack's `properties`, and `force` is
+            only the most; with `hand: {use: deligrasp}` as DeliGrasp has it.
+        safety: by how much more than its weight a tuned force holds; a thing held beside its middle turns.
+        squeeze: how far a tuned force may press the thing together [m].
         close_timeout: time the fingers may take [s].
         lift: how high it is lifted [m].
         turn: how far the torso turns to either side where it is not in view [rad]; 0: not at all.
@@ -76,6 +80,9 @@ class TakeThingConfig:
     reach_speed: float = 0.08
     touch: float = 1.0
     force: float = 16.0
+    tuned: bool = False
+    safety: float = 2.0
+    squeeze: float = 0.004
     close_timeout: float = 2.5
     lift: float = 0.12
     turn: float = 0.45
@@ -95,6 +102,7 @@ class TakeReport:
         below: height of the fingertips above what it stood on [m].
         above: height of its top above the fingertips [m].
         width: how far the fingers are open around it [m].
+        force: what each finger was told to press with [N].
         aside_x, aside_y: where its middle is beside the fingertips, along the hand's x and y axes [m].
         off_x, off_y: how far from where the head camera had it the hand found it, in odom [m].
     """
@@ -107,6 +115,7 @@ class TakeReport:
     below: float = 0.0
     above: float = 0.0
     width: float = 0.0
+    force: float = 0.0
     aside_x: float = 0.0
     aside_y: float = 0.0
     off_x: float = 0.0

@@ -25,7 +25,9 @@ LEANS = 0.25
 HYPOTHESES = 400
 """Planes through three points that are tried."""
 STRAY = 8
-"""Pieces that are too small to be a thing, and are passed over."""
+"""Pieces that are looked at; some are too small to be a thing."""
+ALIKE = 1.6
+"""Factor by which a thing may be larger or smaller to a palm camera than to the head's."""
 FRAMES = 3
 """Frames of a palm camera that are waited for, so that it shows the hand at rest."""
 
@@ -91,34 +93,59 @@ async def palm_view(context: Context, side: Side, label: str, seconds: float) ->
     return points[(points - T[:3, 3]) @ T[:3, 2] > TIPS]
 
 
-def seen_again(points: Array, target: LocalizedObject, trust: float) -> tuple[LocalizedObject, Array] | None:
+def seen_again(
+    points: Array, target: LocalizedObject, trust: float, size: tuple[float, float] | None = None
+) -> tuple[LocalizedObject, Array] | None:
     """Return `target` as a palm camera's `points` (n, 3) show it, and the (3,) normal of the surface it stands on.
 
     A hand whose encoders are off by degrees sees a level surface lean: its normal is what is upright to that hand.
-    None where nothing like the thing is within `trust` [m].
+    None where nothing like the thing is within `trust` [m]. Of what stands there the nearest is taken whose width and
+    height are about those of `size` [m]; where nothing is so, or nobody says the size, the nearest.
     """
     middle = np.median(target.points, axis=0) if len(target.points) else target.position
     around = points[np.linalg.norm(points[:, :2] - middle[:2], axis=1) < trust + 0.10]
     if len(around) < MIN_POINTS:
         return None
-    upright = UP
-    surface = leaning_surface(around)
+    upright, surface = UP, leaning_surface(around)
     if surface is not None:
-        upright, offset = surface
-        around = around[around @ upright > offset + PROUD]
-    cloud = around[:0]
-    for _ in range(STRAY if len(around) else 0):
-        # Seen from above a bottle is a cap over a shoulder, with nothing between them: pieces are those of its plan.
-        own = piece_at(around - np.outer((around - middle) @ upright, upright), middle)
-        cloud, around = around[own], around[~own]
-        if len(cloud) >= MIN_POINTS or not len(around):
-            break
-    if len(cloud) < MIN_POINTS or np.hypot(*(np.median(cloud, axis=0) - middle)[:2]) > trust:
+        upright = surface[0]
+        around = around[around @ upright > surface[1] + PROUD]
+    clouds = _pieces(around, middle, upright, trust)
+    if not clouds:
         return None
+    cloud = clouds[0]
+    if size is not None and surface is not None:
+        cloud = next((one for one in clouds if _alike(one, upright, surface[1], size)), cloud)
     centre = 0.5 * (cloud.min(axis=0) + cloud.max(axis=0))
     centre += (np.quantile(cloud @ upright, 0.9) - centre @ upright) * upright
     nearest = cloud[((cloud - centre) ** 2).sum(axis=1).argmin()].copy()
     return replace(target, position=nearest, points=cloud, mask=None), upright
+
+
+def _pieces(around: Array, middle: Array, upright: Array, trust: float) -> list[Array]:
+    """Return the clouds of what stands within `trust` [m] of `middle` (3,), the nearest first."""
+    clouds: list[Array] = []
+    for _ in range(STRAY):
+        if not len(around):
+            break
+        # Seen from above a bottle is a cap over a shoulder, with nothing between them: pieces are those of its plan.
+        own = piece_at(around - np.outer((around - middle) @ upright, upright), middle)
+        cloud, around = around[own], around[~own]
+        if len(cloud) >= MIN_POINTS and np.hypot(*(np.median(cloud, axis=0) - middle)[:2]) <= trust:
+            clouds.append(cloud)
+    return sorted(clouds, key=lambda cloud: float(np.hypot(*(np.median(cloud, axis=0) - middle)[:2])))
+
+
+def width(points: Array) -> float:
+    """Return the greater side of the plan of points (n, 3), strays left out [m]."""
+    low, high = np.quantile(points[:, :2], (0.02, 0.98), axis=0)
+    return float((high - low).max())
+
+
+def _alike(cloud: Array, upright: Array, surface: float, size: tuple[float, float]) -> bool:
+    """Return whether a cloud on a plane at `surface` along `upright` is about as wide and high as `size`."""
+    found = width(cloud), float(np.quantile(cloud @ upright, 0.98)) - surface
+    return all(1.0 / ALIKE < have / expected < ALIKE for have, expected in zip(found, size, strict=True))
 
 
 def leaning_surface(points: Array) -> tuple[Array, float] | None:

@@ -28,6 +28,23 @@ def test_an_errand_leads_elsewhere_and_to_a_free_place(index: int) -> None:
     assert np.linalg.norm(np.subtract(others, place), axis=1).min() > 0.1
 
 
+def test_the_things_that_are_asked_for_are_tried_case_by_case() -> None:
+    rung = CounterTether(CounterOptions(thing=("can", "bowl")))
+    cases = rung.cases(lambda case: None)
+    assert cases == [{"thing": "can"}, {"thing": "bowl"}]
+    kitchen = draw_counter(np.random.default_rng(0))
+    for case in cases:
+        kind, hand, _ = draw_errand(
+            TrialSpec("counter-tether", "centroid", "field", 1, 0, case=case), kitchen
+        )
+        (thing,) = (one for one in kitchen.things if one.kind == case["thing"])
+        assert kind == case["thing"] and (thing.position[1] > 0.0) == (hand == "left")
+    both = CounterTether(CounterOptions(thing=("can",), each=True)).cases(lambda case: None)
+    assert both == [{"thing": "can", "hand": "left"}, {"thing": "can", "hand": "right"}]
+    with pytest.raises(ConfigError, match="Unknown thing 'spoon'; valid: "):
+        CounterTether(CounterOptions(thing=("spoon",))).cases(lambda case: None)
+
+
 def test_every_thing_is_tried_with_either_hand() -> None:
     rung = CounterTether(CounterOptions(each=True))
     cases = rung.cases(lambda case: None)

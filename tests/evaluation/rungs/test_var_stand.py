@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError
-from golem.evaluation.base import TrialSpec, make_rung, rung_class
+from golem.evaluation.base import TrialOutcome, TrialSpec, make_rung, rung_class
 from golem.evaluation.rungs.var_stand import PLACEMENT, VarStandRung, drawn_stance
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.engine import MujocoRobot
@@ -65,3 +65,13 @@ def test_a_robot_that_stands_badly_docks_and_picks() -> None:
     found = VarStandRung().run(spec(0, dock="yes"), None)
     assert found.series["dockings"] >= 1 and found.series["approaches"] >= 1
     assert found.success, found.detail
+
+
+def test_its_plot_is_of_the_places_alone() -> None:
+    pytest.importorskip("matplotlib", reason="the extra report is not installed")
+    from golem.evaluation.report.svg_figure import page_figure, styled
+
+    rung = make_rung("golem.evaluation.rungs.var_stand:VarStandRung", {"start": ["placed"], "dock": ["no"]})
+    rows = [(spec(i), TrialOutcome(i > 0, "done" if i else "stance")) for i in range(3)]
+    with styled():
+        assert rung.plot({"visual_servo": rows}, page_figure(300.0)) == "Success by condition [%]"

@@ -35,6 +35,7 @@ SUITES: dict[str, str] = {
     "planner": f"{_HERE}.planner_suite:PlannerSuite",
     "localizer": f"{_HERE}.localizer_suite:LocalizerSuite",
     "grasp_method": f"{_HERE}.grasp_suite:GraspSuite",
+    "properties": f"{_HERE}.property_suite:PropertySuite",
     "odometry": f"{_HERE}.odometry_suite:OdometrySuite",
     "mapper": f"{_HERE}.mapper_suite:MapperSuite",
     "memory": f"{_HERE}.memory_suite:MemorySuite",
@@ -56,6 +57,7 @@ UNCHECKED: dict[tuple[str, str], str] = {
     ): "it needs weights: golem check localizer '{use: grounding_dino, weights: FILE}'",
     ("localizer", "owlv2"): "it needs weights: golem check localizer '{use: owlv2, weights: FILE}'",
     ("localizer", "yolo_world"): "it needs weights: golem check localizer '{use: yolo_world, weights: FILE}'",
+    ("properties", "gemini"): "it asks a service: golem check properties gemini, with your key",
     ("grasp_method", "graspgen"): "it needs a server: golem check grasp_method '{use: graspgen, host: HOST}'",
     ("robot", "replay"): "it needs a recording: golem check robot '{use: replay, file: BAG}'",
 }

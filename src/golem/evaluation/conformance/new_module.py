@@ -28,6 +28,12 @@ navigator: {{use: costmap_astar}}
     "memory": """robot: {{use: mujoco}}
 memory: {{use: {name}.py:{cls}}}
 """,
+    "properties": """robot: {{use: mujoco, world: counter, support: gantry}}
+localizer: {{use: clusters}}
+grasp_method: {{use: antipodal}}
+skills: {{take: {{use: take, tuned: true}}}}
+properties: {{use: {name}.py:{cls}}}
+""",
     "navigator": """robot: {{use: mujoco, support: ground, world: open}}
 lower_body: {{use: almi}}
 navigator: {{use: {name}.py:{cls}}}
@@ -42,6 +48,7 @@ test_{name} = conformance_tests("{slot}", "{name}.py:{cls}")
 '''
 _RUN = {
     "skill": "golem run {name}.yaml --skill {name}",
+    "properties": "golem run {name}.yaml --skill take can",
     "robot": "golem run {name}.yaml --skill stand",
     "lower_body": "golem run {name}.yaml --skill stand",
     "mapper": "golem run {name}.yaml --skill navigate --x 2",
@@ -54,6 +61,7 @@ _COMPARE = {
     "estimator": "golem ladder --rung base-estimation --method random_walk_kf {name}.py:{cls} --out runs/{name}",
     "odometry": "golem ladder --rung odometry --method legs {name}.py:{cls} -n 1 --out runs/{name}",
     "mapper": "golem ladder --rung navigate --map none --use mapper={name}.py:{cls} -n 10 --out runs/{name}",
+    "properties": "golem ladder --rung counter-tether --use properties={name}.py:{cls} -n 10 --out runs/{name}",
     "memory": "golem ladder --rung memory --method object_map {name}.py:{cls} -n 5 --out runs/{name}",
     "navigator": "golem ladder --rung navigate-line --use navigator={name}.py:{cls} -n 10 --out runs/{name}",
     **{

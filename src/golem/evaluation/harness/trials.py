@@ -15,6 +15,7 @@ from typing import Any
 
 from golem.errors import GolemError, ModuleFault
 from golem.evaluation.base import Rung, TrialOutcome, TrialSpec, make_rung
+from golem.evaluation.episodes.last_seconds import FILM, LastSeconds
 from golem.evaluation.harness.copies import CopyDied
 from golem.evaluation.harness.culprit import culprit_of
 from golem.evaluation.harness.run_folder import Finished
@@ -137,7 +138,7 @@ def run_batch(batch: Batch) -> tuple[Finished, ...] | Refused | Died:
             with tempfile.TemporaryDirectory(prefix="golem-trial-") as folder:
                 path = Path(folder) / "artefacts"
                 with tallied() as tally:
-                    found = [run_trial(rung, first, path)]
+                    found = [filmed_trial(rung, first, path)]
                 files = {file.name: file.read_bytes() for file in path.glob("*")}
     except (ModuleFault, CopyDied, *LEAVING) as error:
         # `run_trial` lets none through: trials that were run together are run one by one.
@@ -166,6 +167,20 @@ def _mismatch(batch: Batch, rung: Rung[Any]) -> str | None:
         if now != batch.configs[spec.method]:
             return f"Files of {spec.method} changed while this ran, or a worker has others; choose another --out."
     return None
+
+
+def filmed_trial(rung: Rung[Any], spec: TrialSpec, artefacts: Path) -> TrialOutcome:
+    """Run one trial, and keep the film of its last seconds if it is lost; see `run_trial`."""
+    rung.onlooker = last = LastSeconds()
+    try:
+        outcome = run_trial(rung, spec, artefacts)
+    finally:
+        rung.onlooker = None
+    film = None if outcome.success else last.film(outcome.stage)
+    if film is not None:
+        artefacts.mkdir(exist_ok=True)
+        (artefacts / FILM).write_bytes(film)
+    return outcome
 
 
 LEAVING = (SystemExit, KeyboardInterrupt)

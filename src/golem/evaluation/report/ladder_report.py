@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import base64
 import struct
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from golem.evaluation.base import RUNGS, case_name, make_rung
+from golem.evaluation.episodes.last_seconds import FILM
 from golem.evaluation.harness.records import TrialRecord, artefacts, trial_name
 from golem.evaluation.metrics.published import PAPER
 from golem.evaluation.metrics.summary import NO_MODULE, Summary
@@ -16,9 +18,13 @@ from golem.evaluation.metrics.tables import comparisons, metric_differences, met
 from golem.evaluation.metrics.text_table import short_names
 from golem.evaluation.report.html_page import render_page
 from golem.evaluation.report.ladder_plots import failure_plot, own_plot, rate_plot, time_plot
+from golem.evaluation.report.margin_box import MarginBox, margin_box, margin_boxes
 from golem.evaluation.report.margin_plot import MAX_CURVES, MarginCurve, margin_plot
 from golem.evaluation.report.svg_figure import styled
 from golem.robots.mujoco.balance import TRACE, BalanceTrace
+
+MAX_FILMS = 24
+"""Films that the page itself holds at most; the others lie beside it."""
 
 if TYPE_CHECKING:
     from golem.evaluation.harness.ladder import LadderResult
@@ -58,10 +64,12 @@ def render(result: LadderResult) -> str:
             metrics=[]
             if rung.adaptive
             else [t for t in (metrics(summary), metric_differences(summary)) if t],
+            margin_boxes=margin_boxes(_boxes(grouped, result.out)),
             margin_plots=_margins(grouped, result.out),
             max_curves=MAX_CURVES,
             pictures=_pictures(grouped, result.out),
-            lost=[_row(r) for r in lost],
+            films=_films(lost, result.out),
+            lost=[_row(r, result.out) for r in lost],
             traces=any(r.trace for r in lost),
             show=f"{config.command()} --show {trial_name(lost[0])}" if lost else "",
         )
@@ -78,9 +86,31 @@ def _says(r: TrialRecord) -> str:
     return f"trial {r.index}: lost in {r.stage}{blame}{': ' + r.detail if r.detail else ''}"
 
 
-def _row(r: TrialRecord) -> dict[str, str | None]:
+def _row(r: TrialRecord, folder: Path) -> dict[str, str | None]:
     module = r.module or NO_MODULE
-    return {"name": trial_name(r), "stage": r.stage, "module": module, "detail": r.detail, "trace": r.trace}
+    path = artefacts(folder, r) / FILM
+    film = path.relative_to(folder).as_posix() if path.is_file() else None
+    row = {"name": trial_name(r), "stage": r.stage, "module": module, "detail": r.detail}
+    return {**row, "trace": r.trace, "film": film}
+
+
+def _films(lost: Sequence[TrialRecord], folder: Path) -> list[dict[str, str]]:
+    """Return the films of lost trials, at first one of each method and stage, `MAX_FILMS` at most."""
+    filmed = [(r, path) for r in lost if (path := artefacts(folder, r) / FILM).is_file()]
+    seen = Counter[tuple[str, str]]()
+    turns: list[int] = []
+    for r, _ in filmed:
+        turns.append(seen[r.method, r.stage])
+        seen[r.method, r.stage] += 1
+    chosen = sorted(range(len(filmed)), key=lambda k: turns[k])[:MAX_FILMS]
+    return [
+        {
+            "method": filmed[k][0].method,
+            "says": _says(filmed[k][0]),
+            "data": base64.b64encode(filmed[k][1].read_bytes()).decode(),
+        }
+        for k in sorted(chosen)
+    ]
 
 
 def _map(records: Sequence[TrialRecord], summary: Summary) -> dict[str, list[tuple[bool, str]]]:
@@ -91,6 +121,12 @@ def _map(records: Sequence[TrialRecord], summary: Summary) -> dict[str, list[tup
             cells = [(r.success, _says(r)) for r in records if (r.method, r.case) == (method, case)]
             found[" ".join(part for part in (short[method], case_name(case)) if part)] = cells
     return found
+
+
+def _boxes(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> list[MarginBox]:
+    short = short_names(grouped)
+    found = [margin_box(short[method], rows, folder, i) for i, (method, rows) in enumerate(grouped.items())]
+    return [box for box in found if box is not None]
 
 
 def _margins(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> list[tuple[str, str]]:

@@ -12,8 +12,9 @@ from typing import Any, ClassVar, Protocol, TypeVar
 from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.episode import episode_seed, lost
+from golem.evaluation.episodes.episode import lost
 from golem.evaluation.episodes.oracle import Oracle
+from golem.evaluation.episodes.true_masks import build_seeing, with_modules
 from golem.evaluation.rungs.pick_screw import ABORTED, SLOT, balance, let_go
 from golem.provenance import stack_facts
 from golem.robots.mujoco.balance import TRACE, BalanceRecorder
@@ -21,7 +22,7 @@ from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.worlds.conditions import LayoutKind
 from golem.robots.worlds.kitchen import KitchenLayout
-from golem.runtime.lockstep import LockstepRunner, build
+from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import SkillResult
 from golem.slots import KEYS
 from golem.stack import Stack, load_stack
@@ -133,7 +134,7 @@ class KitchenRung(Rung[O]):
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
         stack = self._stack(spec.method, spec.profile, spec.overrides)
-        running, robot = build(stack, episode_seed(spec.seed, spec.index))
+        running, robot = build_seeing(stack, spec)
         if not isinstance(robot, MujocoRobot) or robot.scene.kitchen is None:
             raise ConfigError(
                 f"Rung {self.name} judges the twin's {self.subject}; robot: {stack.choice('robot').use} is none."
@@ -179,6 +180,4 @@ class KitchenRung(Rung[O]):
             )
         stack = load_stack(self.stack_name or self.name, profile=profile).with_choice(self.slot, method)
         stack = stack.with_options("robot", layout=self.options.layout)
-        for slot, use in overrides.items():
-            stack = stack.with_choice(slot, use)
-        return stack
+        return with_modules(stack, overrides)

@@ -24,6 +24,7 @@ from golem.evaluation.episodes.pick_touches import PickTouches
 from golem.evaluation.episodes.pick_verdict import verdict, verdict_tables
 from golem.evaluation.episodes.pick_watch import PickWatch
 from golem.evaluation.episodes.pull import straightness
+from golem.evaluation.episodes.true_masks import build_seeing, with_modules
 from golem.evaluation.harness.sweep import read_sweep
 from golem.evaluation.metrics.text_table import TextTable
 from golem.evaluation.report.condition_plot import condition_plot
@@ -32,7 +33,7 @@ from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.worlds.conditions import Conditions, LayoutKind, draw_conditions, world_stream
-from golem.runtime.lockstep import LockstepRunner, build
+from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import FAULT, SkillResult
 from golem.skills.pick_config import PickGoal
 from golem.skills.pick_report import PickReport
@@ -124,7 +125,7 @@ class PickRung(Rung[PickOptions]):
         stack = self._stack(spec.method, spec.profile, spec.overrides)
         if self.options.layout != "nominal" or spec.case:
             stack = stack.with_options("robot", layout=self.options.layout, conditions=dict(spec.case))
-        running, robot = build(stack, episode_seed(spec.seed, spec.index))
+        running, robot = build_seeing(stack, spec)
         if self.onlooker is not None:
             self.onlooker(running, robot)
         oracle = Oracle(robot)
@@ -180,8 +181,7 @@ class PickRung(Rung[PickOptions]):
         if SLOT in overrides:
             raise ConfigError(f"The method is what sits in {SLOT}; leave out --use {SLOT}=...")
         stack = load_stack(self.name, profile=profile).with_choice(SLOT, method)
-        for slot, use in overrides.items():
-            stack = stack.with_choice(slot, use)
+        stack = with_modules(stack, overrides)
         if stack.on_ground != self.balances:
             raise ConfigError(
                 f"Rung {self.name} has a robot {'on its feet' if self.balances else 'in its hoist'}, and this one is "

@@ -8,14 +8,14 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.navigation.goto import GoTo
 from golem.errors import ConfigError
-from golem.evaluation.base import Case, Results, TrialOutcome, TrialSpec
+from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, lost
 from golem.evaluation.episodes.hall_walk import true_pose
@@ -28,7 +28,7 @@ from golem.evaluation.rungs.navigate_hall import DISTANCE, GUESS, SPREAD
 from golem.evaluation.rungs.pick_screw import SETTLE, PickOptions, PickRung, balance, judge_pick
 from golem.interfaces import topics
 from golem.middleware.bus import News
-from golem.robots.mujoco.balance import BalanceRecorder
+from golem.robots.mujoco.balance import TRACE, BalanceRecorder
 from golem.robots.worlds.conditions import LayoutKind
 from golem.runtime.lockstep import build_robot
 from golem.skills.approach import APPROACH, approach
@@ -115,7 +115,7 @@ class VarStandRung(PickRung):
         """Run one trial; see `Rung`."""
         seed, walks = episode_seed(spec.seed, spec.index), spec.case["start"] == "walked"
         stance = drawn_stance(spec, walks)
-        conditions = {k: v for k, v in spec.case.items() if k not in ("start", "dock")}
+        conditions = dict(_conditions(spec.case))
         stack = self._stack(spec.method, spec.profile, spec.overrides).with_options(
             "robot",
             layout=self.options.layout,
@@ -131,7 +131,19 @@ class VarStandRung(PickRung):
                 guess = (spec.rng("guess").uniform(-1.0, 1.0, 3) * GUESS).tolist()
                 stack = stack.with_options("mapper", file=f"{folder}/hall.yaml", guess=guess)
             with closing(Episode(stack, seed, self.onlooker)) as episode:
-                return _Trial(spec, stack, episode, stance).run()
+                trial = _Trial(spec, stack, episode, stance)
+                outcome = trial.run()
+                if artefacts is not None and trial.recorder is not None:
+                    trial.recorder.trace().save(artefacts / TRACE)
+                return outcome
+
+    def plot(self, outcomes: Outcomes, figure: Any) -> str | None:
+        """Draw success by condition of the place; how the robot came there is none. See `Rung`."""
+        placed = {
+            method: [(replace(spec, case=_conditions(spec.case)), outcome) for spec, outcome in rows]
+            for method, rows in outcomes.items()
+        }
+        return super().plot(placed, figure)
 
     def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
         if "robot" in overrides or "grasp_method" in overrides:
@@ -143,7 +155,11 @@ class VarStandRung(PickRung):
 
 
 class _Trial:
-    """One trial on its way."""
+    """One trial on its way.
+
+    Attributes:
+        recorder: of the balance from the pick on; None before it.
+    """
 
     def __init__(self, spec: TrialSpec, stack: Stack, episode: Episode, stance: PlanarPose) -> None:
         self._spec, self._stack, self._episode, self._stance = spec, stack, episode, stance
@@ -151,6 +167,7 @@ class _Trial:
         self._oracle = Oracle(episode.robot)
         self._contacts = ContactWatch(episode.robot)
         self._series: dict[str, float] = {}
+        self.recorder: BalanceRecorder | None = None
 
     def run(self) -> TrialOutcome:
         """Come to the pack, pick, and judge."""
@@ -195,7 +212,8 @@ class _Trial:
         running, robot = self._episode.running, self._episode.robot
         oracle, before = self._oracle, self._oracle.fasteners()
         touches = PickTouches(robot, before, oracle.T_world_odom)
-        watch = PickWatch(running, oracle, BalanceRecorder(robot), touches)
+        self.recorder = BalanceRecorder(robot)
+        watch = PickWatch(running, oracle, self.recorder, touches)
         goal = DisassembleGoal(1, self._docks, pick=PickGoal(side="either"))
         news, since = News(running.bus, topics.FEEDBACK), running.executor.t
 
@@ -221,10 +239,9 @@ class _Trial:
         ]
         looked_at = {i: _at(T @ T_base_odom, place) for i, place in watch.looked_at.items()}
         served = sum(load_map().serves(side, f.in_base) for f in fasteners if f.loose for side in SIDES)
-        assert watch.recorder is not None
         series = {
             **outcome.series,
-            **balance(watch.recorder.trace(running.executor.t - since)),
+            **balance(self.recorder.trace(running.executor.t - since)),
             **self._series,
             **self._placed("after"),
             **touches.series(),
@@ -279,6 +296,11 @@ class _Trial:
 
     def _name(self, slot: str) -> str:
         return f"{slot}: {self._stack.choice(slot).use}"
+
+
+def _conditions(case: Case) -> Case:
+    """Return what of a case the place is drawn from."""
+    return {k: v for k, v in case.items() if k not in ("start", "dock")}
 
 
 def drawn_stance(spec: TrialSpec, walks: bool) -> PlanarPose:

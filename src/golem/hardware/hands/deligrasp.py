@@ -56,11 +56,13 @@ class DeliGrasp(MagpieHand):
     def step(self, state: HandState, t: float) -> HandCommand:
         """Take in what the hand reports and return what it is told at `t` [s]; see `MagpieHand.step`."""
         command = super().step(state, t)
-        if self._last is None or self._finished:
+        if self._last is None:
             return command
         if self._state is GripState.CLOSING:
+            # A contact that is lost again was an impact: it goes on.
+            self._finished = False
             self._adapt(self._last, t)
-        elif self._state is GripState.CONTACT:
+        elif self._state is GripState.CONTACT and not self._finished:
             self._finished = True
             self._goal = max(self._goal - self._options.gap_step, 0.0)
         return HandCommand(t=t, gap=self._goal, force=self._force)

@@ -1,0 +1,64 @@
+"""A table of what common things are like: it needs no network, and answers at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from golem.capabilities.properties.base import Properties
+from golem.errors import ConfigError, unknown_name
+
+KNOWN: dict[str, tuple[float, float, float]] = {
+    "mug": (0.35, 0.5, 2e5),
+    "bowl": (0.40, 0.5, 1e5),
+    "can": (0.38, 0.4, 2e4),
+    "bottle": (0.60, 0.5, 5e3),
+    "screw": (0.02, 0.3, 1e6),
+    "nut": (0.01, 0.3, 1e6),
+    "egg": (0.06, 0.4, 5e3),
+    "tomato": (0.12, 0.5, 1.5e3),
+    "paper_cup": (0.15, 0.5, 5e2),
+    "sponge": (0.02, 0.8, 3e2),
+}
+"""Mass [kg], friction on rubber, stiffness [N/m] of full or whole things as they are sold: estimates, not measured."""
+
+
+@dataclass(frozen=True)
+class PropertyTableConfig:
+    """Options of `PropertyTable`.
+
+    Attributes:
+        things: mass [kg], friction, stiffness [N/m] by label; they replace and extend what it knows.
+    """
+
+    things: dict[str, tuple[float, float, float]] = field(
+        default_factory=dict[str, tuple[float, float, float]]
+    )
+
+
+class PropertyTable:
+    """Mass, friction and stiffness by name, from a table; see `PropertySource`.
+
+    Attributes:
+        latency: none [s].
+    """
+
+    latency = 0.0
+
+    def __init__(self, config: PropertyTableConfig | None = None) -> None:
+        """Take the table.
+
+        Raises:
+            ConfigError: a number in it is none that a thing can have.
+        """
+        self._things: dict[str, Properties] = {}
+        for label, row in {**KNOWN, **(config or PropertyTableConfig()).things}.items():
+            try:
+                self._things[label] = Properties(*row)
+            except ValueError as error:
+                raise ConfigError(f"The properties of {label}: {error}.") from error
+
+    def properties(self, label: str) -> Properties:
+        """Return the row of `label`; see `PropertySource`."""
+        if label not in self._things:
+            raise unknown_name("thing", label, self._things)
+        return self._things[label]

@@ -1,0 +1,132 @@
+"""The film of a lost trial: its last seconds, as a camera beside the robot sees them, with what the robot said."""
+
+from __future__ import annotations
+
+import io
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+from PIL import Image, ImageDraw, ImageFont
+
+from golem.interfaces import topics
+from golem.middleware.bus import News
+from golem.robots.mujoco.camera import CameraRig
+from golem.robots.mujoco.engine import MujocoRobot
+from golem.robots.mujoco.scene import ONLOOKER
+from golem.robots.mujoco.spectator import HEADLIGHT
+from golem.types import Array
+
+FILM = "film.webp"
+"""Name of the file that holds a lost trial's film among its artefacts."""
+FPS = 10.0
+"""Pictures per second of robot time."""
+LENGTH = 5.0
+"""Length of a film [s]."""
+AFTER = 1.0
+"""How much of it comes after the stage in which the trial was lost [s]."""
+SCALE = 0.5
+"""Size of its pictures, relative to the onlooker's."""
+QUALITY = 45
+BAR = 22
+"""Height of the line with the words [px]."""
+INK, PANEL = (240, 242, 245), (16, 20, 27)
+
+
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    t: float
+    qpos: Array
+    mocap: tuple[Array, Array]
+    words: str
+
+
+class LastSeconds:
+    """Keeps the last seconds of the twin of a trial, and those before each stage was last left; an `Onlooker`.
+
+    Only states are kept; pictures are made if the trial turns out to be lost. No trial is changed by it.
+    """
+
+    period = 1.0 / FPS
+
+    def __init__(self) -> None:
+        """Wait for a trial to begin."""
+        self._robot: MujocoRobot | None = None
+        self._start()
+
+    def _start(self) -> None:
+        self._recent: deque[_Moment] = deque(maxlen=round(LENGTH * FPS))
+        self._left: dict[str, list[_Moment]] = {}
+        self._due: deque[tuple[float, str]] = deque()
+        self._stage = self._words = ""
+
+    def __call__(self, running: Any, robot: Any) -> None:
+        """Look on from now on; see `Onlooker`. What is not the MuJoCo twin has no film."""
+        if isinstance(robot, MujocoRobot):
+            self._start()
+            self._robot, self._news = robot, News(running.bus, topics.FEEDBACK)
+            running.executor.add(self)
+
+    def step(self, t: float) -> None:
+        """Keep the state at `t` [s]."""
+        assert self._robot is not None
+        said = self._news.read()
+        if said is not None:
+            if said.stage != self._stage:
+                self._due.append((t + AFTER, self._stage))
+            self._stage, self._words = said.stage, f"{said.stage}: {said.text}"
+        data = self._robot.data
+        mocap = data.mocap_pos.copy(), data.mocap_quat.copy()
+        self._recent.append(_Moment(t, data.qpos.copy(), mocap, self._words))
+        while self._due and t >= self._due[0][0]:
+            self._left[self._due.popleft()[1]] = list(self._recent)
+
+    def film(self, stage: str) -> bytes | None:
+        """Return the film, as animated WebP, of a trial lost in `stage`; None where no twin was seen.
+
+        It ends a second after a skill last left that stage, else at the end of the trial.
+        """
+        moments = self._left.get(stage) or list(self._recent)
+        if self._robot is None or not moments:
+            return None
+        model, frames = self._robot.scene.model, list[Image.Image]()
+        data = mujoco.MjData(model)
+        font = ImageFont.load_default(size=12)
+        # The lights belong to the model; the hall itself is lit for the robot's eyes.
+        lamp = model.vis.headlight
+        kept = lamp.ambient.copy(), lamp.diffuse.copy()
+        lamp.ambient[:], lamp.diffuse[:] = HEADLIGHT
+        try:
+            with CameraRig(model, [_scaled()]) as rig:
+                for moment in moments:
+                    data.qpos[:] = moment.qpos
+                    data.mocap_pos[:], data.mocap_quat[:] = moment.mocap
+                    mujoco.mj_kinematics(model, data)
+                    mujoco.mj_camlight(model, data)
+                    image = Image.fromarray(rig.render(data, ONLOOKER.name)[0])
+                    draw = ImageDraw.Draw(image)
+                    draw.rectangle((0, image.height - BAR, image.width, image.height), fill=PANEL)
+                    text = f"{moment.t:.1f} s  {moment.words}"
+                    draw.text((6, image.height - BAR + 4), text, fill=INK, font=font)
+                    frames.append(image)
+        finally:
+            lamp.ambient[:], lamp.diffuse[:] = kept
+        return _packed(frames)
+
+
+def _scaled() -> Any:
+    i = ONLOOKER
+    return replace(
+        i, width=round(SCALE * i.width), height=round(SCALE * i.height), fx=SCALE * i.fx, fy=SCALE * i.fy,
+        cx=SCALE * (i.cx + 0.5) - 0.5, cy=SCALE * (i.cy + 0.5) - 0.5,
+    )  # fmt: skip
+
+
+def _packed(frames: list[Image.Image]) -> bytes:
+    stream = io.BytesIO()
+    frames[0].save(
+        stream, "WEBP", save_all=True, append_images=frames[1:], duration=round(1000 / FPS), loop=0, method=2,
+        quality=QUALITY,
+    )  # fmt: skip
+    return stream.getvalue()
