@@ -137,6 +137,16 @@ def test_what_took_the_place_of_another_kind_is_believed_at_the_second_look() ->
     assert len(memory.query("mug", "history")) == 1
 
 
+def test_what_was_seen_from_too_far_to_tell_where_it_is_outvotes_nothing() -> None:
+    memory = ObjectMap()
+    one = look(0.0, {"can": HERE})
+    far = replace(one.objects[0], position=np.array([100.0, 0.3, 1.1]))
+    for t in (0.0, 1.0, 2.0):
+        memory.observe(replace(one, frame=replace(one.frame, t=t), objects=[far], labels=()))
+    memory.observe(look(3.0, {"mug": HERE}))
+    assert memory.query("mug")[0].evidence == "seen"
+
+
 def test_neighbours_of_two_kinds_are_two() -> None:
     memory = ObjectMap()
     beside = (1.4, 0.17, 1.1)

@@ -44,7 +44,9 @@ def _rivals(records: ObjectRecords, row: int, gate: float) -> NDArray[np.intp]:
     at both are two bodies.
     """
     values, mine = records.values, records.values[row]
-    reach = np.maximum(values[:, SIZE], mine[SIZE]) + gate * np.sqrt(values[:, VARIANCE] + mine[VARIANCE])
+    # What may be anywhere, by its variance, is no rival of what is known to be here.
+    sigma = np.sqrt(2.0 * np.minimum(values[:, VARIANCE], mine[VARIANCE]))
+    reach = np.maximum(values[:, SIZE], mine[SIZE]) + gate * sigma
     near = np.flatnonzero(np.abs(values[:, 0] - mine[0]) <= reach)  # most are far off along one axis already
     others, label = values[near], records.label(row)
     same_place = np.linalg.norm(others[:, PLACE] - mine[PLACE], axis=1) <= reach[near]
