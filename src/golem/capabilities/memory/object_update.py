@@ -11,6 +11,8 @@ from golem.types import Array, LocalizedObject
 
 LEAST = 0.15
 """Log odds of a detection that is as likely wrong as right, by its score: what is found again and again is there."""
+LARGEST = 0.3
+"""Largest radius that an object is taken to have [m]."""
 
 
 def update(row: Array, place: Array, variance: float, gain: float, ceiling: float, t: float) -> None:
@@ -39,4 +41,4 @@ def size_of(found: LocalizedObject) -> float:
     if len(found.points) < 4:
         return 0.03
     spread = np.median(np.linalg.norm(found.points - np.median(found.points, axis=0), axis=1))
-    return float(np.clip(1.5 * spread, 0.02, 0.3))
+    return float(np.clip(1.5 * spread, 0.02, LARGEST))

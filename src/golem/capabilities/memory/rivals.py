@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,7 @@ from golem.capabilities.memory.object_records import (
     VARIANCE,
     ObjectRecords,
 )
+from golem.capabilities.memory.object_update import LARGEST
 from golem.types import Array
 
 
@@ -44,12 +47,13 @@ def _rivals(records: ObjectRecords, row: int, gate: float) -> NDArray[np.intp]:
     at both are two bodies.
     """
     values, mine = records.values, records.values[row]
-    # What may be anywhere, by its variance, is no rival of what is known to be here.
-    sigma = np.sqrt(2.0 * np.minimum(values[:, VARIANCE], mine[VARIANCE]))
-    reach = np.maximum(values[:, SIZE], mine[SIZE]) + gate * sigma
-    near = np.flatnonzero(np.abs(values[:, 0] - mine[0]) <= reach)  # most are far off along one axis already
+    # What may be anywhere, by its variance, is no rival of what is known to be here: the smaller variance counts.
+    most = LARGEST + gate * math.sqrt(2.0 * mine[VARIANCE])
+    near = np.flatnonzero(np.abs(values[:, 0] - mine[0]) <= most)  # most are far off along one axis already
     others, label = values[near], records.label(row)
-    same_place = np.linalg.norm(others[:, PLACE] - mine[PLACE], axis=1) <= reach[near]
+    sigma = np.sqrt(2.0 * np.minimum(others[:, VARIANCE], mine[VARIANCE]))
+    reach = np.maximum(others[:, SIZE], mine[SIZE]) + gate * sigma
+    same_place = np.linalg.norm(others[:, PLACE] - mine[PLACE], axis=1) <= reach
     alive_together = _overlap(others, mine, GONE)
     seen_by_turns = _overlap(others, mine, LAST) if mine[LOOKS] > 1.0 else alive_together
     together = others[:, LAST] == mine[LAST]
