@@ -31,7 +31,9 @@ LEGS = LegStatus(
     0.0, Twist(), Twist(), False, "", False, False, PlanarPose(0.0, 0.0, 0.0), np.zeros(2), "hold", speed=0.0
 )
 NOT_THERE = SkillResult(False, "detect", "localizer", "The head camera shows no mug.", value=TakeReport())
-TAKEN = SkillResult(True, "done", None, "", value=TakeReport("left", "top", below=0.08, above=0.02))
+TAKEN = SkillResult(
+    True, "done", None, "", value=TakeReport("left", "top", below=0.08, above=0.02, off_x=0.01, off_y=-0.07)
+)
 DONE = SkillResult(True, "done", None, "")
 
 
@@ -82,6 +84,7 @@ def test_it_takes_it_where_it_is_remembered_and_sets_it_down_as_it_was_taken() -
     (taken,), (placed,) = skills["take"].goals, skills["place"].goals
     assert taken.near == pytest.approx((0.4, 0.0)) and taken.label == "mug"
     assert (placed.x, placed.y, placed.side, placed.below, placed.above) == (0.5, 0.1, "left", 0.08, 0.02)
+    assert placed.off == pytest.approx((0.01, -0.07))  # of a head camera that is off by that much
     assert result.value.looked == pytest.approx([0.4, 0.0])
 
 

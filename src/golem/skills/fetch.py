@@ -255,6 +255,7 @@ class Fetch:
         """Carry it to where it is wanted; returns a sentence."""
         taken = report.taken
         side: Side = "left" if taken.side == "left" else "right"
+        facing = PlanarPose.of(context.legs.pose).yaw
         if walks:
             context.release_arms()
             await step_back(context)
@@ -268,8 +269,11 @@ class Fetch:
             report.approaches += await self._go(context, spot)
             spot = self._in_odom(context, to)
         self._still_held(context, goal, side)
-        aside = (taken.aside_x, taken.aside_y)
-        there = PlaceGoal(float(spot[0]), float(spot[1]), "odom", side, taken.below, taken.above, aside)
+        aside, turned = (taken.aside_x, taken.aside_y), PlanarPose.of(context.legs.pose).yaw - facing
+        # What the head camera is off by turns with the robot.
+        off = PlanarPose(0.0, 0.0, turned) @ PlanarPose(taken.off_x, taken.off_y, 0.0)
+        x, y = float(spot[0]), float(spot[1])
+        there = PlaceGoal(x, y, "odom", side, taken.below, taken.above, aside, (off.x, off.y))
         placed = await context.run("place", there)
         if not placed.success:
             raise StageFailed(placed.stage, placed.slot or "skill", placed.reason)

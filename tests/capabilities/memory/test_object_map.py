@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from tests.capabilities.memory.room import T_LOOK, look
 
-from golem.capabilities.memory.base import HasPlaces, Memory, MemoryFault
+from golem.capabilities.memory.base import HasPlaces, Memory, MemoryFault, Observation
 from golem.capabilities.memory.object_map import ObjectMap, ObjectMapConfig
 from golem.errors import ConfigError, GolemError
 
@@ -67,12 +67,93 @@ def test_what_is_hidden_stays() -> None:
 
 def test_one_missed_detection_does_not_take_an_object_away_but_many_do() -> None:
     memory = ObjectMap()
-    memory.observe(look(1.0, {"mug": HERE}))
-    memory.observe(look(2.0, {"mug": HERE}, seen=()))
+    for t in (1.0, 2.0, 3.0):
+        memory.observe(look(t, {"mug": HERE}))
+    memory.observe(look(4.0, {"mug": HERE}, seen=()))
     assert memory.query("mug")[0].evidence == "seen"
-    for t in range(3, 9):
+    for t in range(5, 15):
         memory.observe(look(float(t), {"mug": HERE}, seen=()))
     assert memory.query("mug")[0].evidence == "moved"
+
+
+def test_what_was_seen_once_and_then_missed_again_and_again_never_was() -> None:
+    memory = ObjectMap()
+    memory.observe(look(1.0, {"mug": HERE}))
+    for t in range(2, 9):
+        memory.observe(look(float(t), {"mug": HERE}, seen=()))
+    assert memory.query("mug", "anywhere") == [] and len(memory) == 0
+
+
+def scored(t: float, score: float) -> Observation:
+    """Return a look that shows one mug with a score."""
+    one = look(t, {"mug": HERE})
+    (mug,) = one.objects
+    return replace(one, objects=[replace(mug, detection=replace(mug.detection, score=score))])
+
+
+def test_a_doubtful_detection_is_believed_once_it_was_repeated() -> None:
+    memory = ObjectMap()
+    for t in (1.0, 2.0):
+        memory.observe(scored(t, 0.5))
+    assert memory.query("mug", "anywhere") == []
+    for t in (3.0, 4.0, 5.0):
+        memory.observe(scored(t, 0.5))
+    assert memory.query("mug")[0].evidence == "seen"
+    sure = ObjectMap()
+    sure.observe(scored(1.0, 0.7))
+    assert sure.query("mug")[0].evidence == "seen"
+
+
+def test_a_misnamed_look_makes_no_second_object() -> None:
+    memory = ObjectMap()
+    for t in (1.0, 2.0, 3.0):
+        memory.observe(look(t, {"mug": HERE}))
+    memory.observe(look(4.0, {"can": HERE}))
+    assert memory.query("can", "anywhere") == []
+    assert memory.query("mug")[0].evidence == "seen"
+    memory.observe(look(5.0, {"mug": HERE}))
+    memory.observe(look(10.0, {}))
+    assert memory.query("can", "anywhere") == []
+    assert memory.query("mug")[0].evidence == "moved"
+
+
+def test_of_two_names_that_were_given_equally_often_both_are_answered() -> None:
+    memory = ObjectMap()
+    memory.observe(look(1.0, {"mug": HERE}))
+    memory.observe(look(2.0, {"can": HERE}))
+    assert [memory.query(label)[0].evidence for label in ("mug", "can")] == ["seen", "seen"]
+
+
+def test_what_took_the_place_of_another_kind_is_believed_at_the_second_look() -> None:
+    memory = ObjectMap()
+    for t in range(10):
+        memory.observe(look(float(t), {"mug": HERE}))
+    for t in (10.0, 11.0):
+        memory.observe(look(t, {"can": HERE}))
+    assert memory.query("can")[0].evidence == "seen"
+    for t in range(12, 20):
+        memory.observe(look(float(t), {"can": HERE}))
+    assert memory.query("mug")[0].evidence == "moved" and memory.query("can")[0].evidence == "seen"
+    assert len(memory.query("mug", "history")) == 1
+
+
+def test_what_was_seen_from_too_far_to_tell_where_it_is_outvotes_nothing() -> None:
+    memory = ObjectMap()
+    one = look(0.0, {"can": HERE})
+    far = replace(one.objects[0], position=np.array([100.0, 0.3, 1.1]))
+    for t in (0.0, 1.0, 2.0):
+        memory.observe(replace(one, frame=replace(one.frame, t=t), objects=[far], labels=()))
+    memory.observe(look(3.0, {"mug": HERE}))
+    assert memory.query("mug")[0].evidence == "seen"
+
+
+def test_neighbours_of_two_kinds_are_two() -> None:
+    memory = ObjectMap()
+    beside = (1.4, 0.17, 1.1)
+    for t in range(8):
+        memory.observe(look(float(t), {"mug": HERE}))
+    memory.observe(look(8.0, {"mug": HERE, "can": beside}))
+    assert memory.query("can")[0].evidence == memory.query("mug")[0].evidence == "seen"
 
 
 def test_what_was_not_asked_for_is_not_missed() -> None:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from golem.capabilities.memory.base import (
@@ -21,19 +24,20 @@ from golem.capabilities.memory.look import Look, look_at
 from golem.capabilities.memory.memory_file import MemoryFile
 from golem.capabilities.memory.object_records import (
     BELIEF,
+    EVIDENCE,
     FIRST,
     GONE,
     LAST,
     LOOKS,
-    PEAK,
     PLACE,
     SIZE,
     VARIANCE,
     ObjectRecords,
 )
+from golem.capabilities.memory.object_update import gain_of, size_of, update
+from golem.capabilities.memory.rivals import outvoted
 from golem.capabilities.memory.words import label_scores
 from golem.errors import ConfigError
-from golem.types import Array, LocalizedObject
 
 FORBIDDEN = 1e9
 """Cost of a pair outside the gate."""
@@ -47,22 +51,23 @@ class ObjectMapConfig:
         file: where they are kept; None keeps them in this process alone.
         gate: distance at which a look can no longer be of an object, in standard deviations of both.
         depth_noise: standard deviation of a position at 1 m, growing with the square of the distance [m].
-        found: log odds of one detection of score 1.
-        missed: the same of a look at a place whose object was not detected though nothing hides it.
+        found: most log odds of one detection. Its score is taken as the share of such detections that are right.
+        missed: log odds of a look at a place whose object was not detected though nothing hides it.
         through: the same of a look through the place.
-        ceiling: highest log odds; below `-through`, so that one look through a place is enough.
-        sure: log odds that an object must have had to be answered; one look with a score of 0.67 gives as much.
+        ceiling: highest log odds that it is there; below `-through`, so that one look through a place is enough.
+        sure: log odds that it ever was there, of all looks that found and missed it, from which on it is answered; one
+            look with a score of 0.65 gives as much.
         most: most objects that are kept; the longest gone are forgotten first, then the longest unseen.
     """
 
     file: str | None = None
     gate: float = 3.0
     depth_noise: float = 0.01
-    found: float = 1.5
-    missed: float = -0.5
+    found: float = 2.0
+    missed: float = -0.35
     through: float = -3.0
     ceiling: float = 2.5
-    sure: float = 1.0
+    sure: float = 0.6
     most: int = 10_000
 
     def __post_init__(self) -> None:
@@ -111,7 +116,7 @@ class ObjectMap:
         """See `Memory.observe`."""
         check_observation(observation, self.last)
         changed = self._match(observation) | self._miss(observation)
-        removed = self._bound()
+        removed = self._never_were() | self._bound()
         self.last = observation.frame.t
         self._keep(changed - removed, removed)
 
@@ -144,17 +149,17 @@ class ObjectMap:
             )  # to each detection a new object of its own
             cost = np.hstack([np.where(distance <= reach, distance, FORBIDDEN), pairs])
             for k, column in zip(*linear_sum_assignment(cost), strict=True):
-                gain = config.found * seen[k].detection.score
+                gain = gain_of(seen[k].detection.score, config.found)
                 if column < len(rows):
                     row = rows[column]
-                    _update(records.values[row], places[k], variances[k], gain, config.ceiling, frame.t)
+                    update(records.values[row], places[k], variances[k], gain, config.ceiling, frame.t)
                     changed.add(int(records.numbers[row]))
                 else:
                     values = np.array(
                         [
                             *places[k],
                             variances[k],
-                            _size(seen[k]),
+                            size_of(seen[k]),
                             gain,
                             frame.t,
                             frame.t,
@@ -180,10 +185,17 @@ class ObjectMap:
         ):
             if look in (Look.THROUGH, Look.EMPTY):
                 values[row, BELIEF] += config.through if look is Look.THROUGH else config.missed
+                values[row, EVIDENCE] += 0.0 if look is Look.THROUGH else config.missed
                 if values[row, BELIEF] < 0.0:
                     values[row, GONE] = frame.t
                 changed.add(int(records.numbers[row]))
         return changed
+
+    def _never_were(self) -> set[int]:
+        """Forget what is gone and was never sure; return the numbers."""
+        values = self._records.values
+        doubtful = (values[:, EVIDENCE] < self._config.sure) & ~np.isinf(values[:, GONE])
+        return self._remove(int(n) for n in self._records.numbers[doubtful])
 
     def _bound(self) -> set[int]:
         """Forget what is too much; return the numbers."""
@@ -192,7 +204,10 @@ class ObjectMap:
             return set()
         values = self._records.values
         worth = np.where(np.isinf(values[:, GONE]), values[:, LAST] + 1e12, values[:, GONE])
-        removed = {int(n) for n in self._records.numbers[np.argsort(worth, kind="stable")[:over]]}
+        return self._remove(int(n) for n in self._records.numbers[np.argsort(worth, kind="stable")[:over]])
+
+    def _remove(self, numbers: Iterable[int]) -> set[int]:
+        removed = set(numbers)
         for number in removed:
             self._records.remove(number)
         return removed
@@ -222,23 +237,20 @@ class ObjectMap:
 
     def _places(self, label: str, score: float, when: When, at: float | None, limit: int) -> list[Place]:
         """Return those of one label that fit, at most `limit`, the one seen last first."""
-        records = self._records
-        rows = records.rows(label)
-        rows = rows[records.values[rows, PEAK] >= self._config.sure]
-        values = records.values[rows]
-        there = np.isinf(values[:, GONE])
+        values = self._records.values
+        rows = self._records.rows(label)
+        rows = rows[values[rows, EVIDENCE] >= self._config.sure]
+        there = np.isinf(values[rows, GONE])
         absent: Evidence = "moved" if when == "now" else "gone"
         if when == "now":
-            chosen = there if there.any() else ~there
+            fitting = self._newest(rows[there], limit) or self._newest(rows[~there], limit)
         elif when == "history":
-            chosen = ~there
+            fitting = self._newest(rows[~there], limit)
         elif when == "at":
             assert at is not None
-            chosen = (values[:, FIRST] <= at) & (at < values[:, GONE])
+            fitting = self._newest(rows[(values[rows, FIRST] <= at) & (at < values[rows, GONE])], limit)
         else:
-            chosen = np.ones(len(rows), bool)
-        fitting = values[chosen]
-        newest = np.argsort(-fitting[:, LAST], kind="stable")[:limit]
+            fitting = self._newest(rows, limit)
         return [
             Place(
                 label, value[PLACE].copy(), score, float(value[FIRST]), float(value[LAST]),
@@ -246,19 +258,26 @@ class ObjectMap:
                 {"belief": float(value[BELIEF]), "looks": float(value[LOOKS]),
                  "sigma": float(np.sqrt(value[VARIANCE]))},
             )
-            for value in fitting[newest]
+            for value in values[fitting]
         ]  # fmt: skip
+
+    def _newest(self, rows: NDArray[np.intp], limit: int) -> list[int]:
+        """Return those that were not misnamed, the one seen last first; at most `limit`."""
+        order = np.argsort(-self._records.values[rows, LAST], kind="stable")
+        config = self._config
+        kept = (
+            int(row) for row in rows[order] if not outvoted(self._records, row, config.gate, -config.missed)
+        )
+        return list(islice(kept, limit))
 
     def forget(self, text: str) -> int:
         """See `Memory.forget`."""
         check_query(text, "anywhere", None, 1)
-        numbers = {
+        numbers = self._remove(
             int(self._records.numbers[row])
             for label in label_scores(text, self._records.labels)
             for row in self._records.rows(label)
-        }
-        for number in numbers:
-            self._records.remove(number)
+        )
         self._keep(set(), numbers)
         return len(numbers)
 
@@ -266,26 +285,3 @@ class ObjectMap:
         """See `Memory.close`."""
         if self._file is not None:
             self._file.close()
-
-
-def _update(row: Array, place: Array, variance: float, gain: float, ceiling: float, t: float) -> None:
-    """Put a look at `place` to an object, whose row is changed.
-
-    The variance does not fall below a quarter of the look's: the errors of poses are those of a drift, and do not
-    average out.
-    """
-    fused = 1.0 / (1.0 / row[VARIANCE] + 1.0 / variance)
-    row[PLACE] += fused / variance * (place - row[PLACE])
-    row[VARIANCE] = max(fused, variance / 4.0)
-    row[BELIEF] = min(row[BELIEF] + gain, ceiling)
-    row[PEAK] = max(row[PEAK], row[BELIEF])
-    row[LAST] = t
-    row[LOOKS] += 1.0
-
-
-def _size(found: LocalizedObject) -> float:
-    """Return the radius of an object [m], by the spread of its points."""
-    if len(found.points) < 4:
-        return 0.03
-    spread = np.median(np.linalg.norm(found.points - np.median(found.points, axis=0), axis=1))
-    return float(np.clip(1.5 * spread, 0.02, 0.3))

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from golem.types import Array
 
 COLUMNS: tuple[str, ...] = (
-    "x", "y", "z", "variance", "size", "belief", "first_seen", "last_seen", "gone_at", "looks", "peak",
+    "x", "y", "z", "variance", "size", "belief", "first_seen", "last_seen", "gone_at", "looks", "evidence",
 )  # fmt: skip
 """Position [m], variance of each of its coordinates [m^2], radius [m], log odds that it is there, times [s] with
-`gone_at` infinite while it may be there, how many looks showed it, and the highest of its log odds."""
+`gone_at` infinite while it may be there, how many looks showed it, and the log odds that it ever was there, of
+the looks that found and missed it until it was gone."""
 PLACE = slice(0, 3)
-VARIANCE, SIZE, BELIEF, FIRST, LAST, GONE, LOOKS, PEAK = range(3, len(COLUMNS))
+VARIANCE, SIZE, BELIEF, FIRST, LAST, GONE, LOOKS, EVIDENCE = range(3, len(COLUMNS))
 
 
 @dataclass(slots=True)
@@ -61,6 +62,10 @@ class ObjectRecords:
     def rows(self, label: str) -> NDArray[np.intp]:
         """Return the rows of all objects with this label, in the order of their numbers."""
         return np.array([self._row[number] for number in self._by_label.get(label, ())], np.intp)
+
+    def label(self, row: int) -> str:
+        """Return what a row is."""
+        return self._labels[row]
 
     def add(self, label: str, values: Array, number: int | None = None) -> int:
         """Add an object, with the next number unless it has one, and return its number."""
