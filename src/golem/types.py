@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
 
+GRAVITY = 9.81
+"""[m/s^2], as in the twin."""
 TICK = 0.002
 """Period of the clock [s]: one servo period (500 Hz)."""
 NUM_JOINTS = 27

@@ -209,15 +209,8 @@ def build_robot(stack: Stack, seed: int) -> Any:
     return robot
 
 
-def build(
-    stack: Stack,
-    seed: int,
-    limits: SafetyLimits | None = None,
-    eyes: Callable[[Any], Localizer] | None = None,
-) -> tuple[LockstepRunner, Any]:
+def build(stack: Stack, seed: int, limits: SafetyLimits | None = None) -> tuple[LockstepRunner, Any]:
     """Build the robot of `stack` for episode `seed`, and the stack around it; `limits` as in `LockstepRunner`.
-
-    `eyes` makes of the robot what sees instead of the stack's localizer.
 
     Returns:
         The running stack, and the robot: for evaluation and viewers, never for modules.
@@ -226,4 +219,4 @@ def build(
         ConfigError, ModuleFault: see `build_robot`; so for every other module.
     """
     robot = build_robot(stack, seed)
-    return LockstepRunner(stack, robot, limits, None if eyes is None else eyes(robot)), robot
+    return LockstepRunner(stack, robot, limits), robot

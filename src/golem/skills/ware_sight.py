@@ -124,16 +124,17 @@ def seen_again(
 
 def _pieces(around: Array, middle: Array, upright: Array, trust: float) -> list[Array]:
     """Return the clouds of what stands within `trust` [m] of `middle` (3,), the nearest first."""
-    clouds: list[Array] = []
+    clouds: list[tuple[float, Array]] = []
     for _ in range(STRAY):
         if not len(around):
             break
         # Seen from above a bottle is a cap over a shoulder, with nothing between them: pieces are those of its plan.
         own = piece_at(around - np.outer((around - middle) @ upright, upright), middle)
         cloud, around = around[own], around[~own]
-        if len(cloud) >= MIN_POINTS and np.hypot(*(np.median(cloud, axis=0) - middle)[:2]) <= trust:
-            clouds.append(cloud)
-    return sorted(clouds, key=lambda cloud: float(np.hypot(*(np.median(cloud, axis=0) - middle)[:2])))
+        away = float(np.hypot(*(np.median(cloud, axis=0) - middle)[:2]))
+        if len(cloud) >= MIN_POINTS and away <= trust:
+            clouds.append((away, cloud))
+    return [cloud for _, cloud in sorted(clouds, key=lambda one: one[0])]
 
 
 def width(points: Array) -> float:

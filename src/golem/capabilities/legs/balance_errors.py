@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.types import Array
-
-GRAVITY = 9.81
-"""[m/s^2]"""
+from golem.types import GRAVITY, Array
 
 
 def heading_frame(R: Array) -> Array:

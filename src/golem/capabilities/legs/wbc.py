@@ -36,9 +36,8 @@ from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
-from golem.types import LEGS, Array, BaseEstimate, LowState
+from golem.types import GRAVITY, LEGS, Array, BaseEstimate, LowState
 
-_G = 9.81
 _SLIP = np.array([0.003, 0.003, 0.02])
 """How far the feet may be from their places relative to each other, x, y [m] and yaw [rad]; further on these move."""
 
@@ -225,9 +224,9 @@ class Wbc:
         t, middle, goal, tasks = self._asked
         d, solution = self._dynamics, self._solution
         forces = solution.forces
-        pendulum = math.sqrt(max(float(d.com[2] - middle[2]), 0.1) / _G)
+        pendulum = math.sqrt(max(float(d.com[2] - middle[2]), 0.1) / GRAVITY)
         given = forces.sum(axis=(0, 1)) / d.mass
-        given[2] -= _G
+        given[2] -= GRAVITY
         full = np.abs(solution.torque) > self._bound - 1e-3
         corners = d.soles[:, None] + np.einsum("fij,cj->fci", d.soles_R, self._program.corners)
         return WbcReport(

@@ -26,11 +26,11 @@ import pinocchio as pin
 from golem.robots.model import pinocchio_model
 from golem.robots.model.leg_kinematics import SOLE_CENTER
 from golem.robots.model.table import DOF, SOLE
-from golem.types import LEGS, SIDES, Array
+from golem.types import GRAVITY, LEGS, SIDES, Array
 
 NUM_LEGS = LEGS.stop - LEGS.start
 """Leg joints."""
-GRAVITY = np.array([0.0, 0.0, -9.81])
+_DOWN = np.array([0.0, 0.0, -GRAVITY])
 """[m/s^2]"""
 _FREE = 6 + NUM_LEGS
 _EDGES = 4
@@ -234,7 +234,7 @@ class StanceProgram:
             A[15:18, i * half : i * half + half] = (
                 root[2] / dynamics.mass * (dynamics.soles_R[i] @ self._force)
             )
-        b[15:18] = root[2] * (tasks.com - GRAVITY)
+        b[15:18] = root[2] * (tasks.com - _DOWN)
         b[18:] = root[3] * tasks.legs
         H = A.T @ A
         H[self._diagonal] += w.force

@@ -18,14 +18,12 @@ import numpy as np
 from numba import njit
 
 from golem.capabilities.odometry.still_start import Beginning
-from golem.types import Array
+from golem.types import GRAVITY, Array
 
 SIZE = 18
 """Numbers of the error: theta, p, v, gyro bias, accelerometer bias, gravity x and y, yaw of the sensor."""
 GRAVITY_XY, YAW = slice(15, 17), 17
 """Which of them are of gravity, and that yaw."""
-GRAVITY = 9.81
-"""[m/s^2]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,11 +8,11 @@ from collections import deque
 import numpy as np
 
 from golem.capabilities.odometry.base import lidar_in_base
-from golem.capabilities.odometry.error_state import GRAVITY, exp
+from golem.capabilities.odometry.error_state import exp
 from golem.capabilities.odometry.still_start import Beginning, level
 from golem.interfaces.lidar import LegOdometry, LidarImu
 from golem.robots.sensors.mid360 import P_LIDAR_IMU
-from golem.types import Array
+from golem.types import GRAVITY, Array
 
 PATIENCE = 3.0
 """Time for which a robot that stands still is waited for [s]."""

@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-GRAVITY = 9.81
-"""[m/s^2]."""
+from golem.types import GRAVITY
+
 BOUNDS = {"mass": (1e-3, 10.0), "friction": (0.05, 2.0), "stiffness": (10.0, 1e7)}
 """What a hand of this robot may be told of a thing: [kg], -, [N/m]."""
 

@@ -14,12 +14,12 @@ from golem.evaluation.conformance.base import Candidate, Inapplicable, check
 from golem.evaluation.conformance.robot_rig import OPEN, Path, RobotRig
 from golem.evaluation.conformance.robot_views import floor_normal, gap_to_own_arm, rotated, up_in_base
 from golem.hardware.safety.base import SafetyLimits
-from golem.hardware.servo.gravity import STANDARD_GRAVITY, Gravity
+from golem.hardware.servo.gravity import Gravity
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
 from golem.runtime.lockstep import start_posture
-from golem.types import NUM_JOINTS, SIDES, UPPER, Array, LowState, Side
+from golem.types import GRAVITY, NUM_JOINTS, SIDES, UPPER, Array, LowState, Side
 
 SETTLE = 1.0
 """Time in which joints come to rest [s]."""
@@ -78,7 +78,7 @@ class RobotMeasures:
         size = float(np.linalg.norm(force))
         lean = float(np.arccos(np.clip(up @ force / max(size, 1e-9), -1.0, 1.0)))
         candidate.figures |= {"force [m/s^2]": size, "rate [rad/s]": rate, "lean [rad]": lean}
-        if abs(size - STANDARD_GRAVITY) > FORCE:
+        if abs(size - GRAVITY) > FORCE:
             raise candidate.fault(f"at rest the IMU feels {size:.2f} m/s^2")
         if rate > RATE:
             raise candidate.fault(f"at rest the IMU turns at {rate:.3f} rad/s")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -15,7 +15,7 @@ from golem.middleware.bus import News
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.scene import ONLOOKER
-from golem.robots.mujoco.spectator import HEADLIGHT
+from golem.robots.mujoco.spectator import halved, headlight
 from golem.types import Array
 
 FILM = "film.webp"
@@ -26,8 +26,6 @@ LENGTH = 5.0
 """Length of a film [s]."""
 AFTER = 1.0
 """How much of it comes after the stage in which the trial was lost [s]."""
-SCALE = 0.5
-"""Size of its pictures, relative to the onlooker's."""
 QUALITY = 45
 BAR = 22
 """Height of the line with the words [px]."""
@@ -93,34 +91,19 @@ class LastSeconds:
         model, frames = self._robot.scene.model, list[Image.Image]()
         data = mujoco.MjData(model)
         font = ImageFont.load_default(size=12)
-        # The lights belong to the model; the hall itself is lit for the robot's eyes.
-        lamp = model.vis.headlight
-        kept = lamp.ambient.copy(), lamp.diffuse.copy()
-        lamp.ambient[:], lamp.diffuse[:] = HEADLIGHT
-        try:
-            with CameraRig(model, [_scaled()]) as rig:
-                for moment in moments:
-                    data.qpos[:] = moment.qpos
-                    data.mocap_pos[:], data.mocap_quat[:] = moment.mocap
-                    mujoco.mj_kinematics(model, data)
-                    mujoco.mj_camlight(model, data)
-                    image = Image.fromarray(rig.render(data, ONLOOKER.name)[0])
-                    draw = ImageDraw.Draw(image)
-                    draw.rectangle((0, image.height - BAR, image.width, image.height), fill=PANEL)
-                    text = f"{moment.t:.1f} s  {moment.words}"
-                    draw.text((6, image.height - BAR + 4), text, fill=INK, font=font)
-                    frames.append(image)
-        finally:
-            lamp.ambient[:], lamp.diffuse[:] = kept
+        with headlight(model), CameraRig(model, [halved(ONLOOKER)]) as rig:
+            for moment in moments:
+                data.qpos[:] = moment.qpos
+                data.mocap_pos[:], data.mocap_quat[:] = moment.mocap
+                mujoco.mj_kinematics(model, data)
+                mujoco.mj_camlight(model, data)
+                image = Image.fromarray(rig.render(data, ONLOOKER.name)[0])
+                draw = ImageDraw.Draw(image)
+                draw.rectangle((0, image.height - BAR, image.width, image.height), fill=PANEL)
+                text = f"{moment.t:.1f} s  {moment.words}"
+                draw.text((6, image.height - BAR + 4), text, fill=INK, font=font)
+                frames.append(image)
         return _packed(frames)
-
-
-def _scaled() -> Any:
-    i = ONLOOKER
-    return replace(
-        i, width=round(SCALE * i.width), height=round(SCALE * i.height), fx=SCALE * i.fx, fy=SCALE * i.fy,
-        cx=SCALE * (i.cx + 0.5) - 0.5, cy=SCALE * (i.cy + 0.5) - 0.5,
-    )  # fmt: skip
 
 
 def _packed(frames: list[Image.Image]) -> bytes:

@@ -20,7 +20,7 @@ from golem.evaluation.base import TrialSpec
 from golem.evaluation.episodes.episode import episode_seed
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.runtime.lockstep import LockstepRunner, build
+from golem.runtime.lockstep import LockstepRunner, build, build_robot
 from golem.stack import Stack
 from golem.types import TICK, Array, CameraInfo, Detection, LocalizedObject, Mask, RgbdImage
 
@@ -144,14 +144,10 @@ def build_seeing(stack: Stack, spec: TrialSpec) -> tuple[LockstepRunner, Any]:
     seed = episode_seed(spec.seed, spec.index)
     if spec.overrides.get("localizer") != USE:
         return build(stack, seed)
-    made: list[TrueMasks] = []
-
-    def eyes(robot: Any) -> TrueMasks:
-        made.append(TrueMasks(robot))
-        return made[0]
-
-    running, robot = build(stack, seed, eyes=eyes)
-    running.executor.add(made[0])
+    robot = build_robot(stack, seed)
+    masks = TrueMasks(robot)
+    running = LockstepRunner(stack, robot, localizer=masks)
+    running.executor.add(masks)
     return running, robot
 
 

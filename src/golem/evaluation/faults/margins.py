@@ -23,10 +23,8 @@ from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.pick_config import PickGoal
 from golem.skills.walk import WalkGoal
 from golem.stack import load_stack
-from golem.types import TICK, LowCommand, LowState
+from golem.types import GRAVITY, TICK, LowCommand, LowState
 
-GRAVITY = 9.81
-"""[m/s^2]"""
 SHOVE = 0.2
 """How long a shove lasts [s]."""
 EVERY = 4.0

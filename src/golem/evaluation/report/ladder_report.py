@@ -18,10 +18,9 @@ from golem.evaluation.metrics.tables import comparisons, metric_differences, met
 from golem.evaluation.metrics.text_table import short_names
 from golem.evaluation.report.html_page import render_page
 from golem.evaluation.report.ladder_plots import failure_plot, own_plot, rate_plot, time_plot
-from golem.evaluation.report.margin_box import MarginBox, margin_box, margin_boxes
+from golem.evaluation.report.margin_box import MarginBox, kept_traces, margin_box, margin_boxes
 from golem.evaluation.report.margin_plot import MAX_CURVES, MarginCurve, margin_plot
 from golem.evaluation.report.svg_figure import styled
-from golem.robots.mujoco.balance import TRACE, BalanceTrace
 
 MAX_FILMS = 24
 """Films that the page itself holds at most; the others lie beside it."""
@@ -43,6 +42,7 @@ def render(result: LadderResult) -> str:
     failed = bool(lost) and not rung.adaptive
     times = dict.fromkeys(name for r in records for name in r.timings)
     with styled():
+        plots, boxes = _margins(grouped, result.out)
         return render_page(
             "ladder.html",
             _provenance(result),
@@ -64,8 +64,8 @@ def render(result: LadderResult) -> str:
             metrics=[]
             if rung.adaptive
             else [t for t in (metrics(summary), metric_differences(summary)) if t],
-            margin_boxes=margin_boxes(_boxes(grouped, result.out)),
-            margin_plots=_margins(grouped, result.out),
+            margin_boxes=boxes,
+            margin_plots=plots,
             max_curves=MAX_CURVES,
             pictures=_pictures(grouped, result.out),
             films=_films(lost, result.out),
@@ -123,23 +123,18 @@ def _map(records: Sequence[TrialRecord], summary: Summary) -> dict[str, list[tup
     return found
 
 
-def _boxes(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> list[MarginBox]:
-    short = short_names(grouped)
-    found = [margin_box(short[method], rows, folder, i) for i, (method, rows) in enumerate(grouped.items())]
-    return [box for box in found if box is not None]
-
-
-def _margins(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> list[tuple[str, str]]:
-    """Return the CoM margin over time, per method, of the trials that kept a trace."""
-    found, short = list[tuple[str, str]](), short_names(grouped)
+def _margins(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> tuple[list[tuple[str, str]], str]:
+    """Return the CoM margin over time, per method, of the trials that kept a trace, and boxes of its means."""
+    plots, boxes, short = list[tuple[str, str]](), list[MarginBox](), short_names(grouped)
     for i, (method, rows) in enumerate(grouped.items()):
-        kept = [(r, path) for r in rows if (path := artefacts(folder, r) / TRACE).is_file()]
-        plot = margin_plot(
-            [MarginCurve(BalanceTrace.load(path), r.success) for r, path in kept[:MAX_CURVES]], i
-        )
+        kept = kept_traces(rows, folder)
+        plot = margin_plot([MarginCurve(trace, r.success) for r, trace in kept[:MAX_CURVES]], i)
         if plot:
-            found.append((short[method], plot))
-    return found
+            plots.append((short[method], plot))
+        box = margin_box(short[method], [trace for _, trace in kept], i)
+        if box is not None:
+            boxes.append(box)
+    return plots, margin_boxes(boxes)
 
 
 def _pictures(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> list[dict[str, Any]]:

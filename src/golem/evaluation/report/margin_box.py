@@ -35,9 +35,14 @@ class MarginBox:
     colour: int
 
 
-def margin_box(name: str, records: Sequence[TrialRecord], folder: Path, colour: int) -> MarginBox | None:
-    """Return the box of the trials in the run `folder` that kept a trace; None where none did."""
-    traces = [BalanceTrace.load(path) for r in records if (path := artefacts(folder, r) / TRACE).is_file()]
+def kept_traces(records: Sequence[TrialRecord], folder: Path) -> list[tuple[TrialRecord, BalanceTrace]]:
+    """Return the trials in the run `folder` that kept a trace, with it."""
+    paths = [(r, artefacts(folder, r) / TRACE) for r in records]
+    return [(r, BalanceTrace.load(path)) for r, path in paths if path.is_file()]
+
+
+def margin_box(name: str, traces: Sequence[BalanceTrace], colour: int) -> MarginBox | None:
+    """Return the box of trials with these traces; None where none has a sample."""
     margins = [trace.margin for trace in traces if len(trace.margin)]
     if not margins:
         return None

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from golem.evaluation.report.html_page import render_page
 from golem.evaluation.report.ladder_plots import failure_plot
-from golem.evaluation.report.margin_box import MarginBox, margin_box, margin_boxes
+from golem.evaluation.report.margin_box import MarginBox, kept_traces, margin_box, margin_boxes
 from golem.evaluation.report.svg_figure import styled
 
 if TYPE_CHECKING:
@@ -48,8 +48,7 @@ def _boxes(table: GraspTable) -> list[MarginBox]:
     found = [
         margin_box(
             f"{line.name}: {column.head}",
-            [r for r in ladder.records if r.method == column.method],
-            ladder.out,
+            [t for _, t in kept_traces([r for r in ladder.records if r.method == column.method], ladder.out)],
             number,
         )
         for line, ladder in table.rows

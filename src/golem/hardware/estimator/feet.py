@@ -11,10 +11,8 @@ from golem.hardware.estimator.contact import Contact, ContactConfig
 from golem.hardware.estimator.foot_force import FootForce, FootForceConfig
 from golem.robots.model.leg_dynamics import LegDynamics
 from golem.robots.model.table import SOLE
-from golem.types import LEGS, Array, LowState
+from golem.types import GRAVITY, LEGS, Array, LowState
 
-GRAVITY = 9.81
-"""[m/s^2], as in the twin."""
 _HALF: Array = 0.5 * np.array([SOLE.x[1] - SOLE.x[0], SOLE.y[1] - SOLE.y[0]])
 """(2,) half length and half width of a sole [m]."""
 _THICKNESS = 0.01

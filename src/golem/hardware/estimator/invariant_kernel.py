@@ -11,12 +11,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from golem.types import Array
+from golem.types import GRAVITY, Array
 
 SIZE = 21
 """Numbers of the error."""
-GRAVITY = 9.81
-"""[m/s^2]."""
 
 
 @njit(cache=True, nogil=True)

@@ -9,10 +9,7 @@ import pinocchio as pin
 
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.pinocchio_model import build
-from golem.types import Array
-
-STANDARD_GRAVITY = 9.81
-"""[m/s^2], as in the twin."""
+from golem.types import GRAVITY, Array
 
 
 class Gravity:
@@ -36,7 +33,7 @@ class Gravity:
             quat: (4,) orientation of the torso IMU, wxyz.
         """
         w, x, y, z = quat.tolist()
-        scale = STANDARD_GRAVITY / (w * w + x * x + y * y + z * z)
+        scale = GRAVITY / (w * w + x * x + y * y + z * z)
         # Down in the torso: minus the third row of its rotation matrix.
         down_x = -2.0 * (x * z - w * y) * scale
         down_y = -2.0 * (y * z + w * x) * scale

@@ -7,7 +7,8 @@ spectator's own, so that the noise of the robot's cameras stays the same whether
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -101,7 +102,7 @@ class SpectatorView:
         self._views = {name: shot.view() for name, shot in self._shots.items()}
         self._infos = [shot.info(name, size) for name, shot in self._shots.items()]
         # A picture only for the eye: half the robot's own resolution is what an inset shows.
-        self._infos += [_halved(info) for info in robot.cameras.values()]
+        self._infos += [halved(info) for info in robot.cameras.values()]
         self._fancy = fancy
         self._rig: CameraRig | None = None
         self._moving = np.array([body for body in body_meshes.visual_geoms(self._model) if body], dtype=int)
@@ -153,15 +154,12 @@ class SpectatorView:
             self._rig = CameraRig(self._model, self._infos, fancy=self._fancy, views=self._views)
         if name not in self._shots:
             return self._rig.render(self._data, name)[0]
-        # The lights belong to the model, and the robot's cameras see by them too.
-        lamp, shadows = self._model.vis.headlight, self._model.light_castshadow.copy()
-        kept = lamp.ambient.copy(), lamp.diffuse.copy()
-        lamp.ambient[:], lamp.diffuse[:] = HEADLIGHT
+        shadows = self._model.light_castshadow.copy()
         self._model.light_castshadow[:] = self._fancy
         try:
-            return self._rig.render(self._data, name)[0]
+            with headlight(self._model):
+                return self._rig.render(self._data, name)[0]
         finally:
-            lamp.ambient[:], lamp.diffuse[:] = kept
             self._model.light_castshadow[:] = shadows
 
     def close(self) -> None:
@@ -171,7 +169,20 @@ class SpectatorView:
             self._rig = None
 
 
-def _halved(info: CameraInfo) -> CameraInfo:
+@contextmanager
+def headlight(model: mujoco.MjModel) -> Iterator[None]:
+    """Light the world for people: its lights belong to the model, and the robot's cameras see by them too."""
+    lamp = model.vis.headlight
+    kept = lamp.ambient.copy(), lamp.diffuse.copy()
+    lamp.ambient[:], lamp.diffuse[:] = HEADLIGHT
+    try:
+        yield
+    finally:
+        lamp.ambient[:], lamp.diffuse[:] = kept
+
+
+def halved(info: CameraInfo) -> CameraInfo:
+    """Return the same camera with half as many pixels along each side."""
     return replace(
         info,
         width=info.width // 2,

@@ -14,12 +14,12 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
-from golem.capabilities.legs.balance_errors import GRAVITY, heading_frame
+from golem.capabilities.legs.balance_errors import heading_frame
 from golem.hardware.estimator.contact import Contact, ContactConfig
 from golem.hardware.estimator.random_walk import RandomWalk, RandomWalkConfig
 from golem.training.legs.batched_safety import LegGate
 from golem.training.legs.training_model import STANCE, STAND_HEIGHT, STEP, build_model
-from golem.types import LEGS, NUM_JOINTS, Array
+from golem.types import GRAVITY, LEGS, NUM_JOINTS, Array
 
 Rows = NDArray[np.intp]
 
@@ -256,8 +256,7 @@ class BatchWorld:
 
     def shim(self, feet: NDArray[np.bool_]) -> None:
         """Draw new ground under the `feet` (n, 2) that are in the air."""
-        even = self.config.roughness == self.config.ledge == 0.0
-        robots, side = np.nonzero(feet & (self._rough > 0.0)[:, None] & (not even))
+        robots, side = np.nonzero(feet & (self._rough > 0.0)[:, None])
         if not len(robots):
             return
         rng, m = self._rng, len(robots)
@@ -288,7 +287,8 @@ class BatchWorld:
         self._offset[where, : LEGS.stop] = rng.normal(0.0, c.leg_offset, (m, LEGS.stop))
         self._offset[where, LEGS.stop :] = rng.normal(0.0, c.arm_offset, (m, NUM_JOINTS - LEGS.stop))
         self._force_scale[where] = 1.0 + rng.normal(0.0, c.force_noise, (m, 2))
-        self._rough[where] = np.where(rng.random(m) < 0.5, 0.0, rng.random(m))
+        uneven = c.roughness > 0.0 or c.ledge > 0.0
+        self._rough[where] = uneven * np.where(rng.random(m) < 0.5, 0.0, rng.random(m))
         self._corners[where] = model.geom_pos
         sloped = rng.random((m, 1)) < 0.4
         self.slope[where] = np.where(sloped, rng.uniform(-c.slope, c.slope, (m, 2)), 0.0)

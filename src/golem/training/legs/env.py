@@ -55,6 +55,7 @@ class EnvConfig:
         episode: length of an episode [s].
         action_scale: joint target per unit of action [rad].
         swing: amplitude of the feed-forward swing [rad].
+        clearance: height of the sole in the middle of its swing that is rewarded [m].
         calm: share of the episodes without pushes and with slow arms: who is always disturbed learns neither to walk as
             told nor to stand quietly.
         impulse: largest push at full difficulty [N s].
@@ -76,6 +77,7 @@ class EnvConfig:
     episode: float = 20.0
     action_scale: float = 0.25
     swing: float = 0.28
+    clearance: float = 0.08
     calm: float = 0.4
     impulse: float = 90.0
     quarters: Quarters = (0.2, 0.3, 0.2, 0.3)
@@ -92,7 +94,7 @@ TASKS: dict[Task, EnvConfig] = {
     "rough": EnvConfig(
         impulse=60.0,
         world=WorldConfig(friction=(0.15, 1.1), payload=5.0, slope=0.15, roughness=0.03, ledge=0.05),
-        weights=RewardWeights(clearance=0.1),
+        clearance=0.1,
     ),
     "stand": EnvConfig(
         standing=1.0,
@@ -152,7 +154,7 @@ class LegsEnv:
         self.upper = UpperBodyMotion(n, self._rng)
         self._pushes = RandomPushes(n, config.impulse, config.quarters, self._rng)
         self._limits = SafetyLimits.from_profile()
-        self._rewards = Rewards(n, config.weights, config.gait, self._limits)
+        self._rewards = Rewards(n, config.weights, config.gait, config.clearance, self._limits)
         self.twist: Array = np.zeros((n, 3))
         self._goal: Array = np.zeros((n, 3))
         self._left: Array = np.zeros(n)

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.legs.balance_errors import GRAVITY, heading_frame
+from golem.capabilities.legs.balance_errors import heading_frame
 from golem.capabilities.legs.gait import Gait
 from golem.training.legs.batch_world import BatchTruth
 from golem.training.legs.training_model import FEET_APART, STAND_HEIGHT
-from golem.types import Array
+from golem.types import GRAVITY, Array
 
 OMEGA = float(np.sqrt(GRAVITY / STAND_HEIGHT))
 """Rate at which the pendulum falls over [1/s]."""

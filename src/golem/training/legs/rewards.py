@@ -11,13 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.legs.balance_errors import GRAVITY
 from golem.capabilities.legs.gait import Gait, GaitConfig
 from golem.capabilities.legs.swing import rise, swing_share
 from golem.hardware.safety.base import SafetyLimits
 from golem.training.legs.batch_world import BatchTruth, Rows
 from golem.training.legs.training_model import FEET_APART, STANCE, STAND_HEIGHT
-from golem.types import LEGS, Array
+from golem.types import GRAVITY, LEGS, Array
 
 _YAW = np.array([0, 6])
 _YAW_ROLL = np.array([0, 2, 6, 8])
@@ -42,7 +41,6 @@ class RewardWeights:
             as `fast`: else a robot that keeps both feet down after a push loses nothing by it.
         placement: in the second half of a swing, the foot above where the capture point says that it belongs,
             exp(-error^2 / 0.12^2), after a push; see `placement`.
-        clearance: height of the sole in the middle of its swing [m]; no weight.
         swing_height: error of the height of a swinging sole [m^2].
         flat: tilt of the soles to the ground, 1 - cos. A foot that lands on an edge slaps down faster than the gate
             allows, and one that rolls over its heel under load misleads the odometry: when that was not punished, the
@@ -85,7 +83,6 @@ class RewardWeights:
     contact: float = 1.0
     dragged: float = -1.5
     placement: float = 1.5
-    clearance: float = 0.08
     swing_height: float = -60.0
     flat: float = -50.0
     upright: float = -20.0
@@ -129,8 +126,11 @@ class Rewards:
     the sum stays positive while the robot recovers, and how it moves its feet counts then as well.
     """
 
-    def __init__(self, n: int, weights: RewardWeights, gait: GaitConfig, limits: SafetyLimits) -> None:
-        """Begin at rest; `limits` are the safety gate's."""
+    def __init__(
+        self, n: int, weights: RewardWeights, gait: GaitConfig, clearance: float, limits: SafetyLimits
+    ) -> None:
+        """Begin at rest; soles are to swing `clearance` [m] high, and `limits` are the safety gate's."""
+        self._clearance = clearance
         self._limits = limits
         self._lower, self._upper = limits.lower[LEGS], limits.upper[LEGS]
         self._weights = weights
@@ -194,7 +194,7 @@ class Rewards:
         swing = swing_share(phase, gait.config.stance)
         lifted = rise(swing)
         near = np.exp(-np.square(landing / 0.12)) * (~stance & (swing > 0.5))
-        high = w.clearance * lifted - truth.clearance
+        high = self._clearance * lifted - truth.clearance
         legs, speed = truth.q[:, LEGS], truth.dq[:, LEGS]
         torque = np.square(truth.torque[:, LEGS])
         level = truth.height - truth.clearance.min(axis=1)

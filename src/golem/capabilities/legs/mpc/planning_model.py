@@ -14,14 +14,14 @@ import mujoco
 import numpy as np
 from mujoco.rollout import Rollout
 
-from golem.capabilities.legs.balance_errors import GRAVITY, heading_frame
+from golem.capabilities.legs.balance_errors import heading_frame
 from golem.hardware.safety.base import SafetyLimits
 from golem.robots.model.imu_mount import sensed_base_rate
 from golem.robots.model.leg_kinematics import SOLE_CENTER, leg_poses
 from golem.robots.model.mjcf import robot_spec
 from golem.robots.model.spatial import quat_of
 from golem.robots.model.table import BASE_LINK, JOINT_NAMES, SOLE
-from golem.types import LEGS, NUM_JOINTS, SIDES, UPPER, Array, BaseEstimate, LowState
+from golem.types import GRAVITY, LEGS, NUM_JOINTS, SIDES, UPPER, Array, BaseEstimate, LowState
 
 NUM_LEGS = LEGS.stop - LEGS.start
 """Joints of both legs."""
