@@ -132,7 +132,7 @@ class Executor:
         self._tick += 1
 
     def advance(self, t: float, maximum: int) -> None:
-        """Follow a clock from outside up to time `t` [s]; ticks further back than the last `most` are left out."""
+        """Follow a clock from outside up to time `t` [s]; ticks further back than the last `maximum` are left out."""
         target = round((t - self._offset) / TICK)
         if target - self._tick >= maximum:
             self._tick = target - maximum + 1

@@ -142,7 +142,7 @@ class Reader(Protocol):
     handle: int
 
     def take(self, maximum: int = 64) -> list[Sample]:
-        """Remove and return up to `most` samples, oldest first; none is an empty list.
+        """Remove and return up to `maximum` samples, oldest first; none is an empty list.
 
         Raises:
             DdsError: the reader is closed.

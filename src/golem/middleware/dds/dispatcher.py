@@ -26,7 +26,7 @@ class Watched(Protocol):
     on_data: Callable[[], None] | None
 
     def take(self, maximum: int = 64) -> list[Sample]:
-        """Remove and return up to `most` samples."""
+        """Remove and return up to `maximum` samples."""
         ...
 
 

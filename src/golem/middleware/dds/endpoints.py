@@ -177,7 +177,7 @@ class CycloneReader(_Endpoint):
         self._piece_ref = ctypes.byref(self._piece)
 
     def take(self, maximum: int = _BATCH) -> list[Sample]:
-        """Remove and return up to `most` samples, oldest first."""
+        """Remove and return up to `maximum` samples, oldest first."""
         samples: list[Sample] = []
         with self._lock:
             while maximum > 0:

@@ -253,7 +253,7 @@ class LocalReader:
         domain.add_reader(self)
 
     def take(self, maximum: int = 64) -> list[Sample]:
-        """Remove and return up to `most` samples, oldest first."""
+        """Remove and return up to `maximum` samples, oldest first."""
         if not self._open:
             raise DdsError(f"The reader of '{self.topic}' is closed; create another one.")
         with self._domain.lock:

@@ -158,7 +158,7 @@ class BalanceTrace:
 
 
 def _runs(values: NDArray[np.bool_], minimum: int) -> int:
-    """Return how many runs of at least `least` true values there are."""
+    """Return how many runs of at least `minimum` true values there are."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], values, [False]]).astype(np.int8)))
     return int((edges[1::2] - edges[::2] >= minimum).sum())
 

@@ -174,7 +174,7 @@ class Ppo:
 
     @torch.no_grad()
     def bound_noise(self, maximum: float) -> None:
-        """Let the standard deviation of no action exceed `most`."""
+        """Let the standard deviation of no action exceed `maximum`."""
         self.actor.log_std.clamp_(max=float(np.log(maximum)))
 
     @torch.no_grad()
