@@ -18,7 +18,7 @@ from golem.runtime.contract_check import ContractCheck
 from golem.types import TICK, Array
 
 PERIOD = 0.01
-"""Time between two poses that are published [s]."""
+"""Time between two poses that are published, and between two words of the legs [s]."""
 
 
 class OdometryNode:
@@ -43,12 +43,14 @@ class OdometryNode:
         call, odometry = self._contract.call, self._odometry
         if (sample := self._imu.read()) is not None:
             call(odometry.add_imu, self._correction.imu(sample))
-        self._add_legs(t)
+        due = t >= self._next - 1e-9
+        if due:
+            self._add_legs(t)
         if (scan := self._scan.read()) is not None:
             call(odometry.add_scan, self._correction.scan(scan))
         if (external := self._external.read()) is not None:
             call(odometry.add_external, external)
-        if t < self._next - 1e-9:
+        if not due:
             return
         self._next = t + PERIOD
         estimate = call(odometry.estimate)

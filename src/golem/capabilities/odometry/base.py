@@ -68,7 +68,7 @@ class LidarOdometry(Protocol):
         ...
 
     def add_legs(self, legs: LegOdometry) -> None:
-        """Take what the legs say, at up to 500 Hz; a robot may have none."""
+        """Take what the legs say, at 100 Hz; a robot may have none."""
         ...
 
     def add_scan(self, scan: LidarScan) -> None:

@@ -50,6 +50,7 @@ class CounterWatch:
         assert robot.scene.kitchen is not None
         self._running, self._robot, self._oracle, self._kind = running, robot, oracle, kind
         self._names = tuple((thing.kind, thing.body) for thing in robot.scene.kitchen.things)
+        self._bodies = [robot.model.body(body).id for _, body in self._names]
         self._before = self._things()
         self._highest = np.array([thing.position[2] for thing in self._before])
         self.recorder = BalanceRecorder(robot) if balances else None
@@ -67,8 +68,7 @@ class CounterWatch:
         """Look on after the errand; it is never a reason to end."""
         if self.recorder is not None:
             self.recorder(self._running.executor.t)
-        heights = [self._robot.data.body(body).xpos[2] for _, body in self._names]
-        self._highest = np.maximum(self._highest, heights)
+        np.maximum(self._highest, self._robot.data.xpos[self._bodies, 2], out=self._highest)
         return False
 
     def last_picture(self) -> bytes:
