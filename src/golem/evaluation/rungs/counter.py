@@ -48,7 +48,8 @@ class CounterOptions:
     thing: tuple[str, ...] = ()
     """Kinds that are asked for, case by case, each with the hand on its side; else the trial's seed draws one."""
     each: bool = False
-    """Whether every kind of thing is tried with each hand, case by case; else the trial's seed draws both."""
+    """Whether every kind of thing is tried with each hand, case by case; else the trial's seed draws both. The counter is
+    mirrored where the thing would stand beyond that hand's reach, on the other side."""
 
 
 class CounterRung(KitchenRung[CounterOptions]):
@@ -74,6 +75,14 @@ class CounterRung(KitchenRung[CounterOptions]):
         if not self.options.each:
             return [{"thing": kind} for kind in kinds] or ({},)
         return [{"thing": kind, "hand": hand} for kind in kinds or KINDS for hand in ("left", "right")]
+
+    def mirrored(self, spec: TrialSpec, kitchen: KitchenLayout) -> bool:
+        """Return whether the thing of a case stands where its hand is not asked to go; see `KitchenRung`."""
+        kind, hand = spec.case.get("thing"), spec.case.get("hand")
+        sign = 1.0 if hand == "left" else -1.0
+        return hand is not None and any(
+            sign * thing.position[1] < -ACROSS for thing in kitchen.things if thing.kind == kind
+        )
 
     def errand(
         self,

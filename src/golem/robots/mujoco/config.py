@@ -41,6 +41,7 @@ class MujocoConfig:
         layout: `nominal`: pack and tray stand where `PackLayout` says, under a robot in the hoist; under one that
             stands they are lowered with it. `varied`: places, light, finishes and clutter are drawn from the seed; of
             a kitchen also sizes, heights, and which way its fridge opens.
+        mirrored: whether what stands on a counter is mirrored, left to right.
         conditions: those of `worlds.conditions` that are not left to the layout, e.g. `{light: 0.3}`.
         hoist: how the robot is held.
         reach_y: near-edge fasteners with |y| up to this are loosened [m]; a varied layout draws among those up to
@@ -69,6 +70,7 @@ class MujocoConfig:
     arms: Literal["home", "hanging"] = "home"
     stance: tuple[float, float, float] = (0.0, 0.0, 0.0)
     layout: LayoutKind = "nominal"
+    mirrored: bool = False
     conditions: dict[str, float | str] = field(default_factory=dict[str, "float | str"])
     hoist: HoistConfig = field(default_factory=HoistConfig)
     reach_y: float = 0.15
@@ -121,6 +123,8 @@ class MujocoConfig:
             raise ConfigError(
                 f"The world '{self.world}' has no pack whose layout or conditions could differ."
             )
+        if self.mirrored and self.world != "counter":
+            raise ConfigError(f"Only a counter's things are mirrored, not the world '{self.world}'.")
         if self.world in KITCHENS and self.stance[2] != 0.0:
             raise ConfigError(
                 f"The twin's stance before a {self.world} has the yaw 0, not {self.stance[2]:g}."

@@ -29,7 +29,7 @@ from golem.robots.worlds.conditions import (
 from golem.robots.worlds.dressing import dress
 from golem.robots.worlds.fridge import Seal, seal_of
 from golem.robots.worlds.furnished import Person
-from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_counter, draw_kitchen
+from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_counter, draw_kitchen, mirrored
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
 from golem.robots.worlds.screws import ScrewDraw, draw_screws
@@ -119,6 +119,7 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
         raised = layout.top_z - PackLayout().top_z
         draw = draw_kitchen if config.world == "kitchen" else draw_counter
         kitchen = draw(stream(seed, "world/kitchen"), raised, config.layout == "varied")
+        kitchen = mirrored(kitchen) if config.mirrored else kitchen
         names = PackNames((), np.zeros((0, 3)), "", add_kitchen(spec, kitchen, (stance.x, stance.y)))
         _add_kitchen_onlooker(spec, kitchen, stance)
     else:

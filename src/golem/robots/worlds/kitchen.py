@@ -140,6 +140,14 @@ def draw_counter(rng: np.random.Generator, raised: float = 0.0, varied: bool = T
     return KitchenLayout(fridge, top, edge, -0.88, things, *colours)
 
 
+def mirrored(layout: KitchenLayout) -> KitchenLayout:
+    """Return a kitchen whose things stand as in a mirror: what was left of the robot is right of it."""
+    things = tuple(
+        replace(t, position=(t.position[0], -t.position[1], t.position[2]), yaw=-t.yaw) for t in layout.things
+    )
+    return replace(layout, things=things)
+
+
 def _draw_things(
     rng: np.random.Generator, kinds: Sequence[str], top: float, area: Area, sign: float
 ) -> tuple[StandingThing, ...]:
