@@ -48,8 +48,8 @@ class CounterOptions:
     thing: tuple[str, ...] = ()
     """Kinds that are asked for, case by case, each with the hand on its side; else the trial's seed draws one."""
     each: bool = False
-    """Whether every kind of thing is tried with each hand, case by case; else the trial's seed draws both. The counter is
-    mirrored where the thing would stand beyond that hand's reach, on the other side."""
+    """Whether every kind of thing is tried with each hand, case by case; else the trial's seed draws both.
+    Where the thing stands on the other side, the counter is mirrored."""
 
 
 class CounterRung(KitchenRung[CounterOptions]):

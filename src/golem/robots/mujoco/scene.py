@@ -249,15 +249,18 @@ def _add_onlooker(spec: mujoco.MjSpec, layout: PackLayout) -> None:
 
 
 def _add_kitchen_onlooker(spec: mujoco.MjSpec, kitchen: KitchenLayout, stance: PlanarPose) -> None:
-    """Add a fixed camera that watches robot, fridge and counter from the counter's side, behind the robot."""
+    """Add a fixed camera that watches robot, fridge and counter from the counter's side, behind the robot.
+
+    Of a robot that works at a counter it shows front and hands, from below the cabinets on the wall.
+    """
     fridge, at = kitchen.fridge, np.array([stance.x, stance.y, 0.0])
     side = 1.0 if fridge.handle_y < 0.0 else -1.0
     eye = np.array([-1.25, 1.35 * side, fridge.handle_z + 0.65])
     target = np.array([fridge.front - 0.05, 0.05 * side, fridge.handle_z - 0.22])
     if fridge.handle_y < kitchen.counter_start:
         eye, target = (
-            np.array([-0.35, 1.25, kitchen.counter_top + 0.65]),
-            np.array([0.40, 0.0, kitchen.counter_top]),
+            np.array([1.20, 0.62, kitchen.counter_top + 0.55]),
+            np.array([0.34, -0.02, kitchen.counter_top + 0.12]),
         )
     _aim(spec.worldbody.add_camera(name=ONLOOKER.name), eye + at, target + at)
 
