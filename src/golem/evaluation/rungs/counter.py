@@ -27,11 +27,13 @@ from golem.skills.place import PlaceGoal
 from golem.skills.take_config import TakeGoal, TakeReport
 from golem.types import Side
 
-AREA = ((0.44, 0.54), (-0.38, 0.38))
-"""x and y bounds in base_link of the places that are asked for [m]: both hands get there."""
-FREE = 0.17
-"""Distance of such a place from other things that is enough [m]."""
-ELSEWHERE = 0.12
+AREA = ((0.43, 0.56), (-0.38, 0.38))
+"""x and y bounds in base_link of the places that are asked for [m]: the hand on their side gets there."""
+FREE = 0.045
+"""Room between what stands at such a place and other things that is enough [m]."""
+EAR = 0.03
+"""How far a mug's ear is beyond its radius [m]."""
+ELSEWHERE = 0.10
 """Least distance of it from where the thing stood [m]."""
 ACROSS = 0.06
 """How far beyond the middle of the robot a hand is asked to go [m]."""
@@ -165,10 +167,16 @@ def draw_errand(
     own: Side = "left" if chosen.position[1] > 0.0 else "right"
     hand: Side = "left" if spec.case.get("hand", own) == "left" else "right"
     mirror = 1.0 if hand == "left" else -1.0
-    others = np.array([thing.position[:2] for thing in things if thing is not chosen]).reshape(-1, 2)
+    others = [thing for thing in things if thing is not chosen]
+    wide = np.array([_radius(thing.kind) + _radius(chosen.kind) for thing in others])
+    there = np.array([thing.position[:2] for thing in others]).reshape(-1, 2)
     spots = spots[mirror * spots[:, 1] > -ACROSS]
-    room = np.linalg.norm(spots[:, None] - others, axis=2).min(axis=1, initial=np.inf)
+    room = (np.linalg.norm(spots[:, None] - there, axis=2) - wide).min(axis=1, initial=np.inf)
     room[np.linalg.norm(spots - chosen.position[:2], axis=1) < ELSEWHERE] = 0.0
     # Any free place; of a counter without one the place with the most room.
     spot = spots[int(np.argmax(np.minimum(room, FREE)))]
     return chosen.kind, hand, (float(spot[0]), float(spot[1]))
+
+
+def _radius(kind: str) -> float:
+    return KINDS[kind][0] + (EAR if kind == "mug" else 0.0)
