@@ -6,7 +6,7 @@ on either rung.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,12 +19,13 @@ from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.worlds.conditions import LayoutKind
-from golem.robots.worlds.kitchen import KitchenLayout
+from golem.robots.worlds.kitchen import KitchenLayout, StandingThing
 from golem.robots.worlds.tableware import KINDS
 from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import SkillResult
 from golem.skills.place import PlaceGoal
 from golem.skills.take_config import TakeGoal, TakeReport
+from golem.stack import Stack
 from golem.types import Side
 
 AREA = ((0.43, 0.56), (-0.38, 0.38))
@@ -49,6 +50,8 @@ class CounterOptions:
     """How the hand is to come."""
     thing: tuple[str, ...] = ()
     """Kinds that are asked for, case by case, each with the hand on its side; else the trial's seed draws one."""
+    sizes: float = 0.0
+    """How much larger or smaller than its kind a thing is at most, as a share, drawn from the trial's seed."""
     each: bool = False
     """Whether every kind of thing is tried with each hand, case by case; else the trial's seed draws both.
     Where the thing stands on the other side, the counter is mirrored."""
@@ -67,6 +70,11 @@ class CounterRung(KitchenRung[CounterOptions]):
     Options = CounterOptions
     default_methods = ("centroid", "antipodal", "reranked")
     subject = "counter"
+
+    def make_stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
+        """Return the stack of a trial, with things of the sizes that are asked for; see `KitchenRung`."""
+        stack = super().make_stack(method, profile, overrides)
+        return stack.with_options("robot", sizes=self.options.sizes) if self.options.sizes else stack
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return the things and hands that are tried one by one; see `Rung`."""
@@ -168,7 +176,7 @@ def draw_errand(
     hand: Side = "left" if spec.case.get("hand", own) == "left" else "right"
     mirror = 1.0 if hand == "left" else -1.0
     others = [thing for thing in things if thing is not chosen]
-    wide = np.array([_radius(thing.kind) + _radius(chosen.kind) for thing in others])
+    wide = np.array([_radius(thing) + _radius(chosen) for thing in others])
     there = np.array([thing.position[:2] for thing in others]).reshape(-1, 2)
     spots = spots[mirror * spots[:, 1] > -ACROSS]
     room = (np.linalg.norm(spots[:, None] - there, axis=2) - wide).min(axis=1, initial=np.inf)
@@ -178,5 +186,5 @@ def draw_errand(
     return chosen.kind, hand, (float(spot[0]), float(spot[1]))
 
 
-def _radius(kind: str) -> float:
-    return KINDS[kind][0] + (EAR if kind == "mug" else 0.0)
+def _radius(thing: StandingThing) -> float:
+    return thing.size * (KINDS[thing.kind][0] + (EAR if thing.kind == "mug" else 0.0))

@@ -129,7 +129,7 @@ class KitchenRung(Rung[O]):
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
-        stack = self._stack(method, profile, overrides)
+        stack = self.make_stack(method, profile, overrides)
         for key, row in KEYS.items():
             registry.load(row.slot, stack.choice(key).use)
         shared_context()
@@ -137,7 +137,7 @@ class KitchenRung(Rung[O]):
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
-        stack = self._stack(spec.method, spec.profile, spec.overrides)
+        stack = self.make_stack(spec.method, spec.profile, spec.overrides)
         running, robot = build_seeing(stack, spec)
         if (
             isinstance(robot, MujocoRobot)
@@ -183,7 +183,12 @@ class KitchenRung(Rung[O]):
         detail = f"{result.reason} {verdict.words}".strip()
         return TrialOutcome(False, stage, module, detail, timings, series, picture, result.trace)
 
-    def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
+    def make_stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
+        """Return the stack of a trial.
+
+        Raises:
+            ConfigError: an override replaces what the rung compares, or is none.
+        """
         if self.slot in overrides or "robot" in overrides:
             raise ConfigError(
                 f"The method is what sits in {self.slot}, and the {self.subject} is the rung's; leave out --use "

@@ -42,6 +42,7 @@ class MujocoConfig:
             stands they are lowered with it. `varied`: places, light, finishes and clutter are drawn from the seed; of
             a kitchen also sizes, heights, and which way its fridge opens.
         mirrored: whether what stands on a counter is mirrored, left to right.
+        sizes: how much larger or smaller than its kind a thing on a counter is at most, as a share; the seed draws it.
         conditions: those of `worlds.conditions` that are not left to the layout, e.g. `{light: 0.3}`.
         hoist: how the robot is held.
         reach_y: near-edge fasteners with |y| up to this are loosened [m]; a varied layout draws among those up to
@@ -71,6 +72,7 @@ class MujocoConfig:
     stance: tuple[float, float, float] = (0.0, 0.0, 0.0)
     layout: LayoutKind = "nominal"
     mirrored: bool = False
+    sizes: float = 0.0
     conditions: dict[str, float | str] = field(default_factory=dict[str, "float | str"])
     hoist: HoistConfig = field(default_factory=HoistConfig)
     reach_y: float = 0.15
@@ -101,6 +103,7 @@ class MujocoConfig:
             ("slope", self.slope, 0.0, 0.5),
             ("step", self.step, 0.0, 0.1),
             ("rubble", self.rubble, 0.0, 0.2),
+            ("sizes", self.sizes, 0.0, 0.3),
             ("people", self.people, 0, 20),
             ("obstacles", self.obstacles, 0, 12),
             ("noslip", self.noslip, 0, 100),
@@ -123,8 +126,10 @@ class MujocoConfig:
             raise ConfigError(
                 f"The world '{self.world}' has no pack whose layout or conditions could differ."
             )
-        if self.mirrored and self.world != "counter":
-            raise ConfigError(f"Only a counter's things are mirrored, not the world '{self.world}'.")
+        if (self.mirrored or self.sizes) and self.world != "counter":
+            raise ConfigError(
+                f"Only a counter's things are mirrored or of other sizes, not those of the world '{self.world}'."
+            )
         if self.world in KITCHENS and self.stance[2] != 0.0:
             raise ConfigError(
                 f"The twin's stance before a {self.world} has the yaw 0, not {self.stance[2]:g}."

@@ -117,8 +117,11 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
         _add_onlooker(spec, layout)
     elif config.world in KITCHENS:
         raised = layout.top_z - PackLayout().top_z
-        draw = draw_kitchen if config.world == "kitchen" else draw_counter
-        kitchen = draw(stream(seed, "world/kitchen"), raised, config.layout == "varied")
+        rng, varied = stream(seed, "world/kitchen"), config.layout == "varied"
+        if config.world == "kitchen":
+            kitchen = draw_kitchen(rng, raised, varied)
+        else:
+            kitchen = draw_counter(rng, raised, varied, config.sizes)
         kitchen = mirrored(kitchen) if config.mirrored else kitchen
         names = PackNames((), np.zeros((0, 3)), "", add_kitchen(spec, kitchen, (stance.x, stance.y)))
         _add_kitchen_onlooker(spec, kitchen, stance)
