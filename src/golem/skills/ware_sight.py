@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from golem.capabilities.grasping.centroid import UP
-from golem.capabilities.grasping.object_cloud import MIN_POINTS, piece_at, spaced
+from golem.capabilities.grasping.object_cloud import MIN_POINTS, fullest, piece_at, spaced
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
 from golem.types import Array, LocalizedObject, Side
@@ -40,10 +40,7 @@ def surface_below(points: Array, place: Array, radius: float = ABOUT) -> float |
     near = points[np.hypot(points[:, 0] - place[0], points[:, 1] - place[1]) < radius]
     if len(near) < MIN_POINTS:
         return None
-    heights = np.sort(near[:, 2])
-    counts = np.searchsorted(heights, heights + LAYER) - np.arange(len(heights))
-    first = int(counts.argmax())
-    return float(np.median(heights[first : first + int(counts[first])]))
+    return fullest(near[:, 2], LAYER)
 
 
 async def find(

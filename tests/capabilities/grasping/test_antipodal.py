@@ -34,6 +34,25 @@ def test_the_ground_and_the_door_are_no_part_of_the_object() -> None:
     assert len(cloud) > 500
 
 
+def test_a_cut_through_a_bottle_is_not_what_it_stands_on_and_its_cap_not_all_of_it() -> None:
+    front, top = things.bottle(above=False), things.bottle(above=True)
+    assert len(object_points(front.points, front.position)) > 0.98 * len(front.points)
+    assert len(object_points(top.points, top.position, 0, DOWN)) > 0.98 * len(top.points)
+    assert np.ptp(object_points(top.points, top.position)[:, 2]) < 0.02
+
+
+def test_a_bottle_is_taken_by_its_body_and_not_by_its_neck() -> None:
+    table = np.column_stack([np.random.default_rng(1).uniform(-0.2, 0.2, (6000, 2)), np.zeros(6000)])
+    for above, approach in ((True, DOWN), (False, np.array([0.88, 0.0, -0.48]))):
+        thing = things.bottle(above=above)
+        scene = np.concatenate([thing.points, table + things.BOTTLE])
+        best = Antipodal().propose(thing, scene, hand(approach))[0]
+        above_foot = float(best.T_odom_gripper[2, 3] - things.BOTTLE[2])
+        assert best.gap > 0.07
+        # From above the palm stays off the cap, which is 220 mm above the foot.
+        assert (0.220 - 0.095 < above_foot < 0.140) if above else (0.03 < above_foot < 0.13)
+
+
 def test_normals_of_a_plane_are_its_own() -> None:
     rng = np.random.default_rng(0)
     points = np.column_stack([rng.random((300, 2)), 1e-4 * rng.standard_normal(300)])

@@ -7,7 +7,7 @@ import pytest
 
 from golem.capabilities.grasping.antipodal import Antipodal
 from golem.capabilities.grasping.base import Gripper
-from golem.capabilities.grasping.rims import FURTHER, MOST, rim_pairs
+from golem.capabilities.grasping.rims import FURTHER, MOST, rim_pairs, wall_lean
 from golem.types import Array
 
 from . import things
@@ -40,6 +40,19 @@ def test_a_pair_leans_a_little_further_than_its_wall(lean: float) -> None:
     leans = np.arctan2(-axes[:, 2], across)
     best = np.median(leans[quality == quality.max()])
     np.testing.assert_allclose(best, min(lean + FURTHER, MOST) if lean else 0.0, atol=0.07)
+
+
+def test_the_rounded_edge_of_an_upright_wall_does_not_lean() -> None:
+    rng = np.random.default_rng(0)
+    outward = np.array([1.0, 0.0, 0.0])
+
+    def wall(high: float) -> Array:
+        """Return a wall that leans by 0.3 rad, as far as `high` [m] below its rim it is seen."""
+        down, aside = rng.uniform(0.003, high, 60), rng.uniform(-0.009, 0.009, 60)
+        return np.column_stack([-np.tan(0.3) * down, aside, -down])
+
+    assert wall_lean(wall(0.007), outward, DOWN, 0.0) == 0.0
+    assert wall_lean(wall(0.025), outward, DOWN, 0.0) == pytest.approx(0.3, abs=0.02)
 
 
 def test_the_hand_on_a_bowl_points_under_its_middle_and_stays_off_its_bottom() -> None:

@@ -1,4 +1,4 @@
-"""Clouds of things as one camera sees them: a can on a table, a bar before a door."""
+"""Clouds of things as one camera sees them: a can on a table, a bar before a door, a bottle."""
 
 from __future__ import annotations
 
@@ -47,3 +47,21 @@ def bar(noise: float = 0.002) -> LocalizedObject:
     return seen(
         points + noise * rng.standard_normal(points.shape), BAR + (-0.0125, 0.0, 0.15), label="handle"
     )
+
+
+BOTTLE = np.array([0.50, -0.20, 0.10])
+"""Where the bottle stands [m]: 70 mm wide up to 136 mm, its cap 31 mm wide, 220 mm above its foot."""
+
+
+def bottle(*, above: bool, noise: float = 0.0007) -> LocalizedObject:
+    """Return a bottle without the table below it: as seen from above, cap and shoulder, or its front half."""
+    rng = np.random.default_rng(0)
+    turn = rng.uniform(-np.pi, np.pi, 1200) if above else rng.uniform(0.5 * np.pi, 1.5 * np.pi, 1200)
+    up = rng.uniform(0.136, 0.180, 1200) if above else rng.uniform(0.012, 0.220, 1200)
+    radius = np.clip(0.035 - 0.35 * (up - 0.136), 0.0155, 0.035)
+    wall = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), up])
+    cap = 0.0155 * np.sqrt(rng.random(400)), rng.uniform(-np.pi, np.pi, 400)
+    top = np.column_stack([cap[0] * np.cos(cap[1]), cap[0] * np.sin(cap[1]), np.full(400, 0.220)])
+    points = np.concatenate([wall, top]) if above else wall
+    place = BOTTLE + ((0.0, 0.0, 0.220) if above else (-0.030, 0.005, 0.11))
+    return seen(BOTTLE + points + noise * rng.standard_normal(points.shape), place, label="bottle")

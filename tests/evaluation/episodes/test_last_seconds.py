@@ -57,14 +57,31 @@ def length(film: bytes) -> tuple[int, Image.Image]:
 def test_the_film_is_of_the_stage_that_was_lost(robot: Any) -> None:
     last, kept = watched(robot), robot.data.qpos.copy()
     lamp = robot.scene.model.vis.headlight.ambient.copy()
-    lost, end = last.film("grasp"), last.film("fall")
+    lost, end = last.film("grasp", "grasp_method: mine"), last.film("fall", None)
     assert lost is not None and end is not None and lost != end
-    assert 2 <= length(lost)[0] <= LENGTH * FPS and length(end)[1].size == (320, 240)
+    assert 2 <= length(lost)[0] <= LENGTH * FPS and length(end)[1].size == (320, 240 + 51)
     np.testing.assert_array_equal(robot.data.qpos, kept)
     np.testing.assert_array_equal(robot.scene.model.vis.headlight.ambient, lamp)
+
+
+def test_the_film_ends_after_the_skill_said_that_it_failed(robot: Any) -> None:
+    bus, last = Bus(), LastSeconds()
+
+    class Fails(Says):
+        def step(self, t: float) -> None:
+            self._robot.data.qpos[0] = 0.02 * t
+            self._bus.publish(
+                topics.FEEDBACK, Feedback(t, "take", "grasp", "Closing.", {"failed": 2.5 < t < 3.5}), t
+            )
+
+    executor = Executor(bus, [Fails(bus, robot)])
+    last(SimpleNamespace(bus=bus, executor=executor), robot)
+    executor.run(20.0)
+    film = last.film("grasp", None)
+    assert film is not None and length(film)[0] == pytest.approx(4.0 * FPS, abs=2)
 
 
 def test_what_is_not_the_twin_has_no_film() -> None:
     last, bus = LastSeconds(), Bus()
     last(SimpleNamespace(bus=bus, executor=Executor(bus, [])), object())
-    assert last.film("grasp") is None
+    assert last.film("grasp", None) is None

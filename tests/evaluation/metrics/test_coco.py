@@ -37,8 +37,9 @@ def detection(label: str, score: float, *box: float) -> Detection:
 
 def test_a_folder_is_read(tmp_path: Path) -> None:
     (image,) = read_coco(folder(tmp_path))
-    assert image.labels == ("bus_bar",)
-    np.testing.assert_array_equal(image.boxes, [[10, 20, 40, 60]])
+    assert image.labels == ("bus_bar", "screw")
+    np.testing.assert_array_equal(image.boxes, [[10, 20, 40, 60], [0, 0, 9, 9]])
+    assert image.ignored == image.crowds == (1,)
     assert image.read().shape == (480, 640, 3)
 
 
@@ -80,6 +81,34 @@ def test_average_precision_of_a_counted_example() -> None:
     assert score.centre == pytest.approx(0.5)
     nothing = score_label("nut", images, {0: [], 1: []}, 0.5)
     assert nothing.ap == 0.0 and np.isnan(nothing.centre)
+
+
+def test_what_is_found_on_an_ignored_box_is_neither_right_nor_wrong(tmp_path: Path) -> None:
+    row: dict[str, object] = {"image_id": 4, "category_id": 1}
+    annotations: list[dict[str, object]] = [
+        row | {"bbox": [0, 0, 10, 10]},
+        row | {"bbox": [100, 0, 10, 10], "ignore": 1},
+        row | {"bbox": [200, 0, 100, 100], "iscrowd": 1},
+    ]
+    images = read_coco(folder(tmp_path, annotations))
+    assert (images[0].ignored, images[0].crowds) == ((1, 2), (2,))
+    asked = detection("screw", 0.5, 0, 0, 10, 10)
+    ignored = detection("screw", 0.9, 100, 0, 110, 10)
+    crowd = [detection("screw", 0.8, 200 + x, 0, 210 + x, 10) for x in (0, 30, 60)]
+    right = score_label("screw", images, {0: [asked, ignored, *crowd]}, 0.5)
+    assert (right.count, right.ap, right.false, right.centre) == (1, 1.0, 0.0, 0.0)
+    # An ignored box takes one detection, and no part of it is a crowd's share.
+    doubled = score_label("screw", images, {0: [asked, ignored, ignored]}, 0.5)
+    assert (doubled.ap, doubled.false) == (0.5, 1.0)
+    part = score_label("screw", images, {0: [asked, detection("screw", 0.4, 100, 0, 103, 3)]}, 0.5)
+    assert (part.ap, part.false) == (1.0, 1.0)
+
+
+def test_a_box_that_is_asked_for_goes_before_an_ignored_one() -> None:
+    both: Array = np.array([[0, 0, 10, 10], [0, 0, 10, 9]], float)
+    image = LabelledImage(Path("a"), ("nut", "nut"), both, ignored=(0,))
+    score = score_label("nut", [image], {0: [detection("nut", 0.9, 0, 0, 10, 10)]}, 0.5)
+    assert (score.count, score.ap) == (1, 1.0)
 
 
 def test_the_bench_scores_any_localizer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

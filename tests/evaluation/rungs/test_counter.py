@@ -9,7 +9,8 @@ from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.rungs.counter import CounterOptions, CounterTether, draw_errand
 from golem.evaluation.rungs.fetch_errand import FetchRung
-from golem.robots.worlds.kitchen import draw_counter
+from golem.robots.mujoco.config import MujocoConfig
+from golem.robots.worlds.kitchen import draw_counter, mirrored
 from golem.robots.worlds.tableware import KINDS
 
 
@@ -24,8 +25,10 @@ def test_an_errand_leads_elsewhere_and_to_a_free_place(index: int) -> None:
     (thing,) = (one for one in kitchen.things if one.kind == kind)
     assert (thing.position[1] > 0.0) == (hand == "left")
     assert np.hypot(*np.subtract(place, thing.position[:2])) > 0.1
-    others = [one.position[:2] for one in kitchen.things if one is not thing]
-    assert np.linalg.norm(np.subtract(others, place), axis=1).min() > 0.1
+    for other in kitchen.things:
+        if other is not thing:
+            room = np.hypot(*np.subtract(other.position[:2], place)) - KINDS[kind][0] - KINDS[other.kind][0]
+            assert room > 0.03
 
 
 def test_the_things_that_are_asked_for_are_tried_case_by_case() -> None:
@@ -53,6 +56,31 @@ def test_every_thing_is_tried_with_either_hand() -> None:
     for case in cases:
         errand = draw_errand(TrialSpec("counter-tether", "centroid", "field", 1, 0, case=case), kitchen)
         assert errand is not None and errand[:2] == (case["thing"], case["hand"])
+
+
+def test_a_counter_is_mirrored_where_a_hand_would_have_to_reach_across() -> None:
+    rung = CounterTether(CounterOptions(each=True))
+    kitchen = draw_counter(np.random.default_rng(0))
+    spec = TrialSpec("counter-tether", "centroid", "field", 1, 0)
+    assert not rung.mirrored(spec, kitchen)
+    for case in rung.cases(lambda case: None):
+        own = TrialSpec("counter-tether", "centroid", "field", 1, 0, case=case)
+        there = mirrored(kitchen) if rung.mirrored(own, kitchen) else kitchen
+        (thing,) = (one for one in there.things if one.kind == case["thing"])
+        assert (1.0 if case["hand"] == "left" else -1.0) * thing.position[1] > -0.07
+
+
+def test_things_have_the_sizes_that_are_asked_for() -> None:
+    plain, grown = (draw_counter(np.random.default_rng(3), sizes=share) for share in (0.0, 0.2))
+    assert [one.position for one in plain.things] == [one.position for one in grown.things]
+    sizes = [one.size for one in grown.things]
+    assert len(set(sizes)) == 4 and all(0.8 <= size <= 1.2 for size in sizes)
+    stack = CounterTether(CounterOptions(sizes=0.2)).make_stack("antipodal", "ideal", {})
+    assert stack.choice("robot").options["sizes"] == 0.2
+    with pytest.raises(ConfigError, match="sizes is from 0 to 0.3"):
+        MujocoConfig(world="counter", sizes=0.5)
+    with pytest.raises(ConfigError, match="Only a counter's things"):
+        MujocoConfig(world="kitchen", mirrored=True)
 
 
 @pytest.mark.parametrize(("rung", "slot"), [(CounterTether(), "grasp_method"), (FetchRung(), "memory")])

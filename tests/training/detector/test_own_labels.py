@@ -137,3 +137,17 @@ def test_broken_annotations_of_coco_are_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "2.png").unlink()
     with pytest.raises(ConfigError, match=r"2\.png is neither in"):
         load_own(tmp_path, 0, 640)
+
+
+def test_ignored_boxes_are_neither_learnt_nor_held_against_it(tmp_path: Path) -> None:
+    folder = coco(tmp_path)
+    path = folder / "labels.json"
+    data = json.loads(path.read_text())
+    data["categories"].append({"id": 4, "name": "Crowd"})
+    extra = {"bbox": [200, 100, 60, 60], "image_id": 0}
+    data["annotations"] += [{"category_id": 3, "ignore": 1} | extra, {"category_id": 4, "iscrowd": 1} | extra]
+    path.write_text(json.dumps(data))
+    train, held, classes = load_own(folder, 0, 640)
+    labels = np.concatenate(train.labels + held.labels)
+    assert classes == ("cap",)
+    assert len(labels) == 6 and labels[:, 7].sum() == 1

@@ -22,6 +22,7 @@ from golem.capabilities.grasping.hand_volume import collides, in_hands
 from golem.capabilities.grasping.object_cloud import (
     MIN_POINTS,
     across,
+    fullest,
     normals_of,
     object_points,
     spaced,
@@ -37,6 +38,8 @@ BETWEEN = 600
 """Points of the object on which hands are fitted."""
 DEPTHS = (0.045, 0.025, 0.0)
 """How much deeper than need be the fingertips go where that is free [m]: what is held by its edge turns and slips."""
+TIPS = 0.089
+"""How far beyond the nearest of a thing the fingertips go at most [m]: the palm stays 6 mm before it."""
 NARROW = 0.045
 """Width up to which fingers do not go deepest [m]."""
 SHALLOW = 0.8
@@ -49,6 +52,11 @@ ROUND = 0.03
 """Greatest half width for which a thing that is seen across is taken to be round [m]: half of the hand's."""
 TWISTS: Array = np.array([2.0, 0.5])
 """How much it counts that a thing hangs beside the fingers, across the closing axis and along it."""
+HANGS = 0.06
+"""Height of the fingertips above the thing's middle at which a grasp counts 1 / e [m]: a bottle that hangs on its neck
+swings and slides out."""
+LAYER, ABOUT = 0.006, 0.12
+"""Thickness of the layer of points that a surface below is, and radius around the thing in which it is [m]."""
 SPARE, TIGHT = 0.015, 0.4
 """Opening beyond what a grasp asks for that leaves nothing to be wished [m], and what a grasp without it counts."""
 COMPACT = 0.10
@@ -121,14 +129,16 @@ class Antipodal(OpenLoop):
         """Return grasps, best first; see `GraspMethod`. Where the cloud holds no object there is none."""
         check_finite("the object's position", target.position)
         c = self.config
-        cloud = object_points(target.points, target.position, c.seed)
+        down = gripper.approach if gripper.approach[2] < -ACROSS else None
+        cloud = object_points(target.points, target.position, c.seed, down)
         if len(cloud) < MIN_POINTS:
             return []
         cloud = thinned(cloud, c.points, c.seed)
         middles, axes, widths, quality, rims = self._pairs(cloud, gripper)
         if not len(middles):
             return []
-        T, turned, index, worth = self._hands(middles, axes, widths, gripper, rims)
+        room = float(np.quantile(cloud @ gripper.approach, 0.01)) + TIPS - middles @ gripper.approach
+        T, turned, index, worth = self._hands(middles, axes, widths, room, gripper, rims)
         if not len(T):
             return []
         rim = index >= len(middles) - rims
@@ -139,6 +149,8 @@ class Antipodal(OpenLoop):
         score = quality[index] * (1.0 - 0.3 * turned / max(c.tilt, 1e-6))
         score *= np.exp(-(off**2) @ TWISTS / size**2)
         score *= np.minimum(held / 6.0, 1.0) * worth
+        above = np.maximum(T[:, 2, 3] - _middle_height(cloud, scene, gripper.approach), 0.0)
+        score *= np.exp(-((above / HANGS) ** 2))
         # A hand that is as wide as it gets, and a few millimetres off, comes down on what it is to hold.
         score *= np.clip((gripper.max_gap - gaps) / SPARE, TIGHT, 1.0)
         good = np.flatnonzero((gaps <= gripper.max_gap) & (held > 0))
@@ -179,7 +191,10 @@ class Antipodal(OpenLoop):
         # Grasps near the middle of the object hold its weight best, and are seen on both sides.
         size = float(np.linalg.norm(cloud.std(axis=0))) + 1e-6
         off = np.linalg.norm(middle - cloud.mean(axis=0), axis=1) / size
-        best = np.argsort(-quality * np.exp(-(off**2)), kind="stable")[: c.laid]
+        order = np.argsort(-quality * np.exp(-(off**2)), kind="stable")
+        # Half of them of the outline: of a bottle from above the cloud's own pairs lie on neck and shoulder.
+        own, outer = order[order < len(held)], order[order >= len(held)]
+        best = np.concatenate([own[: max(c.laid // 2, c.laid - len(outer))], outer])[: c.laid]
         rim = rim_pairs(cloud, gripper.approach)
         if (np.abs(rim[1] @ gripper.approach) > SLANTED).any():
             # Other pairs across a leaning wall are by its curve or by noise, and turn out of the hand.
@@ -219,9 +234,11 @@ class Antipodal(OpenLoop):
         return middle, axes, width[held], quality
 
     def _hands(
-        self, middles: Array, axes: Array, widths: Array, gripper: Gripper, rims: int
+        self, middles: Array, axes: Array, widths: Array, room: Array, gripper: Gripper, rims: int
     ) -> tuple[Array, Array, NDArray[np.intp], Array]:
         """Return poses (m, 4, 4), how far each leans (m,) [rad], its pair (m,), and what its depth is worth (m,).
+
+        The fingertips go no further beyond a pair than there is `room` (n,) for before the palm [m].
 
         A hand on one of the last `rims` pairs leans with the pair and no further: the finger that leans over a bowl
         tips it. Nor does it go deepest: there is a bottom; and what is narrow stands on something wider, such as a
@@ -244,7 +261,8 @@ class Antipodal(OpenLoop):
             T = np.tile(np.eye(4), (len(kept), 1, 1))
             T[:, :3, 1], T[:, :3, 2] = axes[kept], z_turned[kept]
             T[:, :3, 0] = np.cross(axes[kept], z_turned[kept])
-            T[:, :3, 3] = middles[kept] + (c.depth + extra) * z_turned[kept]
+            deep = np.clip(room[kept], c.depth, c.depth + extra)
+            T[:, :3, 3] = middles[kept] + deep[:, None] * z_turned[kept]
             rows.append(T)
             leans.append(lean[kept])
             pairs.append(kept)
@@ -295,6 +313,22 @@ class Antipodal(OpenLoop):
                 if len(kept) == c.most:
                     return kept
         return kept
+
+
+def _middle_height(cloud: Array, scene: Array, approach: Array) -> float:
+    """Return the height of the middle of a thing [m]: a hand that comes from above sees no more than its top.
+
+    Args:
+        cloud: (n, 3) points of the thing.
+        scene: (m, 3) points around it.
+        approach: (3,) unit vector along which the hand comes.
+    """
+    low, high = np.quantile(cloud[:, 2], (0.02, 0.98)).tolist()
+    if approach[2] < -ACROSS:
+        off = np.linalg.norm(scene[:, :2] - cloud[:, :2].mean(axis=0), axis=1)
+        below = scene[(off < ABOUT) & (scene[:, 2] < high), 2]
+        low = min(low, fullest(below, LAYER)) if len(below) >= MIN_POINTS else low
+    return 0.5 * (low + high)
 
 
 def _extent(values: Array, counted: NDArray[np.bool_]) -> tuple[Array, Array]:

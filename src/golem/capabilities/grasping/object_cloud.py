@@ -15,6 +15,9 @@ SHARE = 0.25
 """Least share of a sighting that makes a plane."""
 WIDER = 1.4
 """How much wider a plane is than the thing on it; a thing has flat sides of its own."""
+BEHIND, THROUGH = (-0.04, -2.0 * PLANE), 0.05
+"""What of a sighting lies so far beyond a plane [m], and its share from which on the plane is a cut through the thing:
+nothing is seen behind what a thing stands on."""
 HYPOTHESES = 64
 """Planes through three points that are tried."""
 TESTED = 800
@@ -27,11 +30,13 @@ MIN_POINTS = 20
 """Fewer points are no object to grasp."""
 
 
-def object_points(points: Array, position: Array, seed: int = 0) -> Array:
+def object_points(points: Array, position: Array, seed: int = 0, down: Array | None = None) -> Array:
     """Return the (m, 3) points of the object among the (n, 3) `points` of a sighting [m]; m may be 0.
 
     A plane that holds at least `SHARE` of the points and does not hold the object's `position` (3,) is what it stands
     on or hangs before (RANSAC): what is on it or behind it goes. Of the rest, the piece nearest to `position` stays.
+    What is seen along `down` (3,), a unit vector, is a piece where it is one across it: a bottle is a cap over a
+    shoulder, and nothing is seen between them.
     """
     kept = points[np.isfinite(points).all(axis=1)]
     if len(kept) < MIN_POINTS:
@@ -42,9 +47,12 @@ def object_points(points: Array, position: Array, seed: int = 0) -> Array:
         height = float(position @ normal - offset)
         heights = kept @ normal - offset
         above = heights > np.clip(0.4 * height, 0.5 * PLANE, 2.0 * PLANE)
-        if _width(kept[np.abs(heights) < PLANE]) > WIDER * _width(kept[above]):
+        through = ((heights > BEHIND[0]) & (heights < BEHIND[1])).mean() > THROUGH
+        if not through and _width(kept[np.abs(heights) < PLANE]) > WIDER * _width(kept[above]):
             kept = kept[above]
-    return piece(kept, position)
+    if down is None or not len(kept):
+        return piece(kept, position)
+    return kept[piece_at(kept - np.outer((kept - position) @ down, down), position)]
 
 
 def _width(points: Array) -> float:
@@ -98,6 +106,14 @@ def piece_at(points: Array, position: Array) -> NDArray[np.bool_]:
     own = number[tuple(cells.T)]
     nearest = int(((points - position) ** 2).sum(axis=1).argmin())
     return own == own[nearest]
+
+
+def fullest(values: Array, layer: float) -> float:
+    """Return the median of the fullest layer of thickness `layer` of `values` (n,), at least one."""
+    ordered = np.sort(values)
+    counts = np.searchsorted(ordered, ordered + layer) - np.arange(len(ordered))
+    first = int(counts.argmax())
+    return float(np.median(ordered[first : first + int(counts[first])]))
 
 
 def across(approach: Array) -> tuple[Array, Array]:

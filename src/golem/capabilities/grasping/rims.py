@@ -32,6 +32,9 @@ SLICE, WALL, HIGH = 0.010, 0.025, (0.003, 0.030)
 """A wall is what lies within so much beside the pair, inside of it, and below the rim [m]."""
 SEEN = 12
 """Points that a wall has to have: one that is upright is not seen from above."""
+SPAN = 0.010
+"""Height over which the middle 80 % of those points have to be spread [m]: of an upright wall no more than its rounded
+edge is seen, and the noise of that leans."""
 LEANING = 0.15
 """A wall that leans less is upright to the eye [rad]."""
 FURTHER, MOST = 0.17, 0.50
@@ -90,6 +93,6 @@ def wall_lean(points: Array, outward: Array, approach: Array, first: float) -> f
     inside, depth = -points @ outward, points @ approach - first
     near = (np.abs(points @ np.cross(outward, approach)) < SLICE) & (np.abs(inside) < WALL)
     near &= (depth > HIGH[0]) & (depth < HIGH[1])
-    if near.sum() < SEEN:
+    if near.sum() < SEEN or np.ptp(np.quantile(depth[near], (0.1, 0.9))) < SPAN:
         return 0.0
     return math.atan(float(np.polyfit(depth[near], inside[near], 1)[0]))

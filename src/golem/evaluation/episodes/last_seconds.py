@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections import deque
 from dataclasses import dataclass
 from typing import Any
@@ -25,10 +26,10 @@ FPS = 10.0
 LENGTH = 5.0
 """Length of a film [s]."""
 AFTER = 1.0
-"""How much of it comes after the stage in which the trial was lost [s]."""
+"""How much of it comes after the stage in which the trial was lost, or after the skill said that it failed [s]."""
 QUALITY = 45
-BAR = 22
-"""Height of the line with the words [px]."""
+WIDE, LINE, LINES = 52, 15, 3
+"""Letters of a line below the picture, its height [px], and how many there are: what lost the trial, and the words."""
 INK, PANEL = (240, 242, 245), (16, 20, 27)
 
 
@@ -56,7 +57,8 @@ class LastSeconds:
     def _start(self) -> None:
         self._recent: deque[_Moment] = deque(maxlen=round(LENGTH * FPS))
         self._left: dict[str, list[_Moment]] = {}
-        self._due: deque[tuple[float, str]] = deque()
+        self._failed: dict[str, list[_Moment]] = {}
+        self._due: deque[tuple[float, str, dict[str, list[_Moment]]]] = deque()
         self._stage = self._words = ""
 
     def __call__(self, running: Any, robot: Any) -> None:
@@ -72,36 +74,45 @@ class LastSeconds:
         said = self._news.read()
         if said is not None:
             if said.stage != self._stage:
-                self._due.append((t + AFTER, self._stage))
+                self._due.append((t + AFTER, self._stage, self._left))
+            if said.data.get("failed"):
+                self._due.append((t + AFTER, said.stage, self._failed))
             self._stage, self._words = said.stage, f"{said.stage}: {said.text}"
         data = self._robot.data
         mocap = data.mocap_pos.copy(), data.mocap_quat.copy()
         self._recent.append(_Moment(t, data.qpos.copy(), mocap, self._words))
         while self._due and t >= self._due[0][0]:
-            self._left[self._due.popleft()[1]] = list(self._recent)
+            _, stage, kept = self._due.popleft()
+            kept[stage] = list(self._recent)
 
-    def film(self, stage: str) -> bytes | None:
-        """Return the film, as animated WebP, of a trial lost in `stage`; None where no twin was seen.
+    def film(self, stage: str, module: str | None) -> bytes | None:
+        """Return the film, as animated WebP, of a trial that `module` lost in `stage`; None where no twin was seen.
 
-        It ends a second after a skill last left that stage, else at the end of the trial.
+        It ends a second after a skill last said that it failed in that stage, else after one last left it, else at the
+        end of the trial.
         """
-        moments = self._left.get(stage) or list(self._recent)
+        moments = self._failed.get(stage) or self._left.get(stage) or list(self._recent)
         if self._robot is None or not moments:
             return None
         model, frames = self._robot.scene.model, list[Image.Image]()
         data = mujoco.MjData(model)
         font = ImageFont.load_default(size=12)
+        title = f"Lost in {stage}" + (f" by {module}" if module else "")
         with headlight(model), CameraRig(model, [halved(ONLOOKER)]) as rig:
             for moment in moments:
                 data.qpos[:] = moment.qpos
                 data.mocap_pos[:], data.mocap_quat[:] = moment.mocap
                 mujoco.mj_kinematics(model, data)
                 mujoco.mj_camlight(model, data)
-                image = Image.fromarray(rig.render(data, ONLOOKER.name)[0])
-                draw = ImageDraw.Draw(image)
-                draw.rectangle((0, image.height - BAR, image.width, image.height), fill=PANEL)
-                text = f"{moment.t:.1f} s  {moment.words}"
-                draw.text((6, image.height - BAR + 4), text, fill=INK, font=font)
+                picture = Image.fromarray(rig.render(data, ONLOOKER.name)[0])
+                image = Image.new("RGB", (picture.width, picture.height + LINES * LINE + 6), PANEL)
+                image.paste(picture)
+                said = textwrap.wrap(
+                    f"{moment.t:.1f} s  {moment.words}", WIDE, max_lines=LINES - 1, placeholder=" ..."
+                )
+                ImageDraw.Draw(image).multiline_text(
+                    (6, picture.height + 2), "\n".join((title, *said)), fill=INK, font=font, spacing=2
+                )
                 frames.append(image)
         return _packed(frames)
 

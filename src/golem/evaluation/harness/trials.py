@@ -176,7 +176,7 @@ def filmed_trial(rung: Rung[Any], spec: TrialSpec, artefacts: Path) -> TrialOutc
         outcome = run_trial(rung, spec, artefacts)
     finally:
         rung.onlooker = None
-    film = None if outcome.success else last.film(outcome.stage)
+    film = None if outcome.success else last.film(outcome.stage, outcome.module)
     if film is not None:
         artefacts.mkdir(exist_ok=True)
         (artefacts / FILM).write_bytes(film)

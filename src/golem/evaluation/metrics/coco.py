@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -23,11 +24,22 @@ class LabelledImage:
         path: its file.
         labels: (n,) class names of its boxes.
         boxes: (n, 4) x_min, y_min, x_max, y_max [px].
+        ignored: numbers of the boxes that are neither asked for nor make what is found there wrong.
+        crowds: those of them that hold any number of things.
     """
 
     path: Path
     labels: tuple[str, ...]
     boxes: Array
+    ignored: tuple[int, ...] = ()
+    crowds: tuple[int, ...] = ()
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """(n,) whether a box is asked for."""
+        counted = np.ones(len(self.labels), bool)
+        counted[list(self.ignored)] = False
+        return counted
 
     def read(self) -> NDArray[np.uint8]:
         """Return it as (height, width, 3) RGB.
@@ -41,11 +53,20 @@ class LabelledImage:
         return np.ascontiguousarray(image[:, :, ::-1], np.uint8)
 
 
+class _Row(NamedTuple):
+    """One annotation."""
+
+    label: str
+    box: tuple[float, float, float, float]
+    ignored: bool
+    crowd: bool
+
+
 def read_coco(folder: Path) -> list[LabelledImage]:
     """Return the images of a folder: its one `*.json` in COCO format, with `images`, `annotations`, `categories`.
 
-    Images are looked for beside the JSON file and in `images`. Crowds are left out. Class names are in small letters,
-    with `_` for a space.
+    Images are looked for beside the JSON file and in `images`. Boxes with `iscrowd` or `ignore` are ignored. Class
+    names are in small letters, with `_` for a space.
 
     Raises:
         ConfigError: there is no such file or more than one, or it is no such file, or an image is absent.
@@ -58,24 +79,27 @@ def read_coco(folder: Path) -> list[LabelledImage]:
         data = json.loads(files[0].read_text(encoding="utf-8"))
         names = {int(c["id"]): label_of(str(c["name"])) for c in data["categories"]}
         images = {int(image["id"]): str(image["file_name"]) for image in data["images"]}
-        rows: dict[int, list[tuple[str, list[float]]]] = {key: [] for key in images}
+        rows: dict[int, list[_Row]] = {key: [] for key in images}
         for one in data["annotations"]:
-            if not one.get("iscrowd"):
-                x, y, w, h = (float(v) for v in one["bbox"])
-                kind, image = int(one["category_id"]), int(one["image_id"])
-                if kind not in names:
-                    raise ConfigError(
-                        f"{files[0]}: an annotation is of class {kind}; the categories are "
-                        f"{', '.join(f'{key} ({name})' for key, name in sorted(names.items()))}."
-                    )
-                rows[image].append((names[kind], [x, y, x + w, y + h]))
+            x, y, w, h = (float(v) for v in one["bbox"])
+            kind, image = int(one["category_id"]), int(one["image_id"])
+            if kind not in names:
+                raise ConfigError(
+                    f"{files[0]}: an annotation is of class {kind}; the categories are "
+                    f"{', '.join(f'{key} ({name})' for key, name in sorted(names.items()))}."
+                )
+            crowd = bool(one.get("iscrowd"))
+            box = (x, y, x + w, y + h)
+            rows[image].append(_Row(names[kind], box, crowd or bool(one.get("ignore")), crowd))
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(f"{files[0]} is not in COCO format: {type(error).__name__} {error}.") from error
     return [
         LabelledImage(
             _image(files[0].parent, images[key]),
-            tuple(label for label, _ in rows[key]),
-            np.array([box for _, box in rows[key]]).reshape(-1, 4),
+            tuple(row.label for row in rows[key]),
+            np.array([row.box for row in rows[key]]).reshape(-1, 4),
+            tuple(k for k, row in enumerate(rows[key]) if row.ignored),
+            tuple(k for k, row in enumerate(rows[key]) if row.crowd),
         )
         for key in sorted(images)
     ]
@@ -98,10 +122,10 @@ class LabelScore:
     """How a detector did on one class.
 
     Attributes:
-        count: labelled boxes.
+        count: labelled boxes that are not ignored.
         ap: average precision at the given overlap (all points of the curve).
         centre: median distance of the centres of matched boxes [px]; nan without any.
-        false: detections that matched nothing, per image.
+        false: detections that matched nothing, not even an ignored box, per image.
     """
 
     count: int
@@ -115,6 +139,9 @@ def score_label(
 ) -> LabelScore:
     """Return the score of one class.
 
+    As COCO counts: what matches no box that is asked for, but one that is ignored, is neither right nor wrong. A box
+    takes one detection; a crowd takes all of which it holds a share of `overlap`.
+
     Args:
         label: the class.
         images: the labelled images.
@@ -125,18 +152,25 @@ def score_label(
     off: list[float] = []
     count = 0
     for k, image in enumerate(images):
-        boxes = image.boxes[[name == label for name in image.labels]]
-        count += len(boxes)
+        own = np.array([name == label for name in image.labels], bool)
+        boxes, counted, crowd = (
+            image.boxes[own],
+            image.counted[own],
+            np.isin(np.flatnonzero(own), image.crowds),
+        )
+        count += int(counted.sum())
         free = np.ones(len(boxes), bool)
-        own = sorted((d for d in found[k] if d.label == label), key=lambda d: -d.score)
-        for detection in own:
-            shares = np.where(free, _shares(detection.box, boxes), 0.0)
-            best = int(shares.argmax()) if len(boxes) else -1
-            hit = best >= 0 and float(shares[best]) >= overlap
-            hits.append((detection.score, hit))
-            if hit:
-                free[best] = False
+        for detection in sorted((d for d in found[k] if d.label == label), key=lambda d: -d.score):
+            shares = np.where(free, _shares(detection.box, boxes, crowd), 0.0)
+            fits = shares >= overlap
+            asked = fits & counted
+            best = int(np.where(asked if asked.any() else fits, shares, -1.0).argmax()) if fits.any() else -1
+            if best >= 0:
+                free[best] = crowd[best]
+            if asked.any():
                 off.append(float(np.linalg.norm(detection.center - boxes[best].reshape(2, 2).mean(axis=0))))
+            if asked.any() or not fits.any():
+                hits.append((detection.score, bool(asked.any())))
     hits.sort(key=lambda one: -one[0])
     right = np.cumsum([hit for _, hit in hits]) if hits else np.zeros(0)
     precision = right / np.arange(1, len(right) + 1)
@@ -148,8 +182,10 @@ def score_label(
     return LabelScore(count, ap, float(np.median(off)) if off else float("nan"), wrong)
 
 
-def _shares(box: Array, boxes: Array) -> Array:
+def _shares(box: Array, boxes: Array, crowd: NDArray[np.bool_]) -> Array:
+    """Return what share of the union of `box` and each of `boxes` (n, 4) is in both; of a crowd what share of `box`."""
     low, high = np.maximum(box[:2], boxes[:, :2]), np.minimum(box[2:], boxes[:, 2:])
     shared = np.prod(np.maximum(high - low, 0.0), axis=1)
-    union = float(np.prod(box[2:] - box[:2])) + np.prod(boxes[:, 2:] - boxes[:, :2], axis=1) - shared
-    return shared / np.maximum(union, 1e-9)
+    own = float(np.prod(box[2:] - box[:2]))
+    union = own + np.prod(boxes[:, 2:] - boxes[:, :2], axis=1) - shared
+    return shared / np.maximum(np.where(crowd, own, union), 1e-9)

@@ -6,7 +6,7 @@ on either rung.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,19 +19,22 @@ from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.worlds.conditions import LayoutKind
-from golem.robots.worlds.kitchen import KitchenLayout
+from golem.robots.worlds.kitchen import KitchenLayout, StandingThing
 from golem.robots.worlds.tableware import KINDS
 from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import SkillResult
 from golem.skills.place import PlaceGoal
 from golem.skills.take_config import TakeGoal, TakeReport
+from golem.stack import Stack
 from golem.types import Side
 
-AREA = ((0.44, 0.54), (-0.38, 0.38))
-"""x and y bounds in base_link of the places that are asked for [m]: both hands get there."""
-FREE = 0.17
-"""Distance of such a place from other things that is enough [m]."""
-ELSEWHERE = 0.12
+AREA = ((0.43, 0.56), (-0.38, 0.38))
+"""x and y bounds in base_link of the places that are asked for [m]: the hand on their side gets there."""
+FREE = 0.045
+"""Room between what stands at such a place and other things that is enough [m]."""
+EAR = 0.03
+"""How far a mug's ear is beyond its radius [m]."""
+ELSEWHERE = 0.10
 """Least distance of it from where the thing stood [m]."""
 ACROSS = 0.06
 """How far beyond the middle of the robot a hand is asked to go [m]."""
@@ -47,8 +50,11 @@ class CounterOptions:
     """How the hand is to come."""
     thing: tuple[str, ...] = ()
     """Kinds that are asked for, case by case, each with the hand on its side; else the trial's seed draws one."""
+    sizes: float = 0.0
+    """How much larger or smaller than its kind a thing is at most, as a share, drawn from the trial's seed."""
     each: bool = False
-    """Whether every kind of thing is tried with each hand, case by case; else the trial's seed draws both."""
+    """Whether every kind of thing is tried with each hand, case by case; else the trial's seed draws both.
+    Where the thing stands on the other side, the counter is mirrored."""
 
 
 class CounterRung(KitchenRung[CounterOptions]):
@@ -65,6 +71,11 @@ class CounterRung(KitchenRung[CounterOptions]):
     default_methods = ("centroid", "antipodal", "reranked")
     subject = "counter"
 
+    def make_stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
+        """Return the stack of a trial, with things of the sizes that are asked for; see `KitchenRung`."""
+        stack = super().make_stack(method, profile, overrides)
+        return stack.with_options("robot", sizes=self.options.sizes) if self.options.sizes else stack
+
     def cases(self, results: Results) -> Sequence[Case]:
         """Return the things and hands that are tried one by one; see `Rung`."""
         kinds = self.options.thing
@@ -74,6 +85,14 @@ class CounterRung(KitchenRung[CounterOptions]):
         if not self.options.each:
             return [{"thing": kind} for kind in kinds] or ({},)
         return [{"thing": kind, "hand": hand} for kind in kinds or KINDS for hand in ("left", "right")]
+
+    def mirrored(self, spec: TrialSpec, kitchen: KitchenLayout) -> bool:
+        """Return whether the thing of a case stands where its hand is not asked to go; see `KitchenRung`."""
+        kind, hand = spec.case.get("thing"), spec.case.get("hand")
+        sign = 1.0 if hand == "left" else -1.0
+        return hand is not None and any(
+            sign * thing.position[1] < -ACROSS for thing in kitchen.things if thing.kind == kind
+        )
 
     def errand(
         self,
@@ -156,10 +175,16 @@ def draw_errand(
     own: Side = "left" if chosen.position[1] > 0.0 else "right"
     hand: Side = "left" if spec.case.get("hand", own) == "left" else "right"
     mirror = 1.0 if hand == "left" else -1.0
-    others = np.array([thing.position[:2] for thing in things if thing is not chosen]).reshape(-1, 2)
+    others = [thing for thing in things if thing is not chosen]
+    wide = np.array([_radius(thing) + _radius(chosen) for thing in others])
+    there = np.array([thing.position[:2] for thing in others]).reshape(-1, 2)
     spots = spots[mirror * spots[:, 1] > -ACROSS]
-    room = np.linalg.norm(spots[:, None] - others, axis=2).min(axis=1, initial=np.inf)
+    room = (np.linalg.norm(spots[:, None] - there, axis=2) - wide).min(axis=1, initial=np.inf)
     room[np.linalg.norm(spots - chosen.position[:2], axis=1) < ELSEWHERE] = 0.0
     # Any free place; of a counter without one the place with the most room.
     spot = spots[int(np.argmax(np.minimum(room, FREE)))]
     return chosen.kind, hand, (float(spot[0]), float(spot[1]))
+
+
+def _radius(thing: StandingThing) -> float:
+    return thing.size * (KINDS[thing.kind][0] + (EAR if thing.kind == "mug" else 0.0))

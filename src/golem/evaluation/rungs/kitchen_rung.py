@@ -119,13 +119,17 @@ class KitchenRung(Rung[O]):
     ) -> Errand:
         """Have the errand of a trial done by a robot that stands or hangs ready."""
 
+    def mirrored(self, spec: TrialSpec, kitchen: KitchenLayout) -> bool:
+        """Return whether a trial needs what stands in its kitchen mirrored."""
+        return False
+
     def methods(self) -> tuple[str, ...]:
         """Return what is registered for the slot."""
         return registry.names(self.slot)
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
-        stack = self._stack(method, profile, overrides)
+        stack = self.make_stack(method, profile, overrides)
         for key, row in KEYS.items():
             registry.load(row.slot, stack.choice(key).use)
         shared_context()
@@ -133,8 +137,15 @@ class KitchenRung(Rung[O]):
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
-        stack = self._stack(spec.method, spec.profile, spec.overrides)
+        stack = self.make_stack(spec.method, spec.profile, spec.overrides)
         running, robot = build_seeing(stack, spec)
+        if (
+            isinstance(robot, MujocoRobot)
+            and robot.scene.kitchen
+            and self.mirrored(spec, robot.scene.kitchen)
+        ):
+            robot.close()
+            running, robot = build_seeing(stack.with_options("robot", mirrored=True), spec)
         if not isinstance(robot, MujocoRobot) or robot.scene.kitchen is None:
             raise ConfigError(
                 f"Rung {self.name} judges the twin's {self.subject}; robot: {stack.choice('robot').use} is none."
@@ -172,7 +183,12 @@ class KitchenRung(Rung[O]):
         detail = f"{result.reason} {verdict.words}".strip()
         return TrialOutcome(False, stage, module, detail, timings, series, picture, result.trace)
 
-    def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
+    def make_stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:
+        """Return the stack of a trial.
+
+        Raises:
+            ConfigError: an override replaces what the rung compares, or is none.
+        """
         if self.slot in overrides or "robot" in overrides:
             raise ConfigError(
                 f"The method is what sits in {self.slot}, and the {self.subject} is the rung's; leave out --use "

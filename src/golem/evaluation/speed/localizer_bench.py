@@ -51,7 +51,7 @@ def run_localizer_bench(config: LocalizerBenchConfig) -> dict[str, LabelScore]:
     if not 0.0 < config.overlap <= 1.0:
         raise ConfigError(f"--overlap is a share above 0 and up to 1, not {config.overlap:g}.")
     images = read_labelled(config.folder)
-    labelled = sorted({label for image in images for label in image.labels})
+    labelled = sorted({image.labels[k] for image in images for k in np.flatnonzero(image.counted)})
     for label in config.labels:
         if label not in labelled:
             raise unknown_name("label", label, labelled)

@@ -41,6 +41,8 @@ class MujocoConfig:
         layout: `nominal`: pack and tray stand where `PackLayout` says, under a robot in the hoist; under one that
             stands they are lowered with it. `varied`: places, light, finishes and clutter are drawn from the seed; of
             a kitchen also sizes, heights, and which way its fridge opens.
+        mirrored: whether what stands on a counter is mirrored, left to right.
+        sizes: how much larger or smaller than its kind a thing on a counter is at most, as a share; the seed draws it.
         conditions: those of `worlds.conditions` that are not left to the layout, e.g. `{light: 0.3}`.
         hoist: how the robot is held.
         reach_y: near-edge fasteners with |y| up to this are loosened [m]; a varied layout draws among those up to
@@ -69,6 +71,8 @@ class MujocoConfig:
     arms: Literal["home", "hanging"] = "home"
     stance: tuple[float, float, float] = (0.0, 0.0, 0.0)
     layout: LayoutKind = "nominal"
+    mirrored: bool = False
+    sizes: float = 0.0
     conditions: dict[str, float | str] = field(default_factory=dict[str, "float | str"])
     hoist: HoistConfig = field(default_factory=HoistConfig)
     reach_y: float = 0.15
@@ -99,6 +103,7 @@ class MujocoConfig:
             ("slope", self.slope, 0.0, 0.5),
             ("step", self.step, 0.0, 0.1),
             ("rubble", self.rubble, 0.0, 0.2),
+            ("sizes", self.sizes, 0.0, 0.3),
             ("people", self.people, 0, 20),
             ("obstacles", self.obstacles, 0, 12),
             ("noslip", self.noslip, 0, 100),
@@ -120,6 +125,10 @@ class MujocoConfig:
         if self.world not in WITH_PACK and (self.conditions or varied):
             raise ConfigError(
                 f"The world '{self.world}' has no pack whose layout or conditions could differ."
+            )
+        if (self.mirrored or self.sizes) and self.world != "counter":
+            raise ConfigError(
+                f"Only a counter's things are mirrored or of other sizes, not those of the world '{self.world}'."
             )
         if self.world in KITCHENS and self.stance[2] != 0.0:
             raise ConfigError(

@@ -29,7 +29,7 @@ from golem.robots.worlds.conditions import (
 from golem.robots.worlds.dressing import dress
 from golem.robots.worlds.fridge import Seal, seal_of
 from golem.robots.worlds.furnished import Person
-from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_counter, draw_kitchen
+from golem.robots.worlds.kitchen import KitchenLayout, add_kitchen, draw_counter, draw_kitchen, mirrored
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
 from golem.robots.worlds.screws import ScrewDraw, draw_screws
@@ -117,8 +117,12 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
         _add_onlooker(spec, layout)
     elif config.world in KITCHENS:
         raised = layout.top_z - PackLayout().top_z
-        draw = draw_kitchen if config.world == "kitchen" else draw_counter
-        kitchen = draw(stream(seed, "world/kitchen"), raised, config.layout == "varied")
+        rng, varied = stream(seed, "world/kitchen"), config.layout == "varied"
+        if config.world == "kitchen":
+            kitchen = draw_kitchen(rng, raised, varied)
+        else:
+            kitchen = draw_counter(rng, raised, varied, config.sizes)
+        kitchen = mirrored(kitchen) if config.mirrored else kitchen
         names = PackNames((), np.zeros((0, 3)), "", add_kitchen(spec, kitchen, (stance.x, stance.y)))
         _add_kitchen_onlooker(spec, kitchen, stance)
     else:
@@ -248,15 +252,18 @@ def _add_onlooker(spec: mujoco.MjSpec, layout: PackLayout) -> None:
 
 
 def _add_kitchen_onlooker(spec: mujoco.MjSpec, kitchen: KitchenLayout, stance: PlanarPose) -> None:
-    """Add a fixed camera that watches robot, fridge and counter from the counter's side, behind the robot."""
+    """Add a fixed camera that watches robot, fridge and counter from the counter's side, behind the robot.
+
+    Of a robot that works at a counter it shows front and hands, from below the cabinets on the wall.
+    """
     fridge, at = kitchen.fridge, np.array([stance.x, stance.y, 0.0])
     side = 1.0 if fridge.handle_y < 0.0 else -1.0
     eye = np.array([-1.25, 1.35 * side, fridge.handle_z + 0.65])
     target = np.array([fridge.front - 0.05, 0.05 * side, fridge.handle_z - 0.22])
     if fridge.handle_y < kitchen.counter_start:
         eye, target = (
-            np.array([-0.35, 1.25, kitchen.counter_top + 0.65]),
-            np.array([0.40, 0.0, kitchen.counter_top]),
+            np.array([1.20, 0.62, kitchen.counter_top + 0.55]),
+            np.array([0.34, -0.02, kitchen.counter_top + 0.12]),
         )
     _aim(spec.worldbody.add_camera(name=ONLOOKER.name), eye + at, target + at)
 

@@ -40,13 +40,17 @@ _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
 
 @dataclass(frozen=True, slots=True)
 class StandingThing:
-    """A thing on the counter: its kind, the body's name, and the middle of its underside in the world [m]."""
+    """A thing on the counter: its kind, the body's name, and the middle of its underside in the world [m].
+
+    Its size is a multiple of what `KINDS` says.
+    """
 
     kind: str
     body: str
     position: tuple[float, float, float]
     yaw: float
     colour: tuple[float, float, float]
+    size: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,13 +122,16 @@ def draw_kitchen(rng: np.random.Generator, raised: float = 0.0, varied: bool = T
     return KitchenLayout(fridge, top, edge, 0.06, things, *colours)
 
 
-def draw_counter(rng: np.random.Generator, raised: float = 0.0, varied: bool = True) -> KitchenLayout:
+def draw_counter(
+    rng: np.random.Generator, raised: float = 0.0, varied: bool = True, sizes: float = 0.0
+) -> KitchenLayout:
     """Return a kitchen whose counter is before the robot, with four things within reach, and whose fridge is aside.
 
     Args:
         rng: the same state gives the same kitchen.
         raised: as for `draw_kitchen`.
         varied: height, edge and colours are drawn; else only what stands where.
+        sizes: how much larger or smaller than its kind a thing is at most, as a share.
     """
     draws: list[float] = rng.uniform(-1.0, 1.0, 2).tolist() if varied else [0.0, 0.0]
     picks = rng.integers(0, (len(FRONTS), len(TOPS), len(STEELS))) if varied else np.zeros(3, int)
@@ -134,10 +141,20 @@ def draw_counter(rng: np.random.Generator, raised: float = 0.0, varied: bool = T
     # Where one finds no room, all are put elsewhere.
     drawn = (_draw_things(rng, kinds, top, area, 1.0) for _ in range(40))
     things = next(some for some in drawn if len(some) == len(kinds))
+    grown = (1.0 + sizes * rng.uniform(-1.0, 1.0, len(things))).tolist()
+    things = tuple(replace(thing, size=size) for thing, size in zip(things, grown, strict=True))
     nominal = FridgeLayout()
     fridge = replace(nominal, handle_y=-1.10, handle_z=nominal.handle_z + raised)
     colours = FRONTS[picks[0]], TOPS[picks[1]], STEELS[picks[2]]
     return KitchenLayout(fridge, top, edge, -0.88, things, *colours)
+
+
+def mirrored(layout: KitchenLayout) -> KitchenLayout:
+    """Return a kitchen whose things stand as in a mirror: what was left of the robot is right of it."""
+    things = tuple(
+        replace(t, position=(t.position[0], -t.position[1], t.position[2]), yaw=-t.yaw) for t in layout.things
+    )
+    return replace(layout, things=things)
 
 
 def _draw_things(
@@ -189,8 +206,8 @@ def add_kitchen(
     for thing in layout.things:
         x, y, z = thing.position
         place = (x + at[0], y + at[1], z)
-        geoms = add_object(spec, thing.kind, thing.body, place, thing.yaw, thing.colour)
-        radius, height = KINDS[thing.kind]
+        geoms = add_object(spec, thing.kind, thing.body, place, thing.yaw, thing.colour, size=thing.size)
+        radius, height = (thing.size * length for length in KINDS[thing.kind])
         top = np.array(place) + (0.0, 0.0, height)
         found.append(PackPart(thing.kind, thing.body, geoms, top, np.array([2 * radius, 2 * radius, height])))
     return tuple(found)

@@ -43,6 +43,7 @@ def add_object(
     colour: tuple[float, float, float],
     *,
     loose: bool = True,
+    size: float = 1.0,
 ) -> tuple[str, ...]:
     """Stand an object of `KINDS` somewhere.
 
@@ -54,6 +55,7 @@ def add_object(
         yaw: heading; that of a mug is where its handle is [rad].
         colour: r, g, b.
         loose: whether it can be moved.
+        size: how large it is, as a multiple of what `KINDS` says; its mass stays.
 
     Returns:
         The names of the geoms that are seen of it.
@@ -64,7 +66,22 @@ def add_object(
     body = spec.worldbody.add_body(name=name, pos=list(position), quat=quat)
     if loose:
         body.add_freejoint(name=name)
-    return _BUILDERS[kind](spec, body, name, material)
+    names = _BUILDERS[kind](spec, body, name, material)
+    if size != 1.0:
+        _resize(spec, body, size)
+    return names
+
+
+def _resize(spec: mujoco.MjSpec, body: mujoco.MjsBody, size: float) -> None:
+    for geom in body.geoms:
+        geom.pos = geom.pos * size
+        if geom.type == mujoco.mjtGeom.mjGEOM_MESH:
+            spec.mesh(geom.meshname).scale = [size] * 3
+        elif np.isfinite(geom.fromto).all():
+            geom.size[0] *= size
+            geom.fromto = geom.fromto * size
+        else:
+            geom.size = geom.size * size
 
 
 def _mug(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str) -> tuple[str, ...]:

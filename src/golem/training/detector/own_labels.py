@@ -35,7 +35,7 @@ def load_own(folder: Path, seed: int, width: int) -> tuple[Dataset, Dataset, tup
         ConfigError: the folder is in neither format, an image is absent or broken, or all are held out.
     """
     images = read_labelled(folder)
-    classes = tuple(sorted({label for image in images for label in image.labels}))
+    classes = tuple(sorted({image.labels[k] for image in images for k in np.flatnonzero(image.counted)}))
     if not classes:
         raise ConfigError(f"No image of {folder} has a label.")
     held = np.array(
@@ -70,7 +70,8 @@ def _scaled(image: LabelledImage, classes: tuple[str, ...], width: int) -> tuple
         pixels = np.ascontiguousarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), np.uint8)
     # A pixel's middle is at a whole number here, its corner there.
     boxes = np.clip(image.boxes * scale, 0.0, np.tile(pixels.shape[1::-1], 2)) - 0.5
-    kinds = np.array([classes.index(label) for label in image.labels], float)
+    known = np.array([label in classes for label in image.labels], bool)
+    kinds = np.array([classes.index(label) if label in classes else -1 for label in image.labels], float)
     middle = 0.5 * (boxes[:, :2] + boxes[:, 2:])
-    small = ((boxes[:, 2:] - boxes[:, :2]).min(axis=1, initial=np.inf) < MIN_SIDE).astype(float)
-    return pixels, np.column_stack([kinds, middle, boxes, small]).reshape(-1, 8)
+    ignored = ~image.counted | ((boxes[:, 2:] - boxes[:, :2]).min(axis=1, initial=np.inf) < MIN_SIDE)
+    return pixels, np.column_stack([kinds, middle, boxes, ignored.astype(float)]).reshape(-1, 8)[known]

@@ -62,8 +62,7 @@ def build_world(draw: WareDraw) -> mujoco.MjModel:
     box, top = mujoco.mjtGeom.mjGEOM_BOX, (0.6, 0.6, 0.02)
     parts.collider(spec.worldbody, box, top, (0.0, 0.0, -0.02), friction=0.7)
     parts.visual(spec.worldbody, box, top, (0.0, 0.0, -0.02), material="steel")
-    add_object(spec, draw.kind, WARE, (0.0, 0.0, 0.0), draw.yaw, COLOURS[draw.kind][0])
-    _resize(spec, draw.size)
+    add_object(spec, draw.kind, WARE, (0.0, 0.0, 0.0), draw.yaw, COLOURS[draw.kind][0], size=draw.size)
     spec.worldbody.add_body(name=LEADER, mocap=True)
     wrist = spec.worldbody.add_body(
         name=WRIST, mass=WRIST_MASS, inertia=[WRIST_INERTIA] * 3, explicitinertial=True, pos=[0.0, 0.0, 1.0]
@@ -77,19 +76,6 @@ def build_world(draw: WareDraw) -> mujoco.MjModel:
         data=[0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0],
     )  # fmt: skip
     return spec.compile()
-
-
-def _resize(spec: mujoco.MjSpec, size: float) -> None:
-    """Make the ware larger or smaller; its mass stays."""
-    for geom in spec.body(WARE).geoms:
-        geom.pos = geom.pos * size
-        if geom.type == mujoco.mjtGeom.mjGEOM_MESH:
-            spec.mesh(geom.meshname).scale = [size] * 3
-        elif np.isfinite(geom.fromto).all():
-            geom.size[0] *= size
-            geom.fromto = geom.fromto * size
-        else:
-            geom.size = geom.size * size
 
 
 def palm_cloud(
