@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
+from golem.capabilities.planning.base import PlanRefused
 from golem.errors import ConfigError
 from golem.options import require
 from golem.skills.base import SkillResult, StageFailed
@@ -16,6 +18,7 @@ from golem.skills.counter_stance import BLIND, before, stand_before, step_back
 from golem.skills.navigate import NavigateGoal
 from golem.skills.place import PlaceGoal
 from golem.skills.pose_goal import FIRST_REPORT
+from golem.skills.poses import lifted
 from golem.skills.recalled import RecalledPlace, RecalledPlaces, ask
 from golem.skills.remember import RememberGoal
 from golem.skills.take_config import TakeGoal, TakeReport
@@ -29,6 +32,11 @@ SAME = 0.25
 """Places nearer than this to each other are looked at from one stance [m]."""
 ASIDE = 0.6
 """How far to either side along the counter it is searched for [m]."""
+RAISES = (0.25, 0.20, 0.15, 0.10, 0.05)
+"""How much higher what is held is carried, the first that the arm can [m]: legs that walk sink by 8 cm and sway, and
+what it is carried over is up to 22 cm high."""
+RAISING = (0.15, 0.02, 0.1)
+"""Speed of that, and how far the hand may leave its line, and turn [m/s, m, rad]."""
 TURN = 0.6
 """How far the robot turns where nothing is remembered at all [rad]."""
 
@@ -257,6 +265,7 @@ class Fetch:
         side: Side = "left" if taken.side == "left" else "right"
         facing = PlanarPose.of(context.legs.pose).yaw
         if walks:
+            await self._raise(context, side)
             context.release_arms()
             await step_back(context)
         if to is None:
@@ -279,6 +288,16 @@ class Fetch:
             raise StageFailed(placed.stage, placed.slot or "skill", placed.reason)
         report.x, report.y = float(spot[0]), float(spot[1])
         return f"The {goal.text} was set down at ({spot[0]:.2f}, {spot[1]:.2f}) in odom."
+
+    async def _raise(self, context: Context, side: Side) -> None:
+        """Lift what is held above what else stands on the counter, as far as the arm can."""
+        # Numba takes a second to import, and other skills do without it.
+        from golem.skills.planned_motion import PlannedMotion
+
+        motion, T = PlannedMotion(context), context.arms[side].commanded
+        for height in RAISES:
+            with suppress(PlanRefused):
+                return await motion.line(side, lifted(T, height), RAISING[0], tolerance=RAISING[1:])
 
     def _still_held(self, context: Context, goal: FetchGoal, side: Side) -> None:
         if not context.hands[side].status.holding:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -225,10 +226,12 @@ class SetDown:
         context.say("carry", "Carrying it there.", target=at.tolist(), side=side)
         over = self._tallest(self._scene(context, goal, arm.pose), arm.pose[:3, 3], at) + below + ROOM
         goals = [self._turned(arm.commanded, turn, at, goal.aside or (0.0, 0.0)) for turn in TURNS]
-        for T in goals:
+        # At the height of the hand, or where the arm cannot, as low as what is in the way lets it.
+        levels = (max(float(arm.commanded[2, 3]), over), over)
+        for T, level in product(goals, levels):
             # Straight there and down, as long as the arm can: planned ways of a hand are long ways for a thing.
             try:
-                up = at_height(arm.commanded, max(T[2, 3], arm.commanded[2, 3], over))
+                up = at_height(arm.commanded, max(float(T[2, 3]), level))
                 for stop in (up, at_height(T, up[2, 3]), T):
                     await motion.line(side, stop, c.travel_speed, tolerance=STRAIGHT)
                 return

@@ -33,7 +33,7 @@ class ObjectRecords:
 
     def __init__(self) -> None:
         """Begin with none."""
-        self._values: Array = np.empty((16, len(COLUMNS)))
+        self._values: Array = np.empty((16, len(COLUMNS)), order="F")
         self._numbers: NDArray[np.int64] = np.empty(16, np.int64)
         self._labels: list[str] = []
         self._by_label: dict[str, list[int]] = {}

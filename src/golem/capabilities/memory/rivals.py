@@ -50,6 +50,9 @@ def _rivals(records: ObjectRecords, row: int, gate: float) -> NDArray[np.intp]:
     # What may be anywhere, by its variance, is no rival of what is known to be here: the smaller variance counts.
     most = LARGEST + gate * math.sqrt(2.0 * mine[VARIANCE])
     near = np.flatnonzero(np.abs(values[:, 0] - mine[0]) <= most)  # most are far off along one axis already
+    near = near[np.abs(values[near, 1] - mine[1]) <= most]
+    if len(near) == 1:  # itself
+        return near[:0]
     others, label = values[near], records.label(row)
     sigma = np.sqrt(2.0 * np.minimum(others[:, VARIANCE], mine[VARIANCE]))
     reach = np.maximum(others[:, SIZE], mine[SIZE]) + gate * sigma
