@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from golem.evaluation.episodes.memory_timeline import ObjectTimeline
 from golem.evaluation.report.svg_figure import COLOUR
@@ -43,12 +44,10 @@ def timeline_plot(episodes: Mapping[str, tuple[Sequence[ObjectTimeline], int]], 
 def _draw(axes: Any, rows: Sequence[ObjectTimeline], split: int) -> None:
     looks = len(rows[0].beliefs)
     for y, row in enumerate(rows):
-        there = np.flatnonzero(row.present)
-        axes.barh([y] * len(there), 1, left=there, height=0.8, color=COLOUR["track"], linewidth=0)
-        for k, belief in enumerate(row.beliefs):
-            if belief:
-                alpha = 1.0 if belief == "there" else 0.3
-                axes.barh(y + 0.18, 1, left=k, height=0.3, color=COLOUR["m0"], alpha=alpha, linewidth=0)
+        axes.broken_barh(_spans(row.present), (y - 0.4, 0.8), color=COLOUR["track"], linewidth=0)
+        for belief, alpha in (("there", 1.0), ("gone", 0.3)):
+            held = _spans([one == belief for one in row.beliefs])
+            axes.broken_barh(held, (y + 0.03, 0.3), color=COLOUR["m0"], alpha=alpha, linewidth=0)
         axes.plot([k + 0.5 for k in row.seen], [y + 0.18] * len(row.seen), "|", ms=8, color=COLOUR["ink"])
         for right, mark, colour in ((True, "o", "won"), (False, "x", "lost")):
             at = [k + 0.5 for k, told in enumerate(row.told) if told is right]
@@ -57,3 +56,11 @@ def _draw(axes: Any, rows: Sequence[ObjectTimeline], split: int) -> None:
     axes.set(xlim=(0, looks), ylim=(len(rows) - 0.45, -0.55))
     axes.set_yticks(range(len(rows)), [row.name for row in rows])
     axes.grid(axis="y", visible=False)
+
+
+def _spans(flags: ArrayLike) -> list[tuple[int, int]]:
+    """Return first look and length of each run of true `flags` (n,): bars of one look each show seams."""
+    edges = np.flatnonzero(
+        np.diff(np.concatenate([[False], np.asarray(flags, bool), [False]]).astype(np.int8))
+    )
+    return [(int(first), int(end - first)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
