@@ -50,7 +50,7 @@ class CounterWatch:
         assert robot.scene.kitchen is not None
         self._running, self._robot, self._oracle, self._kind = running, robot, oracle, kind
         self._names = tuple((thing.kind, thing.body) for thing in robot.scene.kitchen.things)
-        self._bodies = [robot.model.body(body).id for _, body in self._names]
+        self._bodies = [robot.data.body(body).id for _, body in self._names]
         self._before = self._things()
         self._highest = np.array([thing.position[2] for thing in self._before])
         self.recorder = BalanceRecorder(robot) if balances else None
