@@ -55,7 +55,7 @@ class Scripted:
 
 def fetch(
     goal: FetchGoal, takes: Sequence[SkillResult], places: Sequence[SkillResult] = (DONE,), seen: bool = True,
-    state: GripState = GripState.HOLDING,
+    state: GripState = GripState.HOLDING, closes: GripState = GripState.EMPTY,
 ) -> tuple[SkillResult, dict[str, Scripted]]:  # fmt: skip
     """Return how an errand of a robot that does not walk ended, and what was asked of which skill."""
     skills = {
@@ -74,6 +74,9 @@ def fetch(
     for _ in range(200):
         context.refresh(context.t + 0.01)
         run.step()
+        if context.bus.latest(topics.hand_goal("left")) is not None:
+            said = HandStatus(context.t, closes, 0.03, 0.0, np.zeros(2))
+            context.bus.publish(topics.hand_status("left"), said, context.t)
     assert run.error is None and run.result is not None
     return run.result, skills
 
@@ -108,6 +111,12 @@ def test_what_was_never_seen_is_looked_for_and_taken() -> None:
 def test_what_is_lost_on_the_way_is_noticed() -> None:
     result, skills = fetch(FetchGoal("mug", (0.5, 0.1)), [TAKEN], state=GripState.SLIPPED)
     assert (result.stage, result.slot) == ("carry", "grasp_method") and not skills["place"].goals
+
+
+def test_what_slid_in_the_fingers_is_gripped_again_and_set_down() -> None:
+    goal = FetchGoal("mug", (0.5, 0.1))
+    result, skills = fetch(goal, [TAKEN], state=GripState.SLIPPED, closes=GripState.HOLDING)
+    assert result.success and len(skills["place"].goals) == 1
 
 
 def test_a_failed_place_is_the_errands_failure() -> None:

@@ -13,6 +13,7 @@ from golem.capabilities.planning.base import PlanRefused
 from golem.errors import ConfigError
 from golem.options import require
 from golem.skills.base import SkillResult, StageFailed
+from golem.skills.closing import close_hand
 from golem.skills.context import Context
 from golem.skills.counter_stance import BLIND, before, stand_before, step_back
 from golem.skills.navigate import NavigateGoal
@@ -35,7 +36,7 @@ ASIDE = 0.6
 RAISES = (0.25, 0.20, 0.15, 0.10, 0.05)
 """How much higher what is held is carried, the first that the arm can [m]: legs that walk sink by 8 cm and sway, and
 what it is carried over is up to 22 cm high."""
-RAISING = (0.15, 0.02, 0.1)
+RAISING = (0.15, 0.1, 0.3)
 """Speed of that, and how far the hand may leave its line, and turn [m/s, m, rad]."""
 TURN = 0.6
 """How far the robot turns where nothing is remembered at all [rad]."""
@@ -271,18 +272,19 @@ class Fetch:
         if to is None:
             if walks:
                 await self._navigate(context, home)
-            self._still_held(context, goal, side)
+            await self._still_held(context, goal, taken)
             return f"The {goal.text} is in the {side} hand, where the robot began."
         spot = self._in_odom(context, to)
         if walks:
             report.approaches += await self._go(context, spot)
             spot = self._in_odom(context, to)
-        self._still_held(context, goal, side)
+        await self._still_held(context, goal, taken)
         aside, turned = (taken.aside_x, taken.aside_y), PlanarPose.of(context.legs.pose).yaw - facing
         # What the head camera is off by turns with the robot.
-        off = PlanarPose(0.0, 0.0, turned) @ PlanarPose(taken.off_x, taken.off_y, 0.0)
+        off_now = PlanarPose(0.0, 0.0, turned) @ PlanarPose(taken.off_x, taken.off_y, 0.0)
         x, y = float(spot[0]), float(spot[1])
-        there = PlaceGoal(x, y, "odom", side, taken.below, taken.above, aside, (off.x, off.y))
+        off = (off_now.x, off_now.y)
+        there = PlaceGoal(x, y, "odom", side, taken.below, taken.above, aside, off, taken.radius)
         placed = await context.run("place", there)
         if not placed.success:
             raise StageFailed(placed.stage, placed.slot or "skill", placed.reason)
@@ -299,9 +301,14 @@ class Fetch:
             with suppress(PlanRefused):
                 return await motion.line(side, lifted(T, height), RAISING[0], tolerance=RAISING[1:])
 
-    def _still_held(self, context: Context, goal: FetchGoal, side: Side) -> None:
-        if not context.hands[side].status.holding:
+    async def _still_held(self, context: Context, goal: FetchGoal, taken: TakeReport) -> None:
+        """Grip again what has slid in the fingers, if it is still there."""
+        side: Side = "left" if taken.side == "left" else "right"
+        if context.hands[side].status.holding:
+            return
+        if not await close_hand(context, side, taken.force):
             raise StageFailed("carry", "grasp_method", f"The {goal.text} was lost on the way.")
+        context.say("carry", f"The {goal.text} had slid in the fingers.")
 
 
 def _elsewhere(result: SkillResult) -> bool:

@@ -18,6 +18,7 @@ from golem.interfaces.payloads import GripState
 from golem.options import require
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
+from golem.skills.closing import close_hand
 from golem.skills.context import Context
 from golem.skills.force_guard import ForceGuard
 from golem.skills.poses import at_height, lifted, retracted
@@ -69,6 +70,7 @@ class PlaceGoal:
         aside: where its middle is beside the fingertips along the hand's x and y axes, as `take` reports it [m]; empty:
             between them.
         off: how far from where the head camera has them the hand finds things, in odom, as `take` reports it [m].
+        radius: half of its width, as `take` reports it [m]; 0 where it is not known.
     """
 
     x: float
@@ -79,6 +81,7 @@ class PlaceGoal:
     above: float = 0.0
     aside: tuple[float, ...] = ()
     off: tuple[float, ...] = ()
+    radius: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the numbers.
@@ -94,6 +97,7 @@ class PlaceGoal:
             "goal of placing: ",
             ("below", self.below, 0.0 <= self.below <= 0.5, "from 0 to 0.5 m"),
             ("above", self.above, 0.0 <= self.above <= 0.5, "from 0 to 0.5 m"),
+            ("radius", self.radius, 0.0 <= self.radius <= 0.5, "from 0 to 0.5 m"),
         )
 
 
@@ -107,7 +111,8 @@ class PlaceConfig:
         travel_speed: between places [m/s].
         lower_speed: down onto the surface [m/s].
         contact: force at which it stands [N].
-        room: free radius that it needs around its middle [m].
+        room: free radius without which it is not set down [m].
+        spare: what is to be free around it [m], where there is such a place.
         unknown: height of the fingertips above what is held where the goal does not say [m].
         back: how far the hand backs off [m].
         timeout: time after which it is given up [s].
@@ -119,6 +124,7 @@ class PlaceConfig:
     lower_speed: float = 0.04
     contact: float = 8.0
     room: float = 0.05
+    spare: float = 0.02
     unknown: float = 0.10
     back: float = 0.14
     timeout: float = 60.0
@@ -200,14 +206,17 @@ class SetDown:
             spot = T[:3, :3] @ spot + T[:3, 3]
         context.say("detect", "Looking at the place.", target=spot.tolist())
         motion.look([(hand, IN_HAND)])
+        motion.displace(np.array([*(goal.off or (0.0, 0.0)), 0.0]))
         scene = self._scene(context, goal, context.arms[side].pose)
         level = surface_below(scene, spot)
         if level is None:
             raise StageFailed("detect", "localizer", "The head camera shows no surface at that place.")
         spot[2] = level
         proud = scene[(scene[:, 2] > level + PROUD) & (scene[:, 2] < level + 0.4), :2]
-        for beside in BESIDE:
-            near = np.linalg.norm(proud - spot[:2] - beside, axis=1) < self._config.room
+        c = self._config
+        # The head camera is off by centimetres: what looks too narrow for the thing may do, less than `room` does not.
+        for room, beside in product((max(goal.radius + c.spare, c.room), c.room), BESIDE):
+            near = np.linalg.norm(proud - spot[:2] - beside, axis=1) < room
             if np.count_nonzero(near) <= MIN_POINTS:
                 return spot + (*beside, 0.0)
         raise StageFailed("detect", "localizer", "Something else stands at that place.")
@@ -290,7 +299,8 @@ class SetDown:
     async def _lower(self, context: Context, goal: PlaceGoal, side: Side, level: float) -> None:
         """Lower it until it stands: where the surface is felt, or a little deeper than where it was seen."""
         c, arm, hand = self._config, context.arms[side], context.hands[side]
-        if not hand.status.holding:
+        # What slid in the fingers on the way is held again, as firmly as it was.
+        if not hand.status.holding and not await close_hand(context, side, float(hand.status.force.max())):
             raise StageFailed("carry", "grasp_method", "It was lost on the way.")
         context.say("lower", "Lowering it.", side=side)
         await arm.settle(0.006, 1.0)

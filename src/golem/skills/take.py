@@ -16,6 +16,7 @@ from golem.capabilities.properties.base import holding_force
 from golem.interfaces.payloads import GripState
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
+from golem.skills.closing import close_hand
 from golem.skills.context import Context
 from golem.skills.poses import lifted, retracted
 from golem.skills.take_config import TakeGoal, TakeReport, TakeThingConfig
@@ -25,8 +26,6 @@ from golem.types import SIDES, Array, LocalizedObject, Side
 if TYPE_CHECKING:
     from golem.skills.planned_motion import PlannedMotion
 
-CLOSED = (GripState.HOLDING, GripState.EMPTY)
-"""States of a hand whose fingers have closed, on something or on nothing."""
 SPARED = 0.07
 """Radius around points of the thing within which nothing is in the hand's way [m]."""
 EVERY = 0.06
@@ -37,8 +36,6 @@ CENTRED = 0.02
 """Distance along the closing axis within which a thing's middle comes between the fingers as they close [m]."""
 OVER_IT = 0.75
 """Cosine of the lean up to which a hand counts as above what it takes."""
-HEARD = 0.06
-"""Time in which a hand begins what it was told [s]."""
 TOP, FORWARD = "top", "forward"
 
 
@@ -228,7 +225,9 @@ class Take:
         low = float(np.quantile(cloud[:, 2], 0.02)) if level is None else level
         self._report.below = max(tips - low, 0.0)
         self._report.above = max(float(np.quantile(cloud[:, 2], 0.98)) - tips, 0.0)
-        middle = 0.5 * (np.quantile(cloud, 0.02, axis=0) + np.quantile(cloud, 0.98, axis=0))
+        ends = np.quantile(cloud, (0.02, 0.98), axis=0)
+        middle = 0.5 * (ends[0] + ends[1])
+        self._report.radius = 0.5 * float(np.max(ends[1, :2] - ends[0, :2]))
         self._report.x, self._report.y, self._report.z = (float(v) for v in middle)
         T = grasp.T_odom_gripper
         off = middle - T[:3, 3]
@@ -256,11 +255,8 @@ class Take:
         await arm.settle(c.tolerance, 2.0)
         context.say("grasp", f"Closing with {self.force:.3g} N per finger.", side=side)
         # Softly first: the finger that touches first waits for the other instead of pushing the thing over.
-        for force in (c.touch, self.force):
-            hand.close(force)
-            await context.sleep(HEARD)
-            await context.until(lambda: hand.status.state in CLOSED, c.close_timeout)
-        if not hand.status.holding:
+        await close_hand(context, side, c.touch, c.close_timeout)
+        if not await close_hand(context, side, self.force, c.close_timeout):
             text = f"The fingers hold nothing (gap {hand.status.gap * 1e3:.0f} mm)."
             raise StageFailed("grasp", "grasp_method", text)
         self._report.width, self._report.force = float(hand.status.gap), self.force
@@ -272,10 +268,17 @@ class Take:
         T = arm.commanded
         rise = max(c.lift + c.before * float(T[2, 2]), 0.0)
         up = lifted(T, 0.5 * c.lift) if rise > 0.02 else T
+
+        def slid() -> bool:
+            return not hand.status.holding
+
         for goal in (up, lifted(retracted(T, c.before), rise)):
-            await arm.move(goal, c.reach_speed, stop=lambda: not hand.status.holding)
-        if not hand.status.holding:
-            raise StageFailed("lift", "grasp_method", "It slipped out of the fingers.")
+            await arm.move(goal, c.reach_speed, stop=slid)
+            while slid():
+                if not await close_hand(context, side, self.force, c.close_timeout):
+                    raise StageFailed("lift", "grasp_method", "It slipped out of the fingers.")
+                context.say("lift", "It slid in the fingers, and is held again.", side=side)
+                await arm.move(goal, c.reach_speed, stop=slid)
 
     async def _leave(self, context: Context, motion: PlannedMotion, home: Array) -> None:
         """Open the hand, back off, and go home, as far as it can go."""

@@ -103,6 +103,7 @@ class TakeReport:
         above: height of its top above the fingertips [m].
         width: how far the fingers are open around it [m].
         force: what each finger was told to press with [N].
+        radius: half of its width as seen, across where it is widest [m].
         aside_x, aside_y: where its middle is beside the fingertips, along the hand's x and y axes [m].
         off_x, off_y: how far from where the head camera had it the hand found it, in odom [m].
     """
@@ -116,6 +117,7 @@ class TakeReport:
     above: float = 0.0
     width: float = 0.0
     force: float = 0.0
+    radius: float = 0.0
     aside_x: float = 0.0
     aside_y: float = 0.0
     off_x: float = 0.0

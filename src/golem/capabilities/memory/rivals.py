@@ -36,7 +36,7 @@ def outvoted(records: ObjectRecords, row: int, gate: float, tie: float) -> bool:
     """
     values = records.values
     rivals = _rivals(records, row, gate)
-    return bool(np.any(values[rivals, EVIDENCE] > values[row, EVIDENCE] + tie))
+    return len(rivals) > 0 and bool(np.any(values[rivals, EVIDENCE] > values[row, EVIDENCE] + tie))
 
 
 def _rivals(records: ObjectRecords, row: int, gate: float) -> NDArray[np.intp]:

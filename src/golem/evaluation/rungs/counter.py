@@ -124,7 +124,8 @@ class CounterRung(KitchenRung[CounterOptions]):
         spot = np.linalg.inv(robot.truth.T_world_odom) @ (*place, 0.0, 1.0)
         side: Side = "left" if found.side == "left" else "right"
         aside, off = (found.aside_x, found.aside_y), (found.off_x, found.off_y)
-        there = PlaceGoal(float(spot[0]), float(spot[1]), "odom", side, found.below, found.above, aside, off)
+        x, y = float(spot[0]), float(spot[1])
+        there = PlaceGoal(x, y, "odom", side, found.below, found.above, aside, off, found.radius)
         placed = running.execute("place", there, watch=watch)
         timings = {
             "detect_to_grasp": taken.timings.get("detect_to_grasp", 0.0),
