@@ -200,6 +200,14 @@ class Fetch:
         near = () if spot is None else (float(spot[0]), float(spot[1]))
         return await context.run("take", TakeGoal(goal.text, goal.side, near=near))
 
+    async def _take_in_view(self, context: Context, goal: FetchGoal, report: FetchReport) -> SkillResult:
+        """Take it where it is seen from here; out of reach, from before its place."""
+        result = await self._take(context, goal, None)
+        if result.success or _elsewhere(result) or not isinstance(result.value, TakeReport):
+            return result
+        context.say(result.stage, f"{result.reason} Trying again from a nearer stance.")
+        return await self._try(context, goal, report, np.array([result.value.x, result.value.y]), True)
+
     async def _search(
         self, context: Context, goal: FetchGoal, report: FetchReport, places: list[RecalledPlace]
     ) -> SkillResult | None:
@@ -212,14 +220,14 @@ class Fetch:
             here = PlanarPose.of(context.legs.pose)
             aside = here @ PlanarPose(STAGE, step, 0.0)
             report.approaches += await self._go(context, np.array([aside.x, aside.y]))
-            result = await self._take(context, goal, None)
+            result = await self._take_in_view(context, goal, report)
             if result.success or not _elsewhere(result):
                 return result
         if not places:
             # From afar the localizer may have overlooked it: nearer to what is ahead first.
             ahead = PlanarPose.of(context.legs.pose) @ PlanarPose(STAGE, 0.0, 0.0)
             report.approaches += await self._go(context, np.array([ahead.x, ahead.y]))
-            result = await self._take(context, goal, None)
+            result = await self._take_in_view(context, goal, report)
             if result.success or not _elsewhere(result):
                 return result
         for turn in () if places else (TURN, -2.0 * TURN):
