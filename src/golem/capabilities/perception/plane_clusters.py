@@ -232,9 +232,9 @@ class PlaneClusters:
             if plane.normal[2] < 0.95:
                 continue
             heights = plane.heights(points)
-            if float(np.quantile(heights, 0.02)) > 0.05 or heights.max() < 0.03:
+            low, high = np.quantile(heights, (0.02, 0.98)).tolist()
+            if low > 0.05 or high < 0.03:
                 continue
-            high = float(np.quantile(heights, 0.98))
             flat = points[:, :2] - points[:, :2].mean(axis=0)
             _, _, axes = np.linalg.svd(flat[:: max(1, len(flat) // 500)], full_matrices=False)
             spans = [float(np.ptp(np.quantile(flat @ axis, (0.02, 0.98)))) for axis in axes]
