@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -33,11 +34,13 @@ SAME = 0.25
 """Places nearer than this to each other are looked at from one stance [m]."""
 ASIDE = 0.6
 """How far to either side along the counter it is searched for [m]."""
-RAISES = (0.25, 0.20, 0.15, 0.10, 0.05)
+RAISES = (0.25, 0.20, 0.15, 0.10)
 """How much higher what is held is carried, the first that the arm can [m]: legs that walk sink by 8 cm and sway, and
 what it is carried over is up to 22 cm high."""
-RAISING = (0.15, 0.1, 0.3)
-"""Speed of that, and how far the hand may leave its line, and turn [m/s, m, rad]."""
+RAISING = 0.15
+"""Speed of that [m/s]."""
+BENT = ((0.02, 0.1), (0.1, 0.3))
+"""How far the hand may leave its line then, and turn [m, rad]; what comes first is tried first."""
 TURN = 0.6
 """How far the robot turns where nothing is remembered at all [rad]."""
 
@@ -305,9 +308,9 @@ class Fetch:
         from golem.skills.planned_motion import PlannedMotion
 
         motion, T = PlannedMotion(context), context.arms[side].commanded
-        for height in RAISES:
+        for tolerance, height in product(BENT, RAISES):
             with suppress(PlanRefused):
-                return await motion.line(side, lifted(T, height), RAISING[0], tolerance=RAISING[1:])
+                return await motion.line(side, lifted(T, height), RAISING, tolerance=tolerance)
 
     async def _still_held(self, context: Context, goal: FetchGoal, taken: TakeReport) -> None:
         """Grip again what has slid in the fingers, if it is still there."""
