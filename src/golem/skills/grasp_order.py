@@ -1,4 +1,4 @@
-"""In which order a skill tries what was proposed: first what the arm alone reaches, which is asked in milliseconds."""
+"""In which order a skill tries what was proposed: first what an arm reaches, which is asked in milliseconds."""
 
 from __future__ import annotations
 
@@ -11,11 +11,14 @@ from golem.capabilities.arms.quick_ik import QuickIK
 from golem.capabilities.grasping.base import Grasp
 from golem.skills.context import Context
 from golem.skills.poses import retracted
-from golem.types import Side
+from golem.types import Array, Side
+
+TURNS = (0.0, 0.25, -0.25)
+"""Turns of the torso that are tried, one after the other, until any grasp is reached [rad]."""
 
 
 def reached_first(context: Context, side: Side, grasps: Sequence[Grasp], before: float) -> list[Grasp]:
-    """Return the same `grasps`, those first that an arm reaches without the torso, else in their order.
+    """Return the same `grasps`, first those that an arm reaches with the least turn of the torso.
 
     Args:
         context: where the arms are.
@@ -26,11 +29,21 @@ def reached_first(context: Context, side: Side, grasps: Sequence[Grasp], before:
     ik, q = QuickIK(), context.commanded_joints
     T = np.linalg.inv(context.T_odom_base)
     starts = np.array([q, posture(f"ready_{side}"), posture(f"forward_{side}")])
-    starts[:, 0] = q[0]
 
-    def reached(grasp: Grasp) -> bool:
-        there = T @ grasp.T_odom_gripper
-        away = ik.solve(side, retracted(there, before), starts)
+    def reached(grasp: Grasp, torso: float) -> bool:
+        there, turned = T @ grasp.T_odom_gripper, _turned(starts, torso)
+        away = ik.solve(side, retracted(there, before), turned)
         return away is not None and ik.solve(side, there, away[None]) is not None
 
-    return sorted(grasps, key=lambda grasp: not reached(grasp))
+    for turn in TURNS:
+        found = [reached(grasp, float(q[0]) + turn) for grasp in grasps]
+        if any(found):
+            order = sorted(range(len(grasps)), key=lambda k: not found[k])
+            return [grasps[k] for k in order]
+    return list(grasps)
+
+
+def _turned(starts: Array, torso: float) -> Array:
+    turned = starts.copy()
+    turned[:, 0] = torso
+    return turned

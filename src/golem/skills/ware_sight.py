@@ -22,6 +22,8 @@ PROUD = 0.012
 """Height above a surface from which on points are of what stands on it [m]."""
 LEANS = 0.25
 """How far a level surface may seem to lean to a hand [rad]."""
+WIDE = 0.10
+"""Least width of a level plane that things may stand on [m]: the cap of a tall bottle is all that a hand above sees."""
 HYPOTHESES = 400
 """Planes through three points that are tried."""
 STRAY = 8
@@ -167,7 +169,7 @@ def leaning_surface(points: Array) -> tuple[Array, float] | None:
     counts = (np.abs(cubes @ normals.T - np.einsum("ij,ij->i", a, normals)) < 0.5 * LAYER).sum(axis=0)
     best = int(counts.argmax())
     on = cubes[np.abs((cubes - a[best]) @ normals[best]) < 0.5 * LAYER]
-    if len(on) < MIN_POINTS:
+    if len(on) < MIN_POINTS or width(on) < WIDE:
         return None
     middle = on.mean(axis=0)
     normal = np.linalg.svd(on - middle, full_matrices=False)[2][2]

@@ -10,6 +10,7 @@ dropped (ten Pas et al., GPD, IJRR 2017).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -258,6 +259,8 @@ class Antipodal(OpenLoop):
             kept = kept[kept < len(middles) - rims] if turn or not less else kept
             kept = kept if less else kept[widths[kept] > NARROW]
             kept = kept[~shallow[kept]] if extra else kept
+            # Where the palm lets them go no deeper than the next depth, that one is enough.
+            kept = kept[room[kept] > c.depth + DEPTHS[less + 1]] if extra else kept
             T = np.tile(np.eye(4), (len(kept), 1, 1))
             T[:, :3, 1], T[:, :3, 2] = axes[kept], z_turned[kept]
             T[:, :3, 0] = np.cross(axes[kept], z_turned[kept])
@@ -304,15 +307,30 @@ class Antipodal(OpenLoop):
         kept: list[int] = []
         for first in range(0, len(order), c.most):
             some = order[first : first + c.most]
-            for k in some[~collides(T[some], gaps[some], around)].tolist():
-                away = np.linalg.norm(T[kept, :3, 3] - T[k, :3, 3], axis=1)
-                turned = T[kept, :3, 2] @ T[k, :3, 2]
-                rolled = np.abs(T[kept, :3, 1] @ T[k, :3, 1])
-                if not ((away < c.apart) & (np.minimum(turned, rolled) > math.cos(c.alike))).any():
+            # Most are copies, and to find that out costs less than whether they are free.
+            some = some[~self._copies(T, some, kept).any(axis=1)]
+            some = some[~collides(T[some], gaps[some], around)] if len(some) else some
+            copies, taken = self._copies(T, some, some), list[int]()
+            for row, k in enumerate(some.tolist()):
+                if not copies[row, taken].any():
+                    taken.append(row)
                     kept.append(k)
                 if len(kept) == c.most:
                     return kept
         return kept
+
+    def _copies(
+        self,
+        T: Array,
+        some: Sequence[int] | NDArray[np.intp],
+        others: Sequence[int] | NDArray[np.intp] | NDArray[np.intp],
+    ) -> NDArray[np.bool_]:
+        """Return (n, m) whether each of `some` (n,) poses is much the same as each of `others` (m,)."""
+        c, one, two = self.config, T[some], T[np.asarray(others, np.intp)]
+        away = np.linalg.norm(one[:, None, :3, 3] - two[None, :, :3, 3], axis=2)
+        turned = one[:, :3, 2] @ two[:, :3, 2].T
+        rolled = np.abs(one[:, :3, 1] @ two[:, :3, 1].T)
+        return (away < c.apart) & (np.minimum(turned, rolled) > math.cos(c.alike))
 
 
 def _middle_height(cloud: Array, scene: Array, approach: Array) -> float:

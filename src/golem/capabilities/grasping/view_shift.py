@@ -8,9 +8,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from golem.capabilities.grasping.centroid import ACROSS
 from golem.capabilities.grasping.object_cloud import MIN_POINTS, PIXEL, across
 from golem.types import Array
 
+TOP = 0.015
+"""Height of the layer that is the top of a thing [m]."""
 SEARCH = 0.06
 """How far a thing may have moved between two looks [m]."""
 
@@ -52,7 +55,10 @@ def _farther(before: Array, after: Array, flat: Array, axis: Array) -> float:
     """Return how much farther along `axis` (3,) a thing is after than before [m], where both views show it.
 
     Both are points (n, 3) of it, across the axis in the same place; a hand above a rim shows the other side of a bowl.
+    Of what is seen from above the top counts: where one view has the bottom of a mug, the other has its wall before it.
     """
+    if axis[2] < -ACROSS:
+        before, after = (view[view[:, 2] > np.quantile(view[:, 2], 0.98) - TOP] for view in (before, after))
     views = before @ flat, after @ flat
     both = np.concatenate(views)
     low = both.min(axis=0)
