@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -11,6 +12,7 @@ import numpy as np
 from golem.evaluation.base import Case, Results, TrialSpec
 from golem.evaluation.episodes.counter_watch import CounterWatch
 from golem.evaluation.episodes.oracle import Oracle
+from golem.evaluation.episodes.place_error import place_error
 from golem.evaluation.rungs.counter import counter_verdict, draw_errand
 from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
 from golem.robots.mujoco.engine import MujocoRobot
@@ -46,7 +48,6 @@ class FetchRung(KitchenRung[FetchOptions]):
     Options = FetchOptions
     default_methods = ("object_map",)
     slot = "memory"
-    claimed = "odometry"
     balances = True
     stack_name = "errand"
 
@@ -78,8 +79,11 @@ class FetchRung(KitchenRung[FetchOptions]):
         ways = {"approaches": float(found.approaches), "places_looked": 0.5 * len(found.looked)}
 
         def judge() -> Verdict:
-            seen = counter_verdict(watch, place)
-            return replace(seen, series=seen.series | ways)
+            seen, off = counter_verdict(watch, place), place_error(running.bus, robot)
+            series = seen.series | ways | {"place_error": off}
+            # Places are in the frame of the memory: a robot that errs about its own sets things down beside them.
+            lost_its_way = off > 0.5 * series.get("set_down_error", math.inf)
+            return replace(seen, series=series, slot="odometry" if lost_its_way else seen.slot)
 
         return Errand(result, watch, judge)
 

@@ -66,11 +66,13 @@ class Verdict:
         done: whether it is as it was asked for.
         words: what is not, in a sentence.
         series: figures of it.
+        slot: what is to blame where the robot says that it is done, and it is not.
     """
 
     done: bool
     words: str
     series: dict[str, float]
+    slot: str = SLOT
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,14 +98,12 @@ class KitchenRung(Rung[O]):
 
     Attributes:
         slot: what the methods are.
-        claimed: slot that is to blame where the robot says that it is done, and it is not.
         subject: what the twin has to have, in the words of an error.
         stack_name: the shipped stack that it runs; empty for the one of its own name.
         balances: whether the robot stands on its own feet.
     """
 
     slot: ClassVar[str] = SLOT
-    claimed: ClassVar[str] = SLOT
     subject: ClassVar[str] = "kitchen"
     stack_name: ClassVar[str] = ""
     balances = False
@@ -178,7 +178,7 @@ class KitchenRung(Rung[O]):
         if verdict.done and result.stage not in ABORTED:
             return TrialOutcome(True, DONE, None, result.reason, timings, series, picture)
         stage = result.stage if result.stage != DONE else "release"
-        slot = result.slot if result.stage != DONE else self.claimed
+        slot = result.slot if result.stage != DONE else verdict.slot
         module = None if slot is None else f"{slot}: {stack.choice(slot).use}" if slot in KEYS else slot
         detail = f"{result.reason} {verdict.words}".strip()
         return TrialOutcome(False, stage, module, detail, timings, series, picture, result.trace)

@@ -23,6 +23,7 @@ from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.episodes.pick_claims import claims
 from golem.evaluation.episodes.pick_touches import PickTouches
 from golem.evaluation.episodes.pick_watch import PickWatch
+from golem.evaluation.episodes.place_error import place_error
 from golem.evaluation.episodes.survey import survey
 from golem.evaluation.rungs.navigate_hall import DISTANCE, GUESS, SPREAD
 from golem.evaluation.rungs.pick_screw import SETTLE, PickOptions, PickRung, balance, judge_pick
@@ -265,17 +266,11 @@ class _Trial:
             return "skill: dock"
         if self._spec.case["start"] == "placed":
             return None  # nobody: the robot was put there
-        drift, off = self._drift(), self._series["before_radial"]
+        drift, off = (
+            place_error(self._episode.running.bus, self._episode.robot),
+            self._series["before_radial"],
+        )
         return self._name("mapper" if drift > 0.5 * off else "navigator")
-
-    def _drift(self) -> float:
-        """Return how far the robot is from where it believes to be in the map [m]."""
-        bus = self._episode.running.bus
-        believed, place = bus.latest(topics.ODOMETRY), bus.latest(topics.MAP_POSE)
-        if believed is None or place is None:
-            return 0.0
-        off = true_pose(self._episode).to(place.T_odom_map.to(PlanarPose.of(believed.T_odom_base)))
-        return math.hypot(off.x, off.y)
 
     def _placed(self, when: str) -> dict[str, float]:
         """Return where the robot stands as seen from the nominal stance."""
