@@ -64,21 +64,36 @@ def test_the_film_is_of_the_stage_that_was_lost(robot: Any) -> None:
     np.testing.assert_array_equal(robot.scene.model.vis.headlight.ambient, lamp)
 
 
-def test_the_film_ends_after_the_skill_said_that_it_failed(robot: Any) -> None:
+class Fails:
+    """Says once a second that it closes the hand, and at some times that this failed."""
+
+    period = 1.0
+
+    def __init__(self, bus: Bus, robot: Any, at: tuple[float, ...]) -> None:
+        self._bus, self._robot, self._at = bus, robot, at
+
+    def step(self, t: float) -> None:
+        self._robot.data.qpos[0] = 0.02 * t
+        failed = any(abs(t - at) < 0.5 for at in self._at)
+        self._bus.publish(topics.FEEDBACK, Feedback(t, "take", "grasp", "Closing.", {"failed": failed}), t)
+
+
+def film_of_failures(robot: Any, *at: float) -> bytes:
     bus, last = Bus(), LastSeconds()
-
-    class Fails(Says):
-        def step(self, t: float) -> None:
-            self._robot.data.qpos[0] = 0.02 * t
-            self._bus.publish(
-                topics.FEEDBACK, Feedback(t, "take", "grasp", "Closing.", {"failed": 2.5 < t < 3.5}), t
-            )
-
-    executor = Executor(bus, [Fails(bus, robot)])
+    executor = Executor(bus, [Fails(bus, robot, at)])
     last(SimpleNamespace(bus=bus, executor=executor), robot)
     executor.run(20.0)
     film = last.film("grasp", None)
-    assert film is not None and length(film)[0] == pytest.approx(4.0 * FPS, abs=2)
+    assert film is not None
+    return film
+
+
+def test_the_film_ends_after_the_skill_said_that_it_failed(robot: Any) -> None:
+    assert length(film_of_failures(robot, 3.0))[0] == pytest.approx(4.0 * FPS, abs=2)
+
+
+def test_the_film_of_a_failure_that_ends_the_trial_is_of_its_end(robot: Any) -> None:
+    assert film_of_failures(robot, 3.0, 19.0) == film_of_failures(robot)
 
 
 def test_what_is_not_the_twin_has_no_film() -> None:

@@ -82,8 +82,11 @@ class LastSeconds:
         mocap = data.mocap_pos.copy(), data.mocap_quat.copy()
         self._recent.append(_Moment(t, data.qpos.copy(), mocap, self._words))
         while self._due and t >= self._due[0][0]:
-            _, stage, kept = self._due.popleft()
-            kept[stage] = list(self._recent)
+            self._keep()
+
+    def _keep(self) -> None:
+        _, stage, kept = self._due.popleft()
+        kept[stage] = list(self._recent)
 
     def film(self, stage: str, module: str | None) -> bytes | None:
         """Return the film, as animated WebP, of a trial that `module` lost in `stage`; None where no twin was seen.
@@ -91,6 +94,8 @@ class LastSeconds:
         It ends a second after a skill last said that it failed in that stage, else after one last left it, else at the
         end of the trial.
         """
+        while self._due:  # a trial may end within the second after
+            self._keep()
         moments = self._failed.get(stage) or self._left.get(stage) or list(self._recent)
         if self._robot is None or not moments:
             return None
