@@ -283,19 +283,18 @@ class Fetch:
         if to is None:
             if walks:
                 await self._navigate(context, home)
-            await self._still_held(context, goal, taken)
+            await self._still_held(context, goal, side, taken.force)
             return f"The {goal.text} is in the {side} hand, where the robot began."
         spot = self._in_odom(context, to)
         if walks:
             report.approaches += await self._go(context, spot)
             spot = self._in_odom(context, to)
-        await self._still_held(context, goal, taken)
+        await self._still_held(context, goal, side, taken.force)
         aside, turned = (taken.aside_x, taken.aside_y), PlanarPose.of(context.legs.pose).yaw - facing
         # What the head camera is off by turns with the robot.
-        off_now = PlanarPose(0.0, 0.0, turned) @ PlanarPose(taken.off_x, taken.off_y, 0.0)
-        x, y = float(spot[0]), float(spot[1])
-        off = (off_now.x, off_now.y)
-        there = PlaceGoal(x, y, "odom", side, taken.below, taken.above, aside, off, taken.radius)
+        off = PlanarPose(0.0, 0.0, turned) @ PlanarPose(taken.off_x, taken.off_y, 0.0)
+        x, y, below, above = float(spot[0]), float(spot[1]), taken.below, taken.above
+        there = PlaceGoal(x, y, "odom", side, below, above, aside, (off.x, off.y), taken.radius)
         placed = await context.run("place", there)
         if not placed.success:
             raise StageFailed(placed.stage, placed.slot or "skill", placed.reason)
@@ -312,12 +311,11 @@ class Fetch:
             with suppress(PlanRefused):
                 return await motion.line(side, lifted(T, height), RAISING, tolerance=tolerance)
 
-    async def _still_held(self, context: Context, goal: FetchGoal, taken: TakeReport) -> None:
-        """Grip again what has slid in the fingers, if it is still there."""
-        side: Side = "left" if taken.side == "left" else "right"
+    async def _still_held(self, context: Context, goal: FetchGoal, side: Side, force: float) -> None:
+        """Grip again, with `force` [N], what has slid in the fingers, if it is still there."""
         if context.hands[side].status.holding:
             return
-        if not await close_hand(context, side, taken.force):
+        if not await close_hand(context, side, force):
             raise StageFailed("carry", "grasp_method", f"The {goal.text} was lost on the way.")
         context.say("carry", f"The {goal.text} had slid in the fingers.")
 

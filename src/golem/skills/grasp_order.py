@@ -11,7 +11,7 @@ from golem.capabilities.arms.quick_ik import QuickIK
 from golem.capabilities.grasping.base import Grasp
 from golem.skills.context import Context
 from golem.skills.poses import retracted
-from golem.types import Array, Side
+from golem.types import Side
 
 TURNS = (0.0, 0.25, -0.25)
 """Turns of the torso that are tried, one after the other, until any grasp is reached [rad]."""
@@ -30,20 +30,15 @@ def reached_first(context: Context, side: Side, grasps: Sequence[Grasp], before:
     T = np.linalg.inv(context.T_odom_base)
     starts = np.array([q, posture(f"ready_{side}"), posture(f"forward_{side}")])
 
-    def reached(grasp: Grasp, torso: float) -> bool:
-        there, turned = T @ grasp.T_odom_gripper, _turned(starts, torso)
-        away = ik.solve(side, retracted(there, before), turned)
+    def reached(grasp: Grasp) -> bool:
+        there = T @ grasp.T_odom_gripper
+        away = ik.solve(side, retracted(there, before), starts)
         return away is not None and ik.solve(side, there, away[None]) is not None
 
     for turn in TURNS:
-        found = [reached(grasp, float(q[0]) + turn) for grasp in grasps]
+        starts[:, 0] = q[0] + turn
+        found = [reached(grasp) for grasp in grasps]
         if any(found):
             order = sorted(range(len(grasps)), key=lambda k: not found[k])
             return [grasps[k] for k in order]
     return list(grasps)
-
-
-def _turned(starts: Array, torso: float) -> Array:
-    turned = starts.copy()
-    turned[:, 0] = torso
-    return turned

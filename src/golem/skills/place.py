@@ -207,10 +207,11 @@ class SetDown:
         if goal.frame == "base_link":
             spot = T[:3, :3] @ spot + T[:3, 3]
         # From here on the place is where this hand would find it.
-        spot[:2] += HANDS * np.array(goal.off or (0.0, 0.0))
+        off = np.array([*(goal.off or (0.0, 0.0)), 0.0])
+        spot += HANDS * off
         context.say("detect", "Looking at the place.", target=spot.tolist())
         motion.look([(hand, IN_HAND)])
-        motion.displace(np.array([*(goal.off or (0.0, 0.0)), 0.0]))
+        motion.displace(off)
         scene = self._scene(context, goal, context.arms[side].pose)
         level = surface_below(scene, spot)
         if level is None:

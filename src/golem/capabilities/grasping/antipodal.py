@@ -323,7 +323,7 @@ class Antipodal(OpenLoop):
         self,
         T: Array,
         some: Sequence[int] | NDArray[np.intp],
-        others: Sequence[int] | NDArray[np.intp] | NDArray[np.intp],
+        others: Sequence[int] | NDArray[np.intp],
     ) -> NDArray[np.bool_]:
         """Return (n, m) whether each of `some` (n,) poses is much the same as each of `others` (m,)."""
         c, one, two = self.config, T[some], T[np.asarray(others, np.intp)]
