@@ -1,6 +1,10 @@
-"""The parts of a battery pack that the shipped detector knows."""
+"""What the shipped detector knows: the parts of a battery pack, and what stands in a kitchen."""
 
 from __future__ import annotations
 
-CLASSES: tuple[str, ...] = ("screw", "screw_hole", "nut", "bus_bar", "tray")
-"""Class names, in the order of the network's heatmaps."""
+PACK: tuple[str, ...] = ("screw", "screw_hole", "nut", "bus_bar", "tray")
+"""Classes of a pack's parts."""
+KITCHEN: tuple[str, ...] = ("handle", "mug", "bowl", "can", "bottle")
+"""Classes of a kitchen: the bar of a fridge, and tableware."""
+CLASSES: tuple[str, ...] = PACK + KITCHEN
+"""All class names, in the order of the network's heatmaps."""

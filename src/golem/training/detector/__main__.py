@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import tyro
+from numpy.typing import NDArray
 
+from golem.capabilities.perception.classes import CLASSES, KITCHEN, PACK
 from golem.errors import ConfigError
 from golem.training.detector import dataset
 from golem.training.detector.train_detector import TrainDetectorConfig
@@ -22,21 +24,28 @@ RUNS = Path("runs/detector")
 def render(
     folder: Path = RUNS / "data",
     seed: int = 0,
-    worlds: int = 150,
+    worlds: int = 600,
+    kitchens: int = 300,
     held_out_worlds: int = 30,
+    held_out_kitchens: int = 15,
     per_camera: int = 16,
+    jobs: int = 1,
 ) -> None:
     """Render the splits `train` and `held_out`; continues where it was stopped.
 
     Args:
         folder: where to put them.
         seed: of the worlds.
-        worlds: compiled worlds of the training split.
-        held_out_worlds: compiled worlds of the held-out split.
+        worlds: compiled packs of the training split.
+        kitchens: compiled kitchens of the training split.
+        held_out_worlds: compiled packs of the held-out split.
+        held_out_kitchens: compiled kitchens of the held-out split.
         per_camera: images of the head camera per world, and as many of the palm cameras.
+        jobs: processes that render.
     """
-    dataset.generate(folder, seed, "held_out", held_out_worlds, per_camera)
-    dataset.generate(folder, seed, "train", worlds, per_camera)
+    held = {"pack": held_out_worlds, "kitchen": held_out_kitchens}
+    dataset.generate(folder, seed, "held_out", held, per_camera, jobs)
+    dataset.generate(folder, seed, "train", {"pack": worlds, "kitchen": kitchens}, per_camera, jobs)
 
 
 def train(
@@ -44,7 +53,11 @@ def train(
     out: Path = RUNS / "run",
     seed: int = 0,
     steps: int = 12000,
+    batch: int = 32,
+    workers: int = 1,
+    check_every: int = 1000,
     start: Path | None = None,
+    device: str = "cpu",
 ) -> None:
     """Train on the rendered splits, or resume.
 
@@ -52,10 +65,18 @@ def train(
         data: folder of the splits.
         out: folder of checkpoints and curve.
         seed: of weights and crops.
-        steps: gradient steps of 8 crops.
+        steps: gradient steps.
+        batch: crops of a step.
+        workers: processes that cut crops.
+        check_every: steps between evaluations on part of the held-out split.
         start: ONNX file of an earlier detector to begin with.
+        device: cpu, or cuda.
     """
-    print(run_training(TrainDetectorConfig(data=data, out=out, seed=seed, steps=steps, start=start)))
+    config = TrainDetectorConfig(
+        data, out, seed, steps, batch, check_every=check_every, check_images=240, workers=workers, start=start,
+        device=device,
+    )  # fmt: skip
+    print(run_training(config))
 
 
 def export(checkpoint: Path = RUNS / "run" / "best.pt", out: Path = RUNS / "detector.onnx") -> None:
@@ -90,9 +111,9 @@ def evaluate(data: Path = RUNS / "data", weights: Path | None = None) -> None:
         weights: ONNX file; the shipped one if absent.
     """
     from golem.capabilities.perception.onnx_detector import OnnxDetector, OnnxDetectorConfig
-    from golem.training.detector.evaluate import THRESHOLD, condition_table, evaluate, table
+    from golem.training.detector.evaluate import THRESHOLD, condition_table, evaluate, false_alarms, table
 
-    detector = OnnxDetector(OnnxDetectorConfig(None if weights is None else str(weights), THRESHOLD))
+    detector = OnnxDetector(OnnxDetectorConfig(None if weights is None else str(weights), THRESHOLD, {}))
     held = dataset.load(data, "held_out")
     found: dict[int, list[Detection]] = {}
     times: dict[str, list[float]] = {"head": [], "palm": []}
@@ -100,9 +121,22 @@ def evaluate(data: Path = RUNS / "data", weights: Path | None = None) -> None:
         start = time.process_time()
         found[id(image)] = detector.detect(image)
         times[camera].append(1e3 * (time.process_time() - start))
-    print(table(evaluate(held, lambda image: found[id(image)])))
-    print()
-    print(condition_table(held, lambda image: found[id(image)]))
+
+    def detect(image: NDArray[np.uint8]) -> list[Detection]:
+        return found[id(image)]
+
+    for world, classes in (("pack", PACK), ("kitchen", KITCHEN)):
+        part = held.of_world(world)
+        known = tuple(name for name in classes if name in detector.classes)
+        if known:
+            print(f"{table(evaluate(part, detect, classes=CLASSES), known)}\n")
+        others = [name for name in detector.classes if name not in classes]
+        if others:
+            per_image = false_alarms(part, detect, others)
+            print(
+                f"{world}: {per_image:.3f} false {', '.join(others)} per image ({len(part.images)} images)\n"
+            )
+    print(condition_table(held.of_world("pack"), detect))
     for camera, taken in times.items():
         print(f"{camera}: {np.median(taken):.1f} ms CPU per image (median of {len(taken)}, one thread)")
 

@@ -1,9 +1,11 @@
-"""Renders and stores labelled images: one folder per split, one file per world."""
+"""Renders and stores labelled images: one folder per split, one file per world, packs and kitchens."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 
 import cv2
@@ -14,10 +16,17 @@ from tqdm import tqdm
 from golem.robots.sensors.auto_exposure import AutoExposure
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds.conditions import Conditions
-from golem.training.detector import random_scene
 from golem.training.detector.labels import COLUMNS, label_image
+from golem.training.detector.random_kitchen import build_kitchen
+from golem.training.detector.random_pack import build_pack
+from golem.training.detector.random_scene import RandomScene, make_rigs
 from golem.types import Array
 
+BUILDERS: dict[str, Callable[[np.random.Generator], RandomScene]] = {
+    "pack": build_pack,
+    "kitchen": build_kitchen,
+}
+"""What compiles a world, by its kind."""
 JPEG_QUALITY = 96
 CONDITIONS = ("finish", "cover", "tray", "light")
 """What is kept of an image's conditions; the light as the name of its range."""
@@ -35,13 +44,17 @@ class Dataset:
         images: (height, width, 3) RGB each, decoded: 3 GB for the default training split.
         labels: per image (n, 8), columns as in `labels.COLUMNS`.
         cameras: per image `"head"` or `"palm"`.
-        conditions: per image the values of `CONDITIONS`.
+        conditions: per image the values of `CONDITIONS`, and the kind of its `world`.
     """
 
     images: list[NDArray[np.uint8]]
     labels: list[Array]
     cameras: list[str]
     conditions: list[dict[str, str]]
+
+    def of_world(self, kind: str) -> Dataset:
+        """Return the images of one kind of world."""
+        return self.only(k for k, conditions in enumerate(self.conditions) if conditions["world"] == kind)
 
     def only(self, chosen: Iterable[int]) -> Dataset:
         """Return the images with these numbers."""
@@ -55,27 +68,31 @@ class Dataset:
 
 
 def render(
-    seed: int, world_index: int, split: str, per_camera: int
+    seed: int, world_index: int, split: str, per_camera: int, kind: str = "pack"
 ) -> Iterator[tuple[NDArray[np.uint8], Array, str, Conditions]]:
     """Yield (image RGB, labels, camera, conditions) of one world; depends on the arguments only.
 
     Args:
         seed: of the dataset.
-        world_index: number of the world in its split.
+        world_index: number of the world of its kind in its split.
         split: `"train"` or `"held_out"`; the two never share a world.
         per_camera: images of the head camera, and as many of the palm cameras.
+        kind: of `BUILDERS`.
     """
-    rng = stream(seed, f"detector/{split}/{world_index}")
-    world = random_scene.build_world(rng)
-    plain, fancy = random_scene.make_rigs(world)
+    rng = stream(
+        seed,
+        f"detector/{split}/{world_index}" if kind == "pack" else f"detector/{split}/{kind}/{world_index}",
+    )
+    scene = BUILDERS[kind](rng)
+    plain, fancy = make_rigs(scene.world)
     with plain, fancy:
         for k in range(2 * per_camera):
-            conditions = random_scene.randomise_looks(world, rng)
-            random_scene.randomise_objects(world, rng)
-            info = (random_scene.place_head if k % 2 == 0 else random_scene.place_palm)(world, rng)
+            conditions = scene.randomise_looks(rng)
+            scene.randomise_objects(rng)
+            info = (scene.place_head if k % 2 == 0 else scene.place_palm)(rng)
             rig = fancy if rng.random() < FANCY_SHARE else plain
-            rgb, _ = rig.render(world.data, info.name)
-            labels = label_image(world, info, plain.segment(world.data, info.name))
+            rgb, _ = rig.render(scene.data, info.name)
+            labels = label_image(scene, info, plain.segment(scene.data, info.name))
             exposed = AutoExposure(conditions.light, rng).expose(rgb)
             yield exposed, labels, "head" if info.name == "head" else "palm", conditions
 
@@ -86,36 +103,56 @@ def named(conditions: Conditions) -> list[str]:
     return [conditions.finish, conditions.cover, conditions.tray, light]
 
 
-def generate(folder: Path, seed: int, split: str, worlds: int, per_camera: int) -> None:
+def generate(
+    folder: Path, seed: int, split: str, worlds: dict[str, int], per_camera: int, jobs: int = 1
+) -> None:
     """Render a split into `folder/split`; worlds already there are kept.
 
     Args:
         folder: where the splits live.
         seed: see `render`.
         split: see `render`.
-        worlds: number of compiled worlds.
+        worlds: number of compiled worlds, by kind.
         per_camera: see `render`.
+        jobs: processes that render.
     """
     target = folder / split
     target.mkdir(parents=True, exist_ok=True)
-    for index in tqdm(range(worlds), desc=f"render {split}"):
-        path = target / f"world_{index:03d}.npz"
-        if path.exists():
-            continue
-        arrays: dict[str, NDArray[np.float32] | NDArray[np.uint8] | NDArray[np.str_]] = {}
-        for k, (rgb, labels, camera, conditions) in enumerate(render(seed, index, split, per_camera)):
-            ok, code = cv2.imencode(
-                ".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
-            )
-            if not ok:
-                raise RuntimeError("JPEG encoding failed")
-            arrays[f"image_{camera}_{k:04d}"] = np.asarray(code, np.uint8)
-            arrays[f"label_{camera}_{k:04d}"] = labels.astype(np.float32)
-            arrays[f"conditions_{camera}_{k:04d}"] = np.array(named(conditions))
-        part = path.with_suffix(".part")
-        with part.open("wb") as file:
-            np.savez(file, allow_pickle=False, **arrays)
-        part.rename(path)
+    # Kinds take turns, so that a split that was stopped has its share of each.
+    wanted = sorted(
+        ((kind, index) for kind, count in worlds.items() for index in range(count)),
+        key=lambda world: world[1] / worlds[world[0]],
+    )
+    missing = [world for world in wanted if not _path(target, *world).exists()]
+    # A rig's OpenGL context does not outlive a fork.
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        running: list[Future[None]] = [
+            pool.submit(_write, _path(target, kind, index), seed, index, split, per_camera, kind)
+            for kind, index in missing
+        ]
+        for done in tqdm(as_completed(running), total=len(running), desc=f"render {split}"):
+            done.result()
+
+
+def _path(folder: Path, kind: str, index: int) -> Path:
+    return folder / f"{kind}_{index:04d}.npz"
+
+
+def _write(path: Path, seed: int, index: int, split: str, per_camera: int, kind: str) -> None:
+    arrays: dict[str, NDArray[np.float32] | NDArray[np.uint8] | NDArray[np.str_]] = {}
+    for k, (rgb, labels, camera, conditions) in enumerate(render(seed, index, split, per_camera, kind)):
+        ok, code = cv2.imencode(
+            ".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
+        )
+        if not ok:
+            raise RuntimeError("JPEG encoding failed")
+        arrays[f"image_{camera}_{k:04d}"] = np.asarray(code, np.uint8)
+        arrays[f"label_{camera}_{k:04d}"] = labels.astype(np.float32)
+        arrays[f"conditions_{camera}_{k:04d}"] = np.array(named(conditions))
+    part = path.with_suffix(".part")
+    with part.open("wb") as file:
+        np.savez(file, allow_pickle=False, **arrays)
+    part.rename(path)
 
 
 def load(folder: Path, split: str) -> Dataset:
@@ -124,21 +161,31 @@ def load(folder: Path, split: str) -> Dataset:
     Raises:
         FileNotFoundError: nothing was rendered there.
     """
-    paths = sorted((folder / split).glob("world_*.npz"))
+    paths = sorted((folder / split).glob("*.npz"))
     if not paths:
         raise FileNotFoundError(f"no rendered worlds in {folder / split}")
     data = Dataset([], [], [], [])
-    for path in paths:
-        with np.load(path) as file:
-            for key in sorted(k for k in file.files if k.startswith("image_")):
-                image = cv2.imdecode(file[key], cv2.IMREAD_COLOR)
-                if image is None:
-                    raise ValueError(f"{key} in {path} cannot be decoded")
-                data.images.append(np.ascontiguousarray(image[..., ::-1], np.uint8))
-                data.labels.append(
-                    file[key.replace("image_", "label_")].reshape(-1, len(COLUMNS)).astype(float)
-                )
-                data.cameras.append(key.split("_")[1])
-                words = file[key.replace("image_", "conditions_")].tolist()
-                data.conditions.append(dict(zip(CONDITIONS, words, strict=True)))
+    with ThreadPoolExecutor() as pool:  # decoding leaves the other threads free
+        for world in pool.map(_read, paths):
+            data.images.extend(world.images)
+            data.labels.extend(world.labels)
+            data.cameras.extend(world.cameras)
+            data.conditions.extend(world.conditions)
+    return data
+
+
+def _read(path: Path) -> Dataset:
+    data = Dataset([], [], [], [])
+    with np.load(path) as file:
+        for key in sorted(k for k in file.files if k.startswith("image_")):
+            image = cv2.imdecode(file[key], cv2.IMREAD_COLOR)
+            if image is None:
+                raise ValueError(f"{key} in {path} cannot be decoded")
+            data.images.append(np.ascontiguousarray(image[..., ::-1], np.uint8))
+            data.labels.append(file[key.replace("image_", "label_")].reshape(-1, len(COLUMNS)).astype(float))
+            data.cameras.append(key.split("_")[1])
+            words = file[key.replace("image_", "conditions_")].tolist()
+            data.conditions.append(
+                {"world": path.stem.split("_")[0], **dict(zip(CONDITIONS, words, strict=True))}
+            )
     return data

@@ -65,6 +65,16 @@ def evaluate(
     return {key: _score(hits[key], counts[key], working_score) for key in sorted(counts)}
 
 
+def false_alarms(
+    data: Dataset, detect: Detector, classes: Sequence[str], working_score: float = 0.3
+) -> float:
+    """Return how many detections of `classes` an image has on average where there are no such things."""
+    count = sum(
+        d.label in classes and d.score >= working_score for image in data.images for d in detect(image)
+    )
+    return count / max(len(data.images), 1)
+
+
 def _match(found: list[Detection], truth: Array) -> list[tuple[float, bool, float]]:
     """Assign each detection, best first, to the nearest free label; those on ignored labels do not count."""
     taken = np.zeros(len(truth), bool)
@@ -118,15 +128,16 @@ def condition_table(data: Dataset, detect: Detector) -> str:
     return "\n".join(lines)
 
 
-def table(scores: dict[tuple[str, str], Score]) -> str:
-    """Return the figures as a Markdown table."""
+def table(scores: dict[tuple[str, str], Score], classes: Sequence[str] | None = None) -> str:
+    """Return the figures as a Markdown table; those of all classes if `classes` is absent."""
     lines = [
         "| camera | class | parts | AP | recall | precision | median error px | p95 error px |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for (camera, label), s in scores.items():
-        lines.append(
-            f"| {camera} | {label} | {s.count} | {s.ap:.3f} | {s.recall:.3f} | {s.precision:.3f} "
-            f"| {s.error:.2f} | {s.error_p95:.2f} |"
-        )
+        if classes is None or label in classes:
+            lines.append(
+                f"| {camera} | {label} | {s.count} | {s.ap:.3f} | {s.recall:.3f} | {s.precision:.3f} "
+                f"| {s.error:.2f} | {s.error_p95:.2f} |"
+            )
     return "\n".join(lines)

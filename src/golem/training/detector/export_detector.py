@@ -83,7 +83,7 @@ class _Graph:
 
 def export_onnx(checkpoint: Path, out: Path) -> Path:
     """Write `out`, with dynamic height and width, from a checkpoint of `train`; returns `out`."""
-    state = torch.load(checkpoint, weights_only=True)
+    state = torch.load(checkpoint, map_location="cpu", weights_only=True)
     classes: list[str] = state["classes"]
     model = PartNet(len(classes))
     model.load_state_dict(state["average"])

@@ -36,6 +36,11 @@ def load_onnx(model: PartNet, path: Path, classes: Sequence[str]) -> None:
     norms = {id(block[0]): block[1] for block in model.modules() if _is_block(block)}
     if len(folded) != len(layers):
         raise ValueError(f"{path} has {len(folded)} convolutions; a part detector has {len(layers)}.")
+    for layer, (weight, _) in zip(layers, folded, strict=True):
+        if layer is not model.heat and layer.weight.shape != weight.shape:
+            raise ValueError(
+                f"{path} has a convolution of {tuple(weight.shape)}; a part detector has {tuple(layer.weight.shape)}."
+            )
     with torch.no_grad():
         for layer, (weight, bias) in zip(layers, folded, strict=True):
             if layer is model.heat:

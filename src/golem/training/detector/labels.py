@@ -7,10 +7,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.perception.classes import CLASSES
+from golem.capabilities.perception.classes import CLASSES, KITCHEN
 from golem.robots.sensors.cameras import project
 from golem.robots.worlds.pack import PackPart
-from golem.robots.worlds.screws import screw_name
 from golem.training.detector.random_scene import RandomScene, camera_pose
 from golem.types import Array, CameraInfo
 
@@ -21,33 +20,33 @@ MIN_VISIBLE = 0.35
 COLUMNS = ("class", "x", "y", "x_min", "y_min", "x_max", "y_max", "ignore")
 
 
-def label_image(world: RandomScene, info: CameraInfo, segmentation: NDArray[np.int32]) -> Array:
+def label_image(scene: RandomScene, info: CameraInfo, segmentation: NDArray[np.int32]) -> Array:
     """Return (n, 8) labels, columns as in `COLUMNS`; centres inside the image only, boxes not clipped.
 
     Args:
-        world: the world at the moment of exposure.
+        scene: the world at the moment of exposure.
         info: the camera.
         segmentation: (height, width) geom ids.
     """
-    T_optical_world = np.linalg.inv(camera_pose(world, info.name)).astype(np.float64)
-    seen = np.bincount(segmentation[segmentation >= 0], minlength=world.model.ngeom).astype(np.int64)
+    T_optical_world = np.linalg.inv(camera_pose(scene.world, info.name)).astype(np.float64)
+    seen = np.bincount(segmentation[segmentation >= 0], minlength=scene.model.ngeom).astype(np.int64)
     rows: list[list[float]] = []
-    for part in world.names.parts:
+    for part in scene.parts:
         if part.label == "screw_hole":
-            rows += _hole(world, info, T_optical_world, part.position, 0.003, segmentation)
+            rows += _hole(scene, info, T_optical_world, part.position, 0.003, segmentation)
         else:
-            rows += _solid(world, info, T_optical_world, part, seen)
-    for draw, mouth in zip(world.draws, world.names.mouths, strict=True):
-        at = world.data.xpos[world.model.body(screw_name(draw.slot)).id]
-        if np.linalg.norm(at - mouth) > 0.04:
-            rows += _hole(world, info, T_optical_world, mouth, draw.bore_radius, segmentation)
+            rows += _solid(scene, info, T_optical_world, part, seen)
+    for bore in scene.bores:
+        at = scene.data.xpos[scene.model.body(bore.screw).id]
+        if np.linalg.norm(at - bore.mouth) > 0.04:
+            rows += _hole(scene, info, T_optical_world, bore.mouth, bore.radius, segmentation)
     return np.array(rows).reshape(-1, len(COLUMNS))
 
 
 def _solid(
-    world: RandomScene, info: CameraInfo, T: Array, part: PackPart, seen: NDArray[np.int64]
+    scene: RandomScene, info: CameraInfo, T: Array, part: PackPart, seen: NDArray[np.int64]
 ) -> list[list[float]]:
-    model, data = world.model, world.data
+    model, data = scene.model, scene.data
     names = [n for n in part.geoms if not n.endswith("_thread")]
     ids = [model.geom(n).id for n in names]
     points = np.concatenate([_outline(model, data, g) for g in ids])
@@ -57,16 +56,16 @@ def _solid(
     pixels = project(info, optical)
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     centre_world, faces = part.position, True
-    if part.label == "screw" and part.body != "pack":
+    if part.body in scene.screw_tops:
         body = model.body(part.body).id
         axis = data.xmat[body].reshape(3, 3)[:, 2]
-        draw = next(d for d in world.draws if screw_name(d.slot) == part.body)
         faces = bool(axis @ T[2, :3] < -0.5)
-        centre_world = data.xpos[body] + axis * draw.head_height
+        centre_world = data.xpos[body] + axis * scene.screw_tops[part.body]
     if part.label == "tray":
         centre_world = data.xpos[model.body(part.body).id]
-    if part.label == "nut":
+    if part.label == "nut" or part.label in KITCHEN:
         # The tip of the stud moves across the nut with the view, and a crop does not show where the camera is.
+        # Tableware stands, lies and is seen from everywhere: a crop can show the middle of its box.
         faces = False
     centre = project(info, T[:3, :3] @ centre_world + T[:3, 3]) if faces else (low + high) / 2
     if not _inside(info, centre):
@@ -80,7 +79,7 @@ def _solid(
 
 
 def _hole(
-    world: RandomScene,
+    scene: RandomScene,
     info: CameraInfo,
     T: Array,
     mouth: Array,
@@ -101,8 +100,8 @@ def _hole(
     low, high = pixels[1:13].min(axis=0), pixels[1:13].max(axis=0)
     index = np.clip(np.round(pixels).astype(int), 0, (info.width - 1, info.height - 1))
     geoms = segmentation[index[:, 1], index[:, 0]]
-    pack = world.model.body("pack").id
-    free = (geoms >= 0) & (world.model.geom_bodyid[geoms] == pack)
+    pack = scene.model.body("pack").id
+    free = (geoms >= 0) & (scene.model.geom_bodyid[geoms] == pack)
     if free.sum() < 3:
         return []
     ignore = (high - low).min() < MIN_SIDE or free.mean() < 0.75 or not free[0]

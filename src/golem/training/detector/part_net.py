@@ -55,6 +55,6 @@ class PartNet(nn.Module):
         f16 = self.down16(f8)
         u8 = self.merge8(f8 + self.up(self.side8(f16)))
         u4 = self.merge4(f4 + self.up(self.side4(u8)))
-        with torch.autocast("cpu", enabled=False):  # sub-pixel offsets need the full mantissa
+        with torch.autocast(image.device.type, enabled=False):  # sub-pixel offsets need the full mantissa
             u4 = u4.float()
             return torch.cat([self.heat(u4), self.regression(u4)], dim=1)

@@ -1,12 +1,13 @@
-"""Randomised pack worlds for the detector: one compiled model, many looks and poses.
+"""A random world for the detector: one compiled model, many looks and poses.
 
 Compiling takes longer than rendering, so a model is kept for many images and only its arrays change: colours, lights,
-distractors, screws, the robot's arms, and where its camera is.
+distractors, what stands about, the robot's arms, and where its camera is.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -16,35 +17,36 @@ from scipy.spatial.transform import Rotation
 from golem.robots.model import magpie_model, mjcf
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.sensors.cameras import CAMERAS, T_MUJOCO_OPTICAL
-from golem.robots.worlds import hall
-from golem.robots.worlds.clutter import add_clutter
-from golem.robots.worlds.conditions import Conditions, draw_conditions
-from golem.robots.worlds.dressing import surfaces
-from golem.robots.worlds.layout import PackLayout
-from golem.robots.worlds.pack import PackNames, add_pack
-from golem.robots.worlds.screws import ScrewDraw, ScrewRanges, draw_screws, screw_name
+from golem.robots.worlds.conditions import Conditions
+from golem.robots.worlds.pack import PackPart
 from golem.types import SIDES, Array, CameraInfo, Side
 
 DISTRACTORS = 14
-WIDE = ScrewRanges(protrusion=(0.004, 0.013))
-"""Loosened screws of the training images: those of the worlds, and some that stand less proud."""
-TINTED = (0.25, 0.35)
-"""Spread of brightness and of colour of the randomised materials (log scale)."""
-CLUTTER = 6
-"""Most things that lie on the cover beside the distractors."""
 AWAY = np.array([0.0, 0.0, -5.0])
 """Where unused distractors are [m]: under the floor."""
 
 
 @dataclass(frozen=True, slots=True)
-class RandomScene:
-    """A compiled random world.
+class Bore:
+    """The bore of a loose screw: an empty one is a part of its own.
+
+    Attributes:
+        mouth: (3,) centre of its mouth in the world [m].
+        radius: its radius [m].
+        screw: the body of its screw.
+    """
+
+    mouth: Array
+    radius: float
+    screw: str
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """What every random world has.
 
     Attributes:
         model, data: MuJoCo's.
-        layout: where the pack stands.
-        names: what the pack added.
-        draws: its loosened screws.
         robot_geoms: ids of the robot's geoms.
         distractors: ids of the distractors' bodies.
         plain_robot: the robot shows its collision primitives instead of its looks.
@@ -53,9 +55,6 @@ class RandomScene:
 
     model: mujoco.MjModel
     data: mujoco.MjData
-    layout: PackLayout
-    names: PackNames
-    draws: tuple[ScrewDraw, ...]
     robot_geoms: NDArray[np.int64]
     distractors: tuple[int, ...]
     plain_robot: bool
@@ -63,32 +62,66 @@ class RandomScene:
     robot_matid: NDArray[np.int32]
 
 
-def build_world(rng: np.random.Generator) -> RandomScene:
-    """Compile a world with random layout, screws and distractors."""
+class RandomScene(ABC):
+    """A compiled random world, and what differs between its images.
+
+    Attributes:
+        world: the compiled model.
+        parts: what a detector can be asked for.
+        bores: of the loose screws.
+        screw_tops: how far above its body a loose screw's head ends, by the name of the body [m].
+    """
+
+    def __init__(
+        self,
+        world: Compiled,
+        parts: tuple[PackPart, ...],
+        bores: tuple[Bore, ...] = (),
+        screw_tops: dict[str, float] | None = None,
+    ) -> None:
+        """Keep what was compiled."""
+        self.world, self.parts, self.bores = world, parts, bores
+        self.screw_tops = screw_tops or {}
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model."""
+        return self.world.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """The state of this image."""
+        return self.world.data
+
+    @abstractmethod
+    def randomise_looks(self, rng: np.random.Generator) -> Conditions:
+        """Draw colours, finishes and lights, and return the conditions that were drawn."""
+
+    @abstractmethod
+    def randomise_objects(self, rng: np.random.Generator) -> None:
+        """Move what can be moved, and the robot's arms."""
+
+    @abstractmethod
+    def place_head(self, rng: np.random.Generator) -> CameraInfo:
+        """Stand the robot where its head camera looks at the parts; returns the camera."""
+
+    @abstractmethod
+    def place_palm(self, rng: np.random.Generator) -> CameraInfo:
+        """Carry the robot to where a palm camera looks at a random part; returns the camera."""
+
+
+def begin(rng: np.random.Generator) -> tuple[mujoco.MjSpec, bool]:
+    """Return a spec that holds the robot alone, and whether it shows its collision primitives."""
     spec = mjcf.robot_spec(hands=True)
     plain = not any(geom.group == 2 for geom in spec.geoms) or rng.random() < 0.25
     for geom in spec.geoms:  # sometimes only the robot's primitives are seen
         if plain:
             geom.group = {2: 4, 3: 2}.get(geom.group, geom.group)
-    layout = PackLayout(
-        near_edge=float(rng.uniform(0.2, 0.45)),
-        top_z=float(rng.uniform(0.85, 1.1)),
-        window_x=(float(rng.uniform(0.09, 0.2)), float(rng.uniform(0.5, 0.75))),
-        window_y=(float(rng.uniform(-0.5, -0.3)), float(rng.uniform(0.3, 0.55))),
-        window_depth=float(rng.uniform(0.03, 0.06)),
-        empty_holes=tuple(int(i) for i in rng.choice(68, size=int(rng.integers(10, 22)), replace=False)),
-        tray_size=(
-            float(rng.uniform(0.16, 0.30)),
-            float(rng.uniform(0.2, 0.34)),
-            float(rng.uniform(0.03, 0.08)),
-        ),
-    )
-    lifted = float(rng.choice([0.0, rng.uniform(0.02, 0.12)]))
-    layout = replace(layout, tray_z=layout.top_z + lifted, tray_xy=(layout.near_edge + 0.1, -0.3))
-    free = [i for i in range(68) if i not in layout.empty_holes]
-    draws = draw_screws(rng, WIDE, [int(i) for i in rng.choice(free, size=14, replace=False)])
-    names = add_pack(spec, layout, draws)
-    add_clutter(spec, layout, int(rng.integers(CLUTTER + 1)), rng)
+    return spec, plain
+
+
+def compile_scene(spec: mujoco.MjSpec, plain: bool, rng: np.random.Generator) -> Compiled:
+    """Add the distractors and compile."""
     for k in range(DISTRACTORS):
         _add_distractor(spec, k, rng)
     model = spec.compile()
@@ -96,9 +129,7 @@ def build_world(rng: np.random.Generator) -> RandomScene:
     root = model.body(mjcf.BASE_LINK).rootid[0]
     robot = np.flatnonzero(model.body_rootid[model.geom_bodyid] == root).astype(np.int64)
     colours = model.geom_rgba.copy(), model.geom_matid.copy()
-    return RandomScene(
-        model, mujoco.MjData(model), layout, names, tuple(draws), robot, bodies, plain, *colours
-    )
+    return Compiled(model, mujoco.MjData(model), robot, bodies, plain, *colours)
 
 
 def _add_distractor(spec: mujoco.MjSpec, index: int, rng: np.random.Generator) -> None:
@@ -128,38 +159,15 @@ def _add_distractor(spec: mujoco.MjSpec, index: int, rng: np.random.Generator) -
             body.add_geom(type=kinds.mjGEOM_SPHERE, size=[u(0.006, 0.02), 0, 0], **look)
 
 
-def randomise_looks(world: RandomScene, rng: np.random.Generator) -> Conditions:
-    """Draw finishes, colours of materials, robot and distractors, the lights, and who casts shadows.
-
-    Returns:
-        The conditions that were drawn: of them finish, cover, tray and light hold for the image.
-    """
+def randomise_robot(world: Compiled, wild: bool, rng: np.random.Generator) -> None:
+    """Draw the colours of robot and distractors; a robot that is not `wild` keeps its own."""
     model = world.model
-    wild = rng.random() < 0.6  # the others keep the colours of a work place, up to light and small tints
-    conditions = draw_conditions("varied", {}, rng)
-    looks = {name: (rgba[:3], *shine[:2]) for name, (rgba, *shine) in hall.MATERIALS.items()}
-    for name, (colour, specular, shininess) in (looks | surfaces(conditions)).items():
-        mat = model.material(name).id
-        base = np.array(colour)
-        if (
-            wild
-            and name in ("cover_coat", "cover_bead", "wall_paint", "wall_band", "stand_blue")
-            and rng.random() < 0.5
-        ):
-            base = rng.uniform(0.05, 0.9) * np.exp(0.25 * rng.standard_normal(3))
-        if wild and name == "tray_teal" and rng.random() < 0.6:
-            base = rng.uniform(0.02, 1.0, 3)
-        brightness, colour = TINTED if wild else (0.1, 0.1)
-        tint = np.exp(brightness * rng.standard_normal()) * np.exp(0.25 * colour * rng.standard_normal(3))
-        model.mat_rgba[mat, :3] = np.clip(base * tint, 0.0, 1.0)
-        model.mat_specular[mat] = np.clip(specular * rng.uniform(0.3, 1.5), 0, 1)
-        model.mat_shininess[mat] = np.clip(shininess * rng.uniform(0.5, 1.5), 0, 1)
-    shell, hand = _random_colour(rng), _random_colour(rng)
+    shell, hand = random_colour(rng), random_colour(rng)
     for geom in world.robot_geoms:
         body = model.body(model.geom_bodyid[geom]).name
         colour = hand if any(word in body for word in ("hand", "crank", "finger")) else shell
         if rng.random() < 0.3:
-            colour = _random_colour(rng)
+            colour = random_colour(rng)
         if world.plain_robot or wild:
             model.geom_rgba[geom] = [*colour, 1.0]
             model.geom_matid[geom] = -1
@@ -169,7 +177,11 @@ def randomise_looks(world: RandomScene, rng: np.random.Generator) -> Conditions:
     for body in world.distractors:
         first, count = model.body_geomadr[body], model.body_geomnum[body]
         for geom in range(first, first + count):
-            model.geom_rgba[geom] = [*_random_colour(rng), 1.0]
+            model.geom_rgba[geom] = [*random_colour(rng), 1.0]
+
+
+def randomise_lights(model: mujoco.MjModel, rng: np.random.Generator) -> None:
+    """Draw places, colours and strengths of the lights, and who casts shadows."""
     model.vis.headlight.ambient[:] = rng.uniform(0.05, 0.45)
     model.vis.headlight.diffuse[:] = rng.uniform(0.0, 0.5)
     model.vis.headlight.specular[:] = rng.uniform(0.0, 0.4)
@@ -182,53 +194,28 @@ def randomise_looks(world: RandomScene, rng: np.random.Generator) -> Conditions:
         model.light_diffuse[light] = level * np.exp(0.08 * rng.standard_normal(3))
         model.light_specular[light] = level * rng.uniform(0.2, 1.0)
         model.light_castshadow[light] = light == 0 or rng.random() < 0.3
-    return conditions
 
 
-def _random_colour(rng: np.random.Generator) -> Array:
+def scatter(world: Compiled, low: Array, high: Array, rng: np.random.Generator) -> None:
+    """Put some of the distractors between two corners (3,) [m], and the others away."""
+    model = world.model
+    for body in world.distractors:
+        model.body_pos[body] = AWAY
+        if rng.random() < 0.3:
+            model.body_pos[body] = rng.uniform(low, high)
+            a = rng.uniform(-np.pi, np.pi)
+            model.body_quat[body] = [np.cos(a / 2), 0, 0, np.sin(a / 2)]
+
+
+def random_colour(rng: np.random.Generator) -> Array:
+    """Return a colour (3,), grey more often than not."""
     if rng.random() < 0.6:
         return np.clip(rng.uniform(0.02, 0.8) * np.exp(0.08 * rng.standard_normal(3)), 0, 1)
     return rng.uniform(0.0, 1.0, 3)
 
 
-def randomise_objects(world: RandomScene, rng: np.random.Generator) -> None:
-    """Move the tray, scatter distractors, take some screws out of their bores (tray, cover, or just raised)."""
-    model, data, layout = world.model, world.data, world.layout
-    mujoco.mj_resetData(model, data)
-    tray = model.body(world.names.tray).id
-    side = rng.choice([-1.0, 1.0])
-    tray_at = np.array(
-        [layout.near_edge + rng.uniform(-0.02, 0.5), side * rng.uniform(0.15, 0.65), layout.tray_z]
-    )
-    model.body_pos[tray] = tray_at
-    turn = rng.uniform(-np.pi, np.pi) if rng.random() < 0.3 else rng.normal(0.0, 0.05)
-    model.body_quat[tray] = [np.cos(turn / 2), 0.0, 0.0, np.sin(turn / 2)]
-    for body in world.distractors:
-        model.body_pos[body] = AWAY
-        if rng.random() < 0.3:
-            spot = [layout.near_edge + rng.uniform(0.0, 0.8), rng.uniform(-0.7, 0.7)]
-            model.body_pos[body] = [*spot, layout.top_z + rng.uniform(0.0, 0.012)]
-            a = rng.uniform(-np.pi, np.pi)
-            model.body_quat[body] = [np.cos(a / 2), 0, 0, np.sin(a / 2)]
-    for draw in world.draws:
-        at = model.joint(screw_name(draw.slot)).qposadr[0]
-        choice = rng.random()
-        if choice < 0.15:
-            data.qpos[at : at + 3] += rng.uniform(0.0, 0.02) * draw.axis()
-        elif choice < 0.45:
-            if choice < 0.3:
-                spot = tray_at[:2] + rng.uniform(-0.35, 0.35, 2) * min(layout.tray_size[:2])
-                z = layout.tray_z + 0.004
-            else:
-                spot = np.array([layout.near_edge + rng.uniform(0.0, 0.7), rng.uniform(-0.6, 0.6)])
-                z = layout.top_z
-            data.qpos[at : at + 3] = [*spot, z + draw.head_diameter / 2]
-            lying = Rotation.from_euler("zy", [rng.uniform(-np.pi, np.pi), np.pi / 2 + rng.uniform(0.0, 0.3)])
-            data.qpos[at + 3 : at + 7] = lying.as_quat(scalar_first=True)
-    _pose_arms(world, rng)
-
-
-def _pose_arms(world: RandomScene, rng: np.random.Generator) -> None:
+def pose_arms(world: Compiled, rng: np.random.Generator) -> None:
+    """Draw the joints of both arms, and the gaps of both hands."""
     model, data = world.model, world.data
     for side in SIDES:
         mirror = 1.0 if side == "left" else -1.0
@@ -238,60 +225,53 @@ def _pose_arms(world: RandomScene, rng: np.random.Generator) -> None:
         ):  # fmt: skip
             sign = 1.0 if joint in ("shoulder_pitch", "elbow", "wrist_pitch") else mirror
             data.qpos[model.joint(f"{side}_{joint}_joint").qposadr[0]] = sign * rng.uniform(low, high)
-        _set_gap(world, side, float(rng.uniform(0.0, magpie_model.MAX_GAP)))
+        set_gap(world, side, float(rng.uniform(0.0, magpie_model.MAX_GAP)))
 
 
-def place_head(world: RandomScene, rng: np.random.Generator) -> CameraInfo:
-    """Stand the robot in front of the pack with its head camera looking down at it; returns the camera."""
+def stand(
+    world: Compiled, position: Array, sway: tuple[float, float, float], rng: np.random.Generator
+) -> None:
+    """Put the base at `position` (3,) [m], turned by normal errors about z, y and x of these sizes [rad]."""
     data = world.data
-    data.qpos[:3] = [rng.uniform(-0.2, 0.15), rng.uniform(-0.4, 0.4), rng.uniform(0.9, 1.15)]
-    angles = [rng.normal(0.0, 0.2), rng.normal(0.0, 0.08), rng.normal(0.0, 0.05)]
-    data.qpos[3:7] = Rotation.from_euler("ZYX", angles).as_quat(scalar_first=True)
+    data.qpos[:3] = position
+    data.qpos[3:7] = Rotation.from_euler("ZYX", [rng.normal(0.0, size) for size in sway]).as_quat(
+        scalar_first=True
+    )
     refresh(world)
-    return CAMERAS["head"]
 
 
-def place_palm(world: RandomScene, rng: np.random.Generator) -> CameraInfo:
-    """Carry the robot to where its palm camera looks down at a random part, sometimes with a screw in its fingers."""
-    model, data = world.model, world.data
-    refresh(world)
-    side = SIDES[int(rng.integers(2))]
-    info = CAMERAS[f"{side}_hand"]
-    labels = sorted({part.label for part in world.names.parts})
-    label = labels[int(rng.integers(len(labels)))]
-    choices = [part for part in world.names.parts if part.label == label]
-    part = choices[int(rng.integers(len(choices)))]
-    target = data.xpos[model.body(part.body).id] if label == "tray" else part.position
-    height = float(np.exp(rng.uniform(np.log(0.10), np.log(0.50))))
-    view = Rotation.from_euler("ZYX", [rng.uniform(-np.pi, np.pi), rng.normal(0, 0.12), rng.normal(0, 0.12)])
-    R = view.as_matrix() @ T_MUJOCO_OPTICAL[:3, :3]
+def random_side(rng: np.random.Generator) -> Side:
+    """Return either side."""
+    return SIDES[int(rng.integers(2))]
+
+
+def aim(info: CameraInfo, target: Array, view: Array, distance: float, rng: np.random.Generator) -> Array:
+    """Return the (4, 4) pose in the world of a camera that shows `target` at a random pixel.
+
+    Args:
+        info: the camera.
+        target: (3,) in the world [m].
+        view: (3, 3) orientation of the optical frame.
+        distance: of the target along the optical axis [m].
+        rng: draws the pixel.
+    """
     pixel = rng.uniform([0.1, 0.1], [0.9, 0.9]) * (info.width, info.height)
     ray = np.array([(pixel[0] - info.cx) / info.fx, (pixel[1] - info.cy) / info.fy, 1.0])
-    T_world_optical = _pose(target - R @ ray * height, R)
-    held = (
-        world.draws[int(rng.integers(len(world.draws)))] if label == "screw" and rng.random() < 0.3 else None
-    )
-    if held is not None:
-        _set_gap(world, side, held.head_diameter)
+    return pose_of(target - view @ ray * distance, view)
+
+
+def carry(world: Compiled, info: CameraInfo, T_world_optical: Array) -> None:
+    """Move the base so that a camera of the hand is at a pose (4, 4)."""
+    data = world.data
     refresh(world)
-    T_base = _pose(data.qpos[:3], Rotation.from_quat(data.qpos[3:7], scalar_first=True).as_matrix())
+    T_base = pose_of(data.qpos[:3], Rotation.from_quat(data.qpos[3:7], scalar_first=True).as_matrix())
     T_base = T_world_optical @ np.linalg.inv(camera_pose(world, info.name)) @ T_base
     data.qpos[:3] = T_base[:3, 3]
     data.qpos[3:7] = Rotation.from_matrix(T_base[:3, :3]).as_quat(scalar_first=True)
     refresh(world)
-    if held is not None:
-        site = model.site(f"{side}_gripper").id
-        R_grip = data.site_xmat[site].reshape(3, 3)
-        tilt = Rotation.from_rotvec(0.15 * rng.standard_normal(3)).as_matrix()
-        at = model.joint(screw_name(held.slot)).qposadr[0]
-        data.qpos[at : at + 3] = data.site_xpos[site] - R_grip[:, 2] * rng.uniform(0.0, 0.01)
-        upright = R_grip @ T_MUJOCO_OPTICAL[:3, :3] @ tilt
-        data.qpos[at + 3 : at + 7] = Rotation.from_matrix(upright).as_quat(scalar_first=True)
-        refresh(world)
-    return info
 
 
-def _set_gap(world: RandomScene, side: Side, gap: float) -> None:
+def set_gap(world: Compiled, side: Side, gap: float) -> None:
     """Open both fingers of a hand to `gap` [m]."""
     crank = float(magpie_model.crank_from_gap(gap))
     for finger in magpie_model.FINGERS:
@@ -300,25 +280,39 @@ def _set_gap(world: RandomScene, side: Side, gap: float) -> None:
         world.data.qpos[world.model.joint(names[1]).qposadr[0]] = -crank
 
 
-def _pose(position: Array, rotation: Array) -> Array:
+def pose_of(position: Array, rotation: Array) -> Array:
+    """Return the (4, 4) pose of a position (3,) and a rotation (3, 3)."""
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = rotation, position
     return T
 
 
-def refresh(world: RandomScene) -> None:
+def reset(world: Compiled) -> None:
+    """Return to the joint positions of the start."""
+    mujoco.mj_resetData(world.model, world.data)
+
+
+def random_part(parts: tuple[PackPart, ...], rng: np.random.Generator) -> PackPart:
+    """Return a part: every class is as likely as the others."""
+    labels = sorted({part.label for part in parts})
+    label = labels[int(rng.integers(len(labels)))]
+    choices = [part for part in parts if part.label == label]
+    return choices[int(rng.integers(len(choices)))]
+
+
+def refresh(world: Compiled) -> None:
     """Compute where bodies, cameras and lights are for the present joint positions."""
     mujoco.mj_kinematics(world.model, world.data)
     mujoco.mj_camlight(world.model, world.data)
 
 
-def camera_pose(world: RandomScene, name: str) -> Array:
+def camera_pose(world: Compiled, name: str) -> Array:
     """Return the (4, 4) pose of a camera's optical frame in the world."""
     camera = world.model.camera(name).id
-    return _pose(world.data.cam_xpos[camera], world.data.cam_xmat[camera].reshape(3, 3)) @ T_MUJOCO_OPTICAL
+    return pose_of(world.data.cam_xpos[camera], world.data.cam_xmat[camera].reshape(3, 3)) @ T_MUJOCO_OPTICAL
 
 
-def make_rigs(world: RandomScene) -> tuple[CameraRig, CameraRig]:
+def make_rigs(world: Compiled) -> tuple[CameraRig, CameraRig]:
     """Return the plain and the shadow-casting renderer of a world."""
     infos = list(CAMERAS.values())
     return CameraRig(world.model, infos), CameraRig(world.model, infos, fancy=True)

@@ -44,6 +44,7 @@ class TrainDetectorConfig:
         start: ONNX file of an earlier detector to begin with; random weights if absent.
         classes: of the labels, in their order.
         bfloat16: compute the convolutions in this type: 1.7 times faster where the processor has it.
+        device: where the network is trained, as PyTorch names it.
     """
 
     data: Path
@@ -58,6 +59,7 @@ class TrainDetectorConfig:
     start: Path | None = None
     classes: tuple[str, ...] = CLASSES
     bfloat16: bool = True
+    device: str = "cpu"
 
 
 class _Batches(TorchDataset[tuple[Tensor, Tensor, Tensor, Tensor]]):
@@ -118,7 +120,7 @@ def detector_of(model: PartNet, classes: tuple[str, ...] = CLASSES) -> Detector:
         height, width = image.shape[:2]
         with torch.inference_mode():
             x = torch.from_numpy(normalise(image, np.array(MEAN), np.array(STD), MULTIPLE))
-            maps = model(x)[0].numpy()
+            maps = model(x.to(model.heat.weight.device))[0].cpu().numpy()
         return find_peaks(maps, classes, set(classes), THRESHOLD, (width, height))
 
     return detect
@@ -151,15 +153,16 @@ def fit(
     pick = np.linspace(0, len(held.images) - 1, min(config.check_images, len(held.images))).astype(int)
     held = held.only(pick.tolist())
     keys = [(camera, label) for camera in sorted(set(held.cameras)) for label in config.classes]
-    model = PartNet(len(config.classes)).to(memory_format=torch.channels_last)
+    model = PartNet(len(config.classes))
     if config.start is not None:
         load_onnx(model, config.start, config.classes)
+    model = model.to(config.device, memory_format=torch.channels_last)
     average = copy.deepcopy(model).eval()
     optimiser = torch.optim.AdamW(model.parameters(), lr=config.rate, weight_decay=1e-3)
     step, best = 0, -1.0
     last_path, best_path, curve_path = (config.out / n for n in ("last.pt", "best.pt", "curve.csv"))
     if last_path.exists():
-        state = torch.load(last_path, weights_only=True)
+        state = torch.load(last_path, map_location=config.device, weights_only=True)
         if state["classes"] != list(config.classes):
             raise ConfigError(f"The run in {config.out} is of other classes; name another folder with --out.")
         model.load_state_dict(state["model"])
@@ -177,14 +180,15 @@ def fit(
     loader = DataLoader(
         batches, batch_size=None, num_workers=config.workers, prefetch_factor=8 if config.workers else None
     )
-    sums = np.zeros(3)
+    sums = torch.zeros(3, device=config.device)
     started = time.process_time()
-    for image, heat, weight, regression in loader:
+    for batch in loader:
+        image, heat, weight, regression = (part.to(config.device) for part in batch)
         rate = config.rate * min(1.0, (step + 1) / 300) * 0.5 * (1 + math.cos(math.pi * step / config.steps))
         for group in optimiser.param_groups:
             group["lr"] = rate
         model.train()
-        with torch.autocast("cpu", torch.bfloat16, enabled=config.bfloat16):
+        with torch.autocast(image.device.type, torch.bfloat16, enabled=config.bfloat16):
             output = model(image.to(memory_format=torch.channels_last))
         focal, offset, box = loss_terms(output, heat, weight, regression)
         optimiser.zero_grad(set_to_none=True)
@@ -193,11 +197,11 @@ def fit(
         optimiser.step()
         step += 1
         _blend(average, model, min(0.998, (1 + step) / (10 + step)))
-        sums += [focal.item(), offset.item(), box.item()]
+        sums += torch.stack([focal, offset, box]).detach()
         if step % config.check_every == 0 or step == config.steps:
             scores = evaluate(held, detector_of(average, config.classes), classes=config.classes)
-            means = sums / config.check_every
-            sums[:] = 0.0
+            means = sums.cpu().numpy() / config.check_every
+            sums.zero_()
             with curve_path.open("a") as file:
                 row = [
                     step,
