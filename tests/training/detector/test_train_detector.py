@@ -41,9 +41,7 @@ def splits(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_an_interrupted_run_ends_with_the_same_weights(splits: Path, tmp_path: Path) -> None:
-    config = TrainDetectorConfig(
-        data=splits, out=tmp_path / "whole", steps=4, batch=2, check_every=2, workers=0
-    )
+    config = TrainDetectorConfig(data=splits, out=tmp_path / "whole", steps=4, batch=2, check_every=2)
     train(config)
     halves = replace(config, out=tmp_path / "halves")
     train(halves, stop=2)

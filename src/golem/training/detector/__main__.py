@@ -24,8 +24,8 @@ RUNS = Path("runs/detector")
 def render(
     folder: Path = RUNS / "data",
     seed: int = 0,
-    worlds: int = 600,
-    kitchens: int = 300,
+    worlds: int = 150,
+    kitchens: int = 75,
     held_out_worlds: int = 30,
     held_out_kitchens: int = 15,
     per_camera: int = 16,
@@ -54,7 +54,6 @@ def train(
     seed: int = 0,
     steps: int = 12000,
     batch: int = 32,
-    workers: int = 1,
     check_every: int = 1000,
     start: Path | None = None,
     device: str = "cpu",
@@ -67,13 +66,12 @@ def train(
         seed: of weights and crops.
         steps: gradient steps.
         batch: crops of a step.
-        workers: processes that cut crops.
         check_every: steps between evaluations on part of the held-out split.
         start: ONNX file of an earlier detector to begin with.
         device: cpu, or cuda.
     """
     config = TrainDetectorConfig(
-        data, out, seed, steps, batch, check_every=check_every, check_images=240, workers=workers, start=start,
+        data, out, seed, steps, batch, check_every=check_every, check_images=240, start=start,
         device=device,
     )  # fmt: skip
     print(run_training(config))
@@ -181,7 +179,6 @@ def own(
             seed,
             steps,
             check_every=min(250, steps),
-            workers=0,
             start=start or default,
             classes=classes,
         )

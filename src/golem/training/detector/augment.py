@@ -1,12 +1,19 @@
-"""Training crops: zoom, flip, light, colour, blur, dirt and noise on rendered images, with the targets to match."""
+"""Training crops: zoom, mirror, light, colour, blur, dirt and noise on rendered images, and their labels.
+
+All on the device that trains: a processor cuts a few hundred crops a second, which is what a GPU trains on in a few
+hundredths of one.
+"""
 
 from __future__ import annotations
 
-import cv2
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Sequence
 
-from golem.capabilities.perception.peaks import STRIDE
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn import functional
+
 from golem.types import Array
 
 MEAN = (0.45, 0.45, 0.45)
@@ -15,118 +22,167 @@ STD = (0.25, 0.25, 0.25)
 CROP = (320, 256)
 """Width and height of a training crop [px]."""
 ZOOM = (0.6, 1.35)
-LARGE = 15
-"""Shorter side from which a part counts as large [cells]."""
+REACH = 4
+"""Half side of the blurs' kernels [px]."""
+AROUND_A_PART = 0.85
+"""Share of the crops that are cut around a part; the others are anywhere."""
 
 
-def crop(
-    image: NDArray[np.uint8], labels: Array, rng: np.random.Generator
-) -> tuple[NDArray[np.uint8], Array]:
-    """Cut a randomly zoomed and mirrored piece, usually around a part; labels (n, 8) follow."""
-    height, width = image.shape[:2]
-    w, h = CROP
+class Images:
+    """Images of any size on a device, padded to the largest."""
+
+    def __init__(self, images: Sequence[NDArray[np.uint8]], device: str) -> None:
+        """Copy them there, as bytes."""
+        height, width = (max(image.shape[side] for image in images) for side in (0, 1))
+        self.sizes = np.array([image.shape[1::-1] for image in images], float)
+        self.pixels = torch.zeros((len(images), 3, height, width), dtype=torch.uint8, device=device)
+        for k, image in enumerate(images):
+            whole = torch.from_numpy(image).to(device).permute(2, 0, 1)
+            self.pixels[k, :, : image.shape[0], : image.shape[1]] = whole
+
+    def cut(self, chosen: Sequence[int], scales: Array, shifts: Array, rng: torch.Generator) -> Tensor:
+        """Return crops (n, 3, height, width) in 0..1 of images `chosen`: a pixel p of one is at scale * p + shift.
+
+        Outside of the image is one colour, or its edge, smeared.
+
+        Args:
+            chosen: numbers of n images.
+            scales: (n, 2) along x and y.
+            shifts: (n, 2) along x and y [px].
+            rng: draws what is outside; on the images' device.
+        """
+        device, n = self.pixels.device, len(chosen)
+        image = self.pixels[torch.as_tensor(chosen, device=device)].float() / 255.0
+        smaller = torch.as_tensor(scales[:, 1], dtype=torch.float32, device=device)
+        image = filtered(image, gaussians(0.35 / smaller), smaller < 0.8)
+        axes, inside = [], []
+        for side, length in enumerate(CROP):
+            place = (np.arange(length) - shifts[:, side : side + 1]) / scales[:, side : side + 1]
+            last = self.sizes[list(chosen), side][:, None] - 1.0
+            inside.append(torch.as_tensor((place >= 0.0) & (place <= last), device=device))
+            whole = self.pixels.shape[3 - side] - 1.0
+            unit = 2.0 * np.clip(place, 0.0, last) / whole - 1.0
+            axes.append(torch.as_tensor(unit, dtype=torch.float32, device=device))
+        x = axes[0][:, None, :].expand(n, CROP[1], CROP[0])
+        y = axes[1][:, :, None].expand(n, CROP[1], CROP[0])
+        pieces = functional.grid_sample(image, torch.stack([x, y], dim=3), align_corners=True)
+        shade = torch.rand((n, 3, 1, 1), generator=rng, device=device)
+        smeared = torch.rand((n, 1, 1, 1), generator=rng, device=device) < 0.3
+        seen = (inside[0][:, None, :] & inside[1][:, :, None])[:, None] | smeared
+        return torch.where(seen, pieces, shade)
+
+
+def place_crop(labels: Array, size: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Draw a zoomed and mirrored piece of an image, usually around a part.
+
+    Args:
+        labels: (n, 8) of the image, columns as in `labels.COLUMNS`.
+        size: (2,) width and height of the image [px].
+        rng: draws it.
+
+    Returns:
+        scale, shift: (2,) each along x and y; see `Images.cut`.
+    """
+    half = np.array(CROP) / 2
     zoom = float(np.exp(rng.uniform(*np.log(ZOOM))))
-    if len(labels) and rng.random() < 0.85:
+    if len(labels) and rng.random() < AROUND_A_PART:
         # Rare classes as often as frequent ones.
         kind = rng.choice(np.unique(labels[:, 0]))
         chosen = labels[rng.choice(np.flatnonzero(labels[:, 0] == kind)), 1:3]
-        middle = chosen + rng.uniform(-0.42, 0.42, 2) * (w, h) / zoom
+        middle = chosen + rng.uniform(-0.84, 0.84, 2) * half / zoom
     else:
-        middle = rng.uniform((0, 0), (width, height))
-    flip = -1.0 if rng.random() < 0.5 else 1.0
-    scale = np.array([zoom * flip, zoom])
-    shift = np.array([(w - 1) / 2, (h - 1) / 2]) - scale * middle
-    matrix = np.column_stack([np.diag(scale), shift])
-    filling = cv2.BORDER_REFLECT_101 if rng.random() < 0.3 else cv2.BORDER_CONSTANT
-    if zoom < 0.8:
-        image = np.asarray(cv2.GaussianBlur(image, (0, 0), 0.35 / zoom), np.uint8)
-    shade = tuple(float(v) for v in rng.uniform(0, 255, 3))
-    piece = cv2.warpAffine(image, matrix, CROP, flags=cv2.INTER_LINEAR, borderMode=filling, borderValue=shade)
-    if filling == cv2.BORDER_REFLECT_101:
-        # Mirrored parts outside the image would be unlabelled: hide them.
-        inside = cv2.warpAffine(np.ones((height, width), np.uint8), matrix, CROP, flags=cv2.INTER_NEAREST)
-        piece[inside == 0] = cv2.blur(piece, (41, 41))[inside == 0]
+        middle = rng.uniform((0, 0), size)
+    scale = np.array([zoom * (-1.0 if rng.random() < 0.5 else 1.0), zoom])
+    return scale, half - 0.5 - scale * middle
+
+
+def moved_labels(labels: Array, size: Array, scale: Array, shift: Array) -> Array:
+    """Return the labels (n, 8) of a crop: of the parts whose centres are in it, with boxes clipped."""
     out = labels.copy()
     for first in (1, 3, 5):
         out[:, first : first + 2] = out[:, first : first + 2] * scale + shift
-    if flip < 0:
+    if scale[0] < 0:
         out[:, [3, 5]] = out[:, [5, 3]]
-    limit = np.array([0.0, 0.0, width - 1.0, height - 1.0])
-    frame = np.concatenate([limit[:2] * scale + shift, limit[2:] * scale + shift])
-    low = np.maximum(np.minimum(frame[:2], frame[2:]), 0)
-    high = np.minimum(np.maximum(frame[:2], frame[2:]), (w - 1, h - 1))
+    ends = np.stack([shift, (size - 1.0) * scale + shift])
+    limit = np.array(CROP) - 1.0
+    low, high = np.maximum(ends.min(axis=0), 0), np.minimum(ends.max(axis=0), limit)
     out[:, 3:5] = np.clip(out[:, 3:5], low, high)
     out[:, 5:7] = np.clip(out[:, 5:7], low, high)
-    keep = (out[:, 1:3] >= 0).all(axis=1) & (out[:, 1] <= w - 1) & (out[:, 2] <= h - 1)
+    keep = (out[:, 1:3] >= 0).all(axis=1) & (out[:, 1:3] <= limit).all(axis=1)
     out[:, 7] = np.maximum(out[:, 7], (out[:, 5:7] - out[:, 3:5]).min(axis=1) < 3.0)
-    return np.asarray(piece, np.uint8), out[keep]
+    return out[keep]
 
 
-def corrupt(image: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.float32]:
-    """Return the image as (3, height, width) float32, normalised, with random exposure, colour, blur and noise."""
-    x = image.astype(np.float32) / 255.0
-    h, w = x.shape[:2]
-    if rng.random() < 0.5:  # uneven light, dirt
-        field = rng.standard_normal((int(rng.integers(3, 9)), int(rng.integers(3, 9)), 1)).astype(np.float32)
-        field = cv2.resize(field, (w, h), interpolation=cv2.INTER_CUBIC)
-        x *= np.exp(rng.uniform(0.02, 0.25) * field)[..., None]
-    if rng.random() < 0.3:  # surface texture
-        grain = rng.standard_normal((h // 2, w // 2)).astype(np.float32)
-        grain = cv2.resize(cv2.GaussianBlur(grain, (0, 0), rng.uniform(0.5, 2.0)), (w, h))
-        x += (rng.uniform(0.01, 0.08) * grain)[..., None]
-    x *= np.exp(rng.normal(0.0, 0.3)) * np.exp(0.07 * rng.standard_normal(3)).astype(np.float32)
-    grey = x.mean(axis=2, keepdims=True)
-    x = grey + (x - grey) * np.float32(rng.uniform(0.4, 1.3))
-    mean = x.mean()
-    x = mean + (x - mean) * np.float32(np.exp(rng.normal(0.0, 0.2)))
-    x = np.clip(x, 0.0, 1.2) ** np.float32(np.exp(rng.normal(0.0, 0.15)))
-    choice = rng.random()
-    if choice < 0.35:
-        x = cv2.GaussianBlur(x, (0, 0), rng.uniform(0.3, 1.3))
-    elif choice < 0.5:
-        length = int(rng.integers(2, 6))
-        kernel = np.zeros((7, 7), np.float32)
-        direction = rng.uniform(0, np.pi)
-        for s in np.linspace(-length / 2, length / 2, 15):
-            kernel[round(3 + s * np.sin(direction)), round(3 + s * np.cos(direction))] += 1
-        x = cv2.filter2D(x, -1, kernel / kernel.sum())
-    if rng.random() < 0.7:
-        x += rng.uniform(0.0, 0.04) * rng.standard_normal(x.shape).astype(np.float32)
-    x = np.round(np.clip(x, 0.0, 1.0) * 255) / 255
-    return np.ascontiguousarray(((x - np.array(MEAN)) / np.array(STD)).transpose(2, 0, 1), dtype=np.float32)
+def corrupt(crops: Tensor, rng: torch.Generator) -> Tensor:
+    """Return crops (n, 3, height, width) in 0..1, normalised, with random exposure, colour, blur and noise.
+
+    Args:
+        crops: to be changed.
+        rng: on their device.
+    """
+    n, _, height, width = crops.shape
+    device = crops.device
+
+    def uniform(low: float, high: float, *shape: int) -> Tensor:
+        return low + (high - low) * torch.rand((n, *(shape or (1, 1, 1))), generator=rng, device=device)
+
+    def normal(*shape: int) -> Tensor:
+        return torch.randn((n, *shape), generator=rng, device=device)
+
+    def sometimes(share: float) -> Tensor:
+        return (uniform(0.0, 1.0) < share).float()
+
+    cells = int(torch.randint(3, 9, (), generator=rng, device=device))
+    field = functional.interpolate(normal(1, cells, cells), (height, width), mode="bicubic")
+    x = crops * torch.exp(sometimes(0.5) * uniform(0.02, 0.25) * field)  # uneven light, dirt
+    textured = sometimes(0.3)
+    grain = normal(1, height // 2, width // 2)
+    grain = filtered(grain, gaussians(uniform(0.5, 2.0, 1)[:, 0]), textured[:, 0, 0, 0] > 0)
+    grain = functional.interpolate(grain, (height, width), mode="bilinear")
+    x = x + textured * uniform(0.01, 0.08) * grain
+    x = x * torch.exp(0.3 * normal(1, 1, 1) + 0.07 * normal(3, 1, 1))
+    grey = x.mean(dim=1, keepdim=True)
+    x = grey + (x - grey) * uniform(0.4, 1.3)
+    mean = x.mean(dim=(1, 2, 3), keepdim=True)
+    x = mean + (x - mean) * torch.exp(0.2 * normal(1, 1, 1))
+    x = x.clamp(0.0, 1.2) ** torch.exp(0.15 * normal(1, 1, 1))
+    choice = uniform(0.0, 1.0, 1)[:, 0]
+    x = filtered(x, gaussians(uniform(0.3, 1.3, 1)[:, 0]), choice < 0.35)
+    moving = (choice >= 0.35) & (choice < 0.5)
+    x = filtered(x, strokes(uniform(2.0, 6.0, 1)[:, 0], uniform(0.0, float(np.pi), 1)[:, 0]), moving)
+    x = x + sometimes(0.7) * uniform(0.0, 0.04) * normal(3, height, width)
+    x = torch.round(x.clamp(0.0, 1.0) * 255.0) / 255.0
+    centre, spread = (torch.tensor(v, device=device)[:, None, None] for v in (MEAN, STD))
+    return (x - centre) / spread
 
 
-def targets(
-    labels: Array, classes: int
-) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Return heatmap (classes, h, w), its weight, and regression (7, h, w: the six channels and their weight)."""
-    w, h = CROP[0] // STRIDE, CROP[1] // STRIDE
-    heat = np.zeros((classes, h, w), np.float32)
-    weight = np.ones_like(heat)
-    regression = np.zeros((7, h, w), np.float32)
-    rows, columns = np.mgrid[:h, :w]
-    middle = (STRIDE - 1) / 2
-    order = np.argsort(-(labels[:, 5:7] - labels[:, 3:5]).prod(axis=1)) if len(labels) else []
-    for kind, x, y, x0, y0, x1, y1, ignore in labels[order]:
-        c = int(kind)
-        if ignore:
-            a, b = np.floor(np.array([x0, y0]) / STRIDE).astype(int) - 1
-            e, f = np.ceil(np.array([x1, y1]) / STRIDE).astype(int) + 2
-            weight[c, max(b, 0) : max(f, 0), max(a, 0) : max(e, 0)] = 0.0
-            continue
-        gx, gy = (x - middle) / STRIDE, (y - middle) / STRIDE
-        side = min(x1 - x0, y1 - y0) / STRIDE
-        # Where the middle of a large part is cannot be told to the cell: a broad peak, and offsets from all over it.
-        sigma = float(np.clip(0.13 * side, 0.7, 2.0) if side < LARGE else np.clip(0.18 * side, 2.0, 8.0))
-        reach = 1 if side < LARGE else int(0.8 * sigma)
-        blob = np.exp(-((columns - gx) ** 2 + (rows - gy) ** 2) / (2 * sigma**2)).astype(np.float32)
-        i, j = int(np.clip(np.round(gy), 0, h - 1)), int(np.clip(np.round(gx), 0, w - 1))
-        np.maximum(heat[c], blob, out=heat[c])
-        heat[c, i, j] = 1.0
-        sides = np.log(np.maximum([x - x0, y - y0, x1 - x, y1 - y], 1.0))
-        share = 2.4 / ((2 * reach + 1) ** 2 - 1)
-        for r in range(max(i - reach, 0), min(i + reach + 1, h)):
-            for q in range(max(j - reach, 0), min(j + reach + 1, w)):
-                if (r, q) == (i, j) or regression[6, r, q] < share:
-                    regression[:, r, q] = [gx - q, gy - r, *sides, 1.0 if (r, q) == (i, j) else share]
-    return heat, weight, regression
+def gaussians(sigma: Tensor) -> Tensor:
+    """Return kernels (n, side, side) of blurs by `sigma` (n,) [px]."""
+    step = torch.arange(-REACH, REACH + 1, device=sigma.device).float()
+    line = torch.exp(-(step**2) / (2.0 * sigma[:, None] ** 2))
+    line = line / line.sum(dim=1, keepdim=True)
+    return line[:, :, None] * line[:, None, :]
+
+
+def strokes(length: Tensor, direction: Tensor) -> Tensor:
+    """Return kernels (n, side, side) of the blur of a motion by `length` (n,) [px] along `direction` (n,) [rad]."""
+    way = torch.linspace(-0.5, 0.5, 15, device=length.device) * length[:, None]
+    step = torch.arange(-REACH, REACH + 1, device=length.device).float()
+    x, y = (way * turn(direction)[:, None] for turn in (torch.cos, torch.sin))
+    near = [(1.0 - (step[None, None, :] - at[:, :, None]).abs()).clamp(min=0.0) for at in (x, y)]
+    kernel = torch.einsum("nky,nkx->nyx", near[1], near[0])
+    return kernel / kernel.sum(dim=(1, 2), keepdim=True)
+
+
+def filtered(images: Tensor, kernels: Tensor, wanted: Tensor) -> Tensor:
+    """Return n images (n, channels, height, width), those `wanted` (n,) filtered by their kernels (n, side, side)."""
+    some = images[wanted]
+    count, channels, height, width = some.shape
+    if count == 0:
+        return images
+    weights = kernels[wanted][:, None].expand(count, channels, *kernels.shape[1:]).flatten(0, 1)[:, None]
+    padded = functional.pad(some, (REACH,) * 4, mode="replicate")
+    out = functional.conv2d(padded.flatten(0, 1)[None], weights, groups=count * channels)
+    whole = images.clone()
+    whole[wanted] = out.reshape(count, channels, height, width)
+    return whole

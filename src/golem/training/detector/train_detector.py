@@ -13,8 +13,6 @@ import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
-from torch.utils.data import DataLoader
-from torch.utils.data import Dataset as TorchDataset
 
 from golem.capabilities.perception.classes import CLASSES
 from golem.capabilities.perception.peaks import find_peaks, normalise
@@ -23,6 +21,7 @@ from golem.robots.sensors.streams import stream
 from golem.training.detector import augment, dataset
 from golem.training.detector.augment import MEAN, STD
 from golem.training.detector.evaluate import THRESHOLD, Detector, evaluate
+from golem.training.detector.heat_targets import targets
 from golem.training.detector.import_detector import load_onnx
 from golem.training.detector.part_net import MULTIPLE, PartNet
 
@@ -40,7 +39,6 @@ class TrainDetectorConfig:
         rate: peak learning rate of AdamW.
         check_every: steps between evaluations on part of the held-out split.
         check_images: how many of its images.
-        workers: processes that cut crops.
         start: ONNX file of an earlier detector to begin with; random weights if absent.
         classes: of the labels, in their order.
         bfloat16: compute the convolutions in this type: 1.7 times faster where the processor has it.
@@ -55,37 +53,32 @@ class TrainDetectorConfig:
     rate: float = 2.5e-3
     check_every: int = 500
     check_images: int = 80
-    workers: int = 1
     start: Path | None = None
     classes: tuple[str, ...] = CLASSES
     bfloat16: bool = True
     device: str = "cpu"
 
 
-class _Batches(TorchDataset[tuple[Tensor, Tensor, Tensor, Tensor]]):
-    """Batch number to batch, so that a resumed run continues with the crops it would have had."""
+class Crops:
+    """Random crops of a data set, and what the network should say of them, made on the device that trains."""
 
-    def __init__(
-        self, data: dataset.Dataset, seed: int, batch: int, first: int, last: int, classes: int
-    ) -> None:
-        self._data, self._seed, self._batch, self._first, self._last = data, seed, batch, first, last
-        self._classes = classes
+    def __init__(self, data: dataset.Dataset, classes: int, device: str) -> None:
+        """Copy the images to the device."""
+        self._data, self._classes, self._device = data, classes, device
+        self._images = augment.Images(data.images, device)
 
-    def __len__(self) -> int:
-        return self._last - self._first
-
-    def __getitem__(self, index: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        rng = stream(self._seed, f"detector/batch/{self._first + index}")
-        images, heats, weights, regressions = [], [], [], []
-        for _ in range(self._batch):
-            k = int(rng.integers(len(self._data.images)))
-            piece, labels = augment.crop(self._data.images[k], self._data.labels[k], rng)
-            heat, weight, regression = augment.targets(labels, self._classes)
-            images.append(augment.corrupt(piece, rng))
-            heats.append(heat)
-            weights.append(weight)
-            regressions.append(regression)
-        return tuple(torch.from_numpy(np.stack(a)) for a in (images, heats, weights, regressions))  # type: ignore[return-value]
+    def batch(self, rng: np.random.Generator, size: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Return images, heatmaps, their weights, and regression maps of `size` crops; see `heat_targets.targets`."""
+        device_rng = torch.Generator(self._device).manual_seed(int(rng.integers(1 << 62)))
+        chosen = rng.integers(len(self._data.images), size=size).tolist()
+        placed = [augment.place_crop(self._data.labels[k], self._images.sizes[k], rng) for k in chosen]
+        scales, shifts = (np.stack(parts) for parts in zip(*placed, strict=True))
+        labels = [
+            augment.moved_labels(self._data.labels[k], self._images.sizes[k], *place)
+            for k, place in zip(chosen, placed, strict=True)
+        ]
+        crops = augment.corrupt(self._images.cut(chosen, scales, shifts, device_rng), device_rng)
+        return crops, *targets(labels, self._classes, self._device)
 
 
 def loss_terms(
@@ -176,14 +169,13 @@ def fit(
                 ["step", "images", "cpu_s", "loss_heat", "loss_offset", "loss_box", *names]
             )
     last = config.steps if stop is None else stop
-    batches = _Batches(data, config.seed, config.batch, step, last, len(config.classes))
-    loader = DataLoader(
-        batches, batch_size=None, num_workers=config.workers, prefetch_factor=8 if config.workers else None
-    )
+    crops = Crops(data, len(config.classes), config.device)
     sums = torch.zeros(3, device=config.device)
     started = time.process_time()
-    for batch in loader:
-        image, heat, weight, regression = (part.to(config.device) for part in batch)
+    while step < last:
+        image, heat, weight, regression = crops.batch(
+            stream(config.seed, f"detector/batch/{step}"), config.batch
+        )
         rate = config.rate * min(1.0, (step + 1) / 300) * 0.5 * (1 + math.cos(math.pi * step / config.steps))
         for group in optimiser.param_groups:
             group["lr"] = rate
