@@ -9,8 +9,6 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from golem.dashboard.film import Film
 from golem.dashboard.live import LiveView
 from golem.errors import OutputError
@@ -120,14 +118,8 @@ def _errands(
         contacts(running.executor.t)
 
     result = run("navigate", GOAL, watch=watch_walk)
-    true = true_pose(robot)
+    true = robot.truth.pose()
     return result, run("disassemble", WORK, watch=watch) if result.success else None, true
-
-
-def true_pose(robot: MujocoRobot) -> PlanarPose:
-    """Return where the robot really is in odom."""
-    truth = robot.truth
-    return PlanarPose.of(np.linalg.inv(truth.T_world_odom) @ truth.base().T_world_base)
 
 
 def _told(

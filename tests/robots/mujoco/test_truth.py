@@ -91,7 +91,11 @@ def test_odom_is_where_the_base_started(falling: MujocoRobot) -> None:
     T = falling.truth.T_world_odom
     np.testing.assert_array_equal(T[:3, :3], np.eye(3))
     np.testing.assert_allclose(T[:3, 3], [0.0, 0.0, 0.965], atol=0.002)
-    assert np.linalg.norm(falling.truth.base().T_world_base - T) > 0.05
+    now = falling.truth.base().T_world_base
+    assert np.linalg.norm(now - T) > 0.05
+    pose = falling.truth.pose()
+    np.testing.assert_allclose((pose.x, pose.y), now[:2, 3] - T[:2, 3])
+    assert pose.yaw == pytest.approx(np.arctan2(now[1, 0], now[0, 0]))
 
 
 def test_soles_have_the_size_of_a_foot(falling: MujocoRobot) -> None:

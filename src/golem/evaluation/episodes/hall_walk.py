@@ -46,13 +46,13 @@ class HallWalk:
             return
         if t >= self._drawn + EVERY:
             self._drawn = t
-            pose = true_pose(episode)
+            pose = episode.robot.truth.pose()
             self.track.append((pose.x, pose.y))
         if step is before:
             return
         if before is not None:
             if before.twist != Twist() and step.twist == Twist():
-                self.stopped = true_pose(episode)
+                self.stopped = episode.robot.truth.pose()
             self.recoveries += step.note == "recover" != before.note
             self.stood += (t - self._since) * (before.note not in WALKING)
         self._step, self._since = step, t
@@ -67,12 +67,6 @@ class HallWalk:
         if self.walkers:
             found["nobody"] = self.nobody / self.walkers
         return found
-
-
-def true_pose(episode: Episode) -> PlanarPose:
-    """Return where the robot really is in odom."""
-    truth = episode.robot.truth
-    return PlanarPose.of(np.linalg.inv(truth.T_world_odom) @ truth.base().T_world_base)
 
 
 def _people(episode: Episode) -> Array:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.robots.mujoco.engine import MujocoRobot
@@ -17,6 +15,5 @@ def place_error(bus: Bus, robot: MujocoRobot) -> float:
     believed, place = bus.latest(topics.ODOMETRY), bus.latest(topics.MAP_POSE)
     if believed is None or place is None:
         return 0.0
-    true = PlanarPose.of(np.linalg.inv(robot.truth.T_world_odom) @ robot.truth.base().T_world_base)
-    off = true.to(place.T_odom_map.to(PlanarPose.of(believed.T_odom_base)))
+    off = robot.truth.pose().to(place.T_odom_map.to(PlanarPose.of(believed.T_odom_base)))
     return math.hypot(off.x, off.y)

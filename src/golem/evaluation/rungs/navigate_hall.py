@@ -18,7 +18,7 @@ from golem.capabilities.navigation.map_picture import GOAL, TRACK, WAY, MapPictu
 from golem.evaluation.base import DONE, Case, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, legs_stack
-from golem.evaluation.episodes.hall_walk import HallWalk, true_pose
+from golem.evaluation.episodes.hall_walk import HallWalk
 from golem.evaluation.episodes.survey import survey
 from golem.interfaces import topics
 from golem.provenance import stack_facts
@@ -134,7 +134,7 @@ def judge(
 ) -> TrialOutcome:
     """Say where the robot ended, and which module lost it."""
     bus, result, loss = episode.running.bus, episode.result, episode.loss
-    true = true_pose(episode)
+    true = episode.robot.truth.pose()
     left = goal.to(true)
     radial, turned = math.hypot(left.x, left.y), abs(wrap(left.yaw))
     track = np.array(walked.track or [(0.0, 0.0)])

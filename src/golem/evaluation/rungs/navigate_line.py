@@ -86,8 +86,7 @@ class NavigateLine(LegRung[LineOptions]):
 
 def judge(episode: Episode, method: str) -> TrialOutcome:
     """Say where the robot ended."""
-    trace, truth = episode.recorder.trace(), episode.robot.truth
-    true = PlanarPose.of(np.linalg.inv(truth.T_world_odom) @ truth.base().T_world_base)
+    trace, true = episode.recorder.trace(), episode.robot.truth.pose()
     left = PlanarPose(DISTANCE, 0.0, 0.0).to(true)
     radial = math.hypot(left.x, left.y)
     series = {

@@ -18,7 +18,6 @@ from golem.errors import ConfigError
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, lost
-from golem.evaluation.episodes.hall_walk import true_pose
 from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.episodes.pick_claims import claims
 from golem.evaluation.episodes.pick_touches import PickTouches
@@ -274,7 +273,7 @@ class _Trial:
 
     def _placed(self, when: str) -> dict[str, float]:
         """Return where the robot stands as seen from the nominal stance."""
-        off = self._stance.to(true_pose(self._episode))
+        off = self._stance.to(self._episode.robot.truth.pose())
         return {
             f"{when}_x": off.x,
             f"{when}_y": off.y,

@@ -40,10 +40,10 @@ class WalkStop(LegRung[PlantOptions]):
         episode.start("walk", WalkGoal(goal.x, goal.y, goal.yaw, "odom", TIMEOUT))
         episode.run(TIMEOUT + 1.0, until=lambda: episode.result is not None)
         episode.run(AFTER)
-        truth, result, loss = episode.robot.truth, episode.result, episode.loss
+        result, loss = episode.result, episode.loss
         if loss is not None or result is None:
             return judged(spec.method, loss or Loss("walk", "The skill did not end."), {})
-        left = goal.to(PlanarPose.of(np.linalg.inv(truth.T_world_odom) @ truth.base().T_world_base))
+        left = goal.to(episode.robot.truth.pose())
         radial = math.hypot(left.x, left.y)
         series = {"goal_x": left.x, "goal_y": left.y, "goal_radial": radial, "goal_yaw": left.yaw}
         loss = None if result.success else Loss(result.stage, result.reason, result.trace)

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from golem.robots.model.table import BASE_LINK, SOLE
-from golem.types import SIDES, Array
+from golem.types import SIDES, Array, PlanarPose
 
 _CORNERS = np.array([[x, y, SOLE.z] for x, y in product(SOLE.x, SOLE.y)])
 """(4, 3) corners of a sole in its ankle_roll frame [m]."""
@@ -68,6 +68,10 @@ class Truth:
         T[:3, :3] = R.reshape(3, 3)
         v = self._data.qvel[self._v : self._v + 6]
         return BaseTruth(T, v[:3].copy(), v[3:].copy())
+
+    def pose(self) -> PlanarPose:
+        """Return where the robot stands and heads in odom."""
+        return PlanarPose.of(np.linalg.inv(self.T_world_odom) @ self.base().T_world_base)
 
     def com(self) -> tuple[Array, Array]:
         """Return position [m] and velocity [m/s] of the robot's centre of mass in the world, (3,) each."""
