@@ -11,7 +11,18 @@ SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
 
 # From the bottom up. A package may import from its own row and from every row below it.
 LAYERS = (
-    ("__init__", "types", "errors", "figures", "finite", "options", "traces", "registry", "slots"),
+    (
+        "__init__",
+        "types",
+        "errors",
+        "figures",
+        "finite",
+        "options",
+        "traces",
+        "registry",
+        "slots",
+        "true_runs",
+    ),
     ("middleware",),
     ("interfaces",),
     ("robots",),

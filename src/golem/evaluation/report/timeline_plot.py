@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from golem.evaluation.episodes.memory_timeline import ObjectTimeline
 from golem.evaluation.report.svg_figure import COLOUR
+from golem.true_runs import true_runs
 
 ROW = 0.29
 """Height of a row [inch]."""
@@ -60,7 +60,4 @@ def _draw(axes: Any, rows: Sequence[ObjectTimeline], split: int) -> None:
 
 def _spans(flags: ArrayLike) -> list[tuple[int, int]]:
     """Return first look and length of each run of true `flags` (n,): bars of one look each show seams."""
-    edges = np.flatnonzero(
-        np.diff(np.concatenate([[False], np.asarray(flags, bool), [False]]).astype(np.int8))
-    )
-    return [(int(first), int(end - first)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
+    return [(first, end - first) for first, end in true_runs(flags).tolist()]

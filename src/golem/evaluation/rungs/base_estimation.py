@@ -20,6 +20,7 @@ from golem.hardware.estimator.base import BaseEstimator
 from golem.provenance import stack_facts
 from golem.runtime.contract_check import ContractCheck
 from golem.stack import Choice
+from golem.true_runs import true_runs
 from golem.types import TICK, Array, LowState
 
 SLOT = "estimator"
@@ -168,5 +169,4 @@ def _way(T: Array, first: int, last: int) -> Array:
 
 def _longest(flags: Array) -> int:
     """Return the length of the longest run of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
-    return int(np.max(edges[1::2] - edges[::2], initial=0))
+    return int(np.max(np.diff(true_runs(flags)), initial=0))

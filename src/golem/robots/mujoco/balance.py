@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.robots.mujoco.truth import Truth
+from golem.true_runs import true_runs
 from golem.types import Array
 
 TRACE = "trace.npz"
@@ -104,8 +105,8 @@ class BalanceTrace:
     @property
     def steps(self) -> int:
         """How often a foot was lifted, the feet counted together."""
-        minimum = round(SHORTEST_LIFT / PERIOD)
-        return sum(_runs(~self.contact[:, foot], minimum) for foot in (0, 1))
+        lifts = np.concatenate([true_runs(~self.contact[:, foot]) for foot in (0, 1)])
+        return int((lifts[:, 1] - lifts[:, 0] >= round(SHORTEST_LIFT / PERIOD)).sum())
 
     @property
     def base_range(self) -> float:
@@ -155,12 +156,6 @@ class BalanceTrace:
                     for f in fields(cls)
                 )
             )
-
-
-def _runs(values: NDArray[np.bool_], minimum: int) -> int:
-    """Return how many runs of at least `minimum` true values there are."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], values, [False]]).astype(np.int8)))
-    return int((edges[1::2] - edges[::2] >= minimum).sum())
 
 
 class HasTruth(Protocol):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import cv2
 import mujoco
-import numpy as np
 
 from golem.robots.model import magpie_model
 from golem.robots.model.spatial import quat_of
 from golem.robots.model.tag_cuff import CELLS, PLATE, TAG_SIZE, cuff_tags
 from golem.robots.worlds import parts
+from golem.true_runs import true_runs
 from golem.types import SIDES
 
 THICK = 0.002
@@ -32,7 +32,7 @@ def add_tag_cuffs(spec: mujoco.MjSpec) -> None:
             parts.visual(hand, mujoco.mjtGeom.mjGEOM_BOX, size, plate, material="", quat=quat, rgba=WHITE)
             bits = cv2.aruco.generateImageMarker(family, number, CELLS) < 128
             for row in range(CELLS):
-                for begin, end in _runs(bits[row]):
+                for begin, end in true_runs(bits[row]).tolist():
                     x = (0.5 * (begin + end) - CELLS / 2.0) * cell
                     y = (row + 0.5 - CELLS / 2.0) * cell
                     # Centred on the plate's face, so that half of it stands out.
@@ -41,9 +41,3 @@ def add_tag_cuffs(spec: mujoco.MjSpec) -> None:
                     parts.visual(
                         hand, mujoco.mjtGeom.mjGEOM_BOX, size, place, material="", quat=quat, rgba=BLACK
                     )
-
-
-def _runs(row: np.ndarray) -> list[tuple[int, int]]:
-    """Return the ranges of neighbouring true cells, (begin, end) each."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], row.astype(np.int8), [0]))))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
