@@ -273,12 +273,13 @@ class Take:
             return not hand.status.holding
 
         for goal in (up, lifted(retracted(T, c.before), rise)):
-            await arm.move(goal, c.reach_speed, stop=slid)
-            while slid():
+            while True:
+                await arm.move(goal, c.reach_speed, stop=slid)
+                if not slid():
+                    break
                 if not await close_hand(context, side, self.force, c.close_timeout):
                     raise StageFailed("lift", "grasp_method", "It slipped out of the fingers.")
                 context.say("lift", "It slid in the fingers, and is held again.", side=side)
-                await arm.move(goal, c.reach_speed, stop=slid)
 
     async def _leave(self, context: Context, motion: PlannedMotion, home: Array) -> None:
         """Open the hand, back off, and go home, as far as it can go."""
