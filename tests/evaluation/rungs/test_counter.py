@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
+from golem.evaluation.episodes.episode import episode_seed
 from golem.evaluation.rungs.counter import CounterOptions, CounterTether, draw_errand
 from golem.evaluation.rungs.fetch_errand import FetchRung
+from golem.registry import configure
 from golem.robots.mujoco.config import MujocoConfig
+from golem.robots.mujoco.scene import lay_kitchen
 from golem.robots.worlds.kitchen import draw_counter, mirrored
 from golem.robots.worlds.tableware import KINDS
+from golem.runtime.lockstep import build_robot
 
 
 @pytest.mark.parametrize("index", range(8))
@@ -68,6 +74,22 @@ def test_a_counter_is_mirrored_where_a_hand_would_have_to_reach_across() -> None
         there = mirrored(kitchen) if rung.mirrored(own, kitchen) else kitchen
         (thing,) = (one for one in there.things if one.kind == case["thing"])
         assert (1.0 if case["hand"] == "left" else -1.0) * thing.position[1] > -0.07
+
+
+def test_the_counter_of_a_case_is_mirrored_before_the_robot_is_built() -> None:
+    rung = CounterTether(CounterOptions(each=True, sizes=0.2))
+    stack = rung.make_stack("antipodal", "ideal", {})
+    turned: list[bool] = []
+    for case in rung.cases(lambda case: None):
+        spec = TrialSpec("counter-tether", "antipodal", "ideal", 5, 1, case=case)
+        options = rung.arranged(spec, stack).choice("robot").options
+        kitchen = lay_kitchen(configure("robot", "mujoco", options), episode_seed(5, 1))
+        assert not rung.mirrored(spec, kitchen)
+        turned.append(bool(options.get("mirrored")))
+    assert any(turned) and not all(turned)
+    with closing(build_robot(rung.arranged(spec, stack), episode_seed(5, 1))) as robot:
+        places = [(one.kind, one.position[:2]) for one in robot.scene.kitchen.things]
+    assert places == [(one.kind, one.position[:2]) for one in kitchen.things]
 
 
 def test_things_have_the_sizes_that_are_asked_for() -> None:

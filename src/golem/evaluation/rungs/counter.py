@@ -12,12 +12,15 @@ from typing import Literal
 
 import numpy as np
 
+from golem import registry
 from golem.errors import ConfigError, unknown_name
 from golem.evaluation.base import Case, Results, TrialSpec
 from golem.evaluation.episodes.counter_watch import CounterWatch
+from golem.evaluation.episodes.episode import episode_seed
 from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
 from golem.robots.mujoco.engine import MujocoRobot
+from golem.robots.mujoco.scene import lay_kitchen
 from golem.robots.worlds.conditions import LayoutKind
 from golem.robots.worlds.kitchen import KitchenLayout, StandingThing
 from golem.robots.worlds.tableware import KINDS
@@ -86,8 +89,15 @@ class CounterRung(KitchenRung[CounterOptions]):
             return [{"thing": kind} for kind in kinds] or ({},)
         return [{"thing": kind, "hand": hand} for kind in kinds or KINDS for hand in ("left", "right")]
 
+    def arranged(self, spec: TrialSpec, stack: Stack) -> Stack:
+        """Return the stack with the counter mirrored where a case needs that; see `KitchenRung`."""
+        choice = stack.choice("robot")
+        config = registry.configure("robot", choice.use, choice.options)
+        kitchen = lay_kitchen(config, episode_seed(spec.seed, spec.index))
+        return stack.with_options("robot", mirrored=True) if self.mirrored(spec, kitchen) else stack
+
     def mirrored(self, spec: TrialSpec, kitchen: KitchenLayout) -> bool:
-        """Return whether the thing of a case stands where its hand is not asked to go; see `KitchenRung`."""
+        """Return whether the thing of a case stands where its hand is not asked to go."""
         kind, hand = spec.case.get("thing"), spec.case.get("hand")
         sign = 1.0 if hand == "left" else -1.0
         return hand is not None and any(

@@ -119,9 +119,9 @@ class KitchenRung(Rung[O]):
     ) -> Errand:
         """Have the errand of a trial done by a robot that stands or hangs ready."""
 
-    def mirrored(self, spec: TrialSpec, kitchen: KitchenLayout) -> bool:
-        """Return whether a trial needs what stands in its kitchen mirrored."""
-        return False
+    def arranged(self, spec: TrialSpec, stack: Stack) -> Stack:
+        """Return `stack` with the world as a trial needs it."""
+        return stack
 
     def methods(self) -> tuple[str, ...]:
         """Return what is registered for the slot."""
@@ -137,15 +137,8 @@ class KitchenRung(Rung[O]):
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
-        stack = self.make_stack(spec.method, spec.profile, spec.overrides)
+        stack = self.arranged(spec, self.make_stack(spec.method, spec.profile, spec.overrides))
         running, robot = build_seeing(stack, spec)
-        if (
-            isinstance(robot, MujocoRobot)
-            and robot.scene.kitchen
-            and self.mirrored(spec, robot.scene.kitchen)
-        ):
-            robot.close()
-            running, robot = build_seeing(stack.with_options("robot", mirrored=True), spec)
         if not isinstance(robot, MujocoRobot) or robot.scene.kitchen is None:
             raise ConfigError(
                 f"Rung {self.name} judges the twin's {self.subject}; robot: {stack.choice('robot').use} is none."

@@ -116,13 +116,7 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
         dress(spec, conditions, stance)
         _add_onlooker(spec, layout)
     elif config.world in KITCHENS:
-        raised = layout.top_z - PackLayout().top_z
-        rng, varied = stream(seed, "world/kitchen"), config.layout == "varied"
-        if config.world == "kitchen":
-            kitchen = draw_kitchen(rng, raised, varied)
-        else:
-            kitchen = draw_counter(rng, raised, varied, config.sizes)
-        kitchen = mirrored(kitchen) if config.mirrored else kitchen
+        kitchen = lay_kitchen(config, seed, layout.top_z - PackLayout().top_z)
         names = PackNames((), np.zeros((0, 3)), "", add_kitchen(spec, kitchen, (stance.x, stance.y)))
         _add_kitchen_onlooker(spec, kitchen, stance)
     else:
@@ -138,6 +132,15 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
     model = spec.compile()
     seal = None if kitchen is None else seal_of(model, kitchen.fridge)
     return Scene(model, names, layout, nominal, tuple(draws), people, conditions, kitchen, seal)
+
+
+def lay_kitchen(config: MujocoConfig, seed: int, raised: float = 0.0) -> KitchenLayout:
+    """Return the kitchen of one seed, for a `config` whose world is one; `raised` as for `draw_kitchen`."""
+    rng, varied = stream(seed, "world/kitchen"), config.layout == "varied"
+    if config.world == "kitchen":
+        return draw_kitchen(rng, raised, varied)
+    kitchen = draw_counter(rng, raised, varied, config.sizes)
+    return mirrored(kitchen) if config.mirrored else kitchen
 
 
 def _robot(config: MujocoConfig) -> mujoco.MjSpec:
