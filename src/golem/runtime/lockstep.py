@@ -85,7 +85,13 @@ class LockstepRunner:
         standing = StandingLegs if stack.on_ground else None
         self._safety = SafetyNodes(self.bus, limits, self.estop, standing)
         self._stack = StackNodes(
-            self.bus, stack, calibration.merged(robot.calibration), gantry, LATENCY, localizer=localizer
+            self.bus,
+            stack,
+            calibration.merged(robot.calibration),
+            calibration.mount,
+            gantry,
+            LATENCY,
+            localizer=localizer,
         )
         placed = self._robot.nodes + self._safety.nodes + self._stack.nodes
         self.executor = Executor(self.bus, in_order(placed))

@@ -188,6 +188,7 @@ class StackNodes:
         bus: Bus,
         stack: Stack,
         calibration: Mapping[str, Array],
+        mount: Array | None,
         gantry: HasGantry | None,
         latency: float,
         pools: Mapping[str, ThreadPoolExecutor] | None = None,
@@ -201,6 +202,7 @@ class StackNodes:
             bus: where they meet.
             stack: which modules.
             calibration: of each camera; see `Robot.calibration`.
+            mount: (4, 4) pose of the LiDAR by calibration; None is that of the nominal model.
             gantry: what is let go once the robot stands, or None.
             latency: what a camera's frame takes on top of its way over the bus [s].
             pools: where the modules of the slots `POOLED` run; None is on the clock, see `LocalizerNode`.
@@ -269,8 +271,6 @@ class StackNodes:
                 MemoryNode(bus, self.memory, calibration, hears_lidar(stack), epoch, pools.get("memory")),
             )
         )
-        lidar = stack.part("calibration").load().lidar
-        mount = None if lidar is None else lidar.pose
         if tuple(odometry.sources) != LEGS_ALONE or hears_lidar(stack):
             self.nodes.append((Phase.PERCEIVE, OdometryNode(bus, odometry, odometry_contract, mount)))
         if hears_lidar(stack):

@@ -112,7 +112,7 @@ class FaultRig:
         self._activate = node.client("/safety/activate", public.TRIGGER)
         nodes = RobotNodes(self.bus, stack, robot, None, lambda: False)
         gantry: Any = robot
-        modules = StackNodes(self.bus, stack, robot.calibration, gantry, 0.0)
+        modules = StackNodes(self.bus, stack, robot.calibration, None, gantry, 0.0)
         placed = nodes.nodes + [(Phase.MEASURE, FaultyRobot(self)), (Phase.PROTECT, self)] + modules.nodes
         self.executor = Executor(self.bus, in_order(placed))
 

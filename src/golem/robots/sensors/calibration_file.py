@@ -76,6 +76,11 @@ class Calibration:
     views: int = 0
     lidar: LidarMount | None = None
 
+    @property
+    def mount(self) -> Array | None:
+        """(4, 4) pose of lidar_link in that of the nominal model; None where it was not looked for."""
+        return None if self.lidar is None else self.lidar.pose
+
     def merged(self, cameras: Mapping[str, Array]) -> dict[str, Array]:
         """Return `cameras`, poses as above, with those that were calibrated in the place of theirs."""
         return {name: self.cameras.get(name, T) for name, T in cameras.items()}

@@ -193,6 +193,7 @@ class StackProcess:
             bus,
             self._stack,
             self._calibrated.merged(self._calibration),
+            self._calibrated.mount,
             self._gantry,
             0.0,
             self._pools,
