@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.navigation.edge_fit import NearEdge
+from golem.capabilities.planning.base import PlanRefused, Refusal
 from golem.capabilities.properties.base import holding_force
 from golem.capabilities.properties.property_table import PropertyTable
 from golem.errors import ConfigError
 from golem.interfaces import topics
-from golem.interfaces.payloads import GripState, HandStatus
+from golem.interfaces.payloads import ArmCommand, GripState, HandStatus
 from golem.skills.counter_stance import STANDOFF, before, stance
 from golem.skills.place import PlaceGoal, SetDown
+from golem.skills.planned_motion import PlannedMotion
 from golem.skills.runner import SkillRun
 from golem.skills.take import Take
 from golem.skills.take_config import TakeGoal, TakeThingConfig
 from golem.skills.ware_sight import leaning_surface, seen_again, surface_below
-from golem.types import NUM_JOINTS, UPPER, Array, Detection, Imu, LocalizedObject, LowState, PlanarPose
+from golem.types import NUM_JOINTS, UPPER, Array, Detection, Imu, LocalizedObject, LowState, PlanarPose, Side
 
 TOP = -0.15
 
@@ -140,6 +144,32 @@ def test_nothing_is_taken_where_nothing_is_seen(world: Any) -> None:
     assert (result.success, result.stage, result.slot) == (False, "detect", "localizer")
     assert result.reason == "The head camera shows no mug."
     assert world.bus.latest(topics.hand_goal("right")) is None
+
+
+@pytest.mark.parametrize("raises", [True, False])
+def test_an_arm_that_hangs_low_is_raised_before_the_torso_turns(
+    world: Any, monkeypatch: pytest.MonkeyPatch, raises: bool
+) -> None:
+    at_home(world)
+    low = POSTURES["home"].copy()
+    low[ARM_COLUMNS["right"]] += 0.5
+    world.bus.publish(topics.ARM_COMMAND, ArmCommand(low, np.zeros(2), np.zeros(2), False), 0.0)
+    world.objects["head"] = lambda: []
+    moves: list[tuple[tuple[str, ...], Array]] = []
+
+    async def to_joints(motion: PlannedMotion, goal: Array, sides: Sequence[Side], hand_speed: float) -> None:
+        assert motion.world.cloud is not None  # it has looked
+        moves.append((tuple(sides), goal))
+        if sides and not raises:
+            raise PlanRefused(Refusal.GOAL, "Something is in the way.")
+
+    monkeypatch.setattr(PlannedMotion, "to_joints", to_joints)
+    result = world.run(Take(TakeThingConfig(turn=0.4)).run(world.context, TakeGoal("mug"))).result
+    assert result.reason == "The head camera shows no mug."
+    assert [sides for sides, _ in moves] == ([("right",), (), ()] if raises else [("right",)])
+    turns = [0.0, 0.4, -0.4]
+    for (_, goal), turn in zip(moves, turns[: len(moves)], strict=True):
+        np.testing.assert_allclose(goal, POSTURES["home"] + turn * np.eye(15)[0], atol=1e-9)
 
 
 def test_an_empty_hand_places_nothing(world: Any) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.grasping.base import Grasp, GraspMethod
 from golem.capabilities.grasping.object_cloud import spaced
@@ -36,6 +37,8 @@ CENTRED = 0.02
 """Distance along the closing axis within which a thing's middle comes between the fingers as they close [m]."""
 OVER_IT = 0.75
 """Cosine of the lean up to which a hand counts as above what it takes."""
+AT_HOME = 0.2
+"""How far a joint may be from the home posture in an arm that is there [rad]."""
 TOP, FORWARD = "top", "forward"
 
 
@@ -105,18 +108,9 @@ class Take:
         expected = None if near is None else (near[0], near[1])
         context.say("detect", f"Looking for a {goal.label}.")
         target = await find(context, goal.label, expected, c.look_timeout)
-        ahead = context.commanded_joints.copy()
-        for turn in (c.turn, -c.turn) if c.turn > 0.0 and target is None else ():
+        if target is None and c.turn > 0.0:
             context.say("detect", f"The head camera shows no {goal.label}. Looking around.")
-            turned = ahead.copy()
-            turned[0] += turn
-            try:
-                await motion.to_joints(turned, (), c.travel_speed)
-            except PlanRefused:
-                continue
-            target = await find(context, goal.label, expected, c.look_timeout)
-            if target is not None:
-                break
+            target = await self._look_around(context, motion, goal.label, expected)
         if target is None:
             raise StageFailed("detect", "localizer", f"The head camera shows no {goal.label}.")
         middle = np.median(target.points, axis=0) if len(target.points) else target.position
@@ -124,6 +118,39 @@ class Take:
         motion.look([(point, SPARED) for point in spaced(target.points, EVERY)])
         context.say("detect", f"A {goal.label}.", target=middle.tolist())
         return target
+
+    async def _look_around(
+        self, context: Context, motion: PlannedMotion, label: str, expected: tuple[float, float] | None
+    ) -> LocalizedObject | None:
+        """Return the thing as the head camera sees it with the torso turned to either side; None where it does not.
+
+        The arms come along. One that is not at home is brought there first, unless it holds something: hanging low it
+        would sweep over what stands there. None turns into what the camera shows ahead.
+        """
+        c, ahead, home = self._config, context.commanded_joints.copy(), posture("home")
+        away = [side for side in SIDES if np.abs((ahead - home)[ARM_COLUMNS[side]]).max() > AT_HOME]
+        motion.look()
+        for side in away:
+            if context.hands[side].status.holding:
+                continue
+            ahead[ARM_COLUMNS[side]] = home[ARM_COLUMNS[side]]
+            try:
+                await motion.to_joints(ahead, [side], c.travel_speed)
+            except PlanRefused as refusal:
+                context.say("detect", f"The torso does not turn, since the {side} arm stays low: {refusal}")
+                return None
+        for turn in (c.turn, -c.turn):
+            turned = ahead.copy()
+            turned[0] += turn
+            try:
+                await motion.to_joints(turned, (), c.travel_speed)
+            except PlanRefused as refusal:
+                context.say("detect", f"The torso does not turn there: {refusal}")
+                continue
+            target = await find(context, label, expected, c.look_timeout)
+            if target is not None:
+                return target
+        return None
 
     async def _approach(
         self, context: Context, motion: PlannedMotion, goal: TakeGoal, target: LocalizedObject
