@@ -14,6 +14,7 @@ from golem.capabilities.legs.locomotion import Locomotion
 from golem.capabilities.legs.policy import BadAction, Policy, PolicyConfig
 from golem.capabilities.legs.swing import swing_offset
 from golem.errors import ConfigError
+from golem.registry import configure
 from golem.types import NUM_JOINTS, UPPER, BaseEstimate, Imu, LowState, Twist
 
 PEERS = Path(__file__).resolve().parents[4] / "shared" / "h12" / "peers"
@@ -124,7 +125,7 @@ def test_networks_that_are_absent_are_named() -> None:
     with pytest.raises(ConfigError, match="no network"):
         Almi(AlmiConfig(stand="absent.onnx"))
     with pytest.raises(ConfigError, match="'icy'; valid: even, rough"):
-        AlmiConfig(ground="icy")  # type: ignore[arg-type]
+        configure("lower_body", "almi", {"ground": "icy"})
 
 
 def peer(name: str, network: str) -> Policy:
