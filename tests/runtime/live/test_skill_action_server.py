@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
 import pytest
 from tests.runtime.live.conftest import Live
 
@@ -216,6 +217,7 @@ def test_a_robot_that_is_started_anew_aborts_its_skill(client: Client) -> None:
         ("/skill/pick", Pick_Goal("screw", "tray", "middle"), "'middle'; valid: either, left, right"),
         ("/skill/pick", Pick_Goal("", "tray", "left"), "names the class"),
         ("/skill/pick", Pick_Goal(), "valid: either, left, right"),
+        ("/skill/pick", Pick_Goal("screw", "tray", "left", np.ones(3)), "pairs of finite numbers"),
         ("/skill/walk", Walk_Goal(PoseStamped(convert.header(0.0, "base_link"))), "'hold', do not walk"),
         ("/skill/walk", Walk_Goal(PoseStamped(convert.header(0.0, "map"))), "'map'; valid: base_link, odom"),
     ],
@@ -254,7 +256,6 @@ MINE = '''
 """Skills of a user."""
 import sys
 from dataclasses import dataclass, field
-import numpy as np
 from golem.errors import ConfigError
 from golem.skills.base import SkillResult
 

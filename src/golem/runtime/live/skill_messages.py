@@ -56,7 +56,8 @@ def _run_goal(message: golem_interfaces.RunSkill_Goal) -> tuple[str, Fields]:
 
 
 def _pick_goal(message: golem_interfaces.Pick_Goal) -> tuple[str, Fields]:
-    return "pick", {"label": message.label, "container": message.container, "side": message.side}
+    rest = {"side": message.side, "avoid": message.avoid.tolist()}
+    return "pick", {"label": message.label, "container": message.container, **rest}
 
 
 def _walk_goal(message: golem_interfaces.Walk_Goal, skill: str = "walk") -> tuple[str, Fields]:

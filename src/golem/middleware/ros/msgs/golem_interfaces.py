@@ -68,6 +68,7 @@ class Pick_Goal(Message):
         label: class of the object, e.g. "screw"
         container: class of what it is dropped into, e.g. "tray"
         side: which hand: "left", "right" or "either"
+        avoid: x, y in odom of objects that are tried only where there is no other, one after the other [m]
     """
 
     __msgtype__: ClassVar[str] = "golem_interfaces/action/Pick_Goal"
@@ -75,6 +76,7 @@ class Pick_Goal(Message):
     label: str = ""
     container: str = ""
     side: str = ""
+    avoid: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0, np.float64))
 
 
 @dataclass(slots=True, eq=False)
