@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from golem.evaluation.episodes.errand_watch import ErrandWatch
 from golem.evaluation.episodes.oracle import Oracle
-from golem.interfaces import topics
-from golem.middleware.bus import News
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.lockstep import LockstepRunner
@@ -36,44 +35,32 @@ class StandingOne:
     lean: float
 
 
-class CounterWatch:
-    """Call it after every tick of an errand.
-
-    Attributes:
-        recorder: of the balance of a robot that stands; None of one that hangs.
-    """
+class CounterWatch(ErrandWatch):
+    """Call it after every tick of an errand. Its picture is of when a thing was let go, or a stage failed."""
 
     def __init__(
         self, running: LockstepRunner, robot: MujocoRobot, oracle: Oracle, kind: str, balances: bool
     ) -> None:
         """Look at the things as they stand now; one of `kind` is to be taken."""
         assert robot.scene.kitchen is not None
-        self._running, self._robot, self._oracle, self._kind = running, robot, oracle, kind
+        super().__init__(running, oracle, BalanceRecorder(robot) if balances else None)
+        self._robot, self._kind = robot, kind
         self._names = tuple((thing.kind, thing.body) for thing in robot.scene.kitchen.things)
         self._bodies = [robot.data.body(body).id for _, body in self._names]
         self._before = self._things()
         self._highest = np.array([thing.position[2] for thing in self._before])
-        self.recorder = BalanceRecorder(robot) if balances else None
-        self._news = News(running.bus, topics.FEEDBACK)
-        self._picture: bytes | None = None
 
     def __call__(self) -> None:
         """Look on."""
         self.look()
         feedback = self._news.read()
         if feedback is not None and (feedback.stage in PICTURED or feedback.data.get("failed")):
-            self._picture = self._oracle.picture()
+            self.picture = self._oracle.picture()
 
     def look(self) -> bool:
         """Look on after the errand; it is never a reason to end."""
-        if self.recorder is not None:
-            self.recorder(self._running.executor.t)
         np.maximum(self._highest, self._robot.data.xpos[self._bodies, 2], out=self._highest)
-        return False
-
-    def last_picture(self) -> bytes:
-        """Return the decisive picture: when it was let go, or when a stage failed; else of now."""
-        return self._picture or self._oracle.picture()
+        return super().look()
 
     def problem(self, place: tuple[float, float]) -> str | None:
         """Return what is not as it was asked for, in a sentence; None where all is.

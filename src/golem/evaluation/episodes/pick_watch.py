@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from golem.evaluation.base import DONE
+from golem.evaluation.episodes.errand_watch import ErrandWatch
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
 from golem.evaluation.episodes.pick_touches import PickTouches
 from golem.interfaces import topics
 from golem.interfaces.payloads import HandGoal
-from golem.middleware.bus import News
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.runtime.lockstep import LockstepRunner
 from golem.types import Array, Side
@@ -18,13 +18,11 @@ LOOKING = ("servo", "descend", "grasp")
 """Stages in which a hand is at an object that it has not moved yet."""
 
 
-class PickWatch:
+class PickWatch(ErrandWatch):
     """Looks on after every tick.
 
     Attributes:
-        recorder: follows the balance; None for a robot that hangs.
         grasp: where hand and screw were when the fingers last began to close; None if they never did.
-        picture: PNG of the decisive moment.
         pull: (4, 4) poses of the hand while it last pulled.
         looked_at: where what the hand looked at last really was, (3,) in odom [m], by the object's place in the pick's
             report.
@@ -39,23 +37,15 @@ class PickWatch:
         touches: PickTouches,
     ) -> None:
         """Look at what `running` does, through `oracle`."""
-        self._running, self._oracle, self._touches = running, oracle, touches
-        self.recorder = recorder
-        self._news = News(running.bus, topics.FEEDBACK)
+        super().__init__(running, oracle, recorder)
+        self._touches = touches
         self.grasp: GraspTruth | None = None
-        self.picture: bytes | None = None
         self.pull: list[Array] = []
         self.looked_at: dict[int, Array] = {}
         self.drop_inside: float | None = None
         self._side: Side = "right"
         self._attempt = 0
         self._stage = ""
-
-    def look(self) -> bool:
-        """Look on after the errand; it is never a reason to end."""
-        if self.recorder is not None:
-            self.recorder(self._running.executor.t)
-        return False
 
     def __call__(self) -> None:
         """Look on."""

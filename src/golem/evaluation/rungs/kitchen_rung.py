@@ -13,11 +13,12 @@ from golem import registry
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import lost
+from golem.evaluation.episodes.errand_watch import ErrandWatch
 from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.episodes.true_masks import build_seeing, with_modules
 from golem.evaluation.rungs.pick_screw import ABORTED, SLOT, balance, let_go
 from golem.provenance import stack_facts
-from golem.robots.mujoco.balance import TRACE, BalanceRecorder
+from golem.robots.mujoco.balance import TRACE
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.worlds.conditions import LayoutKind
@@ -37,24 +38,6 @@ class KitchenOptions(Protocol):
     @property
     def layout(self) -> LayoutKind:
         """Whether it is drawn from the trial's seed."""
-        ...
-
-
-class KitchenWatch(Protocol):
-    """Looks on after every tick of an errand.
-
-    Attributes:
-        recorder: of the balance of a robot that stands; None of one that hangs.
-    """
-
-    recorder: BalanceRecorder | None
-
-    def look(self) -> bool:
-        """Look on after the errand; it is never a reason to end."""
-        ...
-
-    def last_picture(self) -> bytes:
-        """Return the decisive picture."""
         ...
 
 
@@ -86,7 +69,7 @@ class Errand:
     """
 
     result: SkillResult
-    watch: KitchenWatch
+    watch: ErrandWatch
     judge: Callable[[], Verdict]
 
 

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 
 from golem.evaluation.base import DONE, TrialSpec
+from golem.evaluation.episodes.errand_watch import ErrandWatch
 from golem.evaluation.episodes.oracle import Oracle
 from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
-from golem.interfaces import topics
-from golem.middleware.bus import News
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.worlds.conditions import LayoutKind
@@ -87,35 +86,23 @@ class FridgeStand(FridgeRung):
     balances = True
 
 
-class _FridgeWatch:
+class _FridgeWatch(ErrandWatch):
     """Looks on after every tick: how far the door is open, where the hand was when it closed."""
 
     def __init__(
         self, running: LockstepRunner, robot: MujocoRobot, oracle: Oracle, side: Side, balances: bool
     ) -> None:
         assert robot.scene.seal is not None
-        self._running, self._robot, self._oracle = running, robot, oracle
+        super().__init__(running, oracle, BalanceRecorder(robot) if balances else None)
+        self._robot = robot
         self._side: Side = side
         self._hinge = robot.scene.seal.qpos
-        self.recorder = BalanceRecorder(robot) if balances else None
-        self._news = News(running.bus, topics.FEEDBACK)
         self.grasp: dict[str, float] = {}
-        self._picture: bytes | None = None
 
     @property
     def angle(self) -> float:
         """How far the door is open [rad]."""
         return float(self._robot.data.qpos[self._hinge])
-
-    def last_picture(self) -> bytes:
-        """Return the decisive picture: of the pull, or of now."""
-        return self._picture or self._oracle.picture()
-
-    def look(self) -> bool:
-        """Look on after the errand; it is never a reason to end."""
-        if self.recorder is not None:
-            self.recorder(self._running.executor.t)
-        return False
 
     def __call__(self) -> None:
         self.look()
@@ -125,7 +112,7 @@ class _FridgeWatch:
         if feedback.stage == "grasp" and not feedback.data.get("failed"):
             self.grasp = self._where()
         if feedback.stage in ("release", DONE) or feedback.data.get("failed"):
-            self._picture = self._picture or self._oracle.picture()
+            self.picture = self.last_picture()
 
     def _where(self) -> dict[str, float]:
         """Return how far across its approach the hand is from the bar, and from where it was sent [m]."""

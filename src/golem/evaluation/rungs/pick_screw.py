@@ -230,7 +230,7 @@ def judge_pick(
     detail = (
         result.reason if result.stage != DONE else "The skill reports success, but no screw is in the tray."
     )
-    picture = watch.picture or oracle.picture()
+    picture = watch.last_picture()
     return TrialOutcome(False, stage, module, detail, result.timings, series, picture, result.trace)
 
 
