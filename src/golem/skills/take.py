@@ -128,7 +128,9 @@ class Take:
         would sweep over what stands there. None turns into what the camera shows ahead.
         """
         c, ahead, home = self._config, context.commanded_joints.copy(), posture("home")
-        away = [side for side in SIDES if np.abs((ahead - home)[ARM_COLUMNS[side]]).max() > AT_HOME]
+        away: list[Side] = [
+            side for side in SIDES if np.abs((ahead - home)[ARM_COLUMNS[side]]).max() > AT_HOME
+        ]
         motion.look()
         for side in away:
             if context.hands[side].status.holding:
