@@ -7,14 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from golem.capabilities.arms.postures import posture
-from golem.capabilities.arms.quick_ik import QuickIK
+from golem.capabilities.arms.quick_ik import TURNS, QuickIK
 from golem.capabilities.grasping.base import Grasp
 from golem.skills.context import Context
-from golem.skills.poses import retracted
 from golem.types import Side
-
-TURNS = (0.0, 0.25, -0.25)
-"""Turns of the torso that are tried, one after the other, until any grasp is reached [rad]."""
 
 
 def reached_first(context: Context, side: Side, grasps: Sequence[Grasp], before: float) -> list[Grasp]:
@@ -31,9 +27,7 @@ def reached_first(context: Context, side: Side, grasps: Sequence[Grasp], before:
     starts = np.array([q, posture(f"ready_{side}"), posture(f"forward_{side}")])
 
     def reached(grasp: Grasp) -> bool:
-        there = T @ grasp.T_odom_gripper
-        away = ik.solve(side, retracted(there, before), starts)
-        return away is not None and ik.solve(side, there, away[None]) is not None
+        return ik.approach(side, T @ grasp.T_odom_gripper, before, starts) is not None
 
     for turn in TURNS:
         starts[:, 0] = q[0] + turn

@@ -11,8 +11,8 @@ import numpy as np
 from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.goal_postures import POSITION, GoalPostures
 from golem.capabilities.arms.line_check import LineChecker
-from golem.capabilities.collision.obstacles import World
-from golem.capabilities.collision.scene_cloud import cleared, displaced, scene_world
+from golem.capabilities.collision.obstacles import World, cleared
+from golem.capabilities.collision.scene_cloud import displaced, scene_world
 from golem.capabilities.planning.base import Held, Plan, PlanRefused, PlanRequest, Refusal
 from golem.capabilities.planning.escape import apart
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from golem.capabilities.collision.obstacles import REACH, CloudGrid, World, cell_steps, cloud_grid
+from golem.capabilities.collision.obstacles import REACH, CloudGrid, World, cloud_grid
 from golem.capabilities.collision.world_kernel import Points
 from golem.types import Array
 
@@ -30,28 +30,14 @@ def scene_world(points: Points, spheres: Array, spared: Sequence[tuple[Array, fl
     kept = np.asarray(points, np.float64)
     kept = kept[((kept > REACH[0]) & (kept < REACH[1])).all(axis=1)]  # NaN fails every comparison
     for centre, radius in spared:
-        kept = kept[((kept - centre) ** 2).sum(axis=1) > radius**2]
+        off = kept - centre
+        kept = kept[np.einsum("ij,ij->i", off, off) > radius**2]
     if len(kept):
         index = np.floor((kept - REACH[0]) / CELL).astype(np.int64)
         shape = np.ceil((REACH[1] - REACH[0]) / CELL).astype(np.int64) + 1
         flat = np.ravel_multi_index(tuple(index.T), tuple(shape))
         kept = kept[np.bincount(flat)[flat] >= LEAST]
-    return World(cloud=cleared(cloud_grid(kept, CELL), spheres, ROBOT_MARGIN))
-
-
-def cleared(grid: CloudGrid, spheres: Array, margin: float) -> CloudGrid:
-    """Return the grid without the cells that are nearer than `margin` [m] to `spheres` (m, 4)."""
-    near = np.zeros(len(grid.balls), bool)
-    for x, y, z, r in spheres:
-        reach = r + margin + grid.balls[:, 3]
-        near |= ((grid.balls[:, :3] - (x, y, z)) ** 2).sum(axis=1) < reach * reach
-    if not near.any():
-        return grid
-    left = np.flatnonzero(~near)
-    renumbered = np.full(len(near) + 1, -1, np.int32)  # the last is that of empty cells, -1
-    renumbered[left] = np.arange(len(left))
-    cells = renumbered[grid.cells]
-    return CloudGrid(grid.balls[left], cells, cell_steps(cells), grid.frame, grid.dropped)
+    return World(cloud=cloud_grid(kept, CELL, spheres=spheres, margin=ROBOT_MARGIN))
 
 
 def displaced(world: World, by: Array) -> World:
