@@ -11,7 +11,7 @@ import numpy as np
 from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.grasping.base import Grasp, GraspMethod
-from golem.capabilities.grasping.object_cloud import spaced
+from golem.capabilities.grasping.object_cloud import room_around
 from golem.capabilities.planning.base import PlanRefused
 from golem.capabilities.properties.base import holding_force
 from golem.interfaces.payloads import GripState
@@ -27,10 +27,6 @@ from golem.types import SIDES, Array, LocalizedObject, Side
 if TYPE_CHECKING:
     from golem.skills.planned_motion import PlannedMotion
 
-SPARED = 0.07
-"""Radius around points of the thing within which nothing is in the hand's way [m]."""
-EVERY = 0.06
-"""Distance of those points [m]."""
 SPARE = 0.024
 """How much wider than the grasp asks for the hand arrives [m]: encoders and palm camera are off by a centimetre."""
 CENTRED = 0.02
@@ -115,7 +111,7 @@ class Take:
             raise StageFailed("detect", "localizer", f"The head camera shows no {goal.label}.")
         middle = np.median(target.points, axis=0) if len(target.points) else target.position
         self._report.x, self._report.y, self._report.z = (float(v) for v in middle)
-        motion.look([(point, SPARED) for point in spaced(target.points, EVERY)])
+        motion.look(room_around(target.points))
         context.say("detect", f"A {goal.label}.", target=middle.tolist())
         return target
 

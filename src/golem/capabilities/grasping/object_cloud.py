@@ -26,6 +26,8 @@ CELL = 0.012
 """Points of neighbouring cells of this size belong to one piece [m]."""
 PIXEL = 0.003
 """Size of a pixel of a silhouette [m]."""
+SPARED, EVERY = 0.07, 0.06
+"""Radius around points of a thing within which nothing is in a hand's way, and the distance of those points [m]."""
 MIN_POINTS = 20
 """Fewer points are no object to grasp."""
 
@@ -135,6 +137,11 @@ def spaced(points: Array, distance: float = 0.006) -> Array:
     cubes = np.floor(points / distance).astype(np.int64)
     _, first = np.unique(cubes @ (1, 1 << 20, 1 << 40), return_index=True)
     return points[first]
+
+
+def room_around(points: Array) -> list[tuple[Array, float]]:
+    """Return centres (3,) and radii [m] of balls around `points` (n, 3) in which nothing is in a hand's way."""
+    return [(point, SPARED) for point in spaced(points, EVERY)]
 
 
 def normals_of(points: Array, neighbours: int = 16) -> tuple[Array, NDArray[np.bool_]]:
