@@ -41,7 +41,7 @@ def _turn(R: Array, p: Array, axis: Array, point: Array, angle: float, at: Array
 
 
 @njit(cache=True, nogil=True)
-def _logarithm(R: Array, p: Array, out: Array) -> None:
+def logarithm(R: Array, p: Array, out: Array) -> None:
     """Write the twist (6,) that takes one second to the frame `R`, `p`: linear above angular."""
     # The quaternion by its largest part, so that half a turn is as exact as none.
     trace = R[0, 0] + R[1, 1] + R[2, 2]
@@ -106,7 +106,7 @@ def descend(
             for k in range(3):
                 gap[r] += here[k, r] * (goal[k, 3] - tip[k])
                 off[r, k] = here[0, r] * goal[0, k] + here[1, r] * goal[1, k] + here[2, r] * goal[2, k]
-        _logarithm(off, gap, error)
+        logarithm(off, gap, error)
         distance = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
         angle = math.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
         if distance < POSITION and angle < ROTATION:
