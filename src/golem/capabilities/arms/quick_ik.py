@@ -30,7 +30,7 @@ class QuickIK:
         k.update(np.zeros(len(k.lower)))
         self._arms = {side: self._arm(side) for side in SIDES}
 
-    def _arm(self, side: Side) -> tuple[Array, ...]:
+    def _arm(self, side: Side) -> tuple[Array, Array, Array, Array, Array]:
         """Return what the kernel takes of an arm: axes, points, the hand at zero, and the range of the joints."""
         k, columns = self.kinematics, ARM_COLUMNS[side]
         J = pin.getFrameJacobian(k.model, k.data, k.frame[side], pin.ReferenceFrame.WORLD)
