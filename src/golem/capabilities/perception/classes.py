@@ -1,10 +1,10 @@
-"""What the shipped detector knows: the parts of a battery pack, and what stands in a kitchen."""
+"""What a detector learns to find: the parts of a battery pack, and what stands in a kitchen."""
 
 from __future__ import annotations
 
 PACK: tuple[str, ...] = ("screw", "screw_hole", "nut", "bus_bar", "tray")
-"""Classes of a pack's parts."""
+"""Classes of a pack's parts: those of the shipped weights."""
 KITCHEN: tuple[str, ...] = ("handle", "mug", "bowl", "can", "bottle")
 """Classes of a kitchen: the bar of a fridge, and tableware."""
 CLASSES: tuple[str, ...] = PACK + KITCHEN
-"""All class names, in the order of the network's heatmaps."""
+"""All class names, in the order of the heatmaps of a network that is trained anew."""

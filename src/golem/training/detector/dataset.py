@@ -41,7 +41,7 @@ class Dataset:
     """A split in memory.
 
     Attributes:
-        images: (height, width, 3) RGB each, decoded: 3 GB for the default training split.
+        images: (height, width, 3) RGB each, decoded: 5 GB for the default training split.
         labels: per image (n, 8), columns as in `labels.COLUMNS`.
         cameras: per image `"head"` or `"palm"`.
         conditions: per image the values of `CONDITIONS`, and the kind of its `world`.

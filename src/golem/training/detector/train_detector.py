@@ -64,17 +64,17 @@ class Crops:
 
     def __init__(self, data: dataset.Dataset, classes: int, device: str) -> None:
         """Copy the images to the device."""
-        self._data, self._classes, self._device = data, classes, device
+        self._labels, self._classes, self._device = data.labels, classes, device
         self._images = augment.Images(data.images, device)
 
     def batch(self, rng: np.random.Generator, size: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """Return images, heatmaps, their weights, and regression maps of `size` crops; see `heat_targets.targets`."""
         device_rng = torch.Generator(self._device).manual_seed(int(rng.integers(1 << 62)))
-        chosen = rng.integers(len(self._data.images), size=size).tolist()
-        placed = [augment.place_crop(self._data.labels[k], self._images.sizes[k], rng) for k in chosen]
+        chosen = rng.integers(len(self._labels), size=size).tolist()
+        placed = [augment.place_crop(self._labels[k], self._images.sizes[k], rng) for k in chosen]
         scales, shifts = (np.stack(parts) for parts in zip(*placed, strict=True))
         labels = [
-            augment.moved_labels(self._data.labels[k], self._images.sizes[k], *place)
+            augment.moved_labels(self._labels[k], self._images.sizes[k], *place)
             for k, place in zip(chosen, placed, strict=True)
         ]
         crops = augment.corrupt(self._images.cut(chosen, scales, shifts, device_rng), device_rng)
@@ -170,6 +170,7 @@ def fit(
             )
     last = config.steps if stop is None else stop
     crops = Crops(data, len(config.classes), config.device)
+    del data  # the images are on the device now: once is enough
     sums = torch.zeros(3, device=config.device)
     started = time.process_time()
     while step < last:
