@@ -22,7 +22,7 @@ class Walk:
 
     def __init__(self) -> None:
         self.t, self.step = 0.0, None
-        truth = SimpleNamespace(T_world_odom=np.eye(4), base=lambda: SimpleNamespace(T_world_base=np.eye(4)))
+        truth = SimpleNamespace(T_world_odom=np.eye(4), pose=lambda: HERE)
         person = SimpleNamespace(position=lambda t: np.array([t, 2.0, 0.0]))
         self.robot = SimpleNamespace(truth=truth, scene=SimpleNamespace(people=(person,)))
         self.running = SimpleNamespace(bus=SimpleNamespace(latest=lambda topic: self.step))

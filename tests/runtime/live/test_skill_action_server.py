@@ -256,6 +256,7 @@ MINE = '''
 """Skills of a user."""
 import sys
 from dataclasses import dataclass, field
+import numpy as np
 from golem.errors import ConfigError
 from golem.skills.base import SkillResult
 
