@@ -7,7 +7,7 @@ is not reached here, a planner may still reach.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -127,17 +127,16 @@ class Reranking:
         best = max(max(grasp.score for grasp in grasps), 1e-9)
         worth = [min(max(grasp.score / best, 0.0), 1.0) for grasp in grasps]
         comfort = self._comfort(grasps[: self.config.most], gripper, q, space, T_base_odom)
-        scores = [1.0 + worth[k] * (1.0 - self.config.comfort * (1.0 - comfort[k])) for k in comfort]
-        done = [self._scored(grasps[k], score) for k, score in zip(comfort, scores, strict=True)]
-        left = [self._scored(grasps[k], worth[k]) for k in range(len(grasps)) if k not in comfort]
+        done = [
+            replace(grasps[k], score=1.0 + worth[k] * (1.0 - self.config.comfort * (1.0 - ease)))
+            for k, ease in comfort.items()
+        ]
+        left = [replace(grasp, score=worth[k]) for k, grasp in enumerate(grasps) if k not in comfort]
         return sorted(done, key=lambda grasp: -grasp.score) + left
 
     def servo(self, target: LocalizedObject, grasp: Grasp, t: float) -> ServoLaw | None:
         """Return the proposer's law; see `GraspMethod`."""
         return self._proposer.servo(target, grasp, t)
-
-    def _scored(self, grasp: Grasp, score: float) -> Grasp:
-        return Grasp(grasp.T_odom_gripper, grasp.gap, score)
 
     def _space(self, q: Array, target: LocalizedObject, scene: Array, T_base_odom: Array) -> JointSpace:
         """Return the postures that are free of the robot itself and of what the scene shows.
@@ -166,13 +165,14 @@ class Reranking:
         named = [POSTURES["forward"], POSTURES["ready"]]
         if gripper.approach[2] < -ACROSS:
             named.reverse()
+        balanced = space.centre_of_mass(q)
         for turn in TURNS:
             starts, comfort = np.array([q, *named]), dict[int, float]()
             starts[:, 0] = q[0] + turn
             for k, grasp in enumerate(grasps):
                 there = self._posture(gripper.side, T_base_odom @ grasp.T_odom_gripper, starts, space)
                 if there is not None:
-                    comfort[k] = self._comfort_at(gripper.side, grasp, there, q, space)
+                    comfort[k] = self._comfort_at(gripper.side, grasp, there, balanced, space)
             if comfort:
                 return comfort
         return {}
@@ -190,9 +190,11 @@ class Reranking:
                 return found[1]
         return None
 
-    def _comfort_at(self, side: Side, grasp: Grasp, posture: Array, q: Array, space: JointSpace) -> float:
+    def _comfort_at(
+        self, side: Side, grasp: Grasp, posture: Array, balanced: Array, space: JointSpace
+    ) -> float:
         c, kinematics = self.config, self._ik.kinematics
-        shift = float(np.linalg.norm((space.centre_of_mass(posture) - space.centre_of_mass(q))[:2]))
+        shift = float(np.linalg.norm((space.centre_of_mass(posture) - balanced)[:2]))
         margin = max(kinematics.margin(side, posture), 0.0) / COMFORT[0]
         manipulability = kinematics.manipulability(side, posture) / COMFORT[1]
         total = (

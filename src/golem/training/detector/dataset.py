@@ -79,6 +79,7 @@ def render(
         per_camera: images of the head camera, and as many of the palm cameras.
         kind: of `BUILDERS`.
     """
+    # A pack's stream is named as before there were kitchens, so that held-out images stay the same.
     rng = stream(
         seed,
         f"detector/{split}/{world_index}" if kind == "pack" else f"detector/{split}/{kind}/{world_index}",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from golem.robots.model import magpie_model, mjcf
+from golem.robots.model.spatial import transform
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.sensors.cameras import CAMERAS, T_MUJOCO_OPTICAL
 from golem.robots.worlds.conditions import Conditions
@@ -257,14 +258,14 @@ def aim(info: CameraInfo, target: Array, view: Array, distance: float, rng: np.r
     """
     pixel = rng.uniform([0.1, 0.1], [0.9, 0.9]) * (info.width, info.height)
     ray = np.array([(pixel[0] - info.cx) / info.fx, (pixel[1] - info.cy) / info.fy, 1.0])
-    return pose_of(target - view @ ray * distance, view)
+    return transform(target - view @ ray * distance, view)
 
 
 def carry(world: Compiled, info: CameraInfo, T_world_optical: Array) -> None:
     """Move the base so that a camera of the hand is at a pose (4, 4)."""
     data = world.data
     refresh(world)
-    T_base = pose_of(data.qpos[:3], Rotation.from_quat(data.qpos[3:7], scalar_first=True).as_matrix())
+    T_base = transform(data.qpos[:3], Rotation.from_quat(data.qpos[3:7], scalar_first=True).as_matrix())
     T_base = T_world_optical @ np.linalg.inv(camera_pose(world, info.name)) @ T_base
     data.qpos[:3] = T_base[:3, 3]
     data.qpos[3:7] = Rotation.from_matrix(T_base[:3, :3]).as_quat(scalar_first=True)
@@ -278,13 +279,6 @@ def set_gap(world: Compiled, side: Side, gap: float) -> None:
         names = magpie_model.finger_names(side, finger)
         world.data.qpos[world.model.joint(names[0]).qposadr[0]] = crank
         world.data.qpos[world.model.joint(names[1]).qposadr[0]] = -crank
-
-
-def pose_of(position: Array, rotation: Array) -> Array:
-    """Return the (4, 4) pose of a position (3,) and a rotation (3, 3)."""
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = rotation, position
-    return T
 
 
 def reset(world: Compiled) -> None:
@@ -309,7 +303,9 @@ def refresh(world: Compiled) -> None:
 def camera_pose(world: Compiled, name: str) -> Array:
     """Return the (4, 4) pose of a camera's optical frame in the world."""
     camera = world.model.camera(name).id
-    return pose_of(world.data.cam_xpos[camera], world.data.cam_xmat[camera].reshape(3, 3)) @ T_MUJOCO_OPTICAL
+    return (
+        transform(world.data.cam_xpos[camera], world.data.cam_xmat[camera].reshape(3, 3)) @ T_MUJOCO_OPTICAL
+    )
 
 
 def make_rigs(world: Compiled) -> tuple[CameraRig, CameraRig]:
