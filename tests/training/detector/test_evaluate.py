@@ -46,6 +46,12 @@ def test_detections_on_ignored_parts_do_not_count() -> None:
     assert score.count == 1 and score.ap == 1.0 and score.precision == 1.0
 
 
+def test_a_detection_on_what_is_seen_of_an_ignored_part_does_not_count() -> None:
+    cut = [0.0, -3.0, 20.0, -20.0, 3.0, 14.0, 37.0, 1.0]  # its middle is outside of the image
+    score = evaluate(data(cut, screw(40, 20)), lambda image: [hit(12, 30, 0.9), hit(40, 20, 0.8)])
+    assert score["head", "screw"].ap == 1.0
+
+
 def test_the_table_has_a_row_per_class() -> None:
     text = table(evaluate(data(screw(20, 20)), lambda image: []))
     assert len(text.splitlines()) == 2 + len(CLASSES) and "| head | screw | 1 | 0.000 |" in text

@@ -7,7 +7,7 @@ import pytest
 
 from golem.capabilities.perception.classes import CLASSES, KITCHEN
 from golem.training.detector import dataset
-from golem.training.detector.labels import COLUMNS, label_image
+from golem.training.detector.labels import COLUMNS, label_image, within
 from golem.training.detector.random_kitchen import looking
 from golem.training.detector.random_pack import build_pack
 from golem.training.detector.random_scene import AWAY, make_rigs, refresh
@@ -45,6 +45,17 @@ def test_labelled_centres_lie_on_the_geoms_of_their_part(kind: str, classes: set
     assert right / total > (
         0.93 if kind == "pack" else 0.7
     )  # the rest is hidden behind a finger, a cable or a thing
+
+
+def test_small_parts_that_the_border_cuts_are_ignored_and_large_ones_are_not_told() -> None:
+    inside = [0.0, 100.0, 50.0, 95.0, 45.0, 105.0, 55.0, 0.0]
+    cut = [0.0, -2.0, 50.0, -9.0, 43.0, 5.0, 57.0, 0.0]
+    beside = [0.0, -20.0, 50.0, -27.0, 43.0, -13.0, 57.0, 0.0]
+    large = [4.0, -2.0, 50.0, -92.0, -40.0, 88.0, 140.0, 0.0]
+    labels = np.array([inside, cut, beside, large])
+    told = within(labels, np.array([160, 120]))
+    assert np.allclose(told, [inside, [*cut[:7], 1.0]]) and labels[1, 7] == 0.0
+    assert within(labels[:0], np.array([160, 120])).shape == (0, len(COLUMNS))
 
 
 def test_a_pulled_screw_leaves_a_hole_label() -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
+from golem.training.detector.labels import MIN_SIDE, within
 from golem.types import Array
 
 MEAN = (0.45, 0.45, 0.45)
@@ -85,6 +86,7 @@ def place_crop(labels: Array, size: Array, rng: np.random.Generator) -> tuple[Ar
     """
     half = np.array(CROP) / 2
     zoom = float(np.exp(rng.uniform(*np.log(ZOOM))))
+    labels = labels[labels[:, 7] == 0]
     if len(labels) and rng.random() < AROUND_A_PART:
         # Rare classes as often as frequent ones.
         kind = rng.choice(np.unique(labels[:, 0]))
@@ -97,20 +99,20 @@ def place_crop(labels: Array, size: Array, rng: np.random.Generator) -> tuple[Ar
 
 
 def moved_labels(labels: Array, size: Array, scale: Array, shift: Array) -> Array:
-    """Return the labels (n, 8) of a crop: of the parts whose centres are in it, with boxes clipped."""
+    """Return the labels (n, 8) of a crop, with boxes clipped; see `labels.within`."""
     out = labels.copy()
     for first in (1, 3, 5):
         out[:, first : first + 2] = out[:, first : first + 2] * scale + shift
     if scale[0] < 0:
         out[:, [3, 5]] = out[:, [5, 3]]
+    out = within(out, np.array(CROP))
     ends = np.stack([shift, (size - 1.0) * scale + shift])
     limit = np.array(CROP) - 1.0
     low, high = np.maximum(ends.min(axis=0), 0), np.minimum(ends.max(axis=0), limit)
     out[:, 3:5] = np.clip(out[:, 3:5], low, high)
     out[:, 5:7] = np.clip(out[:, 5:7], low, high)
-    keep = (out[:, 1:3] >= 0).all(axis=1) & (out[:, 1:3] <= limit).all(axis=1)
-    out[:, 7] = np.maximum(out[:, 7], (out[:, 5:7] - out[:, 3:5]).min(axis=1) < 3.0)
-    return out[keep]
+    out[:, 7] = np.maximum(out[:, 7], (out[:, 5:7] - out[:, 3:5]).min(axis=1, initial=np.inf) < MIN_SIDE)
+    return out
 
 
 def corrupt(crops: Tensor, rng: torch.Generator) -> Tensor:

@@ -79,6 +79,7 @@ def _match(found: list[Detection], truth: Array) -> list[tuple[float, bool, floa
     """Assign each detection, best first, to the nearest free label; those on ignored labels do not count."""
     taken = np.zeros(len(truth), bool)
     out: list[tuple[float, bool, float]] = []
+    ignored = truth[truth[:, 7] == 1]
     sides = (truth[:, 5:7] - truth[:, 3:5]).min(axis=1) if len(truth) else np.zeros(0)
     reach = np.maximum(sides / 2, MATCH_FLOOR)
     for detection in found:
@@ -89,9 +90,17 @@ def _match(found: list[Detection], truth: Array) -> list[tuple[float, bool, floa
             best = int(np.argmin(np.where(free, distance, np.inf)))
             taken[best] = True
             out.append((detection.score, True, float(distance[best])))
-        elif not (near & (truth[:, 7] == 1)).any():
+        elif not _lies_on(detection.center, ignored):
             out.append((detection.score, False, 0.0))
     return out
+
+
+def _lies_on(center: Array, labels: Array) -> bool:
+    return bool(
+        ((labels[:, 3:5] - MATCH_FLOOR <= center) & (center <= labels[:, 5:7] + MATCH_FLOOR))
+        .all(axis=1)
+        .any()
+    )
 
 
 def _score(hits: list[tuple[float, bool, float]], count: int, working_score: float) -> Score:

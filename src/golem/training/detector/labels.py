@@ -17,11 +17,14 @@ MIN_SIDE = 3.0
 """A part whose box is narrower is neither asked for nor held against the detector [px]."""
 MIN_VISIBLE = 0.35
 """Same for a part of which a smaller share is seen."""
+CUT_SIDE = 60.0
+"""Same for a part whose middle is outside of the image, if its box is narrower than this [px]. Wider ones, trays and
+what is near, should not be reported there: nobody can tell where their middle is."""
 COLUMNS = ("class", "x", "y", "x_min", "y_min", "x_max", "y_max", "ignore")
 
 
 def label_image(scene: RandomScene, info: CameraInfo, segmentation: NDArray[np.int32]) -> Array:
-    """Return (n, 8) labels, columns as in `COLUMNS`; centres inside the image only, boxes not clipped.
+    """Return (n, 8) labels, columns as in `COLUMNS`, boxes not clipped; see `within` for those at the border.
 
     Args:
         scene: the world at the moment of exposure.
@@ -40,7 +43,18 @@ def label_image(scene: RandomScene, info: CameraInfo, segmentation: NDArray[np.i
         at = scene.data.xpos[scene.model.body(bore.screw).id]
         if np.linalg.norm(at - bore.mouth) > 0.04:
             rows += _hole(scene, info, T_optical_world, bore.mouth, bore.radius, segmentation)
-    return np.array(rows).reshape(-1, len(COLUMNS))
+    return within(np.array(rows).reshape(-1, len(COLUMNS)), np.array([info.width, info.height]))
+
+
+def within(labels: Array, size: Array) -> Array:
+    """Return the labels (n, 8) that an image of `size` (2,) [px] has; small parts that its border cuts are ignored."""
+    last = size - 1.0
+    inside = ((labels[:, 1:3] >= 0.0) & (labels[:, 1:3] <= last)).all(axis=1)
+    reaches_in = ((labels[:, 5:7] > 0.0) & (labels[:, 3:5] < last)).all(axis=1)
+    small = (labels[:, 5:7] - labels[:, 3:5]).min(axis=1, initial=np.inf) < CUT_SIDE
+    labels = labels.copy()
+    labels[~inside, 7] = 1.0
+    return labels[inside | (reaches_in & small)]
 
 
 def _solid(
@@ -68,8 +82,6 @@ def _solid(
         # Tableware stands, lies and is seen from everywhere: a crop can show the middle of its box.
         faces = False
     centre = project(info, T[:3, :3] @ centre_world + T[:3, 3]) if faces else (low + high) / 2
-    if not _inside(info, centre):
-        return []
     hull = cv2.contourArea(cv2.convexHull(np.clip(pixels, 0, (info.width, info.height)).astype(np.float32)))
     visible = seen[ids].sum() / max(hull, 1.0)
     if visible <= 0:
@@ -95,8 +107,6 @@ def _hole(
     if optical[:, 2].min() < 0.02:
         return []
     pixels = project(info, optical)
-    if not _inside(info, pixels[0]):
-        return []
     low, high = pixels[1:13].min(axis=0), pixels[1:13].max(axis=0)
     index = np.clip(np.round(pixels).astype(int), 0, (info.width - 1, info.height - 1))
     geoms = segmentation[index[:, 1], index[:, 0]]
@@ -106,10 +116,6 @@ def _hole(
         return []
     ignore = (high - low).min() < MIN_SIDE or free.mean() < 0.75 or not free[0]
     return [[CLASSES.index("screw_hole"), *pixels[0], *low, *high, float(ignore)]]
-
-
-def _inside(info: CameraInfo, pixel: Array) -> bool:
-    return bool(0 <= pixel[0] <= info.width - 1 and 0 <= pixel[1] <= info.height - 1)
 
 
 def _outline(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Array:
