@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from golem import registry
-from golem.capabilities.perception.classes import PACK
+from golem.capabilities.perception.classes import CLASSES
 from golem.cli import main
 from golem.errors import ConfigError
 from golem.evaluation.base import RUNGS, TrialSpec
@@ -100,7 +100,7 @@ def test_the_table_of_motors_is_the_robots() -> None:
 
 def test_the_table_of_labels_is_the_detectors() -> None:
     page = (DOCS / "reference/labels.md").read_text(encoding="utf-8")
-    assert tuple(re.findall(r"^\| `(\w+)` \|", page, re.M)) == PACK
+    assert tuple(re.findall(r"^\| `(\w+)` \|", page, re.M)) == CLASSES
 
 
 def test_the_commands_that_export_the_model_write_what_the_page_reads(

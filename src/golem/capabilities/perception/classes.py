@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 PACK: tuple[str, ...] = ("screw", "screw_hole", "nut", "bus_bar", "tray")
-"""Classes of a pack's parts: those of the shipped weights."""
+"""Classes of a pack's parts."""
 KITCHEN: tuple[str, ...] = ("handle", "mug", "bowl", "can", "bottle")
 """Classes of a kitchen: the bar of a fridge, and tableware."""
 CLASSES: tuple[str, ...] = PACK + KITCHEN
-"""All class names, in the order of the heatmaps of a network that is trained anew."""
+"""All class names, those of the shipped weights, in the order of their heatmaps."""

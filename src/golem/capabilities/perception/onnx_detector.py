@@ -40,7 +40,7 @@ class OnnxDetectorConfig:
 
 
 class OnnxDetector:
-    """Screws, screw holes, nuts, bus bars and trays in images of any size; deterministic."""
+    """Parts of a pack, and what stands in a kitchen, in images of any size; deterministic."""
 
     def __init__(self, config: OnnxDetectorConfig | None = None) -> None:
         """Load the network.

@@ -54,6 +54,7 @@ def train(
     seed: int = 0,
     steps: int = 12000,
     batch: int = 32,
+    rate: float = 2.5e-3,
     check_every: int = 1000,
     start: Path | None = None,
     device: str = "cpu",
@@ -66,12 +67,13 @@ def train(
         seed: of weights and crops.
         steps: gradient steps.
         batch: crops of a step.
+        rate: peak learning rate.
         check_every: steps between evaluations on part of the held-out split.
         start: ONNX file of an earlier detector to begin with.
         device: cpu, or cuda.
     """
     config = TrainDetectorConfig(
-        data, out, seed, steps, batch, check_every=check_every, check_images=240, start=start,
+        data, out, seed, steps, batch, rate, check_every=check_every, check_images=240, start=start,
         device=device,
     )  # fmt: skip
     print(run_training(config))

@@ -91,6 +91,9 @@ def export_onnx(checkpoint: Path, out: Path) -> Path:
     f4 = g.blocks(g.blocks("image", model.stem), model.down4)
     f8 = g.blocks(f4, model.down8)
     f16 = g.blocks(f8, model.down16)
+    for block in model.context:
+        assert isinstance(block, nn.Sequential)
+        f16 = g.add("Add", f16, g.blocks(f16, block))
     u8 = g.blocks(g.add("Add", f8, g.up(g.conv(f16, model.side8))), model.merge8)
     u4 = g.blocks(g.add("Add", f4, g.up(g.conv(u8, model.side4))), model.merge4)
     g.add("Concat", g.conv(u4, model.heat), g.conv(u4, model.regression), output="maps", axis=1)
