@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -58,33 +57,46 @@ def find_peaks(
         size: width and height of the image [px]; boxes are clipped to it and centres outside dropped.
     """
     width, height = size
+    last = np.array([width - 1.0, height - 1.0])
+    asked = [index for index, label in enumerate(labels) if label in wanted]
+    kinds, rows, columns = _peaks(maps[asked], float(np.log(threshold / (1.0 - threshold))))
     found: list[Detection] = []
-    logit = float(np.log(threshold / (1.0 - threshold)))
-    for index, label in enumerate(labels):
-        if label not in wanted:
-            continue
-        heat = maps[index]
-        peak = (heat >= logit) & (heat >= cv2.dilate(heat, np.ones((3, 3), np.uint8)))
-        rows, columns = np.nonzero(peak)
-        best = np.argsort(-heat[rows, columns], kind="stable")[:MAX_PEAKS]
-        rows, columns = rows[best], columns[best]
-        dx, dy, left, top, right, bottom = maps[len(labels) :, rows, columns].astype(np.float64)
-        centers = np.column_stack([STRIDE * (columns + dx), STRIDE * (rows + dy)]) + (STRIDE - 1) / 2
-        sides = np.exp(np.clip([left, top, right, bottom], 0.0, 7.0)).T
-        boxes = np.column_stack([centers - sides[:, :2], centers + sides[:, 2:]])
-        boxes = np.clip(boxes, 0.0, [width - 1, height - 1, width - 1, height - 1])
-        scores = 1.0 / (1.0 + np.exp(-heat[rows, columns].astype(np.float64)))
-        inside = ((centers >= -0.5) & (centers <= np.array(size) - 0.5)).all(axis=1)
-        for k in _distinct(np.flatnonzero(inside), centers, boxes):
+    for kind in np.unique(kinds):
+        label = labels[asked[kind]]
+        j, i = rows[kinds == kind], columns[kinds == kind]
+        heat = maps[asked[kind], j, i].astype(np.float64)
+        best = np.argsort(-heat, kind="stable")[:MAX_PEAKS]
+        j, i, scores = j[best], i[best], 1.0 / (1.0 + np.exp(-heat[best]))
+        regression = maps[len(labels) :, j, i].astype(np.float64).T
+        centers = STRIDE * (np.column_stack([i, j]) + regression[:, :2]) + (STRIDE - 1) / 2
+        sides = np.exp(np.clip(regression[:, 2:6], 0.0, 7.0))
+        low, high = centers - sides[:, :2], centers + sides[:, 2:]
+        boxes = np.clip(np.column_stack([low, high]), 0.0, np.tile(last, 2))
+        inside = ((centers >= -0.5) & (centers <= last + 0.5)).all(axis=1)
+        for k in _distinct(centers, boxes, inside):
             found.append(Detection(label, float(scores[k]), boxes[k], centers[k]))
     return sorted(found, key=lambda d: (-d.score, d.center[1], d.center[0]))
 
 
-def _distinct(order: NDArray[np.intp], centers: Array, boxes: Array) -> list[int]:
-    """Return the candidates of `order` (best first) without second peaks on the part of a better one."""
+def _peaks(heat: NDArray[np.float32], least: float) -> tuple[NDArray[np.intp], ...]:
+    """Return class, row and column of the cells (classes, h, w) that reach `least` and that no neighbour exceeds."""
+    at = np.unravel_index(np.flatnonzero(heat >= least), heat.shape)
+    around = np.pad(heat, ((0, 0), (1, 1), (1, 1)), constant_values=-np.inf)
+    kinds, rows, columns = at
+    highest = np.ones(len(kinds), bool)
+    for down in range(3):
+        for right in range(3):
+            highest &= heat[at] >= around[kinds, rows + down, columns + right]
+    return kinds[highest], rows[highest], columns[highest]
+
+
+def _distinct(centers: Array, boxes: Array, free: NDArray[np.bool_]) -> list[int]:
+    """Return the `free` candidates, best first, without second peaks on the part of a better one."""
     reach = SAME_SHARE * (boxes[:, 2:] - boxes[:, :2]).min(axis=1)
-    kept: list[int] = []
-    for k in order:
-        if not kept or (np.linalg.norm(centers[kept] - centers[k], axis=1) >= reach[kept]).all():
-            kept.append(int(k))
+    distance = np.hypot(*(centers[:, None] - centers[None]).transpose(2, 0, 1))
+    free, kept = free.copy(), []
+    for k in range(len(centers)):
+        if free[k]:
+            kept.append(k)
+            free &= distance[k] >= reach[k]
     return kept
