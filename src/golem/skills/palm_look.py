@@ -16,7 +16,7 @@ from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.grasping.base import Grasp
 from golem.capabilities.grasping.centroid import UP, grasp_pose
 from golem.capabilities.grasping.object_cloud import MIN_POINTS
-from golem.capabilities.grasping.view_shift import View, shift_between
+from golem.capabilities.grasping.view_shift import View, bounds, shift_between
 from golem.skills.context import Context
 from golem.skills.planned_motion import PlannedMotion
 from golem.skills.poses import moved, retracted
@@ -36,6 +36,10 @@ NEARER = 0.03
 """How much nearer than before the last look has to be [m]."""
 STRAYED = 0.03
 """How far the hand may have left its line between two looks [m]; more is a mistake of the eye."""
+NECK = 0.05
+"""Width up to which what is between the fingers is held in its middle [m]: pads are 16 mm wide."""
+FINGERS = 0.08
+"""How far above the fingertips that is looked for [m]."""
 LAST = 0.06
 """How far from where it is expected the thing may be seen by a hand that is before its grasp [m]."""
 
@@ -126,7 +130,7 @@ class PalmLook:
             view, grasp = seen, replace(grasp, T_odom_gripper=moved(grasp.T_odom_gripper, shift))
             target = replace(target, position=np.median(seen.thing, axis=0), points=seen.thing)
             self._context.say("approach", f"The grasp moves by {1e3 * float(np.linalg.norm(shift)):.0f} mm.")
-        return grasp, view
+        return centred(grasp, view.thing), view
 
     async def _seen(self, target: LocalizedObject) -> View | None:
         """Return what the palm camera shows of the thing now; None where it is not where it is expected."""
@@ -160,6 +164,26 @@ class PalmLook:
         return grasp_pose(T[:3, :3] @ (local + there * (best - local)) + T[:3, 3], yaw, -way)
 
 
+def centred(grasp: Grasp, points: Array) -> Grasp:
+    """Return a grasp with the middle of what is between its fingers in the middle of the pads, if that is narrow.
+
+    Fingers centre a thing along the closing axis; a neck that is beside the pads across it turns out of them.
+
+    Args:
+        grasp: where the hand is about to go.
+        points: (n, 3) of the thing as the palm camera shows it.
+    """
+    T = grasp.T_odom_gripper
+    local = (points - T[:3, 3]) @ T[:3, :3]
+    between = (np.abs(local[:, 1]) < 0.5 * grasp.gap) & (local[:, 2] < 0.0) & (local[:, 2] > -FINGERS)
+    if between.sum() < MIN_POINTS:
+        return grasp
+    low, high = np.quantile(local[between, 0], (0.02, 0.98))
+    if high - low > NECK:
+        return grasp
+    return replace(grasp, T_odom_gripper=moved(T, 0.5 * (low + high) * T[:3, 0]))
+
+
 def _size(points: Array) -> tuple[float, float] | None:
     """Return width and height of what stands on a surface, as the head camera's points (n, 3) of it show them [m]."""
     if len(points) < MIN_POINTS:
@@ -170,5 +194,4 @@ def _size(points: Array) -> tuple[float, float] | None:
 
 def _middle(points: Array) -> Array:
     """Return the middle (3,) of the bounds of points (n, 3), strays left out."""
-    low, high = np.quantile(points, (0.02, 0.98), axis=0)
-    return 0.5 * (low + high)
+    return bounds(points).mean(axis=0)

@@ -14,6 +14,8 @@ from golem.types import Array
 
 TOP = 0.015
 """Height of the layer that is the top of a thing [m]."""
+CAP = 0.05
+"""Width up to which a top is small enough to be seen whole [m]: a bottle's cap and neck, unlike its shoulder."""
 SEARCH = 0.06
 """How far a thing may have moved between two looks [m]."""
 
@@ -30,9 +32,37 @@ def shift_between(before: View, after: View, axis: Array) -> Array:
     """Return by how much (3,) a thing has moved from one view to another [m], both along about `axis` (3,).
 
     Across the axis, it is the shift at which the silhouettes differ in the fewest pixels; pixels of which one view
-    knows nothing do not count. Along it, it is how much nearer or farther what both show is.
+    knows nothing do not count. Of what has a small top it is that of the top: from one place a camera shows a bottle's
+    cap alone, from another its shoulder, too. Along the axis, it is how much nearer or farther what both show is.
     """
     flat = np.column_stack(across(axis))
+    if axis[2] < -ACROSS:
+        caps = [bounds(top_of(view.thing)) for view in (before, after)]
+        if all((high - low)[:2].max() < CAP for low, high in caps):
+            aside = flat @ flat.T @ (caps[1].mean(axis=0) - caps[0].mean(axis=0))
+            return aside + _farther(before.thing + aside, after.thing, flat, axis) * axis
+    return _laid_over(before, after, flat, axis)
+
+
+def top_of(points: Array) -> Array:
+    """Return the highest of points (n, 3)."""
+    return points[points[:, 2] > np.quantile(points[:, 2], 0.98) - TOP]
+
+
+def bounds(points: Array) -> Array:
+    """Return the least and the greatest (2, 3) coordinates of points (n, 3), strays left out."""
+    return np.quantile(points, (0.02, 0.98), axis=0)
+
+
+def _laid_over(before: View, after: View, flat: Array, axis: Array) -> Array:
+    """Return the shift by the silhouettes; see `shift_between`.
+
+    Args:
+        before: one view.
+        after: the other.
+        flat: (3, 2) axes of the silhouettes, across `axis`.
+        axis: (3,) along which both look.
+    """
     low = np.minimum((before.thing @ flat).min(axis=0), (after.thing @ flat).min(axis=0)) - SEARCH
     high = np.maximum((before.thing @ flat).max(axis=0), (after.thing @ flat).max(axis=0)) + SEARCH
     size, edge = np.ceil((high - low) / PIXEL).astype(int) + 1, round(SEARCH / PIXEL)
@@ -58,7 +88,7 @@ def _farther(before: Array, after: Array, flat: Array, axis: Array) -> float:
     Of what is seen from above the top counts: where one view has the bottom of a mug, the other has its wall before it.
     """
     if axis[2] < -ACROSS:
-        before, after = (view[view[:, 2] > np.quantile(view[:, 2], 0.98) - TOP] for view in (before, after))
+        before, after = top_of(before), top_of(after)
     views = before @ flat, after @ flat
     both = np.concatenate(views)
     low = both.min(axis=0)
