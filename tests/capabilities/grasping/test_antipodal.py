@@ -118,6 +118,24 @@ def test_what_has_moved_is_found_again_though_a_part_is_hidden() -> None:
     np.testing.assert_allclose(shift, [0.017, -0.008, -0.006], atol=0.003)
 
 
+@pytest.mark.parametrize("lean", [0.0, 0.2, 0.4])
+def test_of_a_bottle_the_cap_says_how_far_it_moved_though_more_of_it_is_seen(lean: float) -> None:
+    turn, down = (
+        grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 6.3, 60), np.arange(0.0, 0.14, 0.003))
+    )
+    ring = np.column_stack([np.cos(turn), np.sin(turn)])
+    neck = np.column_stack([0.015 * ring, 0.22 - 0.4 * down])
+    shoulder = np.column_stack([(0.015 + 0.14 * down)[:, None] * ring, 0.165 - 0.2 * down])
+    body = np.column_stack([0.035 * ring, 0.14 - down])
+    table = np.column_stack([np.random.default_rng(0).uniform(-0.2, 0.2, (9000, 2)), np.zeros(9000)])
+    # First the neck alone in a narrow view; then one side of what is below it, too.
+    before = View(neck, np.concatenate([neck, table[np.abs(table[:, 0]) < 0.02]]))
+    more = np.concatenate([neck, shoulder[ring[:, 1] > 0.0], body[ring[:, 1] > 0.0]]) + (0.004, 0.012, -0.005)
+    axis = np.array([0.0, np.sin(lean), -np.cos(lean)])
+    shift = shift_between(before, View(more, np.concatenate([more, table])), axis)
+    np.testing.assert_allclose(shift, [0.004, 0.012, -0.005], atol=0.002)
+
+
 def test_fingers_that_would_be_in_a_wall_are_not_proposed() -> None:
     can = things.can()
     free = Antipodal().propose(can, can.points, hand(DOWN))
