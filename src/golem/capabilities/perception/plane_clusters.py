@@ -60,7 +60,7 @@ class PlaneClustersConfig:
     handle: tuple[tuple[float, float], tuple[float, float], tuple[float, float]] = (
         (0.10, 1.2), (0.004, 0.06), (0.02, 0.12),
     )  # fmt: skip
-    alike: float = 1.5
+    alike: float = 1.8
     far: float = 1.6
     seed: int = 0
     latency: float = 0.06
