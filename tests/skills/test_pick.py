@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, OpenLoop
+from golem.capabilities.grasping.base import Grasp, GraspMethod, Gripper, OpenLoop, ServoStatus, ServoStep
 from golem.capabilities.grasping.centroid import Centroid, CentroidConfig
 from golem.capabilities.grasping.visual_servo import VisualServo
 from golem.errors import ConfigError
@@ -18,7 +18,7 @@ from golem.interfaces import topics
 from golem.interfaces.payloads import DetectionRequest
 from golem.robots.model.magpie_model import MAX_GAP
 from golem.skills.base import SkillResult
-from golem.skills.pick import Pick, PickConfig, PickGoal
+from golem.skills.pick import Pick, PickConfig, PickGoal, followed
 from golem.skills.runner import SkillRun
 from golem.types import Array, CameraInfo, LocalizedObject, RgbdImage, Side
 
@@ -472,3 +472,13 @@ def test_either_hand_is_the_one_on_the_side_of_the_tray(
     assert world.bus.latest(topics.hand_goal(side)) is not None
     other: Side = "left" if side == "right" else "right"
     assert world.bus.latest(topics.hand_goal(other)) is None
+
+
+def test_the_object_that_was_chosen_is_remembered_and_not_the_neighbour_that_is_taken() -> None:
+    chosen, neighbour = np.array([0.48, 0.13, -0.06]), np.array([0.49, 0.03, -0.06])
+    steps = [(chosen + 0.02, 0.14), (chosen, 0.002), (chosen + 0.004, 0.001), (neighbour, 0.001)]
+    seen = None
+    for target, sigma in steps:
+        seen = followed(seen, ServoStep(np.eye(4), target, sigma, ServoStatus.TRACKING))
+    assert seen is not None and np.allclose(seen, chosen + 0.004)
+    assert followed(None, ServoStep(np.eye(4), chosen, 0.14, ServoStatus.TRACKING)) is None

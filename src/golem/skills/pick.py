@@ -22,7 +22,7 @@ from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight,
 from golem.skills.pick_targets import SAME, Attempt, PickChoice, TargetChoice
 from golem.skills.poses import lifted
 from golem.skills.travel import LineTravel, PlannedTravel, Travel
-from golem.types import Side
+from golem.types import Array, Side
 
 CLOSED = (GripState.HOLDING, GripState.EMPTY)
 """States of a hand whose fingers have closed, on something or on nothing."""
@@ -31,6 +31,8 @@ FINAL = (PickOutcome.TIGHT, PickOutcome.OUT_OF_REACH)
 """What a second try with the same hand would not change."""
 SETTLED = (*FINAL, PickOutcome.JAMMED)
 """What a second look would not change either."""
+SURE = 0.003
+"""Uncertainty of the servo's target below which the object was seen [m]."""
 
 
 class Pick:
@@ -46,6 +48,7 @@ class Pick:
         self._report = PickReport()
         self._heights: list[float] = []
         self._looks_again = False
+        self._seen: Array | None = None
 
     def timeout(self, goal: PickGoal) -> float:
         """Return the time it may take [s]; see `Skill`."""
@@ -73,7 +76,9 @@ class Pick:
         try:
             await self._travel.begin(self._config.travel_speed)
             choice, attempt = await self._look_and_take(context, goal, timings, tried)
-            await place(context, self._config, self._travel, attempt, self._report.tried[-1], choice)
+            last = self._report.tried[-1]
+            seen = np.array([last.x, last.y, last.z]) if self._seen is None else self._seen
+            await place(context, self._config, self._travel, attempt, seen, choice)
             self._report.outcome = self._report.tried[-1].outcome = PickOutcome.PICKED.value
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
@@ -242,7 +247,7 @@ class Pick:
         """Closed loop: let the law bring the hand down, and let it follow the object while the fingers close."""
         arm, hand = context.arms[attempt.side], context.hands[attempt.side]
         end = context.t + law.patience
-        closing, camera = False, f"{attempt.side}_hand"
+        closing, camera, self._seen = False, f"{attempt.side}_hand", None
         below = await ForceGuard.at_rest(
             context, attempt.side, arm.commanded[:3, 2], self._config.press_force
         )
@@ -251,6 +256,7 @@ class Pick:
             while context.t < end and not (closing and hand.status.state in CLOSED):
                 fresh = eye.fresh()
                 step = law.step(context.t, None if fresh is None else list(fresh.objects), arm.pose)
+                self._seen = followed(self._seen, step)
                 if not closing:
                     if fresh is not None:
                         room.look()
@@ -307,6 +313,17 @@ class Pick:
         """Go straight up, away from what was not taken, with the fingers open."""
         arm = context.arms[side]
         await arm.move(lifted(arm.commanded, self._config.clearance), self._config.travel_speed)
+
+
+def followed(seen: Array | None, step: ServoStep) -> Array | None:
+    """Return where the palm camera sees the object that a servo began with, not the neighbours it went on to.
+
+    Args:
+        seen: (3,) where it was seen until now, in odom [m]; None: not yet.
+        step: what the servo follows now.
+    """
+    same = seen is None or float(np.linalg.norm(step.target - seen)) < SAME
+    return step.target.copy() if step.sigma < SURE and same else seen
 
 
 def _hands(goal: PickGoal, tried: Sequence[Attempt]) -> list[Side]:

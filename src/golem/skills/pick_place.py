@@ -13,7 +13,7 @@ from golem.skills.container import Container, shift_of
 from golem.skills.context import Context
 from golem.skills.hand_reach import HandReach
 from golem.skills.pick_config import PickConfig
-from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight, Tried
+from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight
 from golem.skills.pick_targets import Attempt, PickChoice, positions
 from golem.skills.poses import lifted, moved, turned
 from golem.skills.travel import Travel
@@ -40,7 +40,7 @@ NEAR = 0.12
 
 
 async def place(
-    context: Context, config: PickConfig, travel: Travel, attempt: Attempt, tried: Tried, choice: PickChoice
+    context: Context, config: PickConfig, travel: Travel, attempt: Attempt, seen: Array, choice: PickChoice
 ) -> None:
     """Carry what a hand holds over the container and let go.
 
@@ -49,7 +49,7 @@ async def place(
         config: distances and speeds.
         travel: moves them.
         attempt: what is held.
-        tried: where it was taken.
+        seen: (3,) where the palm camera saw what the head camera had chosen, in odom [m].
         choice: has the container.
 
     Raises:
@@ -57,7 +57,7 @@ async def place(
     """
     container, arm, hand = choice.container, context.arms[attempt.side], context.hands[attempt.side]
     others = np.array([o.target.position for o in choice.attempts])
-    shift = shift_of(np.array([tried.x, tried.y, tried.z]), attempt.target.position, others)
+    shift = shift_of(seen, attempt.target.position, others)
     travel.displace(shift)
     spots = container.places(config.drop_margin) + shift
     goals: list[Array] = []
