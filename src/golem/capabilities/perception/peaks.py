@@ -72,7 +72,7 @@ def find_peaks(
         sides = np.exp(np.clip(regression[:, 2:6], 0.0, 7.0))
         low, high = centers - sides[:, :2], centers + sides[:, 2:]
         boxes = np.clip(np.column_stack([low, high]), 0.0, np.tile(last, 2))
-        inside = ((centers >= -0.5) & (centers <= last + 0.5)).all(axis=1)
+        inside = np.asarray(((centers >= -0.5) & (centers <= last + 0.5)).all(axis=1), bool)
         for k in _distinct(centers, boxes, inside):
             found.append(Detection(label, float(scores[k]), boxes[k], centers[k]))
     return sorted(found, key=lambda d: (-d.score, d.center[1], d.center[0]))
