@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 from golem.capabilities.arms.reach_map import load_map
 from golem.capabilities.grasping.base import Grasp
 from golem.capabilities.grasping.centroid import UP, grasp_pose
-from golem.capabilities.grasping.object_cloud import MIN_POINTS
-from golem.capabilities.grasping.view_shift import View, bounds, shift_between
+from golem.capabilities.grasping.object_cloud import MIN_POINTS, bounds
+from golem.capabilities.grasping.view_shift import View, shift_between
 from golem.skills.context import Context
 from golem.skills.planned_motion import PlannedMotion
 from golem.skills.poses import moved, retracted

@@ -79,7 +79,7 @@ class Pick:
             last = self._report.tried[-1]
             seen = np.array([last.x, last.y, last.z]) if self._seen is None else self._seen
             await place(context, self._config, self._travel, attempt, seen, choice)
-            self._report.outcome = self._report.tried[-1].outcome = PickOutcome.PICKED.value
+            self._report.outcome = last.outcome = PickOutcome.PICKED.value
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
             self._note(failure)

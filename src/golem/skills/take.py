@@ -11,7 +11,7 @@ import numpy as np
 from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.grasping.base import Grasp, GraspMethod
-from golem.capabilities.grasping.object_cloud import room_around
+from golem.capabilities.grasping.object_cloud import bounds, room_around
 from golem.capabilities.planning.base import PlanRefused
 from golem.capabilities.properties.base import holding_force
 from golem.interfaces.payloads import GripState
@@ -250,7 +250,7 @@ class Take:
         low = float(np.quantile(cloud[:, 2], 0.02)) if level is None else level
         self._report.below = max(tips - low, 0.0)
         self._report.above = max(float(np.quantile(cloud[:, 2], 0.98)) - tips, 0.0)
-        ends = np.quantile(cloud, (0.02, 0.98), axis=0)
+        ends = bounds(cloud)
         middle = 0.5 * (ends[0] + ends[1])
         self._report.radius = 0.5 * float(np.max(ends[1, :2] - ends[0, :2]))
         self._report.x, self._report.y, self._report.z = (float(v) for v in middle)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from golem.capabilities.grasping.centroid import UP
-from golem.capabilities.grasping.object_cloud import MIN_POINTS, fullest, piece_at, spaced
+from golem.capabilities.grasping.object_cloud import MIN_POINTS, bounds, fullest, piece_at, spaced
 from golem.skills.base import StageFailed
 from golem.skills.context import Context
 from golem.types import Array, LocalizedObject, Side
@@ -138,7 +138,7 @@ def _pieces(around: Array, middle: Array, upright: Array, trust: float) -> list[
 
 def width(points: Array) -> float:
     """Return the greater side of the plan of points (n, 3), strays left out [m]."""
-    low, high = np.quantile(points[:, :2], (0.02, 0.98), axis=0)
+    low, high = bounds(points[:, :2])
     return float((high - low).max())
 
 

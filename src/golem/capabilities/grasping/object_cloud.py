@@ -125,6 +125,11 @@ def across(approach: Array) -> tuple[Array, Array]:
     return u, np.cross(approach, u)
 
 
+def bounds(points: Array) -> Array:
+    """Return the least and the greatest coordinates (2, d) of points (n, d), strays left out."""
+    return np.quantile(points, (0.02, 0.98), axis=0)
+
+
 def thinned(points: Array, most: int, seed: int = 0) -> Array:
     """Return at most `most` of `points` (n, 3), evenly drawn."""
     if len(points) <= most:

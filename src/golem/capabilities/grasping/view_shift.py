@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.capabilities.grasping.centroid import ACROSS
-from golem.capabilities.grasping.object_cloud import MIN_POINTS, PIXEL, across
+from golem.capabilities.grasping.object_cloud import MIN_POINTS, PIXEL, across, bounds
 from golem.types import Array
 
 TOP = 0.015
@@ -47,11 +47,6 @@ def shift_between(before: View, after: View, axis: Array) -> Array:
 def top_of(points: Array) -> Array:
     """Return the highest of points (n, 3)."""
     return points[points[:, 2] > np.quantile(points[:, 2], 0.98) - TOP]
-
-
-def bounds(points: Array) -> Array:
-    """Return the least and the greatest (2, 3) coordinates of points (n, 3), strays left out."""
-    return np.quantile(points, (0.02, 0.98), axis=0)
 
 
 def _laid_over(before: View, after: View, flat: Array, axis: Array) -> Array:
