@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 
 from golem.errors import GolemError
+from golem.native import Record
 from golem.types import Array, LowState
 
 
@@ -37,3 +39,16 @@ def check_measured(state: LowState) -> None:
     check_finite("the IMU's quaternion", imu.quat)
     check_finite("the IMU's gyro", imu.gyro)
     check_finite("the IMU's acceleration", imu.acc)
+
+
+@njit(cache=True, nogil=True)
+def finite_state(r: Record) -> bool:
+    """Return whether joints and IMU of the shared record are finite, as `check_measured` asks; torques may be anything."""
+    total = 0.0  # x - x is 0, or NaN
+    for i in range(len(r.q)):
+        total += (r.q[i] - r.q[i]) + (r.dq[i] - r.dq[i])
+    for i in range(3):
+        total += (r.gyro[i] - r.gyro[i]) + (r.acc[i] - r.acc[i])
+    for i in range(4):
+        total += r.quat[i] - r.quat[i]
+    return total == 0.0

@@ -25,6 +25,8 @@ GRAVITY = 9.81
 """[m/s^2], as in the twin."""
 TICK = 0.002
 """Period of the clock [s]: one servo period (500 Hz)."""
+COMMAND_AGE = 0.1
+"""Age of a command at which the drives go limp [s]; the authors' twin."""
 NUM_JOINTS = 27
 """Body motors of the H1-2, in the order of the vendor's SDK."""
 LEGS = slice(0, 12)

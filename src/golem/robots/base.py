@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.interfaces.lidar import LidarImu, LidarScan
+from golem.native import Stage
 from golem.types import Array, CameraInfo, HandCommand, HandState, Imu, LowCommand, Side
 
 STAMP_TOLERANCE = 5e-4
@@ -135,4 +136,17 @@ class Restorable(Robot, Protocol):
 
     def restore_state(self, save_state: bytes) -> None:
         """Be in the moment of a snapshot: `capture` then shows what it showed there."""
+        ...
+
+
+@runtime_checkable
+class HasStages(Protocol):
+    """A simulated robot that offers compiled stages for the 500 Hz chain; see `golem.native`."""
+
+    def native(self, joint_offset: Array | None) -> tuple[Stage, Stage] | None:
+        """Return the stages that sense and act, with the same state as the methods of `Robot`; None where there are none.
+
+        Args:
+            joint_offset: (27,) what calibration knows of the encoders' zeros: reported minus true [rad].
+        """
         ...

@@ -33,6 +33,7 @@ from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import LACKS, SkillRun
 from golem.types import (
+    COMMAND_AGE,
     LEGS,
     NUM_JOINTS,
     SIDES,
@@ -52,8 +53,6 @@ MIN_RATE = 1.0
 """Slowest controller that is taken for one [Hz]."""
 
 
-WATCHDOG = 0.1
-"""Age of a command at which the drives go limp [s]; the authors' twin."""
 IDENTITY = np.eye(3)
 
 
@@ -88,7 +87,7 @@ class ActNode:
     def step(self, t: float) -> None:
         """Advance the robot by one tick; motors without a command of late are limp."""
         command = self._bus.latest(topics.LOW_CMD)
-        if command is None or t - command.t > WATCHDOG:
+        if command is None or t - command.t > COMMAND_AGE:
             command = _limp(t)
         if self._offset is not None:
             command = replace(command, q=command.q + self._offset)

@@ -64,10 +64,9 @@ def test_the_covariance_predicts_how_an_error_grows() -> None:
         filter.x[2:] = start + POINTS
     correct(other.R, other.x, other.bias, xi)
     # The covariance of a single error is its outer square: noise apart, it must stay that.
-    one.P = np.outer(xi, xi)
-    quiet = InvariantConfig(gyro_noise=0.0, acc_noise=0.0, gyro_walk=0.0, acc_walk=0.0, contact_noise=0.0)
-    one.config = quiet
-    one._noise[:], one._wander[:] = 0.0, 0.0
+    one.P[:] = np.outer(xi, xi)
+    for name in ("noise", "wander", "contact_noise"):
+        one.memory[name] = 0.0
     gyro, acc = np.array([0.3, -0.2, 0.4]), UP + [0.5, 0.2, -0.3]
     for _ in range(100):
         one.predict(gyro, acc, BOTH, DT)

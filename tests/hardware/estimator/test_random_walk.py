@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from golem.hardware.estimator.contact import Contact, ContactConfig
-from golem.hardware.estimator.random_walk import RandomWalk, RandomWalkConfig, base_velocity, fuse
+from golem.hardware.estimator.random_walk import (
+    FILTER,
+    RandomWalk,
+    RandomWalkConfig,
+    base_velocity,
+    filter_options,
+    fuse,
+)
+from golem.native import new_record
 
 DT = 0.002
 BOTH = np.ones(2)
@@ -50,9 +58,11 @@ def test_a_swinging_foot_with_wrong_weight_is_gated_out() -> None:
 
 
 def test_a_foot_between_the_gates_counts_less_but_not_nothing() -> None:
-    config = RandomWalkConfig()
-    near, far = (np.array([[d, 0.0, 0.0], [0.0, 0.0, 0.0]]) for d in (0.1, 0.5))
-    weights = [fuse(config, np.zeros(3), np.array(0.001), m, BOTH, DT)[2] for m in (near, far)]
+    weights = []
+    for distance in (0.1, 0.5):
+        memory = new_record(FILTER)
+        memory["options"], memory["variance"] = filter_options(RandomWalkConfig()), 0.001
+        weights.append(fuse(memory[0], np.array([[distance, 0.0, 0.0], [0.0, 0.0, 0.0]]), BOTH, DT))
     assert weights[0][0] == pytest.approx(weights[0][1])
     assert 0.0 < weights[1][0] < 0.5 * weights[1][1]
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
+from numba import njit
 
-from golem.hardware.estimator import feet_kernel
-from golem.hardware.estimator.contact import Contact, ContactConfig
-from golem.hardware.estimator.foot_force import FootForce, FootForceConfig
-from golem.robots.model.leg_dynamics import LegDynamics
+from golem.hardware.estimator.contact import ContactConfig
+from golem.hardware.estimator.feet_kernel import contact, loads, pressed
+from golem.hardware.estimator.foot_force import FOOT_FORCE, FootForceConfig, foot_wrenches
+from golem.native import Record, Records, new_record
+from golem.robots.model.leg_dynamics import leg_tree
+from golem.robots.model.leg_kernel import LEG_MOTION, leg_motion, tree_dtype
 from golem.robots.model.table import SOLE
 from golem.types import GRAVITY, LEGS, Array, LowState
 
@@ -42,38 +45,116 @@ class FeetConfig:
     sliding: float = 0.1
 
 
+FEET = np.dtype(
+    [
+        ("tree", tree_dtype(LEGS.stop)),
+        ("motion", LEG_MOTION),
+        ("wrench", FOOT_FORCE),
+        ("half", "f8", (2,)),
+        ("contacts", "f8", (6,)),
+        ("doubts", "f8", (3,)),
+        ("planted", "i8", (2,)),
+        ("age", "f8", (2,)),
+        ("new", "i8"),
+        ("force", "f8", (2,)),
+        ("contact", "f8", (2,)),
+        ("weight", "f8", (2,)),
+        ("points", "f8", (2, 3)),
+        ("rates", "f8", (2, 3)),
+        ("local", "f8", (2, 3)),
+    ]
+)
+"""Options, memory and answers of `sense_feet`; of the answers see `Feet`."""
+
+
+def put_feet(memory: Records, config: FeetConfig) -> None:
+    """Write the robot's legs and the options `config` into `memory`, a `FEET`."""
+    memory["tree"] = leg_tree()
+    memory["wrench"]["lag"], memory["wrench"]["floor"] = config.force.lag, config.force.floor()
+    memory["half"] = _HALF
+    memory["contacts"] = astuple(config.contact)
+    memory["doubts"] = config.min_force, config.turning, config.sliding
+    forget_feet(memory)
+
+
+def forget_feet(memory: Records) -> None:
+    """Start over: feet that the next sample finds loaded have stood long."""
+    memory["wrench"]["begun"], memory["new"] = 0, 1
+
+
+@njit(cache=True, nogil=True)
+def sense_feet(
+    m: Record, q: Array, dq: Array, tau: Array, up: Array, omega: Array, dt: float
+) -> None:
+    """Take one sample; arguments as for `Feet.step`, `m` is a `FEET`."""
+    gravity = np.empty(3)
+    for a in range(3):
+        gravity[a] = -GRAVITY * up[a]
+    legs = m.motion
+    leg_motion(m.tree, q, dq, gravity, legs)
+    wrench = foot_wrenches(m.wrench, legs, tau, dt)
+    force = loads(wrench, up, legs.soles, legs.rotations, m.half, _THICKNESS)
+    m.force[0], m.force[1] = force[0], force[1]
+    contact(m.force, m.planted, m.age, m.new != 0, m.contacts, dt, m.contact, m.weight)
+    m.new = 0
+    local, points, rates = pressed(
+        wrench, m.force, m.weight, omega, legs.soles, legs.rotations, legs.twists, m.half, m.doubts
+    )
+    for k in range(2):
+        for a in range(3):
+            m.local[k, a], m.points[k, a], m.rates[k, a] = local[k, a], points[k, a], rates[k, a]
+
+
+FLOOR = np.dtype([("z", "f8"), ("floor", "f8"), ("seen", "i8")])
+"""Memory of `level_floor`: z of base_link in odom, and of the floor [m]; whether a foot has carried the robot, before
+which nothing measured its velocity either."""
+LAG = 0.1
+"""Time constant with which the height in odom follows the planted feet [s]."""
+
+
+@njit(cache=True, nogil=True)
+def level_floor(m: Record, velocity: float, up: Array, feet: Record, dt: float) -> float:
+    """Return the height of base_link above the feet that carry it [m], 0 where none does, on a floor taken as level.
+
+    In odom, `m.z`, it is the integral of the velocity, held to the planted feet: soles that give way under load, and
+    every footstep, would otherwise let it sink without end.
+
+    Args:
+        m: a `FLOOR`.
+        velocity: vertical velocity of base_link [m/s].
+        up: (3,) the vertical in base_link.
+        feet: at the present sample, a `FEET`.
+        dt: time since the previous one [s].
+    """
+    total = height = 0.0
+    for k in range(2):
+        # Squares: a foot that is being unloaded soon counts little.
+        share = feet.weight[k] * feet.weight[k]
+        total += share
+        height -= share * (
+            feet.points[k, 0] * up[0] + feet.points[k, 1] * up[1] + feet.points[k, 2] * up[2]
+        )
+    m.z += velocity * dt
+    if total == 0.0:
+        return 0.0
+    height /= total
+    if not m.seen:
+        m.seen, m.floor = 1, m.z - height
+    m.z += dt / (LAG + dt) * (m.floor + height - m.z)
+    return height
+
+
 class Feet:
     """Both feet of one robot, axes of base_link.
 
     The point of a foot that stands still is where it presses on the ground: heel and toe of a foot that rolls do not.
-
-    Attributes:
-        force: (2,) vertical force of the ground [N].
-        contact: (2,) probability that each foot carries load.
-        weight: (2,) how far each is to be believed to stand still.
-        points: (2, 3) centre of pressure [m].
-        rates: (2, 3) velocity of the sole there, relative to base_link [m/s].
-        rotations: (2, 3, 3) of the soles.
-        local: (2, 3) centre of pressure from the middle of the sole, axes of the foot [m].
     """
 
     def __init__(self, config: FeetConfig) -> None:
         """Start with nothing known."""
-        self.config = config
-        self._legs = LegDynamics()
-        self._force, self._contact = FootForce(config.force), Contact(config.contact)
-        self.force: Array = np.zeros(2)
-        self.contact: Array = np.zeros(2)
-        self.weight: Array = np.zeros(2)
-        self.points: Array = np.zeros((2, 3))
-        self.rates: Array = np.zeros((2, 3))
-        self.rotations: Array = np.zeros((2, 3, 3))
-        self.local: Array = np.zeros((2, 3))
-
-    def reset(self) -> None:
-        """Forget; feet that the next sample finds loaded have stood long."""
-        self._force.reset()
-        self._contact.reset()
+        memory = new_record(FEET)
+        put_feet(memory, config)
+        self._memory = memory[0]
 
     def step(self, state: LowState, up: Array, omega: Array, dt: float) -> None:
         """Take one sample.
@@ -84,67 +165,34 @@ class Feet:
             omega: (3,) angular rate of base_link, in base_link [rad/s].
             dt: time since the previous sample [s].
         """
-        legs, config = self._legs, self.config
-        legs.update(state.q[LEGS], state.dq[LEGS])
-        wrench = self._force.step(legs, state, -GRAVITY * up, dt)
-        self.rotations = legs.rotations
-        self.force = feet_kernel.loads(wrench, up, legs.soles, legs.rotations, _HALF, _THICKNESS)
-        self.contact, self.weight = self._contact.step(self.force, dt)
-        numbers = np.array([config.min_force, config.turning, config.sliding])
-        self.local, self.points, self.rates = feet_kernel.pressed(
-            wrench,
-            self.force,
-            self.weight,
-            omega,
-            legs.soles,
-            legs.rotations,
-            legs.twists,
-            _HALF,
-            numbers,
-        )
-
-
-class LevelFloor:
-    """The height of base_link, above the feet that carry it and in odom, on a floor taken as level.
-
-    In odom it is the integral of the velocity, held to the planted feet: soles that give way under load, and every
-    footstep, would otherwise let it sink without end.
-    """
-
-    LAG = 0.1
-    """Time constant with which the height in odom follows the planted feet [s]."""
-
-    def __init__(self) -> None:
-        """Start at the height of odom's origin, above a floor not seen yet."""
-        self.reset()
-
-    def reset(self) -> None:
-        """Start over."""
-        self._z = 0.0
-        self._floor: float | None = None
+        sense_feet(self._memory, state.q, state.dq, state.tau, up, omega, dt)
 
     @property
-    def seen(self) -> bool:
-        """Whether a foot has carried the robot since the reset; before, nothing measured its velocity either."""
-        return self._floor is not None
+    def force(self) -> Array:
+        """(2,) vertical force of the ground [N]."""
+        return self._memory["force"].copy()
 
-    def step(self, velocity: float, up: Array, feet: Feet, dt: float) -> tuple[float, float]:
-        """Return the height above the feet that carry the robot, 0 where none does, and z of base_link in odom [m].
+    @property
+    def contact(self) -> Array:
+        """(2,) probability that each foot carries load."""
+        return self._memory["contact"].copy()
 
-        Args:
-            velocity: vertical velocity of base_link [m/s].
-            up: (3,) the vertical in base_link.
-            feet: at the present sample.
-            dt: time since the previous one [s].
-        """
-        # Squares: a foot that is being unloaded soon counts little.
-        share = feet.weight * feet.weight
-        total = float(share[0] + share[1])
-        self._z += velocity * dt
-        if total == 0.0:
-            return 0.0, self._z
-        height = -float(share @ (feet.points @ up)) / total
-        if self._floor is None:
-            self._floor = self._z - height
-        self._z += dt / (self.LAG + dt) * (self._floor + height - self._z)
-        return height, self._z
+    @property
+    def weight(self) -> Array:
+        """(2,) how far each is to be believed to stand still."""
+        return self._memory["weight"].copy()
+
+    @property
+    def points(self) -> Array:
+        """(2, 3) centre of pressure [m]."""
+        return self._memory["points"].copy()
+
+    @property
+    def rates(self) -> Array:
+        """(2, 3) velocity of the sole there, relative to base_link [m/s]."""
+        return self._memory["rates"].copy()
+
+    @property
+    def local(self) -> Array:
+        """(2, 3) centre of pressure from the middle of the sole, axes of the foot [m]."""
+        return self._memory["local"].copy()

@@ -1,13 +1,18 @@
-"""The compiled steps of `feet`, `foot_force` and `contact`, at 500 Hz; compiled once, then cached on disk."""
+"""The compiled steps of `feet`, `foot_force` and `contact`, at 500 Hz; compiled once, then cached on disk.
+
+Loops in place of array expressions: numba compiles the messages of their shape errors, too, for seconds.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from golem.robots.model.linear_kernel import cholesky, solve_cholesky
 from golem.types import Array
 
 
@@ -20,13 +25,19 @@ def wrenches(jacobians: Array, external: Array, floor: Array) -> Array:
         external: (2, 6) torque that the ground causes [N m].
         floor: (6,) squared damping per row.
     """
-    out = np.empty((2, 6))
+    out, L = np.empty((2, 6)), np.empty((6, 6))
     for k in range(2):
-        J = jacobians[k]
-        A = J @ J.T
+        J, w = jacobians[k], out[k]
         for i in range(6):
-            A[i, i] += floor[i]
-        out[k] = np.linalg.solve(A, J @ external[k])
+            w[i] = 0.0
+            for m in range(6):
+                w[i] += J[i, m] * external[k, m]
+            for j in range(i + 1):
+                L[i, j] = floor[i] if i == j else 0.0
+                for m in range(6):
+                    L[i, j] += J[i, m] * J[j, m]
+        cholesky(L, 6)
+        solve_cholesky(L, 6, w)
     return out
 
 
@@ -44,20 +55,36 @@ def contacts(
     The state of the contacts, `planted` and `age` (n, 2) and `new` (n,), is brought up to date. `config` (6,) has the
     numbers of `ContactConfig` in their order.
     """
-    touch, leave, middle, width, settle, ramp = config
     probability, weight = np.zeros(force.shape), np.zeros(force.shape)
     for i in range(len(force)):
-        for k in range(2):
-            was = planted[i, k]
-            planted[i, k] = force[i, k] > (leave if was and not new[i] else touch)
-            if not planted[i, k]:
-                age[i, k] = 0.0
-                continue
-            age[i, k] = settle + ramp if new[i] else age[i, k] + dt if was else 0.0
-            probability[i, k] = 1.0 / (1.0 + math.exp((middle - force[i, k]) / width))
-            weight[i, k] = probability[i, k] * min(max((age[i, k] - settle) / ramp, 0.0), 1.0)
+        contact(force[i], planted[i], age[i], new[i], config, dt, probability[i], weight[i])
         new[i] = False
     return probability, weight
+
+
+@njit(cache=True, nogil=True)
+def contact(
+    force: Array,
+    planted: NDArray[Any],
+    age: Array,
+    new: bool,
+    config: Array,
+    dt: float,
+    probability: Array,
+    weight: Array,
+) -> None:
+    """Do what `contacts` does for one robot; all arrays are (2,), the last two are filled."""
+    touch, leave, middle, width, settle, ramp = config[0], config[1], config[2], config[3], config[4], config[5]
+    for k in range(2):
+        was = planted[k] != 0
+        probability[k] = weight[k] = 0.0
+        planted[k] = force[k] > (leave if was and not new else touch)
+        if not planted[k]:
+            age[k] = 0.0
+            continue
+        age[k] = settle + ramp if new else age[k] + dt if was else 0.0
+        probability[k] = 1.0 / (1.0 + math.exp((middle - force[k]) / width))
+        weight[k] = probability[k] * min(max((age[k] - settle) / ramp, 0.0), 1.0)
 
 
 @njit(cache=True, nogil=True)
@@ -75,13 +102,13 @@ def loads(wrench: Array, up: Array, soles: Array, rotations: Array, half: Array,
     force = np.empty(2)
     for k in range(2):
         force[k] = wrench[k, 0] * up[0] + wrench[k, 1] * up[1] + wrench[k, 2] * up[2]
-    apart = soles[0] - soles[1]
-    rise = np.dot(apart, up)
+    u, v, w = soles[0, 0] - soles[1, 0], soles[0, 1] - soles[1, 1], soles[0, 2] - soles[1, 2]
+    rise = u * up[0] + v * up[1] + w * up[2]
     if abs(rise) >= thickness:
         lower = 1 if rise > 0.0 else 0
         R = rotations[lower]
-        x = apart[0] * R[0, 0] + apart[1] * R[1, 0] + apart[2] * R[2, 0]
-        y = apart[0] * R[0, 1] + apart[1] * R[1, 1] + apart[2] * R[2, 1]
+        x = u * R[0, 0] + v * R[1, 0] + w * R[2, 0]
+        y = u * R[0, 1] + v * R[1, 1] + w * R[2, 1]
         if abs(x) < 2.0 * half[0] and abs(y) < 2.0 * half[1]:
             force[lower] += force[1 - lower]
             force[1 - lower] = 0.0
@@ -116,7 +143,7 @@ def pressed(
     Returns:
         Centre of pressure in the foot and in base_link, velocity of the sole there, (2, 3) each.
     """
-    least, turning, sliding = config
+    least, turning, sliding = config[0], config[1], config[2]
     local, points, rates = np.zeros((2, 3)), np.empty((2, 3)), np.empty((2, 3))
     lever = np.empty(3)
     for k in range(2):
@@ -139,11 +166,10 @@ def pressed(
         rates[k, 0] = twists[k, 0] + turn[1] * lever[2] - turn[2] * lever[1]
         rates[k, 1] = twists[k, 1] + turn[2] * lever[0] - turn[0] * lever[2]
         rates[k, 2] = twists[k, 2] + turn[0] * lever[1] - turn[1] * lever[0]
-    x, y, z = points[0] - points[1]
-    u, v, w = rates[0] - rates[1]
-    u += omega[1] * z - omega[2] * y
-    v += omega[2] * x - omega[0] * z
-    w += omega[0] * y - omega[1] * x
+    x, y, z = points[0, 0] - points[1, 0], points[0, 1] - points[1, 1], points[0, 2] - points[1, 2]
+    u = rates[0, 0] - rates[1, 0] + (omega[1] * z - omega[2] * y)
+    v = rates[0, 1] - rates[1, 1] + (omega[2] * x - omega[0] * z)
+    w = rates[0, 2] - rates[1, 2] + (omega[0] * y - omega[1] * x)
     lesser = 1 if force[1] < force[0] else 0
     weight[lesser] /= 1.0 + (u * u + v * v + w * w) / sliding**2
     return local, points, rates
@@ -159,7 +185,13 @@ def in_torso(points: Array, rotations: Array, moved: Array, waist: Array) -> tup
         moved: (2, 3) by how much each moved, axes of its foot [m].
         waist: (3, 3) rotation of the torso in base_link.
     """
-    shift = np.empty((2, 3))
+    centres, shift, foot = np.zeros((2, 3)), np.zeros((2, 3)), np.empty(3)
     for k in range(2):
-        shift[k] = rotations[k] @ moved[k]
-    return points @ waist, shift @ waist
+        R = rotations[k]
+        for i in range(3):
+            foot[i] = R[i, 0] * moved[k, 0] + R[i, 1] * moved[k, 1] + R[i, 2] * moved[k, 2]
+        for i in range(3):
+            for j in range(3):
+                centres[k, i] += points[k, j] * waist[j, i]
+                shift[k, i] += foot[j] * waist[j, i]
+    return centres, shift

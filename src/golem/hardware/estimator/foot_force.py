@@ -14,15 +14,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
-from golem.hardware.estimator import feet_kernel
-from golem.robots.model.leg_dynamics import LEG, LegDynamics
-from golem.types import LEGS, Array, LowState
+from golem.hardware.estimator.feet_kernel import wrenches
+from golem.native import Record
+from golem.robots.model.leg_kernel import LEG
+from golem.types import Array
 
 
 @dataclass(frozen=True, slots=True)
 class FootForceConfig:
-    """Options of `FootForce`.
+    """Options of `foot_wrenches`.
 
     Attributes:
         lag: time constant of the low-pass [s].
@@ -35,38 +37,42 @@ class FootForceConfig:
     damping: float = 0.01
     foot: float = 0.1
 
+    def floor(self) -> Array:
+        """Return the (6,) squared damping of forces and moments."""
+        return np.repeat([self.damping, self.damping / self.foot], 3) ** 2
 
-class FootForce:
-    """The wrenches under both feet of one robot."""
 
-    def __init__(self, config: FootForceConfig) -> None:
-        """Start with nothing known."""
-        self.config = config
-        moment = config.damping / config.foot
-        self._floor: Array = np.repeat([config.damping, moment], 3) ** 2
-        self._torque: Array | None = None
-        self._momentum: Array = np.zeros((2, LEG))
+FOOT_FORCE = np.dtype(
+    [
+        ("lag", "f8"),
+        ("floor", "f8", (6,)),
+        ("torque", "f8", (2, LEG)),
+        ("momentum", "f8", (2, LEG)),
+        ("begun", "i8"),
+    ]
+)
+"""Options and memory of `foot_wrenches`; not `begun`, the next sample is taken as if nothing had moved before."""
 
-    def reset(self) -> None:
-        """Forget; the next sample is taken as if nothing had moved before."""
-        self._torque = None
 
-    def step(self, legs: LegDynamics, state: LowState, field: Array, dt: float) -> Array:
-        """Return the (2, 6) wrench on the left and the right foot: force [N], moment about the sole's centre [N m].
+@njit(cache=True, nogil=True)
+def foot_wrenches(m: Record, motion: Record, tau: Array, dt: float) -> Array:
+    """Return the (2, 6) wrench on the left and the right foot: force [N], moment about the sole's centre [N m].
 
-        Args:
-            legs: updated with the joints of `state`; the wrench has its axes, those of base_link.
-            state: its torques are used.
-            field: (3,) gravity in base_link [m/s^2].
-            dt: time since the previous sample [s].
-        """
-        torque = legs.gravity(state.q[LEGS], field) - state.tau[LEGS].reshape(2, LEG)
-        if self._torque is None:
-            self._torque, self._momentum = torque, legs.momentum
-        lag = self.config.lag
-        share = dt / (lag + dt)
-        self._torque = self._torque + share * (torque - self._torque)
-        self._momentum = self._momentum + share * (legs.momentum - self._momentum)
-        external = self._torque + (legs.momentum - self._momentum) / lag
-        # Least squares, damped: J J^T w = J tau.
-        return feet_kernel.wrenches(legs.jacobians, external, self._floor)
+    Args:
+        m: a `FOOT_FORCE`.
+        motion: of the legs at this sample, a `LEG_MOTION`; the wrench has its axes, those of base_link.
+        tau: of all motors [N m]; the legs are the first twelve.
+        dt: time since the previous sample [s].
+    """
+    share, external = dt / (m.lag + dt), np.empty((2, LEG))
+    for k in range(2):
+        for i in range(LEG):
+            torque, momentum = motion.gravity[k, i] - tau[LEG * k + i], motion.momentum[k, i]
+            if not m.begun:
+                m.torque[k, i], m.momentum[k, i] = torque, momentum
+            m.torque[k, i] += share * (torque - m.torque[k, i])
+            m.momentum[k, i] += share * (momentum - m.momentum[k, i])
+            external[k, i] = m.torque[k, i] + (momentum - m.momentum[k, i]) / m.lag
+    m.begun = 1
+    # Least squares, damped: J J^T w = J tau.
+    return wrenches(motion.jacobians, external, m.floor)

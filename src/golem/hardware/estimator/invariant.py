@@ -13,10 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from golem.hardware.estimator import invariant_kernel
 from golem.hardware.estimator.invariant_kernel import SIZE
+from golem.native import Record, Records, new_record
 from golem.robots.model.spatial import skew
 from golem.types import Array
 
@@ -63,42 +65,84 @@ class InvariantConfig:
     acc_bias: float = 0.1
 
 
+INVARIANT = np.dtype(
+    [
+        ("R", "f8", (3, 3)),
+        ("x", "f8", (4, 3)),
+        ("bias", "f8", (2, 3)),
+        ("P", "f8", (SIZE, SIZE)),
+        ("planted", "i8", (2,)),
+        ("noise", "f8", (2,)),
+        ("wander", "f8", (SIZE,)),
+        ("contact_noise", "f8"),
+        ("numbers", "f8", (6,)),
+    ]
+)
+"""State and options of the filter; see `InvariantFilter`."""
+
+
+@njit(cache=True, nogil=True)
+def predict(m: Record, gyro: Array, acc: Array, weight: Array, dt: float) -> None:
+    """Advance the `INVARIANT` `m` by one IMU sample; see `InvariantFilter.predict`."""
+    contact = np.empty(2)
+    for k in range(2):
+        contact[k] = m.contact_noise / max(weight[k], m.numbers[0])
+    invariant_kernel.predict(m.R, m.x, m.bias, m.P, m.noise, m.wander, contact, gyro, acc, dt)
+
+
+@njit(cache=True, nogil=True)
+def update(
+    m: Record, points: Array, weight: Array, shift: Array, heading: float, hanging: bool
+) -> NDArray[np.bool_]:
+    """Fuse where the feet are seen into the `INVARIANT` `m`; see `InvariantFilter.update`."""
+    return invariant_kernel.update(
+        m.R, m.x, m.bias, m.P, m.planted, points, weight, shift, heading, hanging, m.numbers
+    )
+
+
 class InvariantFilter:
     """The filter.
 
     Attributes:
         config: its noise.
+        memory: all it knows; the next five are views of it.
         R: (3, 3) rotation of the IMU in odom.
         x: (4, 3) velocity of the IMU, its position, the left and the right contact point, in odom [m/s], [m].
         bias: (2, 3) of the gyro [rad/s] and the accelerometer [m/s^2], in the IMU's axes.
         P: (21, 21) covariance of the invariant error.
-        planted: whether the left and the right contact point are in use.
+        planted: (2,) whether the left and the right contact point are in use, 0 or 1.
     """
 
-    def __init__(self, config: InvariantConfig) -> None:
-        """Begin at the origin of odom."""
+    def __init__(self, config: InvariantConfig, memory: Records | None = None) -> None:
+        """Begin at the origin of odom, in `memory`, an `INVARIANT`, or in one of its own."""
         self.config = config
+        self.memory = memory = new_record(INVARIANT) if memory is None else memory
+        c = config
+        memory["noise"] = c.gyro_noise**2, c.acc_noise**2
+        memory["wander"][0, _GYRO], memory["wander"][0, _ACC] = c.gyro_walk**2, c.acc_walk**2
+        memory["contact_noise"] = c.contact_noise**2
+        memory["numbers"] = (
+            c.min_weight, c.foot_noise**2, c.heading_noise**2, c.rest_noise**2, c.gate, c.reject
+        )  # fmt: skip
+        self.R: Array = memory["R"][0]
+        self.x: Array = memory["x"][0]
+        self.bias: Array = memory["bias"][0]
+        self.P: Array = memory["P"][0]
+        self.planted: NDArray[np.int64] = memory["planted"][0]
         self.reset(np.eye(3), np.zeros(3))
 
     def reset(self, R: Array, p: Array) -> None:
         """Begin at rest, with the IMU's rotation `R` (3, 3) and position `p` (3,) [m] in odom, feet in the air."""
         c = self.config
-        self.R: Array = R.copy()
-        self.x: Array = np.zeros((4, 3))
+        self.R[:], self.x[:], self.bias[:], self.planted[:] = R, 0.0, 0.0, 0
         self.x[1] = p
-        self.bias: Array = np.zeros((2, 3))
         spread = np.zeros(SIZE)
         spread[:_HEADING], spread[_V] = c.tilt, c.velocity
         spread[_GYRO], spread[_ACC] = c.gyro_bias, c.acc_bias
         # An invariant error of the rotation turns about the origin of odom, and moves what is away from it.
-        self.P: Array = np.diag(spread**2)
         lever = np.eye(SIZE)
         lever[_P, _ROTATION] = skew(p)
-        self.P = lever @ self.P @ lever.T
-        self.planted: NDArray[np.bool_] = np.zeros(2, np.bool_)
-        self._noise: Array = np.array([c.gyro_noise**2, c.acc_noise**2])
-        self._wander: Array = np.zeros(SIZE)
-        self._wander[_GYRO], self._wander[_ACC] = c.gyro_walk**2, c.acc_walk**2
+        self.P[:] = lever @ np.diag(spread**2) @ lever.T
 
     def predict(self, gyro: Array, acc: Array, weight: Array, dt: float) -> None:
         """Advance by one IMU sample.
@@ -109,11 +153,7 @@ class InvariantFilter:
             weight: (2,) how far each foot is to be believed to stand still.
             dt: time since the previous sample [s].
         """
-        c = self.config
-        contact = c.contact_noise**2 / np.maximum(weight, c.min_weight)
-        invariant_kernel.predict(
-            self.R, self.x, self.bias, self.P, self._noise, self._wander, contact, gyro, acc, dt
-        )
+        predict(self.memory[0], gyro, acc, weight, dt)
 
     def update(
         self, points: Array, weight: Array, shift: Array, heading: float, hanging: bool
@@ -131,20 +171,4 @@ class InvariantFilter:
         Returns:
             (2,) which feet were believed.
         """
-        c = self.config
-        numbers = np.array(
-            [c.min_weight, c.foot_noise**2, c.heading_noise**2, c.rest_noise**2, c.gate, c.reject]
-        )
-        return invariant_kernel.update(
-            self.R,
-            self.x,
-            self.bias,
-            self.P,
-            self.planted,
-            points,
-            weight,
-            shift,
-            heading,
-            hanging,
-            numbers,
-        )
+        return update(self.memory[0], points, weight, shift, heading, hanging)

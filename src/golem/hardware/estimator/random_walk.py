@@ -13,8 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
+from golem.native import Record, Records
 from golem.robots.model.spatial import skew
 from golem.types import Array
 
@@ -59,62 +61,92 @@ def base_velocity(R: Array, omega: Array, soles: Array, rates: Array) -> Array:
     return -(turning + rates) @ R.swapaxes(-1, -2)
 
 
-def fuse(
-    config: RandomWalkConfig, velocity: Array, variance: Array, measured: Array, weight: Array, dt: float
-) -> tuple[Array, Array, Array]:
-    """Predict by `dt` and fuse what the feet measure; leading axes are robots.
+FILTER = np.dtype([("options", "f8", (5,)), ("velocity", "f8", (3,)), ("variance", "f8"), ("unmeasured", "f8")])
+"""Options, see `filter_options`, and memory of `fuse`, of one robot."""
+
+
+def filter_options(config: RandomWalkConfig) -> Array:
+    """Return the (5,) numbers of `config` that `fuse` takes."""
+    return np.array([config.walk, config.foot_noise, config.min_weight, config.gate, config.reject])
+
+
+@njit(cache=True, nogil=True)
+def fuse(m: Record, measured: Array, weight: Array, dt: float) -> Array:
+    """Predict by `dt` [s] and fuse what the feet measure.
 
     Args:
-        config: noise and gates.
-        velocity: (..., 3) previous estimate [m/s].
-        variance: (...) its variance per axis [m^2/s^2].
-        measured: (..., 2, 3) the velocity that each foot implies, from `base_velocity` [m/s].
-        weight: (..., 2) how far each foot is to be believed, 0 to 1, from `contact.Contact`.
+        m: the memory of one robot, a `FILTER`.
+        measured: (2, 3) the velocity that each foot implies, see `base_velocity` [m/s].
+        weight: (2,) how far each foot is to be believed, 0 to 1, from `contact.Contact`.
         dt: time since the previous estimate [s].
 
     Returns:
-        velocity (..., 3), variance (...), and information (..., 2): what each foot contributed [s^2/m^2], 0 for one
-        that was left out.
+        (2,) what each foot contributed [s^2/m^2], 0 for one that was left out.
     """
-    prior = variance + config.walk**2 * dt
-    innovation = measured - velocity[..., None, :]
-    noise = config.foot_noise**2 / np.maximum(weight, config.min_weight)
-    distance = (innovation * innovation).sum(axis=-1) / (prior[..., None] + noise)
-    believed = (weight >= config.min_weight) & (distance <= config.reject)
-    information = believed / (noise * np.maximum(distance / config.gate, 1.0))
-    posterior = prior / (1.0 + prior * information.sum(axis=-1))
-    step = (information[..., None] * innovation).sum(axis=-2)
-    return velocity + posterior[..., None] * step, posterior, information
+    walk, foot_noise, min_weight = m.options[0], m.options[1], m.options[2]
+    gate, reject = m.options[3], m.options[4]
+    prior = m.variance + walk * walk * dt
+    information, step, total = np.empty(2), np.empty((2, 3)), 0.0
+    for k in range(2):
+        square = 0.0
+        for a in range(3):
+            step[k, a] = measured[k, a] - m.velocity[a]
+            square += step[k, a] * step[k, a]
+        noise = foot_noise * foot_noise / max(weight[k], min_weight)
+        distance = square / (prior + noise)
+        believed = weight[k] >= min_weight and distance <= reject
+        grown = noise if distance <= gate else noise * distance / gate
+        information[k] = (1.0 if believed else 0.0) / grown
+        total += information[k]
+    m.variance = prior / (1.0 + prior * total)
+    for a in range(3):
+        m.velocity[a] += m.variance * (information[0] * step[0, a] + information[1] * step[1, a])
+    m.unmeasured = 0.0 if total > 0.0 else m.unmeasured + dt
+    return information
+
+
+@njit(cache=True, nogil=True)
+def _fuse_all(memories: Records, measured: Array, weight: Array, dt: float) -> None:
+    for i in range(len(memories)):
+        fuse(memories[i], measured[i], weight[i], dt)
 
 
 class RandomWalk:
-    """`fuse` with its memory, for `shape` robots.
+    """`fuse` for `shape` robots.
 
     Attributes:
         config: noise and gates.
-        velocity: (*shape, 3) estimate [m/s].
-        variance: (*shape,) its variance per axis [m^2/s^2].
-        unmeasured: (*shape,) time since a foot was last believed [s].
     """
 
     def __init__(self, config: RandomWalkConfig, shape: tuple[int, ...] = ()) -> None:
         """Begin at rest."""
         self.config = config
-        self.velocity: Array = np.zeros((*shape, 3))
-        self.variance: Array = np.full(shape, config.start**2)
-        self.unmeasured: Array = np.zeros(shape)
+        self._memory = np.zeros(shape, FILTER)
+        self._memory["options"] = filter_options(config)
+        self._memory["variance"] = config.start**2
+
+    @property
+    def velocity(self) -> Array:
+        """(*shape, 3) estimate [m/s]."""
+        return self._memory["velocity"].copy()
+
+    @property
+    def variance(self) -> Array:
+        """(*shape,) its variance per axis [m^2/s^2]."""
+        return self._memory["variance"].copy()
+
+    @property
+    def unmeasured(self) -> Array:
+        """(*shape,) time since a foot was last believed [s]."""
+        return self._memory["unmeasured"].copy()
 
     def reset(self, where: NDArray[np.bool_] | None = None) -> None:
         """Put the robots `where` (*shape,) back to rest; None is all."""
-        chosen = np.ones_like(self.variance, dtype=bool) if where is None else where
-        self.velocity = np.where(chosen[..., None], 0.0, self.velocity)
-        self.variance = np.where(chosen, self.config.start**2, self.variance)
-        self.unmeasured = np.where(chosen, 0.0, self.unmeasured)
+        chosen = ... if where is None else where
+        for name, value in (("velocity", 0.0), ("variance", self.config.start**2), ("unmeasured", 0.0)):
+            self._memory[name][chosen] = value
 
     def step(self, measured: Array, weight: Array, dt: float) -> Array:
         """Advance by `dt` [s] with `measured` (*shape, 2, 3) and `weight` (*shape, 2); return `velocity`."""
-        self.velocity, self.variance, information = fuse(
-            self.config, self.velocity, self.variance, measured, weight, dt
-        )
-        self.unmeasured = np.where(information.any(axis=-1), 0.0, self.unmeasured + dt)
+        _fuse_all(self._memory.reshape(-1), measured.reshape(-1, 2, 3), weight.reshape(-1, 2), dt)
         return self.velocity

@@ -2,29 +2,59 @@
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
 import numpy as np
+from numba import cfunc, njit
 
-from golem.finite import check_finite
-from golem.hardware.estimator.attitude import Attitude
-from golem.types import BaseEstimate, LowState
+from golem.hardware.estimator.attitude import Attitude, base_rotation
+from golem.finite import finite_state
+from golem.hardware.estimator.compiled import CompiledEstimator
+from golem.native import ORDINARY, STAGE, UNUSUAL, Record, Stage, new_record, shared, view
+from golem.robots.model.imu_mount import TORSO
+from golem.types import LowState
+
+TETHER = np.dtype([("heading", "f8")])
+"""Memory of the estimator."""
+_memory_at = view(TETHER)
 
 
-class TetherEstimator:
+@njit(cache=True, nogil=True)
+def tether(r: Record, m: Record) -> None:
+    """Write the pose of a base that hangs into the shared record `r`; `m` is a `TETHER`."""
+    T = r.T_odom_base
+    base_rotation(r.quat, r.q[TORSO], m.heading, T)
+    for a in range(3):
+        T[a, 3] = T[3, a] = 0.0
+    T[3, 3] = 1.0
+    r.base_t = r.state_t
+
+
+def _step(record: int, memory: int) -> int:
+    r = shared(record)
+    if not finite_state(r):
+        return UNUSUAL
+    tether(r, _memory_at(memory))
+    return ORDINARY
+
+
+@cache
+def _code() -> Any:
+    return cfunc(STAGE, cache=True)(_step)
+
+
+class TetherEstimator(CompiledEstimator):
     """Position fixed at the origin of odom, orientation from the IMU with the torso's yaw undone. Never stale."""
 
     requires = ("hoist",)
 
     def __init__(self) -> None:
         """Start without a heading."""
-        self._attitude = Attitude()
+        super().__init__(Stage(_code(), new_record(TETHER)))
 
     def reset(self, state: LowState) -> None:
         """Take the present heading of base_link as zero."""
-        self._attitude.reset(state)
-
-    def step(self, state: LowState, dt: float) -> BaseEstimate:
-        """Return the pose; see `BaseEstimator`."""
-        check_finite("the IMU's quaternion", state.imu.quat)
-        T = np.eye(4)
-        T[:3, :3] = self._attitude.rotation(state)
-        return BaseEstimate(state.t, T)
+        attitude = Attitude()
+        attitude.reset(state)
+        self.stage.memory["heading"] = attitude.heading

@@ -16,15 +16,24 @@ knows: where it gives one, the servo adds nothing of its own to the legs and lea
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import cfunc, njit
 
-from golem.finite import check_finite, check_measured
+from golem.finite import check_finite, check_measured, finite_state
 from golem.hardware.safety.base import SafetyLimits
-from golem.hardware.servo.gains import default_gains
-from golem.hardware.servo.gravity import Gravity
+from golem.hardware.servo.gains import Gains, default_gains
+from golem.hardware.servo.gravity import body_tree, gravity_in_base
+from golem.native import ORDINARY, STAGE, UNUSUAL, Record, Stage, new_record, new_shared, shared, view
+from golem.native_messages import command_of, put_legs, put_state
+from golem.robots.model.imu_mount import TORSO
+from golem.robots.model.leg_kernel import tree_dtype, tree_gravity
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand, LowState
+
+
+_LEGS = LEGS.stop
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +60,93 @@ class ServoConfig:
     hands: bool = True
 
 
+SERVO = np.dtype(
+    [
+        ("tree", tree_dtype(NUM_JOINTS)),
+        ("gains", "f8", (4, NUM_JOINTS)),
+        ("torque", "f8", (NUM_JOINTS,)),
+        ("ramp", "f8"),
+        ("steady_error", "f8"),
+        ("steady_speed", "f8"),
+        ("integral", "i8"),
+        ("bias", "f8", (NUM_JOINTS,)),
+        ("elapsed", "f8"),
+    ]
+)
+"""Model, gains (rows kp, kd, ki, bound of the bias), options and memory of the servo."""
+_memory_at = view(SERVO)
+
+
+@njit(cache=True, nogil=True)
+def servo(r: Record, m: Record) -> None:
+    """Write the command that state and targets of the shared record `r` ask for into it; `m` is a `SERVO`."""
+    field, gravity = np.empty(3), np.empty(NUM_JOINTS)
+    gravity_in_base(r.quat, r.q[TORSO], field)
+    tree_gravity(m.tree, r.q, field, gravity)
+    if not r.moving:
+        m.elapsed = 0.0
+        for i in range(NUM_JOINTS):
+            m.bias[i] = 0.0
+    m.elapsed += r.dt
+    for i in range(NUM_JOINTS):
+        leg = i < _LEGS
+        at, dq, kp, kd = r.q[i], r.dq[i], m.gains[0, i], m.gains[1, i]
+        # A half that has not spoken yet stays where it is.
+        goal = at
+        if leg and r.has_legs:
+            goal = r.leg_q[i]
+        elif not leg and r.has_arms:
+            goal = r.arm_q[i - _LEGS]
+        if leg and r.has_leg_gains:
+            kp, kd = r.leg_kp[i], r.leg_kd[i]
+        if m.elapsed < m.ramp:
+            if not (leg and r.has_leg_tau):
+                kp *= m.elapsed / m.ramp
+        elif m.integral:
+            error = goal - at
+            predicted = kp * error - kd * dq + gravity[i] + m.bias[i]
+            if abs(error) < m.steady_error and abs(dq) < m.steady_speed:
+                # Of joints that rest near their target and whose torque has room.
+                if not (abs(predicted) >= m.torque[i] and predicted * error > 0.0):
+                    bound = m.gains[3, i]
+                    m.bias[i] = min(max(m.bias[i] + m.gains[2, i] * r.dt * error, -bound), bound)
+        r.request[i] = goal
+        r.request[NUM_JOINTS + i] = 0.0
+        r.request[2 * NUM_JOINTS + i] = r.leg_tau[i] if leg and r.has_leg_tau else gravity[i] + m.bias[i]
+        r.request[3 * NUM_JOINTS + i] = kp
+        r.request[4 * NUM_JOINTS + i] = kd
+    r.request_t = r.state_t
+
+
+@njit(cache=True, nogil=True)
+def _finite_targets(r: Record) -> bool:
+    total = 0.0  # x - x is 0, or NaN
+    for i in range(_LEGS):
+        total += r.leg_q[i] - r.leg_q[i]
+    for i in range(NUM_JOINTS - _LEGS):
+        total += r.arm_q[i] - r.arm_q[i]
+    return total == 0.0
+
+
+def _step(record: int, memory: int) -> int:
+    r = shared(record)
+    if not (finite_state(r) and _finite_targets(r)):
+        return UNUSUAL
+    servo(r, _memory_at(memory))
+    return ORDINARY
+
+
+@cache
+def _code() -> Any:
+    return cfunc(STAGE, cache=True)(_step)
+
+
 class Servo:
     """The motor servo of all 27 joints.
 
     Attributes:
         config: its options.
+        stage: its compiled step; in a chain it is called without this class, with the same memory.
         gains: gains at full stiffness.
         bias: (27,) integral torque [N m].
     """
@@ -66,17 +157,23 @@ class Servo:
         Raises:
             ConfigError: the limit profile does not exist.
         """
-        self.config = config or ServoConfig()
-        self.gains = default_gains()
-        self.bias: Array = np.zeros(NUM_JOINTS)
-        self._torque = SafetyLimits.from_profile(self.config.limits).torque_command
-        self._gravity = Gravity(hands=self.config.hands)
-        self._elapsed = 0.0
+        self.config = c = config or ServoConfig()
+        self.stage = Stage(_code(), new_record(SERVO))
+        memory, gains = self.stage.memory, default_gains()
+        memory["tree"] = body_tree(c.hands)
+        memory["gains"] = gains.kp, gains.kd, gains.ki, gains.bias
+        memory["torque"] = SafetyLimits.from_profile(c.limits).torque_command
+        memory["ramp"], memory["integral"] = c.ramp, c.integral
+        memory["steady_error"], memory["steady_speed"] = c.steady_error, c.steady_speed
+        self.gains = Gains(*memory["gains"][0])
+        self.bias: Array = memory["bias"][0]
+        self._record = new_shared()
+        self._record["moving"] = self._record["has_legs"] = self._record["has_arms"] = 1
 
     def reset(self, state: LowState) -> None:
         """Start over: stiffness ramps up from zero and the bias is forgotten."""
-        self.bias = np.zeros(NUM_JOINTS)
-        self._elapsed = 0.0
+        self.bias[:] = 0.0
+        self.stage.memory["elapsed"] = 0.0
 
     def step(
         self,
@@ -89,53 +186,9 @@ class Servo:
         """Return the command of this tick; see `MotorServo.step`."""
         check_measured(state)
         check_finite("the targets", q_cmd)
-        self._elapsed += dt
-        kp, kd = self.gains.kp.copy(), self.gains.kd.copy()
-        if leg_gains is not None:
-            kp[LEGS], kd[LEGS] = leg_gains
-        gravity = self._gravity.torque(state.q, state.imu.quat)
-        if self._elapsed < self.config.ramp:
-            ramped = slice(None) if leg_tau is None else UPPER
-            kp[ramped] *= self._elapsed / self.config.ramp
-        elif self.config.integral:
-            error = q_cmd - state.q
-            self._integrate(error, state.dq, kp * error - kd * state.dq + gravity + self.bias, dt)
-        tau = gravity + self.bias
-        if leg_tau is not None:
-            tau[LEGS] = leg_tau
-        return LowCommand(t=state.t, q=q_cmd.copy(), dq=np.zeros(NUM_JOINTS), tau=tau, kp=kp, kd=kd)
-
-    def _integrate(self, error: Array, dq: Array, predicted: Array, dt: float) -> None:
-        c, gains = self.config, self.gains
-        self.bias = _integrated(
-            self.bias,
-            error,
-            dq,
-            predicted,
-            self._torque,
-            gains.bias,
-            gains.ki * dt,
-            c.steady_error,
-            c.steady_speed,
-        )
-
-
-@njit(cache=True, nogil=True)
-def _integrated(
-    bias: Array,
-    error: Array,
-    dq: Array,
-    predicted: Array,
-    torque: Array,
-    bound: Array,
-    gain: Array,
-    steady_error: float,
-    steady_speed: float,
-) -> Array:
-    """Return the bias (27,) after one step: of joints that rest near their target and whose torque has room."""
-    out = bias.copy()
-    for i in range(len(bias)):
-        steady = abs(error[i]) < steady_error and abs(dq[i]) < steady_speed
-        if steady and not (abs(predicted[i]) >= torque[i] and predicted[i] * error[i] > 0.0):
-            out[i] = min(max(bias[i] + gain[i] * error[i], -bound[i]), bound[i])
-    return out
+        record = self._record
+        put_state(record, state)
+        put_legs(record, q_cmd[LEGS], leg_gains, leg_tau)
+        record["arm_q"], record["dt"] = q_cmd[UPPER], dt
+        self.stage.run(record)
+        return command_of(record["request"][0], state.t)

@@ -27,16 +27,19 @@ def base_rate(gyro: Array, waist: Array, waist_rate: Array) -> Array:
     return np.stack([c * x - s * y, s * x + c * y, z - waist_rate], axis=-1)
 
 
+@njit(cache=True, nogil=True)
+def turn_to_base(gyro: Array, waist: float, waist_rate: float, out: Array) -> None:
+    """Write what `base_rate` returns of one sample into `out` (3,)."""
+    c, s = math.cos(waist), math.sin(waist)
+    x, y, z = gyro[0], gyro[1], gyro[2]
+    out[0], out[1], out[2] = c * x - s * y, s * x + c * y, z - waist_rate
+
+
 def sensed_base_rate(state: LowState) -> Array:
     """Return the (3,) angular rate of base_link in base_link as `state` measures it [rad/s]."""
-    return turned_rate(state.imu.gyro, float(state.q[TORSO]), float(state.dq[TORSO]))
-
-
-def turned_rate(gyro: Array, waist: float, waist_rate: float) -> Array:
-    """Return what `base_rate` does, of one sample; in a 500 Hz loop arrays of one cost more than the arithmetic."""
-    c, s = math.cos(waist), math.sin(waist)
-    x, y, z = gyro.tolist()
-    return np.array([c * x - s * y, s * x + c * y, z - waist_rate])
+    rate = np.empty(3)
+    turn_to_base(state.imu.gyro, float(state.q[TORSO]), float(state.dq[TORSO]), rate)
+    return rate
 
 
 @njit(cache=True, nogil=True)

@@ -1,21 +1,31 @@
 """The legs of one robot as seen from base_link: where the soles are, how they move, what the joints weigh there.
 
-Compiled (Pinocchio), for the 500 Hz loop of one robot; for many robots at once see `leg_kinematics`.
+Compiled, for the 500 Hz loop of one robot; for many robots at once see `leg_kinematics`.
 """
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pinocchio as pin
 
+from golem.native import Records, new_record
 from golem.robots.model import pinocchio_model
-from golem.robots.model.leg_kinematics import SOLE_CENTER
-from golem.robots.model.table import DOF, JOINT_NAMES
-from golem.types import LEGS, NUM_JOINTS, SIDES, Array
+from golem.robots.model.leg_kernel import LEG, LEG_MOTION, leg_motion, tree_of
+from golem.robots.model.table import JOINT_NAMES
+from golem.types import LEGS, NUM_JOINTS, Array
 
-LEG = 6
-"""Joints of one leg."""
-_NOTHING, _AT_REST = np.zeros(3), np.zeros(LEGS.stop)
+__all__ = ["LEG", "LegDynamics", "leg_tree"]
+_NOTHING = np.zeros(3)
+
+
+@cache
+def leg_tree() -> Records:
+    """Return the tree of the twelve leg joints, see `leg_kernel`; shared, not to be changed."""
+    whole = pinocchio_model.build(hands=False)
+    locked = [whole.getJointId(name) for name in JOINT_NAMES[LEGS.stop :]]
+    return tree_of(pin.buildReducedModel(whole, locked, np.zeros(NUM_JOINTS)))
 
 
 class LegDynamics:
@@ -33,37 +43,20 @@ class LegDynamics:
 
     def __init__(self) -> None:
         """Build the model of pelvis and legs."""
-        whole = pinocchio_model.build(hands=False)
-        locked = [whole.getJointId(name) for name in JOINT_NAMES[LEGS.stop :]]
-        self._model = pin.buildReducedModel(whole, locked, np.zeros(NUM_JOINTS))
-        self._model.armature = np.full(LEGS.stop, DOF.armature)
-        self._soles = []
-        for side in SIDES:
-            joint = self._model.getJointId(f"{side}_ankle_roll_joint")
-            frame = pin.Frame(f"{side}_sole", joint, pin.SE3(np.eye(3), SOLE_CENTER), pin.FrameType.OP_FRAME)
-            self._soles.append(self._model.addFrame(frame))
-        self._data = self._model.createData()
-        self.soles: Array = np.zeros((2, 3))
-        self.rotations: Array = np.zeros((2, 3, 3))
-        self.jacobians: Array = np.zeros((2, LEG, LEG))
-        self.twists: Array = np.zeros((2, LEG))
-        self.momentum: Array = np.zeros((2, LEG))
+        self._tree, out = leg_tree()[0], new_record(LEG_MOTION)
+        self._motion = out[0]
+        self.soles: Array = out["soles"][0]
+        self.rotations: Array = out["rotations"][0]
+        self.jacobians: Array = out["jacobians"][0]
+        self.twists: Array = out["twists"][0]
+        self.momentum: Array = out["momentum"][0]
 
     def update(self, q: Array, dq: Array) -> None:
         """Set the leg joints `q`, `dq` (12,) [rad], [rad/s]."""
-        model, data = self._model, self._data
-        pin.computeJointJacobians(model, data, q)
-        for k, frame in enumerate(self._soles):
-            placement = pin.updateFramePlacement(model, data, frame)
-            self.soles[k], self.rotations[k] = placement.translation, placement.rotation
-            jacobian = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-            self.jacobians[k] = jacobian[:, LEG * k : LEG * (k + 1)]
-        self.twists = (self.jacobians @ dq.reshape(2, LEG, 1))[..., 0]
-        # Inverse dynamics at rest and without weight: what dq would take as an acceleration.
-        model.gravity.linear = _NOTHING
-        self.momentum = pin.rnea(model, data, q, _AT_REST, dq).reshape(2, LEG)
+        leg_motion(self._tree, np.ascontiguousarray(q), np.ascontiguousarray(dq), _NOTHING, self._motion)
 
     def gravity(self, q: Array, field: Array) -> Array:
         """Return the (2, 6) torque that carries the legs' weight in the gravitational `field` (3,) [N m], [m/s^2]."""
-        self._model.gravity.linear = field
-        return pin.computeGeneralizedGravity(self._model, self._data, q).reshape(2, LEG)
+        motion = new_record(LEG_MOTION)[0]
+        leg_motion(self._tree, np.ascontiguousarray(q), np.zeros(LEGS.stop), field, motion)
+        return motion["gravity"]

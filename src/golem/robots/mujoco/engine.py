@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.interfaces.lidar import LidarImu, LidarScan
+from golem.native import Stage, address, new_record
 from golem.robots.model import magpie_model
 from golem.robots.model.imu_mount import torso_motion
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
@@ -24,6 +25,7 @@ from golem.robots.mujoco.lidar_sensor import LidarMoment, LidarSensor
 from golem.robots.mujoco.motors import Motors
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP, Scene, build_scene
 from golem.robots.mujoco.truth import Truth
+from golem.robots.mujoco.twin_stages import TWIN, act_code, delicate, put_simulation, sense_code
 from golem.robots.sensors.auto_exposure import AutoExposure
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import StereoDepth
@@ -36,8 +38,6 @@ from golem.types import LEGS, SIDES, UPPER, Array, HandCommand, HandState, Imu, 
 
 START_GAP = 0.060
 """Opening of the hands at the start of an episode [m]."""
-MOVING = 0.02
-"""Speed of a screw above which it counts as moving [m/s, rad/s]."""
 STILL = np.zeros(2)
 """Sway of a hoist that stands still [m]."""
 
@@ -96,26 +96,23 @@ class MujocoRobot:
             if self.config.world == "pack" and self.config.layout == "varied"
             else None
         )
-        self._imu_model = ImuModel(self.profile.imu, self._errors.imu, stream(seed, "imu"))
-        self._hoist = Hoist(model, hoist)
-        self._pushes = Pushes(model)
+        self._memory = memory = new_record(TWIN)
+        noise = stream(seed, "imu")
+        self._imu_model = ImuModel(self.profile.imu, self._errors.imu, noise, memory["imu"])
+        self._hoist = Hoist(model, hoist, memory["hoist"])
+        self._pushes = Pushes(model, memory["pushes"])
         self._motors = Motors(
             model,
             load_limits(self.config.torque_profile).torque,
             self._errors.joint_offset,
             self.profile.actuator_delay + self.config.latency,
+            memory["motors"],
         )
         self._rig: CameraRig | None = None
         self._seed = seed
         self._lidar: LidarSensor | None = None
 
-        self._hands = {side: HandServos(model, side) for side in SIDES}
-        self._fingers = np.array(
-            [model.body(f"{s}_{f}_finger").id for s in SIDES for f in magpie_model.FINGERS]
-        )
-        self._screws = np.array([model.body(name).id for name in self.scene.names.screws], dtype=int)
-        first = np.array([model.joint(name).dofadr[0] for name in self.scene.names.screws], dtype=int)
-        self._screw_v = (first[:, None] + np.arange(6)).ravel()
+        self._hands = {side: HandServos(model, side, memory[side]) for side in SIDES}
         self._acc = _sensor(model, "imu_acc")
 
         mujoco.mj_resetData(model, self.data)
@@ -128,6 +125,34 @@ class MujocoRobot:
         self.scene.move_people(self.data)
         mujoco.mj_forward(model, self.data)
         self.truth = Truth(model, self.data)
+        self._put_world()
+
+    def _put_world(self) -> None:
+        """Write into the memory of the stages what the world is like, and where it is."""
+        memory, model, names = self._memory, self._model, self.scene.names.screws
+        put_simulation(memory, model, self.data)
+        memory["base_q"], memory["base_v"] = self._base.qposadr[0], self._base.dofadr[0]
+        memory["acc"], memory["near"] = self._acc.start, self.config.near
+        memory["fingers"] = [model.body(f"{s}_{f}_finger").id for s in SIDES for f in magpie_model.FINGERS]
+        first = np.array([model.joint(name).dofadr[0] for name in names], dtype=np.int64)
+        # Kept: the stages know their address only.
+        self._screws = np.array([model.body(name).id for name in names], dtype=np.int64)
+        self._screw_v: NDArray[np.int64] = (first[:, None] + np.arange(6)).ravel()
+        memory["screws"] = len(self._screws)
+        memory["screw_bodies"], memory["screw_speeds"] = address(self._screws), address(self._screw_v)
+        sway, seal = self._errors.hoist_sway, self.scene.seal
+        if self.config.support == "hoist":
+            memory["sway"], memory["sway_amplitude"] = (sway.omega, sway.phase), sway.amplitude
+        if seal is not None:
+            memory["sealed"], memory["seal_q"], memory["seal_v"] = 1, seal.qpos, seal.dof
+            memory["seal_torque"] = seal.torque
+
+    def native(self, joint_offset: Array | None) -> tuple[Stage, Stage] | None:
+        """Return the compiled stages that sense and act; see `HasStages`. None where the world needs Python."""
+        if self.scene.people or type(self)._step is not MujocoRobot._step:
+            return None
+        self._memory["joint_offset"] = 0.0 if joint_offset is None else joint_offset
+        return Stage(sense_code(), self._memory), Stage(act_code(), self._memory)
 
     @classmethod
     def on_feet(cls, options: Mapping[str, object]) -> bool:
@@ -174,7 +199,8 @@ class MujocoRobot:
 
     def advance(self, command: LowCommand, hands: dict[Side, HandCommand], dt: float) -> None:
         """Let time pass; see `Robot`."""
-        step = FINE_STEP if self._delicate() else COARSE_STEP
+        self._memory["fine"] = fine = delicate(self._memory[0])
+        step = FINE_STEP if fine else COARSE_STEP
         self._model.opt.timestep = step
         for side, hand in hands.items():
             self._hands[side].command(hand, dt)
@@ -191,6 +217,7 @@ class MujocoRobot:
             if self.scene.seal is not None:
                 self.scene.seal.apply(self.data)
             self._step()
+        self._memory["time"] = self.data.time
 
     def _step(self) -> None:
         """Advance the physics by one step under the torques and wrenches of `data`."""
@@ -246,6 +273,7 @@ class MujocoRobot:
     def restore_state(self, save_state: bytes) -> None:
         """Be in the moment of `snapshot`; see `Restorable`."""
         mujoco.mj_setState(self._model, self.data, np.frombuffer(save_state), _MOMENT)
+        self._memory["time"] = self.data.time
 
     def close(self) -> None:
         """Release the rendering context and the LiDAR."""
@@ -255,16 +283,6 @@ class MujocoRobot:
         if self._lidar is not None:
             self._lidar.close()
             self._lidar = None
-
-    def _delicate(self) -> bool:
-        """Return whether a screw moves, or a finger is so close that it may touch one."""
-        if not len(self._screws):
-            return False
-        speeds = self.data.qvel.take(self._screw_v)
-        if max(speeds.max(), -speeds.min()) > MOVING:
-            return True
-        gaps = self.data.xpos[self._fingers, None] - self.data.xpos[None, self._screws]
-        return bool((gaps * gaps).sum(axis=2).min() < self.config.near**2)
 
 
 def _hanging(posture: Array) -> Array:

@@ -6,9 +6,11 @@ import math
 
 import mujoco
 import numpy as np
+from numba import njit
 
+from golem.native import Record, Records, address, floats, new_record
 from golem.robots.model import magpie_model
-from golem.types import HandCommand, HandState, Side
+from golem.types import Array, HandCommand, HandState, Side
 
 SERVO_KP = 8.0
 """Stiffness of a finger servo [N m/rad]: full torque at 5 deg of lag, the order of the AX-12A's compliance slope 32."""
@@ -20,69 +22,116 @@ OVERTRAVEL = 0.20
 goal beyond the object both servos press with their full torque wherever between the fingers it stands."""
 
 
+HAND = np.dtype(
+    [
+        ("q", "i8", (2,)),
+        ("v", "i8", (2,)),
+        ("u", "i8", (2,)),
+        ("sign", "f8", (2,)),
+        ("commanded", "i8"),
+        ("gap", "f8"),
+        ("goal", "f8"),
+        ("force", "f8"),
+        ("reference", "f8"),
+    ]
+)
+"""Indices, signs and memory of the servos of one hand; angles of the cranks are positive when closing [rad]."""
+
+
+@njit(cache=True, nogil=True)
+def move_reference(h: Record, dt: float) -> None:
+    """Let the reference move towards its goal for `dt` [s]."""
+    reach = magpie_model.MAX_SPEED * dt
+    h.reference += min(max(h.goal - h.reference, -reach), reach)
+
+
+@njit(cache=True, nogil=True)
+def drive_hand(h: Record, qpos: int, qvel: int, ctrl: int) -> None:
+    """Set the crank torques for one physics step; arrays of the simulation by address."""
+    q, v, out = floats(qpos), floats(qvel), floats(ctrl)
+    for k in range(2):
+        sign = h.sign[k]
+        theta = sign * q[h.q[k]]
+        ceiling = h.force * magpie_model.ARM * math.sin(magpie_model.ANGLE_OPEN + theta)
+        torque = SERVO_KP * (h.reference - theta) - SERVO_KD * sign * v[h.v[k]]
+        out[h.u[k]] = sign * min(max(torque, -ceiling), ceiling)
+
+
+@njit(cache=True, nogil=True)
+def read_hand(h: Record, qpos: int, ctrl: int, crank: Array, tau: Array) -> None:
+    """Write angles [rad] and torques [N m] of both cranks, (2,) each, positive when closing."""
+    q, u = floats(qpos), floats(ctrl)
+    for k in range(2):
+        crank[k], tau[k] = h.sign[k] * q[h.q[k]], h.sign[k] * u[h.u[k]]
+
+
+def hand_state(t: float, crank: Array, tau: Array) -> HandState:
+    """Return what a hand reports at time `t` [s], from what `read_hand` wrote."""
+    fingers: list[float] = []
+    force: list[float] = []
+    for theta, torque in zip(crank.tolist(), tau.tolist(), strict=True):
+        fingers.append(float(magpie_model.pad_offset(theta)))
+        lever = magpie_model.ARM * math.sin(magpie_model.ANGLE_OPEN + theta)
+        force.append(max(torque, 0.0) / lever)
+    return HandState(t, sum(fingers), np.array(fingers), np.array(force))
+
+
 class HandServos:
     """Drives the cranks of one hand.
 
     The reference runs ahead at the servo's speed whether or not the finger follows; the torque ceiling is what
     limits the force.
+
+    Attributes:
+        memory: a `HAND`.
     """
 
-    def __init__(self, model: mujoco.MjModel, side: Side) -> None:
-        """Find the cranks and fingers of the hand on `side`."""
+    def __init__(self, model: mujoco.MjModel, side: Side, memory: Records | None = None) -> None:
+        """Find cranks and fingers of the hand on `side`; `memory`, a `HAND`, None for one of its own."""
         names = [magpie_model.finger_names(side, finger) for finger in magpie_model.FINGERS]
         cranks = [model.joint(crank) for crank, _, _ in names]
-        self._q = [int(j.qposadr[0]) for j in cranks]
-        self._v = [int(j.dofadr[0]) for j in cranks]
         self._q_finger = [int(model.joint(finger).qposadr[0]) for _, finger, _ in names]
-        self._u = [int(model.actuator(crank).id) for crank, _, _ in names]
+        self.memory = memory = new_record(HAND) if memory is None else memory
+        memory["q"] = [int(j.qposadr[0]) for j in cranks]
+        memory["v"] = [int(j.dofadr[0]) for j in cranks]
+        memory["u"] = [int(model.actuator(crank).id) for crank, _, _ in names]
         # The hinges may be counted in opposite senses; here both cranks count positive when closing.
-        self._sign = [1.0 if j.range.sum() > 0 else -1.0 for j in cranks]
-        self._reference = 0.0
-        self._force = magpie_model.MIN_FORCE
-        self._gap = math.nan
-        self._goal = 0.0
+        memory["sign"] = [1.0 if j.range.sum() > 0 else -1.0 for j in cranks]
+        memory["force"], memory["gap"] = magpie_model.MIN_FORCE, math.nan
 
     def reset(self, data: mujoco.MjData, gap: float) -> None:
         """Place both fingers at an opening of `gap` [m]."""
-        self._reference = float(magpie_model.crank_from_gap(gap))
-        for q, q_finger, sign in zip(self._q, self._q_finger, self._sign, strict=True):
-            data.qpos[q] = sign * self._reference
-            data.qpos[q_finger] = -sign * self._reference
+        row = self.memory[0]
+        row["reference"] = reference = float(magpie_model.crank_from_gap(gap))
+        for q, q_finger, sign in zip(row["q"], self._q_finger, row["sign"], strict=True):
+            data.qpos[q] = sign * reference
+            data.qpos[q_finger] = -sign * reference
 
-    def command(self, command: HandCommand, dt: float) -> None:
-        """Let the reference move towards the commanded gap for `dt` [s]."""
-        if command.gap != self._gap:
-            self._gap = command.gap
+    def take(self, command: HandCommand) -> None:
+        """Take a command; the reference moves towards its gap while time passes."""
+        row = self.memory[0]
+        if command.gap != row["gap"]:
+            row["gap"] = command.gap
             closes = command.gap <= 0.0
-            self._goal = (
+            row["goal"] = (
                 magpie_model.CLOSED + OVERTRAVEL
                 if closes
                 else float(magpie_model.crank_from_gap(command.gap))
             )
-        reach = magpie_model.MAX_SPEED * dt
-        self._reference += min(max(self._goal - self._reference, -reach), reach)
-        self._force = min(max(command.force, magpie_model.MIN_FORCE), magpie_model.MAX_FORCE)
+        row["force"] = min(max(command.force, magpie_model.MIN_FORCE), magpie_model.MAX_FORCE)
+        row["commanded"] = 1
 
-    # Scalars below: this runs at every physics step, where arrays of two cost more than the arithmetic.
+    def command(self, command: HandCommand, dt: float) -> None:
+        """Let the reference move towards the commanded gap for `dt` [s]."""
+        self.take(command)
+        move_reference(self.memory[0], dt)
 
     def drive(self, data: mujoco.MjData) -> None:
         """Set the crank torques for one physics step."""
-        qpos, qvel, ctrl = data.qpos, data.qvel, data.ctrl
-        for q, v, u, sign in zip(self._q, self._v, self._u, self._sign, strict=True):
-            theta = sign * qpos.item(q)
-            ceiling = self._force * magpie_model.ARM * math.sin(magpie_model.ANGLE_OPEN + theta)
-            torque = SERVO_KP * (self._reference - theta) - SERVO_KD * sign * qvel.item(v)
-            ctrl[u] = sign * min(max(torque, -ceiling), ceiling)
+        drive_hand(self.memory[0], address(data.qpos), address(data.qvel), address(data.ctrl))
 
     def read(self, data: mujoco.MjData, t: float) -> HandState:
         """Return the hand's report at time `t` [s]: the servos' present positions and loads."""
-        qpos, ctrl = data.qpos, data.ctrl
-        fingers: list[float] = []
-        force: list[float] = []
-        for q, u, sign in zip(self._q, self._u, self._sign, strict=True):
-            theta = sign * qpos.item(q)
-            fingers.append(float(magpie_model.pad_offset(theta)))
-            force.append(
-                max(sign * ctrl.item(u), 0.0) / (magpie_model.ARM * math.sin(magpie_model.ANGLE_OPEN + theta))
-            )
-        return HandState(t, sum(fingers), np.array(fingers), np.array(force))
+        crank, tau = np.empty(2), np.empty(2)
+        read_hand(self.memory[0], address(data.qpos), address(data.ctrl), crank, tau)
+        return hand_state(t, crank, tau)

@@ -6,7 +6,10 @@ import math
 from dataclasses import dataclass
 
 import mujoco
+import numpy as np
+from numba import njit
 
+from golem.native import Record, Records, address, floats, new_record
 from golem.types import Array
 
 
@@ -34,63 +37,75 @@ RELEASE_TIME = 0.5
 """Time in which a released hoist hands the weight over to the feet [s]."""
 
 
-class Hoist:
-    """Spring and damper between the pelvis and the hook, preloaded with the robot's weight."""
+HOIST = np.dtype(
+    [
+        ("body", "i8"),
+        ("q", "i8"),
+        ("v", "i8"),
+        ("weight", "f8", (3,)),
+        ("home", "f8", (3,)),
+        ("k", "f8", (2, 3)),
+        ("d", "f8", (2, 3)),
+        ("released_at", "f8"),
+    ]
+)
+"""Indices, options and memory of a hoist: stiffness and damping along the axes, then about them."""
 
-    def __init__(self, model: mujoco.MjModel, config: HoistConfig) -> None:
-        """Hang the body `pelvis` of `model` from its free joint `base`."""
-        self._body = model.body("pelvis").id
-        joint = model.joint("base")
-        self._position = slice(int(joint.qposadr[0]), int(joint.qposadr[0]) + 3)
-        self._attitude = slice(self._position.stop, self._position.stop + 4)
-        self._velocity = slice(int(joint.dofadr[0]), int(joint.dofadr[0]) + 6)
-        mass = float(model.body_subtreemass[self._body])
-        self._weight: list[float] = (-mass * model.opt.gravity).tolist()
-        self._home = (0.0, 0.0, config.height)
-        self._k, self._k_rot = config.stiffness, config.rotational_stiffness
-        self._d = [2.0 * config.damping_ratio * math.sqrt(k * mass) for k in self._k]
-        # 8 kg m^2: the robot about its pelvis, order of magnitude; only the damping ratio depends on it.
-        self._d_rot = [2.0 * config.damping_ratio * math.sqrt(k * 8.0) for k in self._k_rot]
-        self._released_at = math.inf
+
+@njit(cache=True, nogil=True)
+def pull(h: Record, time: float, sway_x: float, sway_y: float, qpos: int, qvel: int, xfrc: int) -> None:
+    """Set the wrench on the pelvis; see `Hoist.apply`. Arrays of the simulation by address."""
+    out, at = floats(xfrc), 6 * h.body
+    gone = (time - h.released_at) / RELEASE_TIME
+    if gone >= 1.0:
+        for i in range(6):
+            out[at + i] = 0.0
+        return
+    share = 1.0 if gone <= 0.0 else 0.5 * (1.0 + math.cos(math.pi * gone))
+    q, v = floats(qpos), floats(qvel)
+    # Small rotations: the vector part of the quaternion is half the rotation vector. A free joint's angular
+    # velocity is in the body frame, which differs from the world's by that same small rotation.
+    sign = 2.0 if q[h.q + 3] >= 0.0 else -2.0
+    for i in range(3):
+        hook = h.home[i] + (sway_x if i == 0 else sway_y if i == 1 else 0.0)
+        out[at + i] = share * (h.k[0, i] * (hook - q[h.q + i]) - h.d[0, i] * v[h.v + i] + h.weight[i])
+        turn = -h.k[1, i] * sign * q[h.q + 4 + i] - h.d[1, i] * v[h.v + 3 + i]
+        out[at + 3 + i] = share * turn
+
+
+class Hoist:
+    """Spring and damper between the pelvis and the hook, preloaded with the robot's weight.
+
+    Attributes:
+        memory: a `HOIST`.
+    """
+
+    def __init__(self, model: mujoco.MjModel, config: HoistConfig, memory: Records | None = None) -> None:
+        """Hang the body `pelvis` of `model` from its free joint `base`; `memory`, a `HOIST`, None for one of its own."""
+        joint, pelvis = model.joint("base"), model.body("pelvis").id
+        mass = float(model.body_subtreemass[pelvis])
+        self.memory = memory = new_record(HOIST) if memory is None else memory
+        memory["body"], memory["q"], memory["v"] = pelvis, joint.qposadr[0], joint.dofadr[0]
+        memory["weight"] = -mass * model.opt.gravity
+        memory["home"] = 0.0, 0.0, config.height
+        memory["k"] = config.stiffness, config.rotational_stiffness
+        memory["d"] = (
+            [2.0 * config.damping_ratio * math.sqrt(k * mass) for k in config.stiffness],
+            # 8 kg m^2: the robot about its pelvis, order of magnitude; only the damping ratio depends on it.
+            [2.0 * config.damping_ratio * math.sqrt(k * 8.0) for k in config.rotational_stiffness],
+        )
+        memory["released_at"] = math.inf
 
     @property
     def released(self) -> bool:
         """Whether `release` was called."""
-        return self._released_at < math.inf
+        return bool(self.memory["released_at"][0] < math.inf)
 
     def release(self, t: float) -> None:
         """Let go smoothly from time `t` [s] on; a second call does nothing."""
-        self._released_at = min(self._released_at, t)
+        self.memory["released_at"] = np.minimum(self.memory["released_at"], t)
 
     def apply(self, data: mujoco.MjData, sway: Array) -> None:
         """Set the wrench on the pelvis for the present state; the hook is displaced by `sway` (2,) [m]."""
-        share = self._share(data.time)
-        if share == 0.0:
-            data.xfrc_applied[self._body] = 0.0
-            return
-        # Scalars: this runs at every physics step, where small arrays cost more than the arithmetic.
-        x, y, z = data.qpos[self._position].tolist()
-        w, *axis = data.qpos[self._attitude].tolist()
-        vx, vy, vz, *rate = data.qvel[self._velocity].tolist()
-        hook_x, hook_y, hook_z = self._home
-        hook_x, hook_y = hook_x + float(sway[0]), hook_y + float(sway[1])
-        k, d, carry = self._k, self._d, self._weight
-        # Small rotations: the vector part of the quaternion is half the rotation vector. A free joint's angular
-        # velocity is in the body frame, which differs from the world's by that same small rotation.
-        sign = 2.0 if w >= 0.0 else -2.0
-        k_rot, d_rot = self._k_rot, self._d_rot
-        data.xfrc_applied[self._body] = (
-            k[0] * (hook_x - x) - d[0] * vx + carry[0],
-            k[1] * (hook_y - y) - d[1] * vy + carry[1],
-            k[2] * (hook_z - z) - d[2] * vz + carry[2],
-            -k_rot[0] * sign * axis[0] - d_rot[0] * rate[0],
-            -k_rot[1] * sign * axis[1] - d_rot[1] * rate[1],
-            -k_rot[2] * sign * axis[2] - d_rot[2] * rate[2],
-        )
-        if share < 1.0:
-            data.xfrc_applied[self._body] *= share
-
-    def _share(self, t: float) -> float:
-        """Return how much of the wrench is left at time `t` [s], 1 to 0."""
-        gone = (t - self._released_at) / RELEASE_TIME
-        return 1.0 if gone <= 0.0 else 0.0 if gone >= 1.0 else 0.5 * (1.0 + math.cos(math.pi * gone))
+        qpos, qvel, xfrc = address(data.qpos), address(data.qvel), address(data.xfrc_applied)
+        pull(self.memory[0], data.time, float(sway[0]), float(sway[1]), qpos, qvel, xfrc)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from golem.native import Record, Records, new_record
 from golem.types import Array, Imu
 
 
@@ -54,13 +55,58 @@ class ImuErrors:
         )
 
 
-class ImuModel:
-    """Adds bias and white noise to clean samples, one call per sample."""
+BLOCK = 256
+"""Samples whose noise is drawn at once; drawn one by one it would be the same."""
 
-    def __init__(self, errors: ImuErrors, bias: ImuBias, rng: np.random.Generator) -> None:
-        """Use the given magnitudes, episode bias and noise stream."""
-        self._errors = errors
-        self._bias = bias
+IMU = np.dtype(
+    [
+        ("tilt", "f8", (4,)),
+        ("bias", "f8", (2, 3)),
+        ("noise", "f8", (3,)),
+        ("used", "i8"),
+        ("drawn", "f8", (BLOCK, 3, 3)),
+    ]
+)
+"""Errors of an IMU: tilt; bias of gyro and accelerometer; magnitudes of the noise of orientation, gyro and
+accelerometer; standard normal numbers for them, and how many samples have used theirs."""
+
+
+@njit(cache=True, nogil=True)
+def measure_imu(m: Record, quat: Array, gyro: Array, acc: Array, out: Record) -> None:
+    """Write the sample reported for clean values into `quat`, `gyro` and `acc` of `out`; see `ImuModel.measure`.
+
+    `m` is an `IMU` with noise left.
+    """
+    drawn = m.drawn[m.used]
+    m.used += 1
+    rotvec = np.empty(3)
+    for i in range(3):
+        rotvec[i] = m.noise[0] * drawn[0, i]
+        out.gyro[i] = gyro[i] + m.bias[0, i] + m.noise[1] * drawn[1, i]
+        out.acc[i] = acc[i] + m.bias[1, i] + m.noise[2] * drawn[2, i]
+    shaken = _shaken(m.tilt, quat, rotvec)
+    for i in range(4):
+        out.quat[i] = shaken[i]
+
+
+_SAMPLE = np.dtype([("quat", "f8", (4,)), ("gyro", "f8", (3,)), ("acc", "f8", (3,))])
+
+
+class ImuModel:
+    """Adds bias and white noise to clean samples, one call per sample.
+
+    Attributes:
+        memory: an `IMU`.
+    """
+
+    def __init__(
+        self, errors: ImuErrors, bias: ImuBias, rng: np.random.Generator, memory: Records | None = None
+    ) -> None:
+        """Use the given magnitudes, episode bias and noise stream; `memory`, an `IMU`, None for one of its own."""
+        self.memory = memory = new_record(IMU) if memory is None else memory
+        memory["tilt"], memory["bias"] = bias.tilt, (bias.gyro, bias.acc)
+        memory["noise"] = errors.attitude_noise, errors.gyro_noise, errors.acc_noise
+        memory["used"] = BLOCK
         self._rng = rng
 
     def measure(self, quat: Array, gyro: Array, acc: Array) -> Imu:
@@ -71,12 +117,11 @@ class ImuModel:
             gyro: (3,) true angular rate [rad/s], imu frame.
             acc: (3,) true specific force [m/s^2], imu frame.
         """
-        noise = self._rng.standard_normal((3, 3))
-        return Imu(
-            quat=_shaken(self._bias.tilt, quat, self._errors.attitude_noise * noise[0]),
-            gyro=gyro + self._bias.gyro + self._errors.gyro_noise * noise[1],
-            acc=acc + self._bias.acc + self._errors.acc_noise * noise[2],
-        )
+        if self.memory["used"][0] >= BLOCK:
+            self.memory["drawn"], self.memory["used"] = self._rng.standard_normal((BLOCK, 3, 3)), 0
+        sample = new_record(_SAMPLE)[0]
+        measure_imu(self.memory[0], quat, gyro, np.ascontiguousarray(acc), sample)
+        return Imu(sample["quat"], sample["gyro"], sample["acc"])
 
 
 @njit(cache=True, nogil=True)
@@ -84,7 +129,9 @@ def _small_rotation(rotvec: Array) -> Array:
     """Return the unit quaternion of a rotation vector; exact to third order, for angles of a few degrees."""
     x, y, z = 0.5 * rotvec[0], 0.5 * rotvec[1], 0.5 * rotvec[2]
     scale = 1.0 / math.sqrt(1.0 + x * x + y * y + z * z)
-    return np.array([scale, scale * x, scale * y, scale * z])
+    out = np.empty(4)
+    out[0], out[1], out[2], out[3] = scale, scale * x, scale * y, scale * z
+    return out
 
 
 @njit(cache=True, nogil=True)
@@ -97,11 +144,9 @@ def _shaken(tilt: Array, quat: Array, rotvec: Array) -> Array:
 def _multiply(p: Array, q: Array) -> Array:
     pw, px, py, pz = p[0], p[1], p[2], p[3]
     qw, qx, qy, qz = q[0], q[1], q[2], q[3]
-    return np.array(
-        [
-            pw * qw - px * qx - py * qy - pz * qz,
-            pw * qx + px * qw + py * qz - pz * qy,
-            pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw,
-        ]
-    )
+    out = np.empty(4)
+    out[0] = pw * qw - px * qx - py * qy - pz * qz
+    out[1] = pw * qx + px * qw + py * qz - pz * qy
+    out[2] = pw * qy - px * qz + py * qw + pz * qx
+    out[3] = pw * qz + px * qy - py * qx + pz * qw
+    return out

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from numba import njit
 
 from golem.robots.worlds import parts
 
@@ -77,8 +78,13 @@ class Seal:
 
     def apply(self, data: mujoco.MjData) -> None:
         """Pull the door shut, less the further it is open."""
-        angle = float(data.qpos[self.qpos])
-        data.qfrc_applied[self.dof] = -self.torque * float(np.clip(1.0 - angle / SEAL, 0.0, 1.0))
+        data.qfrc_applied[self.dof] = -seal_torque(self.torque, float(data.qpos[self.qpos]))
+
+
+@njit(cache=True, nogil=True)
+def seal_torque(most: float, angle: float) -> float:
+    """Return how hard the gasket pulls a door shut that is open by `angle` [rad], if `most` breaks it [N m]."""
+    return most * min(max(1.0 - angle / SEAL, 0.0), 1.0)
 
 
 def add_fridge(spec: mujoco.MjSpec, layout: FridgeLayout) -> None:

@@ -1,0 +1,181 @@
+"""The twin's compiled part of the 500 Hz chain: what its sensors report, and how time passes under a command."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numba import cfunc, njit
+
+from golem.native import (
+    ORDINARY,
+    STAGE,
+    UNUSUAL,
+    Record,
+    address,
+    call_library,
+    floats,
+    ints,
+    library_function,
+    shared,
+    view,
+)
+from golem.robots.model.imu_mount import TORSO, torso_motion
+from golem.robots.mujoco.external_forces import PUSHES, apply_pushes, clear_pushes
+from golem.robots.mujoco.hand_servos import HAND, drive_hand, move_reference, read_hand
+from golem.robots.mujoco.hoist import HOIST, pull
+from golem.robots.mujoco.motors import MOTORS, drive, give
+from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP
+from golem.robots.sensors.imu import BLOCK, IMU, measure_imu
+from golem.robots.sensors.sway import TONES
+from golem.robots.worlds.fridge import seal_torque
+from golem.types import COMMAND_AGE, NUM_JOINTS
+
+MOVING = 0.02
+"""Speed of a screw above which it counts as moving [m/s, rad/s]."""
+
+_ARRAYS = ("qpos", "qvel", "ctrl", "xfrc_applied", "qfrc_applied", "sensordata", "xpos", "xmat", "xipos")
+TWIN = np.dtype(
+    [
+        *((name, "i8") for name in ("step", "model", "data", *_ARRAYS)),
+        ("time", "f8"),
+        ("motors", MOTORS),
+        ("left", HAND),
+        ("right", HAND),
+        ("hoist", HOIST),
+        ("pushes", PUSHES),
+        ("imu", IMU),
+        ("base_q", "i8"),
+        ("base_v", "i8"),
+        ("acc", "i8"),
+        # What calibration knows of the encoders' zeros [rad].
+        ("joint_offset", "f8", (NUM_JOINTS,)),
+        ("sway", "f8", (2, 2, TONES)),
+        ("sway_amplitude", "f8"),
+        ("screws", "i8"),
+        ("screw_bodies", "i8"),
+        ("screw_speeds", "i8"),
+        ("fingers", "i8", (4,)),
+        ("near", "f8"),
+        ("fine", "i8"),
+        ("sealed", "i8"),
+        ("seal_q", "i8"),
+        ("seal_v", "i8"),
+        ("seal_torque", "f8"),
+    ]
+)
+"""Everything the stages need of a twin: addresses of the simulation's arrays, the parts of the robot with what they
+remember, and how the world differs. `sway`: angular frequencies and phases; `fine`: whether steps are short now."""
+_memory_at = view(TWIN)
+
+
+def put_simulation(memory: np.ndarray[Any, Any], model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Write where the arrays of a simulation are into `memory`, a `TWIN`."""
+    library = next(Path(mujoco.__file__).parent.glob("libmujoco.*"))
+    memory["step"] = library_function(str(library), "mj_step")
+    memory["model"], memory["data"] = model._address, data._address
+    for name in _ARRAYS:
+        memory[name] = address(getattr(data, name))
+
+
+@njit(cache=True, nogil=True)
+def delicate(m: Record) -> bool:
+    """Return whether a screw moves, or a finger is so close that it may touch one; `m` is a `TWIN`."""
+    speeds, v, p, bodies = ints(m.screw_speeds), floats(m.qvel), floats(m.xpos), ints(m.screw_bodies)
+    for i in range(6 * m.screws):
+        if abs(v[speeds[i]]) > MOVING:
+            return True
+    for k in range(m.screws):
+        screw = 3 * bodies[k]
+        for i in range(4):
+            finger = 3 * m.fingers[i]
+            x, y, z = p[finger] - p[screw], p[finger + 1] - p[screw + 1], p[finger + 2] - p[screw + 2]
+            if x * x + y * y + z * z < m.near * m.near:
+                return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def sense(r: Record, m: Record) -> None:
+    """Write what motors, IMU and hands report into the shared record `r`; `m` is a `TWIN` whose IMU has noise left."""
+    qpos, qvel, sensors = floats(m.qpos), floats(m.qvel), floats(m.sensordata)
+    motors = m.motors
+    for i in range(NUM_JOINTS):
+        r.q[i] = qpos[motors.q[i]] + motors.offset[i] - m.joint_offset[i]
+        r.dq[i] = qvel[motors.v[i]]
+        r.tau[i] = motors.tau[i]
+    # MuJoCo's sensors describe the beginning of the last step. Orientation and rate must be of the encoders'
+    # instant: 2 ms apart they make planted feet seem to move by a centimetre per second.
+    quat, rate, acc = np.empty(4), np.empty(3), np.empty(3)
+    for i in range(4):
+        quat[i] = qpos[m.base_q + 3 + i]
+    for i in range(3):
+        rate[i], acc[i] = qvel[m.base_v + 3 + i], sensors[m.acc + i]
+    turned, gyro = torso_motion(quat, rate, qpos[motors.q[TORSO]], qvel[motors.v[TORSO]])
+    measure_imu(m.imu, turned, gyro, acc, r)
+    read_hand(m.left, m.qpos, m.ctrl, r.crank[0], r.crank_tau[0])
+    read_hand(m.right, m.qpos, m.ctrl, r.crank[1], r.crank_tau[1])
+    r.state_t = r.t
+
+
+@njit(cache=True, nogil=True)
+def let_pass(r: Record, m: Record) -> None:
+    """Advance the simulation by one tick under the command in the shared record `r`; `m` is a `TWIN`."""
+    command = np.empty(5 * NUM_JOINTS)
+    for i in range(5 * NUM_JOINTS):
+        command[i] = r.command[i] + (m.joint_offset[i] if i < NUM_JOINTS else 0.0)
+    give(m.motors, command, m.time)
+    if m.left.commanded:
+        move_reference(m.left, r.dt)
+    if m.right.commanded:
+        move_reference(m.right, r.dt)
+    sway_x = sway_y = 0.0
+    for i in range(TONES):
+        sway_x += math.sin(m.sway[0, 0, i] * m.time + m.sway[1, 0, i])
+        sway_y += math.sin(m.sway[0, 1, i] * m.time + m.sway[1, 1, i])
+    step = FINE_STEP if m.fine else COARSE_STEP
+    for _ in range(round(r.dt / step)):
+        drive(m.motors, m.time, m.qpos, m.qvel, m.ctrl)
+        drive_hand(m.left, m.qpos, m.qvel, m.ctrl)
+        drive_hand(m.right, m.qpos, m.qvel, m.ctrl)
+        clear_pushes(m.pushes, m.xfrc_applied)
+        amplitude = m.sway_amplitude
+        pull(m.hoist, m.time, amplitude * sway_x, amplitude * sway_y, m.qpos, m.qvel, m.xfrc_applied)
+        apply_pushes(m.pushes, m.xfrc_applied, m.xpos, m.xmat, m.xipos)
+        if m.sealed:
+            floats(m.qfrc_applied)[m.seal_v] = -seal_torque(m.seal_torque, floats(m.qpos)[m.seal_q])
+        call_library(m.step, m.model, m.data)
+        m.time += step
+
+
+def _sense(record: int, memory: int) -> int:
+    m = _memory_at(memory)
+    if m.imu.used >= BLOCK:
+        return UNUSUAL
+    sense(shared(record), m)
+    return ORDINARY
+
+
+def _act(record: int, memory: int) -> int:
+    r, m = shared(record), _memory_at(memory)
+    # Motors without a command of late are limp, and the length of a step is the model's.
+    if r.t - r.command_t > COMMAND_AGE or delicate(m) != (m.fine != 0):
+        return UNUSUAL
+    let_pass(r, m)
+    return ORDINARY
+
+
+@cache
+def sense_code() -> Any:
+    """Return the compiled stage that senses; see `native.STAGE`."""
+    return cfunc(STAGE, cache=True)(_sense)
+
+
+@cache
+def act_code() -> Any:
+    """Return the compiled stage in which time passes; see `native.STAGE`."""
+    return cfunc(STAGE, cache=True)(_act)
