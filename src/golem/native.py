@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from llvmlite import ir
@@ -64,9 +64,9 @@ RECORD = _layout(
     ("gyro", _f8(3)),
     ("acc", _f8(3)),
     ("state_t", "f8"),
-    # Cranks of the fingers, (hand, finger): angle, positive when closing, and torque.
-    ("crank", _f8(2, 2)),
-    ("crank_tau", _f8(2, 2)),
+    # What the hands report, (hand, finger); see `HandState`.
+    ("fingers", _f8(2, 2)),
+    ("finger_force", _f8(2, 2)),
     # The estimate of the base.
     ("base_t", "f8"),
     ("T_odom_base", _f8(4, 4)),
@@ -118,6 +118,17 @@ class Stage:
     def run(self, record: Records) -> int:
         """Run it once on the shared `record`; return `ORDINARY` or `UNUSUAL`."""
         return self.code.ctypes(address(record), address(self.memory))
+
+
+@runtime_checkable
+class HasStage(Protocol):
+    """A module whose step is compiled, too.
+
+    Attributes:
+        stage: does what `step` does, with the same memory.
+    """
+
+    stage: Stage
 
 
 def new_record(dtype: np.dtype[Any]) -> Records:

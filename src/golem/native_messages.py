@@ -35,9 +35,7 @@ def put_command(numbers: Array, command: LowCommand) -> None:
     np.concatenate((command.q, command.dq, command.tau, command.kp, command.kd), out=numbers[:COMMAND])
 
 
-def put_legs(
-    record: Records, q: Array, gains: tuple[Array, Array] | None, tau: Array | None
-) -> None:
+def put_legs(record: Records, q: Array, gains: tuple[Array, Array] | None, tau: Array | None) -> None:
     """Write targets `q` (12,) of the legs, gains kp, kd and torques (12,) of their own if any, into the record."""
     row = record[0]
     row["has_legs"], row["has_leg_gains"], row["has_leg_tau"] = 1, gains is not None, tau is not None

@@ -7,9 +7,11 @@ modules: nobody can reach another module (or the simulator) through it.
 
 from __future__ import annotations
 
+import math
 from collections import deque
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar, cast
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 from golem.errors import GolemError
 
@@ -33,6 +35,33 @@ class Topic(Generic[T]):
     kind: type[T]
 
 
+class Deferred(Generic[T]):
+    """A value that is made when somebody reads it, once; whoever publishes it does so again when it has changed."""
+
+    __slots__ = ("made", "make", "name")
+
+    def __init__(self, topic: Topic[T], make: Callable[[], T]) -> None:
+        """Call `make` for the value, which is published on `topic`."""
+        self.name, self.make = topic.name, make
+        self.made: T | None = None
+
+    def value(self) -> T:
+        """Return the value."""
+        if self.made is None:
+            self.made = self.make()
+        return self.made
+
+
+class Waker(Protocol):
+    """Who is to be told that a topic has news.
+
+    Attributes:
+        woken: set to true whenever it has.
+    """
+
+    woken: bool
+
+
 class Bus:
     """Latest-value streams by topic."""
 
@@ -41,6 +70,7 @@ class Bus:
         self._now: dict[str, object] = {}
         self._count: dict[str, int] = {}
         self._pending: dict[str, deque[tuple[float, object]]] = {}
+        self._wakers: dict[str, list[Waker]] = {}
 
     def publish(self, topic: Topic[T], value: T, t: float, latency: float = 0.0) -> None:
         """Send `value` on `topic` at time `t`; readers see it from `t + latency` on [s].
@@ -56,22 +86,51 @@ class Bus:
             )
         name = topic.name
         if latency <= 0.0 and not self._pending.get(name):
-            self._now[name] = value
-            self._count[name] = self._count.get(name, 0) + 1
+            self._show(name, value)
         else:
             self._pending.setdefault(name, deque()).append((t + latency, value))
+
+    def defer(self, values: Iterable[Deferred[Any]], count: int = 1) -> None:
+        """Publish on each topic `count` values, of which only the newest can still be made, when somebody reads it."""
+        now, counts, wakers = self._now, self._count, self._wakers
+        for value in values:
+            name, value.made = value.name, None
+            now[name] = value
+            counts[name] = counts.get(name, 0) + count
+            if name in wakers:
+                self._wake(name)
+
+    def _show(self, name: str, value: object) -> None:
+        self._now[name] = value
+        self._count[name] = self._count.get(name, 0) + 1
+        if name in self._wakers:
+            self._wake(name)
+
+    def _wake(self, name: str) -> None:
+        for waker in self._wakers[name]:
+            waker.woken = True
+
+    def wake(self, topic: Topic[Any], waker: Waker) -> None:
+        """Tell `waker` of all news of `topic` from now on."""
+        self._wakers.setdefault(topic.name, []).append(waker)
+
+    def next_delivery(self) -> float:
+        """Return when the next value is due that is on its way [s]; infinity where none is."""
+        return min((queue[0][0] for queue in self._pending.values() if queue), default=math.inf)
 
     def withdraw(self, topic: Topic[Any]) -> None:
         """Forget what was published on `topic` and has not been delivered yet."""
         self._pending.pop(topic.name, None)
 
-    def deliver(self, t: float) -> None:
-        """Make every value that is due at time `t` visible. The executor calls it once per tick."""
+    def deliver(self, t: float) -> bool:
+        """Make every value that is due at time `t` visible; return whether there was one. For the executor, per tick."""
+        some = False
         for name, queue in self._pending.items():
             # Half a microsecond of slack: ticks are sums of binary fractions.
             while queue and queue[0][0] <= t + 5e-7:
-                self._now[name] = queue.popleft()[1]
-                self._count[name] = self._count.get(name, 0) + 1
+                self._show(name, queue.popleft()[1])
+                some = True
+        return some
 
     def clear(self) -> None:
         """Forget every value, delivered or not; counts go on, so that no reader takes what comes next for old."""
@@ -80,7 +139,8 @@ class Bus:
 
     def latest(self, topic: Topic[T]) -> T | None:
         """Return the newest delivered value of `topic`, or None before the first."""
-        return cast("T | None", self._now.get(topic.name))
+        value = self._now.get(topic.name)
+        return cast("T | None", value.value() if value.__class__ is Deferred else value)
 
     def count(self, topic: Topic[Any]) -> int:
         """Return how many values of `topic` were delivered so far: a reader sees by it that a value is new."""
@@ -88,7 +148,13 @@ class Bus:
 
     def topics(self) -> dict[str, str]:
         """Return the name of each stream that has delivered something, with the type it carries."""
-        return {name: type(value).__name__ for name, value in sorted(self._now.items())}
+        known = {n: v.value() if isinstance(v, Deferred) else v for n, v in sorted(self._now.items())}
+        return {name: type(value).__name__ for name, value in known.items()}
+
+    def newest(self, names: Iterable[str]) -> list[object]:
+        """Return what `latest` reads on each topic, or its `Deferred` where it is one that nobody needs to make."""
+        now = self._now
+        return [now.get(name) for name in names]
 
 
 class News(Generic[T]):
@@ -98,6 +164,11 @@ class News(Generic[T]):
         """Begin now: what was delivered before does not count."""
         self._bus, self._topic = bus, topic
         self._seen = bus.count(topic)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether there is a value that was not read."""
+        return self._bus.count(self._topic) != self._seen
 
     def read(self) -> T | None:
         """Return the newest value if it is new since the last reading, else None."""

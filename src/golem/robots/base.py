@@ -150,3 +150,7 @@ class HasStages(Protocol):
             joint_offset: (27,) what calibration knows of the encoders' zeros: reported minus true [rad].
         """
         ...
+
+    def take_hand_command(self, side: Side, command: HandCommand) -> None:
+        """Take the command of one hand for the ticks that stages let pass."""
+        ...

@@ -23,13 +23,43 @@ class Node(Protocol):
     """What the executor drives: connects one module to the bus.
 
     Attributes:
-        period: time between two steps [s], at least one tick.
+        period: time between two steps [s], at least one tick; infinite for a node that only waits for news.
+
+    A node may also have `wakes`, topics: it then has its turn at every tick at which one of them has news, too. Every
+    node has its turn at the first tick.
     """
 
     period: float
 
     def step(self, t: float) -> None:
         """Read the bus, run the module once at time `t` [s], publish what it returns."""
+        ...
+
+
+class Chain(Protocol):
+    """Nodes that have their turn at every tick, and can have it in compiled code; see `runtime.chain`.
+
+    Attributes:
+        members: the nodes, in the order of their turns.
+    """
+
+    members: Sequence[Node]
+
+    def run(self, t: float, first: int, last: int) -> None:
+        """Let the members from `first` up to `last` have their turns of the tick at `t` [s]."""
+        ...
+
+    def run_ticks(self, tick: int, offset: float, ticks: int) -> int:
+        """Let all members have their turns of up to so many ticks.
+
+        Args:
+            tick: number of the first one, whose time is `offset + tick * TICK`.
+            offset: time of the tick number 0 [s].
+            ticks: how many at most, one or more.
+
+        Returns:
+            How many ticks have passed, at least one; fewer where others may want a turn.
+        """
         ...
 
 
@@ -63,12 +93,20 @@ def in_order(placed: Iterable[Placed]) -> list[Node]:
     return [node for _, node in sorted(placed, key=lambda pair: pair[0])]
 
 
+_NEVER = 1 << 62
+
+
 class _Entry:
-    """When one node is due: its k-th step happens at the first tick at or after k periods."""
+    """When one node is due: its k-th step happens at the first tick at or after k periods, and when it is woken.
 
-    __slots__ = ("due", "k", "period", "step")
+    Attributes:
+        link: its place in the chain; -1 for a node that is none of its.
+        woken: whether a topic that it waits for has news.
+    """
 
-    def __init__(self, node: Node) -> None:
+    __slots__ = ("due", "k", "link", "period", "step", "woken")
+
+    def __init__(self, node: Node, link: int = -1) -> None:
         if node.period < TICK - 1e-9:
             rate, maximum = 1.0 / node.period, 1.0 / TICK
             raise ConfigError(
@@ -76,43 +114,58 @@ class _Entry:
             )
         self.step = node.step
         self.period = node.period / TICK
+        self.link = link
         self.k = 0
         self.due = 0
+        self.woken = False
 
     def advance(self) -> None:
         self.k += 1
-        self.due = math.ceil(self.k * self.period - 1e-6)
+        self._set_due()
 
     def skip(self, tick: int) -> None:
         """Leave out every step that was due before `tick`."""
         if self.due < tick:
             self.k = math.ceil(tick / self.period - 1e-6)
-            self.due = math.ceil(self.k * self.period - 1e-6)
+            self._set_due()
+
+    def _set_due(self) -> None:
+        self.due = _NEVER if self.period == math.inf else math.ceil(self.k * self.period - 1e-6)
 
 
 class Executor:
     """Drives nodes in the given order on one clock."""
 
-    def __init__(self, bus: Bus, nodes: Sequence[Node], start: float = 0.0) -> None:
+    def __init__(
+        self, bus: Bus, nodes: Sequence[Node], start: float = 0.0, chain: Chain | None = None
+    ) -> None:
         """Schedule `nodes`, which exchange messages over `bus`.
 
         Args:
             bus: where they meet.
             nodes: in the order of their turns.
             start: a time that is to be a tick [s]; a clock from outside need not start at a multiple of one.
+            chain: some of the nodes, which then run as a chain.
 
         Raises:
             ConfigError: a node is faster than the clock.
         """
-        self._bus = bus
-        self._schedule = [_Entry(node) for node in nodes]
+        self._bus, self._chain = bus, chain
+        links = {} if chain is None else {id(node): i for i, node in enumerate(chain.members)}
+        self._schedule = [self._entry(node, links.get(id(node), -1)) for node in nodes]
         self._tick = 0
         # Whole microseconds, so that it is exactly zero for a clock that ticks as this one does.
         self._offset = round(start - TICK * round(start / TICK), 6)
 
+    def _entry(self, node: Node, link: int = -1) -> _Entry:
+        entry = _Entry(node, link)
+        for topic in getattr(node, "wakes", ()):
+            self._bus.wake(topic, entry)
+        return entry
+
     def add(self, node: Node) -> None:
         """Let `node` have the last turn of its ticks from now on: for who looks on."""
-        entry = _Entry(node)
+        entry = self._entry(node)
         entry.skip(self._tick)
         self._schedule.append(entry)
 
@@ -122,14 +175,50 @@ class Executor:
         return self._offset + self._tick * TICK
 
     def step(self) -> None:
-        """Advance by one tick: deliver what is due, then step every node whose period has come."""
-        t = self.t
+        """Advance by one tick: deliver what is due, then step every node whose period has come or that has news."""
+        t, tick, chain = self.t, self._tick, self._chain
         self._bus.deliver(t)
+        first = last = -1
         for entry in self._schedule:
-            if self._tick >= entry.due:
-                entry.step(t)
+            if entry.link >= 0:
+                first, last = entry.link if first < 0 else first, entry.link + 1
+                continue
+            due = tick >= entry.due
+            if not (due or entry.woken):
+                continue
+            if first >= 0 and chain is not None:
+                chain.run(t, first, last)
+                first = -1
+            entry.woken = False
+            entry.step(t)
+            if due:
                 entry.advance()
+        if first >= 0 and chain is not None:
+            chain.run(t, first, last)
         self._tick += 1
+
+    def _quiet_ticks(self, until: float) -> int:
+        """Return for how many ticks from the present one on nobody but the chain has a turn.
+
+        Args:
+            until: when somebody who looks on wants to be asked [s]: the time after the last of them is not later.
+        """
+        t = self.t
+        came = self._bus.deliver(t)
+        due = _NEVER
+        for entry in self._schedule:
+            if entry.link < 0:
+                if entry.woken:
+                    return 0
+                if entry.due < due:
+                    due = entry.due
+        if came or due <= self._tick:
+            return min(1, due - self._tick)
+        delivery = self._bus.next_delivery()
+        ticks = min(due - self._tick, math.ceil((until - t) / TICK - 1e-6))
+        if delivery < t + ticks * TICK:
+            ticks = min(ticks, math.ceil((delivery - 5e-7 - t) / TICK))
+        return max(ticks, 1)
 
     def advance(self, t: float, maximum: int) -> None:
         """Follow a clock from outside up to time `t` [s]; ticks further back than the last `maximum` are left out."""
@@ -141,7 +230,13 @@ class Executor:
         while self._tick <= target:
             self.step()
 
-    def run(self, until: float, stop: Callable[[], bool] = lambda: False, realtime: bool = False) -> None:
+    def run(
+        self,
+        until: float,
+        stop: Callable[[], bool] = lambda: False,
+        realtime: bool = False,
+        due: Callable[[], float] | None = None,
+    ) -> None:
         """Step until time `until` [s] or until `stop()` is true.
 
         Args:
@@ -149,10 +244,18 @@ class Executor:
             stop: asked after every tick.
             realtime: wait after each tick so that simulated time never runs ahead of the wall clock; a machine
                 that is too slow falls behind and does not try to catch up.
+            due: returns the time [s] at which `stop` has to be asked again; before that, it may be left out after a
+                tick in which no node but the chain's had a turn. None: it is asked after every tick.
         """
         end = round(until / TICK)
         origin = time.perf_counter() - self.t
+        together = self._chain if due is not None and not realtime else None
         while self._tick < end and not stop():
+            if together is not None and due is not None:
+                ticks = self._quiet_ticks(min(due(), self._offset + end * TICK))
+                if ticks > 0:
+                    self._tick += together.run_ticks(self._tick, self._offset, ticks)
+                    continue
             self.step()
             if realtime:
                 lag = time.perf_counter() - origin - self.t

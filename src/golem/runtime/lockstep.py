@@ -21,6 +21,7 @@ from golem.interfaces.payloads import GateStatus
 from golem.middleware.bus import Bus
 from golem.robots.base import HasGantry, HasLivingSensors, Robot
 from golem.robots.sensors.profiles import load_profile
+from golem.runtime.chain import chain_of
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import FOREVER, Executor, in_order
 from golem.runtime.node_groups import RobotNodes, SafetyNodes, StackNodes, hears_lidar
@@ -76,7 +77,7 @@ class LockstepRunner:
         seen = partial(detection_requested, self.bus)
         calibration = stack.part("calibration").load()
         offset = calibration.joint_offset if calibration.joint_offset.any() else None
-        self._robot = RobotNodes(self.bus, stack, robot, seen, lambda: lidar, offset)
+        self._robot = RobotNodes(self.bus, stack, robot, seen, (lambda: True) if lidar else None, offset)
         limits = limits or SafetyLimits.from_profile(stack.limits)
         if not isinstance(robot, HasLivingSensors):
             limits = limits.believing()
@@ -93,8 +94,8 @@ class LockstepRunner:
             LATENCY,
             localizer=localizer,
         )
-        placed = self._robot.nodes + self._safety.nodes + self._stack.nodes
-        self.executor = Executor(self.bus, in_order(placed))
+        ordered = in_order(self._robot.nodes + self._safety.nodes + self._stack.nodes)
+        self.executor = Executor(self.bus, ordered, chain=chain_of(self.bus, ordered))
         self.request(OperatorRequest.ACTIVATE)
 
     @property

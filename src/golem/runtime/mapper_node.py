@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,14 @@ from golem.interfaces import topics
 from golem.interfaces.nav_payloads import HERE, MapFile, MapPlace, OccupancyGrid
 from golem.middleware.bus import Bus, News
 from golem.runtime.contract_check import ContractCheck
-from golem.types import TICK, PlanarPose
+from golem.types import PlanarPose
 
 
 class MapperNode:
     """Runs a mapper: every scan at once, a grid when one is due and something new was seen."""
 
-    period = TICK
+    period = math.inf
+    wakes = topics.SCAN, topics.MAP_SAVE
 
     def __init__(self, bus: Bus, mapper: Mapper, contract: ContractCheck) -> None:
         """Run `mapper`."""

@@ -30,8 +30,6 @@ class MemoryNode:
     before the place in the map is known is not remembered. A look that the memory refuses ends nothing.
     """
 
-    period = TICK
-
     def __init__(
         self,
         bus: Bus,
@@ -53,7 +51,9 @@ class MemoryNode:
         """
         self._bus, self._memory, self._pool, self._in_map = bus, memory, pool, in_map
         self._epoch = epoch if math.isinf(memory.last) else max(epoch, memory.last)
-        self._news = [News(bus, topics.detections(camera)) for camera in cameras]
+        self.period = TICK if pool is not None else math.inf
+        self.wakes = tuple(map(topics.detections, cameras))
+        self._news = [News(bus, topic) for topic in self.wakes]
         self._last, self._looks, self._began = -math.inf, 0, False
         self._job: tuple[Future[str], float] | None = None
 

@@ -107,7 +107,7 @@ class RobotNodes:
         stack: Stack,
         robot: Robot,
         wanted: Callable[[str], Callable[[], bool]] | None,
-        lidar_wanted: Callable[[], bool],
+        lidar_wanted: Callable[[], bool] | None,
         joint_offset: Array | None = None,
     ) -> None:
         """Connect `robot` to `bus`.
@@ -118,7 +118,7 @@ class RobotNodes:
             robot: the robot.
             wanted: called with the name of a camera, returns what says whether it is to be exposed; None where that
                 is another process's business.
-            lidar_wanted: says whether anybody listens to the LiDAR.
+            lidar_wanted: says whether anybody listens to the LiDAR; None where nobody ever does.
             joint_offset: (27,) reported minus true joint positions by calibration [rad]; None believes them.
 
         Raises:
@@ -131,7 +131,7 @@ class RobotNodes:
             for name in robot.cameras:
                 camera = perception_nodes.CameraNode(bus, robot, name, wanted(name), contract)
                 self.nodes.append((Phase.EXPOSE, camera))
-        if isinstance(robot, HasLidar):
+        if isinstance(robot, HasLidar) and lidar_wanted is not None:
             self.nodes.append((Phase.EXPOSE, LidarNode(bus, robot, lidar_wanted, contract)))
         loco: LocoServiceNode | None = None
         if stack.legs_on_board is not None:
@@ -162,7 +162,7 @@ class SafetyNodes:
         self.gate = nodes.SafetyNode(bus, limits, standing)
         self.nodes: list[Placed] = [(Phase.PROTECT, self.gate)]
         if estop is not None:
-            self.nodes.insert(0, (Phase.PROTECT, nodes.EstopNode(bus, estop)))
+            self.nodes.append((Phase.MEASURE, nodes.EstopNode(bus, estop)))
 
     def request(self, request: OperatorRequest) -> None:
         """Ask something of the safety gate as an operator does: activate, stop, reset; it decides."""

@@ -11,9 +11,11 @@ from golem.capabilities.arms.base import UpperBody
 from golem.capabilities.arms.trajectory import TrajectoryFollower
 from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.estop.base import EmergencyStop
+from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.hands.base import HandController
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
+from golem.hardware.safety.gate_stage import GateStage
 from golem.hardware.safety.standing_gate import StandingController, StandingGate
 from golem.hardware.servo.base import MotorServo
 from golem.interfaces import topics
@@ -25,8 +27,10 @@ from golem.interfaces.payloads import (
     JointTrajectory,
 )
 from golem.middleware.bus import Bus, News
-from golem.robots.base import Robot
+from golem.native import HasStage, Stage
+from golem.robots.base import HasStages, Robot
 from golem.runtime.arm_limits import ArmLimits
+from golem.runtime.chain import Link
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.gate_tally import current_tally
 from golem.skills.base import SkillResult
@@ -65,6 +69,13 @@ class SenseNode:
         """Read `robot`, whose joints report `offset` (27,) more than they are [rad]; None believes them."""
         self._bus, self._robot, self._contract, self._offset = bus, robot, contract, offset
 
+    def link(self) -> Link | None:
+        """Return how it takes part in the chain; None for a robot without stages."""
+        stages = _stages(self._robot, self._offset)
+        if stages is None:
+            return None
+        return Link(self, stages[0], (), (topics.LOW_STATE, *map(topics.hand_state, SIDES)))
+
     def step(self, t: float) -> None:
         """Publish one sample of everything."""
         call = self._contract.call
@@ -83,6 +94,24 @@ class ActNode:
     def __init__(self, bus: Bus, robot: Robot, contract: ContractCheck, offset: Array | None = None) -> None:
         """Drive `robot`; `offset` as for `SenseNode`."""
         self._bus, self._robot, self._contract, self._offset = bus, robot, contract, offset
+        self._taken: dict[Side, HandCommand] = {}
+
+    def link(self) -> Link | None:
+        """Return how it takes part in the chain; None for a robot without stages."""
+        robot = self._robot
+        stages = _stages(robot, self._offset)
+        if stages is None or not isinstance(robot, HasStages):
+            return None
+
+        def prepare(t: float) -> bool:
+            for side in SIDES:
+                hand = self._bus.latest(topics.hand_command(side))
+                if hand is not None and hand is not self._taken.get(side):
+                    self._taken[side] = hand
+                    robot.take_hand_command(side, hand)
+            return True
+
+        return Link(self, stages[1], (topics.LOW_CMD,), (), prepare)
 
     def step(self, t: float) -> None:
         """Advance the robot by one tick; motors without a command of late are limp."""
@@ -99,6 +128,10 @@ class ActNode:
         self._contract.call(self._robot.advance, command, hands, TICK)
 
 
+def _stages(robot: Robot, offset: Array | None) -> tuple[Stage, Stage] | None:
+    return robot.native(offset) if isinstance(robot, HasStages) else None
+
+
 class EstimatorNode:
     """Runs the base estimator on every state."""
 
@@ -109,6 +142,14 @@ class EstimatorNode:
         self._bus, self._estimator, self._contract = bus, estimator, contract
         contract.times.allowed = self.period
         self._started = False
+
+    def link(self) -> Link | None:
+        """Return how it takes part in the chain; None for an estimator without a stage."""
+        if not isinstance(self._estimator, HasStage):
+            return None
+        # The first state is the node's: it resets the estimator.
+        ready: Callable[[float], bool] = lambda t: self._started  # noqa: E731
+        return Link(self, self._estimator.stage, (topics.LOW_STATE,), (topics.BASE,), ready)
 
     def step(self, t: float) -> None:
         """Publish the estimate of the base."""
@@ -261,6 +302,13 @@ class ServoNode:
         self._bus, self._servo, self._contract = bus, servo, contract
         contract.times.allowed = self.period
 
+    def link(self) -> Link | None:
+        """Return how it takes part in the chain; None for a servo without a stage."""
+        if not isinstance(self._servo, HasStage):
+            return None
+        reads = topics.LOW_STATE, topics.SAFETY, topics.LEG_COMMAND, topics.ARM_COMMAND
+        return Link(self, self._servo.stage, reads, (topics.LOW_CMD_REQUEST,))
+
     def step(self, t: float) -> None:
         """Publish the command that the safety gate shall judge."""
         state = self._bus.latest(topics.LOW_STATE)
@@ -287,11 +335,10 @@ class ServoNode:
 class EstopNode:
     """Publishes the frames of the emergency stop."""
 
-    period = TICK
-
     def __init__(self, bus: Bus, estop: EmergencyStop) -> None:
-        """Publish what `estop` says."""
+        """Publish what `estop` says, at its own rate if it has one."""
         self._bus, self._estop = bus, estop
+        self.period = estop.period if isinstance(estop, VirtualEstop) else TICK
 
     def step(self, t: float) -> None:
         """Publish a frame when there is one."""
@@ -316,10 +363,35 @@ class SafetyNode:
         self._bus, self._gate = bus, StandingGate(Gate(limits), standing)
         self._faults = News(bus, topics.TRANSPORT_FAULT)
         self._tally = current_tally()
+        self._chained: GateStage | None = None
+        self._away = False
         self.request = OperatorRequest.NONE
+
+    def link(self) -> Link:
+        """Return how it takes part in the chain."""
+        self._chained = chained = GateStage(self._gate.gate.limits)
+        reads = topics.LOW_STATE, topics.LOW_CMD_REQUEST, topics.ESTOP, topics.BASE
+        return Link(self, chained.stage, reads, (topics.LOW_CMD, topics.SAFETY), self._prepare, self._passed)
+
+    def _prepare(self, t: float) -> bool:
+        """Hand the gate's memory to the stage, unless the gate itself has something to decide at `t` [s]."""
+        memory, stage = self._gate.memory, self._chained
+        if self.request is not memory.request or self.request is OperatorRequest.STOP or self._faults.waiting:
+            return False
+        if not self._away:
+            self._away = stage is not None and stage.take(memory)
+        return self._away
+
+    def _passed(self, ticks: int) -> None:
+        if self._tally is not None:
+            for _ in range(ticks):
+                self._tally.add(GateState.ACTIVE, GateState.ACTIVE, None)
 
     def step(self, t: float) -> None:
         """Let the newest command through, limited, or stop the robot."""
+        if self._away and self._chained is not None:
+            self._away = False
+            self._gate.gate.memory = self._chained.give_back(self._gate.memory)
         estop = self._bus.latest(topics.ESTOP)
         # The gate acts on the edge of a request, and an activation before it is armed would be spent for nothing.
         waiting = self.request is OperatorRequest.ACTIVATE and self._gate.memory.mode is GateState.INIT

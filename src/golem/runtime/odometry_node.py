@@ -24,7 +24,8 @@ PERIOD = 0.01
 class OdometryNode:
     """Runs an odometry that goes by more than the legs. While that is silent, so is the node."""
 
-    period = TICK
+    period = PERIOD
+    wakes = topics.LIDAR_IMU, topics.LIDAR_SCAN, topics.EXTERNAL_ODOMETRY
 
     def __init__(
         self, bus: Bus, odometry: LidarOdometry, contract: ContractCheck, mount: Array | None = None

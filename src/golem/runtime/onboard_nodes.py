@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -65,12 +66,13 @@ class BusOnboard:
 class ServiceNode:
     """Answers the calls to one service, one per tick."""
 
-    period = TICK
+    period = math.inf
 
     def __init__(self, bus: Bus, service: str, answer: Callable[[ApiRequest, float], Response]) -> None:
         """Serve `service` on `bus`; `answer` acts on a call at a time [s]."""
         self._bus, self._answer = bus, answer
         self._topic = topics.api_response(service)
+        self.wakes = (topics.api_request(service),)
         self._requests = News(bus, topics.api_request(service))
 
     def step(self, t: float) -> None:

@@ -47,11 +47,15 @@ class CameraNode:
 class ImagePoseNode:
     """Gives each exposure the pose the robot believes the camera had when it was made."""
 
-    period = TICK
-
     def __init__(self, bus: Bus, calibration: Mapping[str, Array], latency: float) -> None:
-        """Serve the cameras of `calibration` (see `Robot.calibration`); frames take another `latency` [s]."""
+        """Serve the cameras of `calibration` (see `Robot.calibration`); frames take another `latency` [s].
+
+        Without a latency exposures come over a network, and are older than what is known here: the node then remembers
+        every tick.
+        """
         self._bus, self._calibration, self._latency = bus, calibration, latency
+        self.period = TICK if latency == 0.0 else math.inf
+        self.wakes = tuple(map(topics.exposures, calibration))
         self._exposures = {name: News(bus, topics.exposures(name)) for name in calibration}
         self._kinematics = Kinematics()
         self._moments: deque[tuple[LowState, BaseEstimate]] = deque()
@@ -88,8 +92,6 @@ class LocalizerNode:
     A fault of it ends the skill that looks, and nothing else: no robot falls over a label that nobody knows.
     """
 
-    period = TICK
-
     def __init__(
         self,
         bus: Bus,
@@ -109,7 +111,9 @@ class LocalizerNode:
         """
         self._bus, self._localizer, self._camera, self._contract = bus, localizer, camera, contract
         self._latency = contract.number("latency", localizer.latency, minimum=0.0) if pool is None else 0.0
-        contract.times.allowed = math.inf if pool is not None else max(self._latency, self.period)
+        contract.times.allowed = math.inf if pool is not None else max(self._latency, TICK)
+        self.period = TICK if pool is not None else math.inf
+        self.wakes = (topics.rgbd_images(camera),)
         self._frames = News(bus, topics.rgbd_images(camera))
         self._pool = pool
         self._job: tuple[Future[Detections], tuple[str, ...]] | None = None

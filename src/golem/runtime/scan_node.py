@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 import numpy as np
@@ -16,7 +17,7 @@ from golem.interfaces.nav_payloads import Scan
 from golem.interfaces.payloads import Odometry
 from golem.middleware.bus import Bus, News
 from golem.robots.sensors.lidar_mount import LidarCorrection
-from golem.types import TICK, Array
+from golem.types import Array
 
 MEMORY = 0.6
 """How long poses are kept [s]."""
@@ -29,7 +30,8 @@ BLIND = 0.35
 class ScanNode:
     """Publishes every scan in odom. One of a time of which no pose is known is left out, and one that came before."""
 
-    period = TICK
+    period = math.inf
+    wakes = topics.LIDAR_SCAN, topics.ODOMETRY
 
     def __init__(self, bus: Bus, mount: Array | None = None) -> None:
         """Read scans and odometry from `bus`, with the LiDAR at `mount` (4, 4) in the nominal lidar_link."""

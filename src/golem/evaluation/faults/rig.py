@@ -110,7 +110,7 @@ class FaultRig:
         node, base = DdsNode(self._member, "others"), public.topic("/base_estimate")
         self._base = node.publisher(base.name, base.type, base.qos)
         self._activate = node.client("/safety/activate", public.TRIGGER)
-        nodes = RobotNodes(self.bus, stack, robot, None, lambda: False)
+        nodes = RobotNodes(self.bus, stack, robot, None, None)
         gantry: Any = robot
         modules = StackNodes(self.bus, stack, robot.calibration, None, gantry, 0.0)
         placed = nodes.nodes + [(Phase.MEASURE, FaultyRobot(self)), (Phase.PROTECT, self)] + modules.nodes

@@ -83,9 +83,7 @@ def forget_feet(memory: Records) -> None:
 
 
 @njit(cache=True, nogil=True)
-def sense_feet(
-    m: Record, q: Array, dq: Array, tau: Array, up: Array, omega: Array, dt: float
-) -> None:
+def sense_feet(m: Record, q: Array, dq: Array, tau: Array, up: Array, omega: Array, dt: float) -> None:
     """Take one sample; arguments as for `Feet.step`, `m` is a `FEET`."""
     gravity = np.empty(3)
     for a in range(3):
@@ -131,9 +129,7 @@ def level_floor(m: Record, velocity: float, up: Array, feet: Record, dt: float) 
         # Squares: a foot that is being unloaded soon counts little.
         share = feet.weight[k] * feet.weight[k]
         total += share
-        height -= share * (
-            feet.points[k, 0] * up[0] + feet.points[k, 1] * up[1] + feet.points[k, 2] * up[2]
-        )
+        height -= share * (feet.points[k, 0] * up[0] + feet.points[k, 1] * up[1] + feet.points[k, 2] * up[2])
     m.z += velocity * dt
     if total == 0.0:
         return 0.0

@@ -74,7 +74,14 @@ def contact(
     weight: Array,
 ) -> None:
     """Do what `contacts` does for one robot; all arrays are (2,), the last two are filled."""
-    touch, leave, middle, width, settle, ramp = config[0], config[1], config[2], config[3], config[4], config[5]
+    touch, leave, middle, width, settle, ramp = (
+        config[0],
+        config[1],
+        config[2],
+        config[3],
+        config[4],
+        config[5],
+    )
     for k in range(2):
         was = planted[k] != 0
         probability[k] = weight[k] = 0.0

@@ -154,6 +154,10 @@ class MujocoRobot:
         self._memory["joint_offset"] = 0.0 if joint_offset is None else joint_offset
         return Stage(sense_code(), self._memory), Stage(act_code(), self._memory)
 
+    def take_hand_command(self, side: Side, command: HandCommand) -> None:
+        """Take the command of one hand; see `HasStages`."""
+        self._hands[side].take(command)
+
     @classmethod
     def on_feet(cls, options: Mapping[str, object]) -> bool:
         """Return whether the option `support` has the robot stand; see `Standing`."""

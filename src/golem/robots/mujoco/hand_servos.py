@@ -22,6 +22,9 @@ OVERTRAVEL = 0.20
 goal beyond the object both servos press with their full torque wherever between the fingers it stands."""
 
 
+_OFFSET = magpie_model.pad_offset(0.0) - magpie_model.ARM * math.cos(magpie_model.ANGLE_OPEN)
+"""Distance of a pad from the hand's centre plane, less what the crank's angle adds [m]."""
+
 HAND = np.dtype(
     [
         ("q", "i8", (2,)),
@@ -58,22 +61,13 @@ def drive_hand(h: Record, qpos: int, qvel: int, ctrl: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def read_hand(h: Record, qpos: int, ctrl: int, crank: Array, tau: Array) -> None:
-    """Write angles [rad] and torques [N m] of both cranks, (2,) each, positive when closing."""
+def read_hand(h: Record, qpos: int, ctrl: int, fingers: Array, force: Array) -> None:
+    """Write what both fingers report, (2,) each; see `HandState`. Arrays of the simulation by address."""
     q, u = floats(qpos), floats(ctrl)
     for k in range(2):
-        crank[k], tau[k] = h.sign[k] * q[h.q[k]], h.sign[k] * u[h.u[k]]
-
-
-def hand_state(t: float, crank: Array, tau: Array) -> HandState:
-    """Return what a hand reports at time `t` [s], from what `read_hand` wrote."""
-    fingers: list[float] = []
-    force: list[float] = []
-    for theta, torque in zip(crank.tolist(), tau.tolist(), strict=True):
-        fingers.append(float(magpie_model.pad_offset(theta)))
-        lever = magpie_model.ARM * math.sin(magpie_model.ANGLE_OPEN + theta)
-        force.append(max(torque, 0.0) / lever)
-    return HandState(t, sum(fingers), np.array(fingers), np.array(force))
+        angle = magpie_model.ANGLE_OPEN + h.sign[k] * q[h.q[k]]
+        fingers[k] = _OFFSET + magpie_model.ARM * math.cos(angle)
+        force[k] = max(h.sign[k] * u[h.u[k]], 0.0) / (magpie_model.ARM * math.sin(angle))
 
 
 class HandServos:
@@ -132,6 +126,6 @@ class HandServos:
 
     def read(self, data: mujoco.MjData, t: float) -> HandState:
         """Return the hand's report at time `t` [s]: the servos' present positions and loads."""
-        crank, tau = np.empty(2), np.empty(2)
-        read_hand(self.memory[0], address(data.qpos), address(data.ctrl), crank, tau)
-        return hand_state(t, crank, tau)
+        fingers, force = np.empty(2), np.empty(2)
+        read_hand(self.memory[0], address(data.qpos), address(data.ctrl), fingers, force)
+        return HandState(t, float(fingers.sum()), fingers, force)

@@ -117,8 +117,8 @@ def sense(r: Record, m: Record) -> None:
         rate[i], acc[i] = qvel[m.base_v + 3 + i], sensors[m.acc + i]
     turned, gyro = torso_motion(quat, rate, qpos[motors.q[TORSO]], qvel[motors.v[TORSO]])
     measure_imu(m.imu, turned, gyro, acc, r)
-    read_hand(m.left, m.qpos, m.ctrl, r.crank[0], r.crank_tau[0])
-    read_hand(m.right, m.qpos, m.ctrl, r.crank[1], r.crank_tau[1])
+    read_hand(m.left, m.qpos, m.ctrl, r.fingers[0], r.finger_force[0])
+    read_hand(m.right, m.qpos, m.ctrl, r.fingers[1], r.finger_force[1])
     r.state_t = r.t
 
 
