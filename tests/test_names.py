@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import ast
 from collections import Counter
 from pathlib import Path
 
-SOURCE = Path(__file__).resolve().parent.parent / "src" / "golem"
+from tests.sources import FILES, code
+
 MESSAGES = "msgs"
 """Folder of the generated ROS messages, whose names are those of their packages."""
 MAY_REPEAT = {"__init__.py", "__main__.py", "base.py", "config.py"}
@@ -15,7 +15,7 @@ MAY_REPEAT = {"__init__.py", "__main__.py", "base.py", "config.py"}
 
 def files() -> list[Path]:
     """Return every source file but the generated ones."""
-    return [path for path in SOURCE.rglob("*.py") if MESSAGES not in path.parts]
+    return [path for path in FILES if MESSAGES not in path.parts]
 
 
 def twice(names: list[str]) -> set[str]:
@@ -24,12 +24,7 @@ def twice(names: list[str]) -> set[str]:
 
 
 def test_no_class_name_occurs_twice() -> None:
-    classes = [
-        node.name
-        for path in files()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
-    ]
+    classes = [name for path in files() for name in code(path).classes if not name.startswith("_")]
     assert len(classes) > 300
     assert twice(classes) == set()
 

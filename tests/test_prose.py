@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 from statistics import median
-
-import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 PAGES = sorted([*(REPOSITORY / "docs").rglob("*.md"), *REPOSITORY.glob("*.md")])
@@ -21,6 +20,11 @@ COMMIT = re.compile(r"\b(?=[0-9a-f]*[a-f])(?=[0-9a-f]*[0-9])[0-9a-f]{7,40}\b")
 
 def name(page: Path) -> str:
     return page.relative_to(REPOSITORY).as_posix()
+
+
+@cache
+def read(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
 
 
 def without_code(text: str) -> str:
@@ -58,30 +62,43 @@ def test_a_sentence_is_counted_as_it_is_read() -> None:
     assert sentences(text + "\n```sh\nno word of this counts at all\n```\n\n- a b c d e\n") == [4, 5, 5]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name)
-def test_sentences_are_short(page: Path) -> None:
-    lengths = sentences(page.read_text(encoding="utf-8")) or [0]
-    assert max(lengths) <= LONGEST_SENTENCE and median(lengths) <= MEDIAN_SENTENCE
-
-
-@pytest.mark.parametrize("page", PAGES, ids=name)
-def test_lines_are_narrow(page: Path) -> None:
-    text = page.read_text(encoding="utf-8")
+def wide_lines(text: str) -> list[str]:
+    """Return the lines of a page that are too wide, those of shell blocks and those of prose."""
     shell = re.findall(r"^ *```(?:sh|bash|console)\n(.*?)^ *```", text, re.S | re.M)
-    assert [line for block in shell for line in block.splitlines() if len(line) > WIDEST_SHELL_LINE] == []
     prose = [
         line for line in text.splitlines() if "|" not in line and "](" not in line and "http" not in line
     ]
-    assert [line for line in prose if len(line) > WIDEST_LINE] == []
+    commands = [line for block in shell for line in block.splitlines() if len(line) > WIDEST_SHELL_LINE]
+    return commands + [line for line in prose if len(line) > WIDEST_LINE]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name)
-def test_commits_are_named_only_beside_results(page: Path) -> None:
-    if not name(page).startswith(("docs/results", "docs/history")):
-        assert COMMIT.findall(without_code(page.read_text(encoding="utf-8"))) == []
+def test_a_wide_line_is_found() -> None:
+    wide = 101 * "x"
+    assert wide_lines(f"{wide}\n```sh\n{wide}\n```\n{20 * wide} | {wide}\n{121 * 'y'}\n") == [wide, 121 * "y"]
+
+
+def test_sentences_are_short() -> None:
+    assert len(PAGES) > 40
+    lengths = {name(page): sentences(read(page)) or [0] for page in PAGES}
+    assert {page: max(n) for page, n in lengths.items() if max(n) > LONGEST_SENTENCE} == {}
+    assert {page: median(n) for page, n in lengths.items() if median(n) > MEDIAN_SENTENCE} == {}
+
+
+def test_lines_are_narrow() -> None:
+    found = {name(page): wide_lines(read(page)) for page in PAGES}
+    assert {page: lines for page, lines in found.items() if lines} == {}
+
+
+def test_commits_are_named_only_beside_results() -> None:
+    found = {
+        name(page): COMMIT.findall(without_code(read(page)))
+        for page in PAGES
+        if not name(page).startswith(("docs/results", "docs/history"))
+    }
+    assert {page: commits for page, commits in found.items() if commits} == {}
 
 
 if __name__ == "__main__":
     for page in PAGES:
-        lengths = sorted(sentences(page.read_text(encoding="utf-8"))) or [0]
+        lengths = sorted(sentences(read(page))) or [0]
         print(f"{name(page):44} {len(lengths):5} sentences, median {median(lengths):4}, most {lengths[-1]}")
