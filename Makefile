@@ -1,8 +1,10 @@
 # `make demo` and `make test` need only Python 3.11-3.13 and a network to the package index. Another interpreter than
 # the first suitable one: make PYTHON=/path/to/python3.12 ...
 BIN := .venv/bin
+# Without what Python keeps of a file that it has compiled, every process of the tests spends seconds on compiling.
+export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo test test-slow lint format docs lock venv venv-isaac clean
+.PHONY: help demo test test-slow kernels lint format docs lock venv venv-isaac clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | expand -t 12
@@ -10,12 +12,15 @@ help:  ## list the targets
 demo: venv  ## the standing robot pulls loosened screws from the pack in the twin
 	$(BIN)/golem demo
 
-test: lint  ## lint, types and the fast tests
+test: lint kernels  ## lint, types and the fast tests
 	$(BIN)/pytest -n 2 -m "not slow"
 
 test-slow: venv-dev  ## the tests that take more than a few seconds
 	$(BIN)/pytest -n 2 -m "slow and not alone"
 	$(BIN)/pytest -m "slow and alone"
+
+kernels: venv-dev  ## compile the numba kernels, once for all tests
+	scripts/compile_kernels.sh
 
 lint: venv-dev  ## style and types
 	$(BIN)/ruff check src tests
