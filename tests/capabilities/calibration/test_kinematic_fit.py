@@ -50,7 +50,7 @@ def views(count: int, mount: Array, offset: Array, seed: int) -> list[TagView]:
     return out
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_mount_and_zeros_are_found_within_what_the_covariance_says(seed: int) -> None:
     rng = np.random.default_rng(seed)
     mount = np.eye(4)

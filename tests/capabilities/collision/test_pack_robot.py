@@ -41,6 +41,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_robot_is_packed_and_nothing_is_missed(model: Path, tmp_path: Path) -> None:
     out = tmp_path / "spheres.json"
     packed = run_spheres(SpheresConfig(model, out, spheres=40, postures=300))

@@ -39,6 +39,7 @@ def test_a_conservative_set_covers_what_it_has_not_seen(most: int) -> None:
     assert row.covered > 0.9995 and row.gap < 5e-4
 
 
+@pytest.mark.slow
 def test_more_spheres_stand_out_less_and_a_tight_set_is_smaller() -> None:
     def mean(kind: SphereKind, most: int) -> tuple[float, float]:
         row = coverage("rod", surface(), pack(surface(), kind, 0.003, most))
@@ -49,6 +50,7 @@ def test_more_spheres_stand_out_less_and_a_tight_set_is_smaller() -> None:
     assert few[1] > many[1] > 1.0 and tight[1] == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_packing_is_the_same_each_time() -> None:
     one, other = (pack(surface(), "conservative", 0.006, 10) for _ in range(2))
     assert np.array_equal(one.centres, other.centres) and np.array_equal(one.radii, other.radii)

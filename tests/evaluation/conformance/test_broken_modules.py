@@ -364,7 +364,7 @@ def _count(context: Context) -> SkillResult:
         ("opens_no_file", lambda: _Mine(lambda context: Path(__file__).read_text())),
         ("starts_no_thread", lambda: _Mine(lambda context: threading.Thread(target=int).start())),
         ("draws_no_shared_randomness", lambda: _Mine(lambda context: random.random())),
-        ("can_be_cancelled", _Stubborn),
+        pytest.param("can_be_cancelled", _Stubborn, marks=pytest.mark.slow),
         ("gives_reasons", lambda: _Mine(lambda context: SkillResult(False, "count", None, " "))),
     ],
 )

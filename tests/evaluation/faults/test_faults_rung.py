@@ -41,6 +41,7 @@ def test_the_judge_names_what_went_wrong(fault: Injection, finding: FaultFinding
     assert verdict(fault, finding, "standing")[0] == stage
 
 
+@pytest.mark.slow
 def test_a_robot_whose_stack_goes_silent_is_stopped_in_time_and_stands() -> None:
     case = {"posture": "standing", "fault": "silent"}
     outcome = FaultsRung().run(TrialSpec("faults", "gate", "bench", 0, 0, case=case), None)

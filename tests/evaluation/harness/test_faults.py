@@ -92,6 +92,7 @@ def marked(mark: Path) -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_trials_that_share_a_past_are_run_one_by_one_when_one_of_them_kills_it(fake: Make) -> None:
     result = run_ladder(fake("fragile", rung="climb", n=1))
     found = {(r.case["side"], r.case["level"]): (r.success, r.stage) for r in result.records}

@@ -48,6 +48,7 @@ def content(config: LadderConfig) -> dict[str, bytes]:
     return {name: (out / name).read_bytes() for name in ("trials.jsonl", "summary.json", *names)}
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_whatever_the_number_of_processes(fake: Make) -> None:
     one, two = fake("poor", "good", "faulty", out="one"), fake("poor", "good", "faulty", out="two", j=2)
     run_ladder(one)
@@ -67,6 +68,7 @@ def test_every_method_meets_the_same_scenes(fake: Make) -> None:
     assert len(set(scenes["poor"])) == 8
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_not_run_again_and_a_longer_one_continues_it(fake: Make) -> None:
     config = fake("good", n=3)
     run_ladder(config)
@@ -145,6 +147,7 @@ def test_a_replaced_module_is_another_configuration(fake: Make) -> None:
     assert content(config) == written
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_finished_and_tells_the_command(
     fake: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -168,6 +171,7 @@ def test_ctrl_c_keeps_what_finished_and_tells_the_command(
     assert content(config) == content(whole)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="no /proc here")
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
 def test_a_killed_run_leaves_no_process_and_continues_to_the_same_bytes(
