@@ -4,7 +4,7 @@ BIN := .venv/bin
 # Without what Python keeps of a file that it has compiled, every process of the tests spends seconds on compiling.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo test test-slow kernels lint format docs lock venv venv-isaac clean
+.PHONY: help demo test test-slow test-long kernels lint format docs lock venv venv-isaac clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | expand -t 12
@@ -15,9 +15,13 @@ demo: venv  ## the standing robot pulls loosened screws from the pack in the twi
 test: lint kernels  ## lint, types and the fast tests
 	$(BIN)/pytest -n 2 -m "not slow"
 
-test-slow: venv-dev  ## the tests that take more than a few seconds
-	$(BIN)/pytest -n 2 -m "slow and not alone"
-	$(BIN)/pytest -m "slow and alone"
+test-slow: venv-dev  ## the tests that take more than a few seconds, up to a minute
+	$(BIN)/pytest -n 2 -m "slow and not alone and not long"
+	$(BIN)/pytest -m "slow and alone and not long"
+
+test-long: venv-dev  ## more trials and more mutations of what the others check; before a release
+	$(BIN)/pytest -n 2 -m "long and not alone"
+	$(BIN)/pytest -m "long and alone"
 
 kernels: venv-dev  ## compile the numba kernels, once for all tests
 	scripts/compile_kernels.sh

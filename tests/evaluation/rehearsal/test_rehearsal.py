@@ -69,7 +69,14 @@ def test_a_sound_robot_passes_and_faults_are_found_after_it(tmp_path: Path, doma
 @pytest.mark.slow
 @pytest.mark.alone
 @pytest.mark.timeout(1200)
-@pytest.mark.parametrize("fault", ["swapped_joints", "wrong_sign", "tilted_imu"])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "tilted_imu",
+        pytest.param("swapped_joints", marks=pytest.mark.long),
+        pytest.param("wrong_sign", marks=pytest.mark.long),
+    ],
+)
 def test_a_fault_is_found(tmp_path: Path, domain: int, fault: str) -> None:
     pytest.importorskip("cyclonedds")
     found = golem(domain, tmp_path, fault)

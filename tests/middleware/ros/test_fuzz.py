@@ -101,6 +101,7 @@ def test_a_hundred_thousand_mutated_payloads_of_each_type_that_is_read_further(n
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_half_a_million_mutated_payloads() -> None:
     rng = random.Random(500_000)
     names = travelling(codec.codec())
