@@ -1,0 +1,252 @@
+"""Plant faults in a copy of the sources, one at a time, and see whether the tests find them.
+
+`python -m tests.plant_faults` tries all with the tests of CI; names of faults choose some. `--tree` takes another
+checkout, `--select` other marks: so it is seen what a change of the tests loses. A fault whose line is gone is an
+error: give it its new line.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+CI = "not long"
+"""Marks of the tests that CI runs."""
+
+
+class PlantedFault(NamedTuple):
+    """A line of a file below `src/golem` that becomes another one, and the tests that shall notice."""
+
+    file: str
+    line: str
+    becomes: str
+    tests: tuple[str, ...]
+
+
+FAULTS = {
+    "gate-torque-steps": PlantedFault(
+        "hardware/safety/kernel.py",
+        "tau = min(max(tau, last_tau - step), last_tau + step)",
+        "tau = min(max(tau, last_tau - 3.0 * step), last_tau + 3.0 * step)",
+        ("tests/hardware/safety/test_limiter.py", "tests/hardware/safety/test_kernel.py"),
+    ),
+    "gate-old-estop": PlantedFault(
+        "hardware/safety/gate.py",
+        "if t - old.t > limits.estop_age:",
+        "if t - old.t > 10.0 * limits.estop_age:",
+        ("tests/hardware/safety/test_gate.py",),
+    ),
+    "gate-late-braking": PlantedFault(
+        "hardware/safety/monitor.py",
+        "return q + dq * np.abs(dq) / (deceleration + deceleration)",
+        "return q + dq * np.abs(dq) / (4.0 * deceleration)",
+        (
+            "tests/hardware/safety/test_monitor.py",
+            "tests/hardware/safety/test_kernel.py",
+            "tests/hardware/safety",
+        ),
+    ),
+    "estimator-turns-backwards": PlantedFault(
+        "hardware/estimator/random_walk.py",
+        "return -(turning + rates) @ R.swapaxes(-1, -2)",
+        "return -(rates - turning) @ R.swapaxes(-1, -2)",
+        ("tests/hardware/estimator/test_random_walk.py", "tests/hardware/estimator/test_base_estimators.py"),
+    ),
+    "estimator-half-bias": PlantedFault(
+        "hardware/estimator/attitude.py",
+        "(state.imu.gyro - (2.0 * sign / dt) * turn - self.value)",
+        "(state.imu.gyro - (1.0 * sign / dt) * turn - self.value)",
+        ("tests/hardware/estimator/test_attitude.py",),
+    ),
+    "servo-no-ramp": PlantedFault(
+        "hardware/servo/servo.py",
+        "kp[ramped] *= self._elapsed / self.config.ramp",
+        "kp[ramped] *= 1.0",
+        ("tests/hardware/servo",),
+    ),
+    "servo-bias-unbounded": PlantedFault(
+        "hardware/servo/servo.py",
+        "out[i] = min(max(bias[i] + gain[i] * error[i], -bound[i]), bound[i])",
+        "out[i] = bias[i] + gain[i] * error[i]",
+        ("tests/hardware/servo",),
+    ),
+    "codec-no-padding": PlantedFault(
+        "middleware/ros/codec.py",
+        "buffer = self._scratch.zeros(size + -size % 4)",
+        "buffer = self._scratch.zeros(size)",
+        ("tests/middleware/ros/test_codec.py", "tests/middleware/ros/test_vendor_messages.py"),
+    ),
+    "planner-too-fast": PlantedFault(
+        "capabilities/planning/timed_path.py",
+        "cap = (SLACK * limits.speed / both).min(axis=1)",
+        "cap = (1.2 * limits.speed / both).min(axis=1)",
+        ("tests/capabilities/planning/test_rrt_connect.py",),
+    ),
+    "memory-too-sure": PlantedFault(
+        "capabilities/memory/object_update.py",
+        "row[VARIANCE] = max(fused, variance / 4.0)",
+        "row[VARIANCE] = fused",
+        ("tests/capabilities/memory/test_object_map.py",),
+    ),
+    "skill-feels-late": PlantedFault(
+        "skills/force_guard.py",
+        "self.stuck = force > self._force and",
+        "self.stuck = force > 3.0 * self._force and",
+        ("tests/skills/test_force_guard.py",),
+    ),
+    "skill-follows-links": PlantedFault(
+        "skills/kept_file.py",
+        "if path.is_symlink():",
+        "if path.is_symlink() and not path.exists():",
+        ("tests/skills/test_kept_file.py",),
+    ),
+    "way-ignores-costs": PlantedFault(
+        "capabilities/navigation/astar.py",
+        "through = spent[cell] + length + beta * cost[r, c]",
+        "through = spent[cell] + length + 0.0 * beta",
+        ("tests/capabilities/navigation/test_astar.py",),
+    ),
+    "walk-never-dwells": PlantedFault(
+        "capabilities/navigation/goto.py",
+        "self._walking = self._near < config.dwell",
+        "self._walking = self._near < 0.01 * config.dwell",
+        ("tests/capabilities/navigation/test_goto.py",),
+    ),
+    "collision-thin-cells": PlantedFault(
+        "capabilities/collision/obstacles.py",
+        "off, reach = balls[:, :3] - sphere[:3], sphere[3] + margin + balls[:, 3]",
+        "off, reach = balls[:, :3] - sphere[:3], sphere[3] + margin",
+        ("tests/capabilities/collision/test_scene_cloud.py",),
+    ),
+    "odometry-begins-wrongly": PlantedFault(
+        "capabilities/odometry/moving_start.py",
+        "up = force / (WINDOW - 1) - gained",
+        "up = force / (WINDOW - 1) + gained",
+        ("tests/capabilities/odometry/test_lio.py",),
+    ),
+    "bag-repair-forgets": PlantedFault(
+        "middleware/bags/reader.py",
+        "contents.add(message.topic, message.log_time)",
+        "contents.add(message.topic, 0)",
+        ("tests/middleware/bags/test_bag.py",),
+    ),
+    "options-take-nan": PlantedFault(
+        "options.py",
+        "elif value != value:",
+        "elif value is Ellipsis:",
+        ("tests/test_options.py", "tests/test_stack.py", "tests/test_registry.py"),
+    ),
+    "cli-refusal-is-failure": PlantedFault(
+        "cli.py",
+        "return 0 if result.success else BAD_INPUT if result.stage == REFUSED else FAILED",
+        "return 0 if result.success or result.stage == REFUSED else FAILED",
+        ("tests/test_run.py", "tests/test_cli.py"),
+    ),
+    "skill-sees-the-truth": PlantedFault(
+        "skills/walk.py",
+        "from golem.options import require\n",
+        "from golem.evaluation.base import DONE as DONE\nfrom golem.options import require\n",
+        ("tests/test_layers.py", "tests/test_no_truth.py"),
+    ),
+}
+
+
+def copied(tree: Path, folder: Path) -> Path:
+    """Return a copy of the checkout `tree` in `folder`, with the kernels that it has compiled."""
+    target = folder / "tree"
+    listed = subprocess.run(
+        ["git", "-C", str(tree), "ls-files", "-z"], check=True, capture_output=True, text=True
+    )
+    kernels = [str(path.relative_to(tree)) for path in tree.glob("src/**/__pycache__/*.nb[ic]")]
+    for name in [*filter(None, listed.stdout.split("\0")), *kernels]:
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(tree / name, target / name, follow_symlinks=False)
+    shared = tree.parent / "shared"
+    if shared.is_dir():
+        (folder / "shared").symlink_to(shared.resolve())
+    return target
+
+
+def forget_kernels(tree: Path, file: Path) -> None:
+    """Remove the compiled kernels of `file` and of those that call them: numba does not see that they changed."""
+    kernels = [path for path in (tree / "src").rglob("*.py") if "@njit" in path.read_text(encoding="utf-8")]
+    changed = {file}
+    while more := {
+        path
+        for path in kernels
+        if path not in changed
+        and any(re.search(rf"\b{each.stem}\b", path.read_text(encoding="utf-8")) for each in changed)
+    }:
+        changed |= more
+    for path in changed:
+        for compiled in path.parent.glob(f"__pycache__/{path.stem}.*.nb[ic]"):
+            compiled.unlink()
+
+
+def noticed(tree: Path, fault: PlantedFault, select: str) -> str | None:
+    """Return the first test that fails with the fault in the copy `tree`, None if none does.
+
+    Raises:
+        SystemExit: the line is not there once, or the tests could not be run.
+    """
+    path = tree / "src" / "golem" / fault.file
+    whole = path.read_text(encoding="utf-8")
+    if whole.count(fault.line) != 1:
+        raise SystemExit(f"{fault.file} holds {whole.count(fault.line)} times: {fault.line}")
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "900"]
+    compiled = "@njit" in whole
+    try:
+        path.write_text(whole.replace(fault.line, fault.becomes), encoding="utf-8")
+        if compiled:
+            forget_kernels(tree, path)
+        done = subprocess.run(
+            [*command, "-m", select, *fault.tests],
+            cwd=tree,
+            env=os.environ | {"PYTHONPATH": str(tree / "src")},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    finally:
+        path.write_text(whole, encoding="utf-8")
+        if compiled:
+            forget_kernels(tree, path)
+    if done.returncode not in (0, 1):
+        raise SystemExit(done.stdout + done.stderr)
+    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.M)
+    return None if done.returncode == 0 else failed[1] if failed else done.stdout
+
+
+def main() -> int:
+    """Try the faults; return 1 if one is not found."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help="faults to plant; default: all")
+    parser.add_argument(
+        "--tree", type=Path, default=REPOSITORY, help="checkout whose sources and tests are taken"
+    )
+    parser.add_argument("--select", default=CI, help="marks of the tests, as pytest's -m takes them")
+    given = parser.parse_args()
+    if unknown := set(given.names) - set(FAULTS):
+        parser.error(f"unknown faults {sorted(unknown)}; there are {list(FAULTS)}")
+    lost: list[str] = []
+    with tempfile.TemporaryDirectory() as folder:
+        tree = copied(given.tree.resolve(), Path(folder))
+        for name in given.names or FAULTS:
+            by = noticed(tree, FAULTS[name], given.select)
+            print(f"{name:26} {f'found by {by}' if by else 'NOT FOUND'}", flush=True)
+            if by is None:
+                lost.append(name)
+    print(f"{len(given.names or FAULTS) - len(lost)} of {len(given.names or FAULTS)} faults found")
+    return 1 if lost else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
