@@ -6,15 +6,13 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-# Kernels compiled from bytecode, numbers that pass through C; dataclasses, type hints, enumerations and options; bytes,
-# text and files; processes, threads, signals and asyncio; command lines. Left out is what only calculates: the same
-# wheels of NumPy, MuJoCo and Pinocchio do that, whatever the Python.
+# Dataclasses, type hints, enumerations and options; bytes, text and files; processes, threads, signals and asyncio;
+# command lines. compile_kernels.sh has compiled the kernels from this Python's bytecode and tried them. Left out is what
+# only calculates: the same wheels of NumPy, MuJoCo and Pinocchio do that, whatever the Python.
 portable=(
-    tests/capabilities/collision/test_collision_model.py tests/capabilities/memory
-    tests/capabilities/odometry/test_lio.py tests/capabilities/planning/test_rrt_connect.py
-    tests/dashboard/test_server.py tests/dashboard/test_status.py
+    tests/capabilities/memory tests/dashboard/test_server.py tests/dashboard/test_status.py
     tests/evaluation/harness tests/evaluation/metrics tests/evaluation/report tests/evaluation/test_base.py
-    tests/hardware/drivers tests/hardware/estop tests/hardware/estimator/test_invariant.py
+    tests/hardware/drivers tests/hardware/estop
     tests/hardware/safety/test_gate.py tests/hardware/safety/test_kernel.py
     tests/interfaces tests/middleware tests/robots/replay
     tests/runtime/live tests/runtime/bringup tests/runtime/test_call_times.py tests/runtime/test_checked.py
