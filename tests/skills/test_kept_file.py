@@ -77,10 +77,19 @@ def test_a_link_is_not_followed(tmp_path: Path) -> None:
     assert said.startswith("refused") and "is a link" in said
 
 
+def _save_map(stem: Path) -> None:
+    cells, nothing = np.zeros((3, 4), np.int8), np.zeros((0, 3))
+    save_map(stem, StoredMap(PlanarPose(0.0, 0.0, 0.0), 0.1, cells, nothing, nothing[:, :2]))
+
+
+def test_a_link_to_a_map_is_not_followed_either(tmp_path: Path) -> None:
+    _save_map(tmp_path / "elsewhere")
+    (tmp_path / "hall.pgm").symlink_to(tmp_path / "elsewhere.pgm")
+    _, said = _explored(tmp_path, "hall")
+    assert said.startswith("refused") and "is a link" in said
+
+
 def test_a_map_replaces_a_map(tmp_path: Path) -> None:
-    one = StoredMap(
-        PlanarPose(0.0, 0.0, 0.0), 0.1, np.zeros((3, 4), np.int8), np.zeros((0, 3)), np.zeros((0, 2))
-    )
-    save_map(tmp_path / "hall", one)
+    _save_map(tmp_path / "hall")
     _, said = _explored(tmp_path, "hall")
     assert said.startswith("done") and str(tmp_path / "hall.yaml") in said
