@@ -215,6 +215,7 @@ def test_every_field_of_every_goal_at_its_edges(crowd: Crowd, action: str) -> No
     assert {"done", "cancelled", "detect"} & set(stages) or action in WALKS  # whose legs do not
 
 
+@pytest.mark.slow
 def test_every_field_of_every_goal_in_json_at_its_edges(crowd: Crowd) -> None:
     walk = {"x": 1.0}
     sound = {
@@ -326,6 +327,7 @@ def _send_damaged(crowd: Crowd, rng: random.Random) -> None:
 
 
 @pytest.mark.timeout(120 + COUNT // 20)
+@pytest.mark.slow
 def test_thousands_of_random_goals_requests_and_commands(crowd: Crowd) -> None:
     rng = random.Random(COUNT)
     statuses: list[GoalStatus] = []

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from tests.runtime.live.conftest import Live
 
 from golem.hardware.estop.virtual import VirtualEstop
@@ -22,6 +23,7 @@ from golem.runtime.live.safety_process import SafetyProcess
 from golem.types import LowCommand
 
 
+@pytest.mark.slow
 def test_a_stop_leaves_a_bag_of_the_seconds_around_it(live: Live, tmp_path: Path) -> None:
     said: list[str] = []
     box = BlackBox(tmp_path, said.append, run=lambda write: write())
