@@ -90,10 +90,10 @@ FAULTS = {
         "cap = (1.2 * limits.speed / both).min(axis=1)",
         ("tests/capabilities/planning/test_rrt_connect.py",),
     ),
-    "memory-too-sure": PlantedFault(
+    "memory-learns-slowly": PlantedFault(
         "capabilities/memory/object_update.py",
-        "row[VARIANCE] = max(fused, variance / 4.0)",
-        "row[VARIANCE] = fused",
+        "row[PLACE] += fused / variance * (place - row[PLACE])",
+        "row[PLACE] += 0.1 * fused / variance * (place - row[PLACE])",
         ("tests/capabilities/memory/test_object_map.py",),
     ),
     "skill-feels-late": PlantedFault(
@@ -105,7 +105,7 @@ FAULTS = {
     "skill-follows-links": PlantedFault(
         "skills/kept_file.py",
         "if path.is_symlink():",
-        "if path.is_symlink() and not path.exists():",
+        "if path.is_symlink() and path.is_dir():",
         ("tests/skills/test_kept_file.py",),
     ),
     "way-ignores-costs": PlantedFault(
@@ -114,10 +114,10 @@ FAULTS = {
         "through = spent[cell] + length + 0.0 * beta",
         ("tests/capabilities/navigation/test_astar.py",),
     ),
-    "walk-never-dwells": PlantedFault(
+    "walk-ends-turned": PlantedFault(
         "capabilities/navigation/goto.py",
-        "self._walking = self._near < config.dwell",
-        "self._walking = self._near < 0.01 * config.dwell",
+        "distance < self._slack * config.close and turn < self._slack * config.aligned",
+        "distance < self._slack * config.close",
         ("tests/capabilities/navigation/test_goto.py",),
     ),
     "collision-thin-cells": PlantedFault(
