@@ -126,16 +126,16 @@ FAULTS = {
         "off, reach = balls[:, :3] - sphere[:3], sphere[3] + margin",
         ("tests/capabilities/collision/test_scene_cloud.py",),
     ),
-    "odometry-begins-wrongly": PlantedFault(
-        "capabilities/odometry/moving_start.py",
-        "up = force / (WINDOW - 1) - gained",
-        "up = force / (WINDOW - 1) + gained",
+    "odometry-pitches-wrongly": PlantedFault(
+        "capabilities/odometry/still_start.py",
+        "pitch = -math.asin(",
+        "pitch = math.asin(",
         ("tests/capabilities/odometry/test_lio.py",),
     ),
     "bag-repair-forgets": PlantedFault(
         "middleware/bags/reader.py",
-        "contents.add(message.topic, message.log_time)",
-        "contents.add(message.topic, 0)",
+        "os.replace(part, file.path)",
+        "part.unlink()",
         ("tests/middleware/bags/test_bag.py",),
     ),
     "options-take-nan": PlantedFault(
