@@ -126,10 +126,10 @@ FAULTS = {
         "off, reach = balls[:, :3] - sphere[:3], sphere[3] + margin",
         ("tests/capabilities/collision/test_scene_cloud.py",),
     ),
-    "odometry-pitches-wrongly": PlantedFault(
+    "odometry-begins-moving": PlantedFault(
         "capabilities/odometry/still_start.py",
-        "pitch = -math.asin(",
-        "pitch = math.asin(",
+        "if moving or np.abs(bias).max() > LARGEST_BIAS:",
+        "if np.abs(bias).max() > 10.0 * LARGEST_BIAS:",
         ("tests/capabilities/odometry/test_lio.py",),
     ),
     "bag-repair-forgets": PlantedFault(
@@ -146,9 +146,9 @@ FAULTS = {
     ),
     "cli-refusal-is-failure": PlantedFault(
         "cli.py",
-        "return 0 if result.success else BAD_INPUT if result.stage == REFUSED else FAILED",
-        "return 0 if result.success or result.stage == REFUSED else FAILED",
-        ("tests/test_run.py", "tests/test_cli.py"),
+        "BAD_INPUT = 2\n",
+        "BAD_INPUT = 1\n",
+        ("tests/test_cli.py", "tests/test_run.py"),
     ),
     "skill-sees-the-truth": PlantedFault(
         "skills/walk.py",

@@ -49,6 +49,7 @@ def rung() -> TetherRung:
     return TetherRung()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["centroid", "visual_servo"])
 def test_a_perfect_robot_puts_the_screw_in_the_tray(method: str, rung: TetherRung) -> None:
     outcome = rung.run(spec(method), None)
