@@ -114,11 +114,11 @@ FAULTS = {
         "through = spent[cell] + length + 0.0 * beta",
         ("tests/capabilities/navigation/test_astar.py",),
     ),
-    "walk-ends-turned": PlantedFault(
-        "capabilities/navigation/goto.py",
-        "distance < self._slack * config.close and turn < self._slack * config.aligned",
-        "distance < self._slack * config.close",
-        ("tests/capabilities/navigation/test_goto.py",),
+    "walkers-go-back": PlantedFault(
+        "capabilities/navigation/movers.py",
+        "mean(axis=0) + (t - then) * self.velocity",
+        "mean(axis=0) - (t - then) * self.velocity",
+        ("tests/capabilities/navigation/test_movers.py",),
     ),
     "collision-thin-cells": PlantedFault(
         "capabilities/collision/obstacles.py",
