@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from golem.middleware.ros.definitions import ARRAY, BASE, NAME, SEQUENCE, Definition, nested
+from golem.middleware.ros.definitions import nested
+from golem.middleware.ros.message_class import ARRAY, BASE, NAME, SEQUENCE, Definition
 
 _PRIMITIVES = {
     "bool": "boolean",

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from golem.middleware.ros.codec import Codec
-from golem.middleware.ros.definitions import ARRAY, BASE, EMPTY_MEMBER, NAME
+from golem.middleware.ros.definitions import EMPTY_MEMBER
+from golem.middleware.ros.message_class import ARRAY, BASE, NAME
 
 INTEGERS = {
     "byte": "b",

@@ -1,19 +1,24 @@
 from __future__ import annotations
 
+import ast
+import importlib
+import pickle
 import re
 import subprocess
 import sys
 import tomllib
 import xml.etree.ElementTree as ElementTree
+from dataclasses import fields
 from enum import StrEnum
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
 
 from golem.interfaces.payloads import GateState, GripState
-from golem.middleware.ros import definitions, generate
+from golem.middleware.ros import definitions, generate, msgs
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGE = definitions.SHARE / "golem_interfaces"
@@ -81,10 +86,38 @@ def test_states_are_those_of_the_software(name: str, states: type[StrEnum]) -> N
     assert {constant: value for constant, _, value in constants} == {s.name: s.value for s in states}
 
 
-def test_the_generated_classes_are_current() -> None:
+def test_the_generated_files_are_current() -> None:
     # If this fails: python -m golem.middleware.ros.generate
-    kept = {path.name: path.read_text() for path in generate.MSGS.glob("*.py") if path.name != "__init__.py"}
-    assert kept == generate.modules()
+    kept = {path.name: path.read_text() for path in generate.MSGS.glob("*.*") if path.suffix != ".py"}
+    assert kept == generate.files()
+
+
+@pytest.mark.parametrize("name", msgs.DEFINITIONS)
+def test_a_stub_says_what_its_class_is(name: str) -> None:
+    package, _, short = name.split("/")
+    tree = ast.parse((generate.MSGS / f"{package}.pyi").read_text())
+    (stub,) = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == short)
+    said = {ast.unparse(each.target): each for each in stub.body if isinstance(each, ast.AnnAssign)}
+    made = getattr(importlib.import_module(f"golem.middleware.ros.msgs.{package}"), short)
+    assert made.__msgtype__ == name and made.__module__ == f"golem.middleware.ros.msgs.{package}"
+    assert [field for field, each in said.items() if each.value] == [field.name for field in fields(made)]
+    message = made()
+    for field, each in said.items():
+        value, hint = getattr(message, field), ast.unparse(each.annotation).removeprefix("ClassVar[")
+        if isinstance(value, np.ndarray):
+            assert value.dtype == getattr(np, hint.removeprefix("NDArray[np.").removesuffix("]"))
+        else:
+            assert hint.startswith(type(value).__name__)
+    assert pickle.loads(pickle.dumps(message)) == message
+
+
+def test_a_package_of_messages_lists_them_and_has_no_others() -> None:
+    package = importlib.import_module("golem.middleware.ros.msgs.std_srvs")
+    assert dir(package)[-2:] == ["Trigger_Request", "Trigger_Response"]
+    with pytest.raises(ImportError):
+        importlib.import_module("golem.middleware.ros.msgs.of_nobody")
+    with pytest.raises(AttributeError, match="Shout"):
+        _ = package.Shout
 
 
 def without_extras(code: str) -> None:

@@ -30,10 +30,10 @@ from golem.interfaces.public import TopicRow
 from golem.middleware.dds.base import DdsError, Qos
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.base import ClientGoal
-from golem.middleware.ros.definitions import ARRAY, BASE, EMPTY_MEMBER, NAME
+from golem.middleware.ros.definitions import EMPTY_MEMBER
 from golem.middleware.ros.future import Future
-from golem.middleware.ros.generate import numpy_name, python_name
 from golem.middleware.ros.goals import GoalStatus
+from golem.middleware.ros.message_class import ARRAY, BASE, NAME, numpy_name, python_name
 from golem.middleware.ros.msgs.geometry_msgs import PoseStamped
 from golem.middleware.ros.msgs.golem_interfaces import (
     Pick_Goal,

@@ -8,7 +8,6 @@ to the payload.
 from __future__ import annotations
 
 import functools
-import importlib
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,10 +17,19 @@ import numpy as np
 
 from golem.errors import unknown_name
 from golem.middleware.dds.base import Payload
-from golem.middleware.ros import definitions
-from golem.middleware.ros.definitions import ARRAY, BASE, NAME, SEQUENCE, Definition
-from golem.middleware.ros.generate import class_source, numpy_name, python_name, short
+from golem.middleware.ros import definitions, msgs
 from golem.middleware.ros.message import CodecError, Message
+from golem.middleware.ros.message_class import (
+    ARRAY,
+    NAME,
+    SEQUENCE,
+    Definition,
+    is_numeric,
+    message_class,
+    numpy_name,
+    python_name,
+    short,
+)
 
 DEFAULT_DISTRO = "jazzy"
 """Distribution of the functions of this module; where the distribution matters, use `codec`."""
@@ -118,7 +126,11 @@ class Codec:
                 for used in definitions.nested(self._types[name][1]):
                     self.message(used)
                 if name not in self._classes:
-                    made = self._saved(name) or self._made(name)
+                    definition = self._types[name]
+                    kept = name in msgs.DEFINITIONS
+                    made = (
+                        msgs.held(name) if kept else message_class(name, definition, self.message, __name__)
+                    )
                     self._store.types[name] = cast(Any, made)
                     self._classes[name] = made
         return self._classes[name]
@@ -208,28 +220,6 @@ class Codec:
             raise unknown_name("ROS interface", wrong, siblings)
         raise unknown_name("ROS package", package, {each.split("/")[0] for each in self._types})
 
-    def _saved(self, name: str) -> type[Message] | None:
-        try:
-            module = importlib.import_module(f"golem.middleware.ros.msgs.{name.split('/')[0]}")
-        except ModuleNotFoundError:
-            return None
-        found = getattr(module, short(name), None)
-        return found if found is not None and found.__msgtype__ == name else None
-
-    def _made(self, name: str) -> type[Message]:
-        """Return the class of a type that `msgs` does not hold."""
-        nested = {_identifier(used): self._classes[used] for used in definitions.nested(self._types[name][1])}
-        source = (
-            "from dataclasses import dataclass, field\n"
-            "from typing import ClassVar\n"
-            "import numpy as np\n"
-            "from numpy.typing import NDArray\n"
-            "from golem.middleware.ros.message import Message\n"
-        ) + class_source(name, self._types[name], _identifier)
-        scope: dict[str, Any] = {**nested, "__name__": __name__}
-        exec(compile(source, f"<{name}>", "exec", dont_inherit=True), scope)
-        return scope[_identifier(name)]
-
     def _compile(self, name: str) -> _Compiled:
         self.message(name)
         functions = self._store.get_msgdef(name)
@@ -248,7 +238,7 @@ class Codec:
                 inner = self._check(element[1])
                 if inner is not None:
                     deeper.append((python_name(field), what != NAME, inner))
-            elif what != BASE and element[1][0] != "string":
+            elif what in (ARRAY, SEQUENCE) and is_numeric(element):
                 arrays.append((python_name(field), np.dtype(getattr(np, numpy_name(element[1][0])))))
         if not arrays and not deeper:
             return None
@@ -272,10 +262,6 @@ class Codec:
                     inner(each)
 
         return check
-
-
-def _identifier(name: str) -> str:
-    return name.replace("/", "__")
 
 
 def _described(value: object) -> str:

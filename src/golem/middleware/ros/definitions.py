@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 from golem.errors import MissingExtra, unknown_name
 from golem.middleware.dds.domain import Distro
+from golem.middleware.ros.message_class import ARRAY, BASE, NAME, SEQUENCE, Definition, Kind
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -26,14 +27,8 @@ SEPARATOR = "---"
 EMPTY_MEMBER = "structure_needs_at_least_one_member"
 """The member that stands in for the fields of a type without any, as in rosidl; one byte on the wire."""
 
-BASE, NAME, ARRAY, SEQUENCE = 1, 2, 3, 4
-"""Kinds of a field: (BASE, (primitive, string bound)), (NAME, type), and (ARRAY or SEQUENCE, (element, length))."""
-
-Field = tuple[str, tuple[int, Any]]
+Field = tuple[str, Kind]
 """Name and kind of a field."""
-Definition = tuple[list[tuple[str, str, Any]], list[Field]]
-"""Constants (name, type, value) and fields of a type."""
-
 PARTS = {"msg": ("",), "srv": ("_Request", "_Response"), "action": ("_Goal", "_Result", "_Feedback")}
 """What is appended to the name of a file for each of its parts, by the kind of file."""
 
@@ -180,7 +175,7 @@ def _lines(definition: Definition) -> list[str]:
     return written + [f"{_spelled(kind)} {name}" for name, kind in fields if name != EMPTY_MEMBER]
 
 
-def _spelled(kind: tuple[int, Any]) -> str:
+def _spelled(kind: Kind) -> str:
     what, of = kind
     if what == BASE:
         primitive, bound = of
@@ -206,7 +201,7 @@ def _literal(value: object) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value)
 
 
-def _without_char(kind: tuple[int, Any]) -> tuple[int, Any]:
+def _without_char(kind: Kind) -> Kind:
     what, of = kind
     if what == BASE:
         return what, ("uint8", of[1]) if of[0] == "char" else of
