@@ -10,7 +10,7 @@ import pytest
 if TYPE_CHECKING:
     from tests.interop.peers import Ros, Setup
 
-    from golem.middleware.ros.node import DdsNode
+    from golem.middleware.ros.node import RosNode
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -50,7 +50,7 @@ def ros(join: Callable[[], Ros]) -> Ros:
 
 
 @pytest.fixture
-def node(domain: int) -> Iterator[DdsNode]:
+def node(domain: int) -> Iterator[RosNode]:
     """A node of ours."""
     from tests.interop.peers import joined
 

@@ -24,7 +24,7 @@ from golem.interfaces import public
 from golem.interfaces.payloads import GateState
 from golem.middleware.dds.base import Writer
 from golem.middleware.ros import codec, names
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.middleware.ros.request_header import Header, pack
 
 LEFT_OUT = ("/safety/stop", "/safety/reset", "/estop/press", "/elastic_band/release")
@@ -33,7 +33,7 @@ RATE = 400.0
 """Messages per second at most."""
 
 
-def writers(node: DdsNode) -> list[tuple[str, str, Writer, bool]]:
+def writers(node: RosNode) -> list[tuple[str, str, Writer, bool]]:
     """Return name, type and writer of everything that is sent, and whether it is a request."""
     found: list[tuple[str, str, str, bool]] = []
     for service in public.SERVICES:
@@ -57,7 +57,7 @@ def writers(node: DdsNode) -> list[tuple[str, str, Writer, bool]]:
     ]
 
 
-def attack(node: DdsNode, count: int, seed: int) -> Counter[str]:
+def attack(node: RosNode, count: int, seed: int) -> Counter[str]:
     """Send `count` messages, half of them mutated as bytes, and return how many of each name."""
     rng, sent = random.Random(seed), Counter[str]()
     targets = writers(node)

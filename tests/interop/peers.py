@@ -19,7 +19,7 @@ from typing import Any, Literal
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -129,7 +129,7 @@ class Ros:
         self._process.stdin.write(json.dumps({"do": do, **words}) + "\n")
         self._process.stdin.flush()
 
-    def hear(self, node: DdsNode | None = None, timeout: float = 30.0) -> Any:
+    def hear(self, node: RosNode | None = None, timeout: float = 30.0) -> Any:
         """Return what the oldest order came to, spinning `node` meanwhile."""
         end = time.monotonic() + timeout
         while self._lines.empty():
@@ -143,7 +143,7 @@ class Ros:
             raise RuntimeError(answer["error"])
         return answer["value"]
 
-    def do(self, do: str, node: DdsNode | None = None, **words: Any) -> Any:
+    def do(self, do: str, node: RosNode | None = None, **words: Any) -> Any:
         """Give an order, and return what it came to."""
         self.tell(do, **words)
         return self.hear(node)
@@ -164,14 +164,14 @@ class Ros:
 
 
 @contextmanager
-def joined(domain: int, name: str = "golem") -> Iterator[DdsNode]:
+def joined(domain: int, name: str = "golem") -> Iterator[RosNode]:
     """Give a node of ours on a domain."""
     with closing(connect(DdsConfig(domain=domain), PARTICIPANT_USER_DATA)) as participant:
-        with closing(DdsNode(participant, name)) as node:
+        with closing(RosNode(participant, name)) as node:
             yield node
 
 
-def until(node: DdsNode, condition: Callable[[], Any], timeout: float = PATIENCE) -> bool:
+def until(node: RosNode, condition: Callable[[], Any], timeout: float = PATIENCE) -> bool:
     """Spin `node` until `condition()`, and return whether it came true."""
     end = time.monotonic() + timeout
     while not condition():

@@ -15,10 +15,10 @@ from tests.middleware.ros.samples import random_message
 from golem.interfaces import public
 from golem.interfaces.public import ActionRow, ServiceRow, TopicRow
 from golem.middleware.ros import codec
-from golem.middleware.ros.base import ServerGoal
+from golem.middleware.ros.action_server import ServerGoal
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.goals import GoalStatus
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 
 Row = TopicRow | ServiceRow | ActionRow
 Result = Literal["passed", "failed", "cannot"]
@@ -63,7 +63,7 @@ def cdr(message: Any) -> str:
     return bytes(codec.serialize(message)).hex()
 
 
-def from_us(row: Row, node: DdsNode, ros: Ros) -> Verdict:
+def from_us(row: Row, node: RosNode, ros: Ros) -> Verdict:
     """Judge what ROS gets of us: our messages, our services called, our actions pursued."""
     return _judged(
         _published if isinstance(row, TopicRow) else _asked if isinstance(row, ServiceRow) else _pursued,
@@ -73,7 +73,7 @@ def from_us(row: Row, node: DdsNode, ros: Ros) -> Verdict:
     )
 
 
-def to_us(row: Row, node: DdsNode, ros: Ros) -> Verdict:
+def to_us(row: Row, node: RosNode, ros: Ros) -> Verdict:
     """Judge what we get of ROS: its messages, its services called, its actions pursued."""
     return _judged(
         _echoed if isinstance(row, TopicRow) else _asks if isinstance(row, ServiceRow) else _pursues,
@@ -83,7 +83,7 @@ def to_us(row: Row, node: DdsNode, ros: Ros) -> Verdict:
     )
 
 
-def _judged(judge: Callable[..., str], row: Row, node: DdsNode, ros: Ros) -> Verdict:
+def _judged(judge: Callable[..., str], row: Row, node: RosNode, ros: Ros) -> Verdict:
     try:
         why = judge(row, node, ros)
     except RosError as error:
@@ -97,7 +97,7 @@ def _qos(row: TopicRow) -> dict[str, Any]:
     return asdict(row.qos)
 
 
-def _published(row: TopicRow, node: DdsNode, ros: Ros) -> str:
+def _published(row: TopicRow, node: RosNode, ros: Ros) -> str:
     message = sample(row.type)
     name, back = f"/from_us{row.name}", f"/own{row.name}"
     publisher = node.publisher(name, row.type, row.qos)
@@ -128,7 +128,7 @@ def _published(row: TopicRow, node: DdsNode, ros: Ros) -> str:
     return ""
 
 
-def _echoed(row: TopicRow, node: DdsNode, ros: Ros) -> str:
+def _echoed(row: TopicRow, node: RosNode, ros: Ros) -> str:
     message = sample(row.type)
     name = f"/to_us{row.name}"
     came: list[Any] = []
@@ -145,7 +145,7 @@ def _echoed(row: TopicRow, node: DdsNode, ros: Ros) -> str:
     )
 
 
-def _asked(row: ServiceRow, node: DdsNode, ros: Ros) -> str:
+def _asked(row: ServiceRow, node: RosNode, ros: Ros) -> str:
     kind = codec.service(row.type)
     request, response = sample(f"{row.type}_Request"), sample(f"{row.type}_Response")
     came: list[Any] = []
@@ -171,7 +171,7 @@ def _asked(row: ServiceRow, node: DdsNode, ros: Ros) -> str:
     return "" if right else "another content came"
 
 
-def _asks(row: ServiceRow, node: DdsNode, ros: Ros) -> str:
+def _asks(row: ServiceRow, node: RosNode, ros: Ros) -> str:
     request, response = sample(f"{row.type}_Request"), sample(f"{row.type}_Response")
     name = f"/to_us{row.name}"
     ros.do("serve", node, name=name, type=row.type, response=cdr(response))
@@ -210,7 +210,7 @@ class Pursuer:
         return False
 
 
-def _pursued(row: ActionRow, node: DdsNode, ros: Ros) -> str:
+def _pursued(row: ActionRow, node: RosNode, ros: Ros) -> str:
     goal, feedback, result = (sample(f"{row.type}_{part}") for part in ("Goal", "Feedback", "Result"))
     name = f"/from_us{row.name}"
     handler = Pursuer(feedback, result)
@@ -230,7 +230,7 @@ def _pursued(row: ActionRow, node: DdsNode, ros: Ros) -> str:
     return "" if right and all(same(feedback, hex) for hex in outcome["feedback"]) else "another content came"
 
 
-def _pursues(row: ActionRow, node: DdsNode, ros: Ros) -> str:
+def _pursues(row: ActionRow, node: RosNode, ros: Ros) -> str:
     goal, feedback, result = (sample(f"{row.type}_{part}") for part in ("Goal", "Feedback", "Result"))
     name = f"/to_us{row.name}"
     ros.do("act", node, name=name, type=row.type, feedback=cdr(feedback), result=cdr(result))

@@ -12,12 +12,12 @@ pytest.importorskip("rosbags")
 from tests.interop.peers import Ros, joined, until
 from tests.interop.rows import cdr
 
-from golem.middleware.ros.action_client import DdsActionClient
-from golem.middleware.ros.base import ServerGoal
+from golem.middleware.ros.action_client import ActionClient
+from golem.middleware.ros.action_server import ServerGoal
 from golem.middleware.ros.codec import action
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.goals import CancelCode, GoalStatus
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 
@@ -45,33 +45,33 @@ class Handler:
 
 
 @pytest.fixture
-def handler(node: DdsNode) -> Handler:
+def handler(node: RosNode) -> Handler:
     handler = Handler()
     node.action_server(NAME, PICK, handler)
     return handler
 
 
-def outcome(ros: Ros, node: DdsNode) -> GoalStatus:
+def outcome(ros: Ros, node: RosNode) -> GoalStatus:
     return GoalStatus(ros.do("outcome", node, name=NAME)["status"])
 
 
-def canceling(ros: Ros, node: DdsNode, **words: Any) -> tuple[CancelCode, int]:
+def canceling(ros: Ros, node: RosNode, **words: Any) -> tuple[CancelCode, int]:
     answer = ros.do("cancel_id" if "id" in words else "cancel", node, name=NAME, **words)
     return CancelCode(answer["code"]), answer["goals"]
 
 
-def test_a_client_of_ros_is_refused(node: DdsNode, ros: Ros, handler: Handler) -> None:
+def test_a_client_of_ros_is_refused(node: RosNode, ros: Ros, handler: Handler) -> None:
     handler.accepts = False
     assert ros.do("give", node, **GOAL) == {"found": True, "answered": True, "accepted": False}
 
 
-def test_a_client_of_ros_sees_its_goal_fail(node: DdsNode, ros: Ros, handler: Handler) -> None:
+def test_a_client_of_ros_sees_its_goal_fail(node: RosNode, ros: Ros, handler: Handler) -> None:
     assert ros.do("give", node, **GOAL)["accepted"]
     handler.goals[0].abort(Pick.Result())
     assert outcome(ros, node) is GoalStatus.ABORTED
 
 
-def test_a_client_of_ros_cancels(node: DdsNode, ros: Ros, handler: Handler) -> None:
+def test_a_client_of_ros_cancels(node: RosNode, ros: Ros, handler: Handler) -> None:
     assert ros.do("give", node, **GOAL)["accepted"]
     assert canceling(ros, node) == (CancelCode.NONE, 1)
     handler.goals[0].canceled(Pick.Result())
@@ -79,7 +79,7 @@ def test_a_client_of_ros_cancels(node: DdsNode, ros: Ros, handler: Handler) -> N
     assert canceling(ros, node) == (CancelCode.GOAL_TERMINATED, 0)
 
 
-def test_a_client_of_ros_may_not_cancel(node: DdsNode, ros: Ros, handler: Handler) -> None:
+def test_a_client_of_ros_may_not_cancel(node: RosNode, ros: Ros, handler: Handler) -> None:
     handler.yields = False
     assert ros.do("give", node, **GOAL)["accepted"]
     assert canceling(ros, node) == (CancelCode.REJECTED, 0)
@@ -88,7 +88,7 @@ def test_a_client_of_ros_may_not_cancel(node: DdsNode, ros: Ros, handler: Handle
 
 
 def test_a_client_of_ros_cancels_what_is_not_there_and_then_everything(
-    node: DdsNode, ros: Ros, handler: Handler
+    node: RosNode, ros: Ros, handler: Handler
 ) -> None:
     assert canceling(ros, node, id="17" * 16) == (CancelCode.UNKNOWN_GOAL_ID, 0)
     assert ros.do("give", node, **GOAL)["accepted"]
@@ -97,7 +97,7 @@ def test_a_client_of_ros_cancels_what_is_not_there_and_then_everything(
 
 
 def test_a_client_of_ros_that_dies_leaves_its_goal(
-    node: DdsNode, ros: Ros, handler: Handler, join: Any
+    node: RosNode, ros: Ros, handler: Handler, join: Any
 ) -> None:
     assert ros.do("give", node, **GOAL)["accepted"]
     ros.kill()
@@ -110,7 +110,7 @@ def test_a_client_of_ros_that_dies_leaves_its_goal(
     assert outcome(other, node) is GoalStatus.SUCCEEDED
 
 
-def test_a_client_of_ros_sees_that_its_server_has_gone(node: DdsNode, ros: Ros, domain: int) -> None:
+def test_a_client_of_ros_sees_that_its_server_has_gone(node: RosNode, ros: Ros, domain: int) -> None:
     with joined(domain) as serving:
         serving.action_server(NAME, PICK, Handler())
         assert ros.do("give", serving, **GOAL)["accepted"]
@@ -120,13 +120,13 @@ def test_a_client_of_ros_sees_that_its_server_has_gone(node: DdsNode, ros: Ros, 
 class Theirs:
     """An action server of ROS, and our client of it."""
 
-    def __init__(self, node: DdsNode, ros: Ros) -> None:
+    def __init__(self, node: RosNode, ros: Ros) -> None:
         if ros.setup.vendor == "fastdds":
             pytest.skip("we do not call servers of Fast DDS")
         self.node, self.ros = node, ros
         words = {"feedback": cdr(Pick.Feedback()), "result": cdr(Pick.Result())}
         ros.do("act", node, name=NAME, type=PICK, **words)
-        self.client: DdsActionClient = node.action_client(NAME, PICK)
+        self.client: ActionClient = node.action_client(NAME, PICK)
         assert until(node, self.client.ready)
 
     def give(self, mode: str) -> Any:
@@ -135,7 +135,7 @@ class Theirs:
 
 
 @pytest.fixture
-def theirs(node: DdsNode, ros: Ros) -> Theirs:
+def theirs(node: RosNode, ros: Ros) -> Theirs:
     return Theirs(node, ros)
 
 

@@ -21,7 +21,7 @@ from golem.middleware.ros.msgs.rcl_interfaces import (
     SetParameters_Response,
 )
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 
@@ -42,7 +42,7 @@ def test_each_finds_the_other_whoever_came_first(join: Callable[[], Ros], domain
         ]
 
 
-def test_the_graph_shows_our_node_and_what_it_offers(node: DdsNode, ros: Ros) -> None:
+def test_the_graph_shows_our_node_and_what_it_offers(node: RosNode, ros: Ros) -> None:
     node.publisher("/chat", "std_msgs/msg/String")
     node.service("/ready", TRIGGER, lambda _: Trigger_Response())
     node.action_server("/skill/pick", "golem_interfaces/action/Pick", None)  # type: ignore[arg-type]
@@ -59,7 +59,7 @@ def test_the_graph_shows_our_node_and_what_it_offers(node: DdsNode, ros: Ros) ->
     assert until(node, seen), ros.do("graph", node)
 
 
-def test_our_node_answers_for_its_parameters(node: DdsNode, ros: Ros) -> None:
+def test_our_node_answers_for_its_parameters(node: RosNode, ros: Ros) -> None:
     def call(what: str, type: str, request: object, response: type) -> object:
         answers = ros.do("call", node, name=f"/golem/{what}", type=type, request=cdr(request))["answers"]
         return codec.deserialize(bytes.fromhex(answers[0]), response)

@@ -20,7 +20,7 @@ from golem.interfaces.nav_payloads import NavGoal, NavStep
 from golem.middleware.bus import Bus
 from golem.middleware.ros import codec
 from golem.middleware.ros.msgs import geometry_msgs
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.runtime.live.nav2_bridge import ACTION, TYPE, VELOCITY, Nav2Bridge
 from golem.runtime.nav2_link import BusNav2
 from golem.types import PlanarPose, Twist
@@ -34,7 +34,7 @@ PERIOD = 0.02
 class Stack:
     """A stack's side, and Nav2 as rclpy runs it."""
 
-    def __init__(self, node: DdsNode, ros: Ros, patience: float = PATIENCE) -> None:
+    def __init__(self, node: RosNode, ros: Ros, patience: float = PATIENCE) -> None:
         if ros.setup.vendor == "fastdds":
             pytest.skip("we do not call servers of Fast DDS")
         self.node, self.ros, self.bus = node, ros, Bus()
@@ -75,7 +75,7 @@ class Stack:
         raise AssertionError("it does not come to that")
 
 
-def test_rclpy_gets_the_goal_drives_and_is_believed_when_it_has_arrived(node: DdsNode, ros: Ros) -> None:
+def test_rclpy_gets_the_goal_drives_and_is_believed_when_it_has_arrived(node: RosNode, ros: Ros) -> None:
     stack = Stack(node, ros)
     stack.serve("wait")
     stack.begin()
@@ -96,14 +96,14 @@ def test_rclpy_gets_the_goal_drives_and_is_believed_when_it_has_arrived(node: Dd
 
 
 @pytest.mark.parametrize("mode, why", [("abort", "gave the goal up"), ("reject", "refused")])
-def test_rclpy_that_gives_up_or_refuses_ends_the_walk(node: DdsNode, ros: Ros, mode: str, why: str) -> None:
+def test_rclpy_that_gives_up_or_refuses_ends_the_walk(node: RosNode, ros: Ros, mode: str, why: str) -> None:
     stack = Stack(node, ros)
     stack.serve(mode)
     stack.begin()
     assert why in (stack.until(lambda step: step.ended).failure or "")
 
 
-def test_a_walk_that_is_cancelled_is_cancelled_at_rclpy(node: DdsNode, ros: Ros) -> None:
+def test_a_walk_that_is_cancelled_is_cancelled_at_rclpy(node: RosNode, ros: Ros) -> None:
     stack = Stack(node, ros)
     stack.serve("wait")
     stack.begin()
@@ -116,7 +116,7 @@ def test_a_walk_that_is_cancelled_is_cancelled_at_rclpy(node: DdsNode, ros: Ros)
     assert not stack.until(lambda step: step.note == "nav2").ended
 
 
-def test_without_a_server_it_says_so(node: DdsNode, ros: Ros) -> None:
+def test_without_a_server_it_says_so(node: RosNode, ros: Ros) -> None:
     stack = Stack(node, ros, patience=2.0)
     stack.begin()
     assert "/navigate_to_pose" in (stack.until(lambda step: step.ended).failure or "")

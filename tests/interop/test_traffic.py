@@ -17,7 +17,7 @@ from golem.middleware.dds.base import SENSOR
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs.sensor_msgs import Image
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 
@@ -27,7 +27,7 @@ ROS_KEEPS = 10
 RATE, SECONDS = 15, 4
 
 
-def test_a_burst_of_calls_is_answered_as_far_as_ros_keeps_it(node: DdsNode, ros: Ros) -> None:
+def test_a_burst_of_calls_is_answered_as_far_as_ros_keeps_it(node: RosNode, ros: Ros) -> None:
     node.service("/set", SET_BOOL, lambda request: SetBool_Response(request.data, "done"))
     call = {"name": "/set", "type": SET_BOOL, "request": cdr(SetBool_Request(True))}
     for count in (1, ROS_KEEPS):
@@ -36,7 +36,7 @@ def test_a_burst_of_calls_is_answered_as_far_as_ros_keeps_it(node: DdsNode, ros:
     assert len(ros.do("call", node, **call)["answers"]) == 1
 
 
-def test_a_burst_of_ours_loses_what_ros_does_not_keep(node: DdsNode, ros: Ros) -> None:
+def test_a_burst_of_ours_loses_what_ros_does_not_keep(node: RosNode, ros: Ros) -> None:
     if ros.setup.vendor == "fastdds":
         pytest.skip("we do not call servers of Fast DDS")
     ros.do("serve", node, name="/set", type=SET_BOOL, response=cdr(SetBool_Response(True, "done")))
@@ -49,7 +49,7 @@ def test_a_burst_of_ours_loses_what_ros_does_not_keep(node: DdsNode, ros: Ros) -
 
 
 @pytest.mark.alone  # best effort: a peer that another test slows down loses images that it did not read in time
-def test_images_arrive_at_the_rate_of_the_cameras(node: DdsNode, ros: Ros) -> None:
+def test_images_arrive_at_the_rate_of_the_cameras(node: RosNode, ros: Ros) -> None:
     publisher = node.publisher("/image", "sensor_msgs/msg/Image", SENSOR)
     ros.do("listen", node, name="/image", type="sensor_msgs/msg/Image", keep=0,
            reliable=False, transient_local=False, depth=5)  # fmt: skip

@@ -11,7 +11,7 @@ import pytest
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 
 PICK = "golem_interfaces/action/Pick"
 SET_BOOL = "std_srvs/srv/SetBool"
@@ -35,21 +35,21 @@ class World:
     def __init__(self, join: Callable[[], Participant], pause: float) -> None:
         """Take participants from `join`; `pause` [s] between looks at the network."""
         self._join, self._pause = join, pause
-        self._participants: dict[DdsNode, Participant] = {}
+        self._participants: dict[RosNode, Participant] = {}
         self.clock = Clock()
 
-    def participant(self, node: DdsNode) -> Participant:
+    def participant(self, node: RosNode) -> Participant:
         """The participant of a node, to do with it what no node does."""
         return self._participants[node]
 
-    def node(self, name: str, namespace: str = "/") -> DdsNode:
+    def node(self, name: str, namespace: str = "/") -> RosNode:
         """A new node."""
         participant = self._join()
-        node = DdsNode(participant, name, namespace, now=self.clock)
+        node = RosNode(participant, name, namespace, now=self.clock)
         self._participants[node] = participant
         return node
 
-    def kill(self, node: DdsNode) -> None:
+    def kill(self, node: RosNode) -> None:
         """Take a node away without its doing anything about it."""
         self._participants.pop(node).close()
 

@@ -8,12 +8,12 @@ from typing import Any
 
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.ros.base import ServerGoal
+from golem.middleware.ros.action_server import ServerGoal
 from golem.middleware.ros.codec import action, service
 from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.msgs.golem_interfaces import SkillFeedback, SkillResult
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 
 PICK, SET_BOOL = "golem_interfaces/action/Pick", "std_srvs/srv/SetBool"
 STAGES = ("detect", "approach", "grasp", "pull")
@@ -51,7 +51,7 @@ class Picking:
 
 def main() -> None:
     participant = connect(DdsConfig(domain=int(sys.argv[1])), PARTICIPANT_USER_DATA)
-    node = DdsNode(participant, "peer")
+    node = RosNode(participant, "peer")
     answer = service(SET_BOOL).Response
     node.service("set", SET_BOOL, lambda request: answer(request.data, "from another process"))
     picking = Picking()

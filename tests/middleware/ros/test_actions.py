@@ -11,16 +11,15 @@ import pytest
 pytest.importorskip("rosbags")
 
 from golem.middleware.dds.base import ENCAPSULATION, LATCHED, Qos
-from golem.middleware.ros.action_client import DdsActionClient
-from golem.middleware.ros.action_server import DdsActionServer
-from golem.middleware.ros.base import ServerGoal
+from golem.middleware.ros.action_client import ActionClient
+from golem.middleware.ros.action_server import ActionServer, ServerGoal
 from golem.middleware.ros.codec import action, dds_name
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.goal_info import STATUS_ARRAY
 from golem.middleware.ros.goals import CancelCode, GoalStatus
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.golem_interfaces import SkillFeedback, SkillResult
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 
 from .conftest import PICK, World
 
@@ -56,11 +55,11 @@ class Pair:
         self.server_node, self.server = self.serve()
         self.client_node, self.client = self.join("client")
 
-    def serve(self) -> tuple[DdsNode, DdsActionServer]:
+    def serve(self) -> tuple[RosNode, ActionServer]:
         node = self.world.node("server")
         return node, node.action_server("/skill/pick", PICK, self.handler, result_timeout=10.0)
 
-    def join(self, name: str) -> tuple[DdsNode, DdsActionClient]:
+    def join(self, name: str) -> tuple[RosNode, ActionClient]:
         node = self.world.node(name)
         client = node.action_client("/skill/pick", PICK)
         self.world.until(client.ready)

@@ -11,13 +11,13 @@ pytest.importorskip("rosbags")
 
 from golem.errors import ConfigError
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.ros.base import ServerGoal
+from golem.middleware.ros.action_server import ServerGoal
 from golem.middleware.ros.callback_guard import REMEMBERED, CallbackGuard
 from golem.middleware.ros.codec import action
 from golem.middleware.ros.goals import CancelCode, GoalStatus
 from golem.middleware.ros.msgs.std_msgs import String
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 
 from .conftest import PICK, SET_BOOL, STRING
 
@@ -30,8 +30,8 @@ class Nodes:
     def __init__(self) -> None:
         domain = LocalDomain()
         self.logged: list[str] = []
-        self.server = DdsNode(domain.participant(), "server", log=self.logged.append)
-        self.client = DdsNode(domain.participant(), "client")
+        self.server = RosNode(domain.participant(), "server", log=self.logged.append)
+        self.client = RosNode(domain.participant(), "client")
 
     def spin(self) -> None:
         for _ in range(5):

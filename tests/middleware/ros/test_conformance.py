@@ -10,10 +10,11 @@ pytest.importorskip("rosbags")
 
 from golem.errors import ConfigError
 from golem.middleware.dds.base import LATCHED, SENSOR, Qos
-from golem.middleware.ros.base import Client, RosNode
 from golem.middleware.ros.codec import dds_name, message, service
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.service import Client
 
 from .conftest import SET_BOOL, STRING, World
 

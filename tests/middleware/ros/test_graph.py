@@ -17,7 +17,7 @@ from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros import parameters
 from golem.middleware.ros.codec import dds_name, type_hash
 from golem.middleware.ros.graph import INFO, PARTICIPANT_USER_DATA
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 
 from .conftest import PICK, SET_BOOL, STRING
 
@@ -46,7 +46,7 @@ def gid(guid: bytes, size: int) -> list[int]:
 def test_a_node_is_announced_in_the_layout_of_its_peers(distro: str, store: Stores, size: int) -> None:
     domain = LocalDomain()
     participant = domain.participant()
-    node = DdsNode(participant, "twin", "/robot", distro)
+    node = RosNode(participant, "twin", "/robot", distro)
     publisher = node.publisher("chatter", STRING)
     subscription = node.subscription("chatter", STRING)
     (sample,) = newest(domain.participant())
@@ -66,7 +66,7 @@ def test_a_node_is_announced_in_the_layout_of_its_peers(distro: str, store: Stor
 
 def test_what_is_closed_is_announced_no_more() -> None:
     domain = LocalDomain()
-    node = DdsNode(domain.participant(), "twin")
+    node = RosNode(domain.participant(), "twin")
     node.client("set", SET_BOOL).close()
     node.action_client("pick", PICK).close()
     server = node.action_server("pick", PICK, Handler())
@@ -91,7 +91,7 @@ def test_what_is_closed_is_announced_no_more() -> None:
 
 def test_an_unknown_distro_is_refused() -> None:
     with pytest.raises(ConfigError, match="'noetic'.*humble, jazzy"):
-        DdsNode(LocalDomain().participant(), "twin", distro="noetic")
+        RosNode(LocalDomain().participant(), "twin", distro="noetic")
 
 
 def test_peers_are_told_hashes_and_identities(domain: int) -> None:
@@ -100,7 +100,7 @@ def test_peers_are_told_hashes_and_identities(domain: int) -> None:
     from golem.middleware.dds.domain import DdsConfig
 
     participant = connect(DdsConfig(domain=domain), PARTICIPANT_USER_DATA)
-    node = DdsNode(participant, "twin")
+    node = RosNode(participant, "twin")
     node.publisher("chatter", STRING)
     node.service("set", SET_BOOL, lambda request: request)
     node.client("set", SET_BOOL)

@@ -10,13 +10,13 @@ pytest.importorskip("rosbags")
 
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.msgs import rcl_interfaces as rcl
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.middleware.ros.parameters import SERVICES
 
 
 def ask(service: str, request: Any) -> Any:
     domain = LocalDomain()
-    server, client = DdsNode(domain.participant(), "twin", "/robot"), DdsNode(domain.participant(), "ros2cli")
+    server, client = RosNode(domain.participant(), "twin", "/robot"), RosNode(domain.participant(), "ros2cli")
     kind, _ = SERVICES[service]
     call = client.client(f"/robot/twin/{service}", f"rcl_interfaces/srv/{kind}").call(request)
     server.poll()

@@ -11,12 +11,12 @@ import pytest
 
 pytest.importorskip("rosbags")
 
-from golem.middleware.ros.action_client import DdsActionClient
+from golem.middleware.ros.action_client import ActionClient
 from golem.middleware.ros.codec import action, service
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.goals import CancelCode, GoalStatus
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 
 from .conftest import PICK, SET_BOOL
 
@@ -52,18 +52,18 @@ class Peer:
 
 
 @pytest.fixture
-def node(domain: int) -> Iterator[DdsNode]:
+def node(domain: int) -> Iterator[RosNode]:
     from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
 
     participant = connect(DdsConfig(domain=domain), PARTICIPANT_USER_DATA)
-    node = DdsNode(participant, "here")
+    node = RosNode(participant, "here")
     yield node
     node.close()
     participant.close()
 
 
-def reach(node: DdsNode, client: DdsActionClient) -> None:
+def reach(node: RosNode, client: ActionClient) -> None:
     for _ in range(400):
         if client.ready():
             return
@@ -71,7 +71,7 @@ def reach(node: DdsNode, client: DdsActionClient) -> None:
     raise AssertionError("the peer was not found")
 
 
-def test_a_service_and_an_action_between_two_processes(node: DdsNode, domain: int) -> None:
+def test_a_service_and_an_action_between_two_processes(node: RosNode, domain: int) -> None:
     peer = Peer(domain)
     setter, picker = node.client("set", SET_BOOL), node.action_client("pick", PICK)
     reach(node, picker)
@@ -99,7 +99,7 @@ def test_a_service_and_an_action_between_two_processes(node: DdsNode, domain: in
 
 @pytest.mark.slow
 @pytest.mark.parametrize("at_once", [False, True], ids=["after its lease", "within its lease"])
-def test_a_killed_server_is_missed_and_its_successor_found(node: DdsNode, domain: int, at_once: bool) -> None:
+def test_a_killed_server_is_missed_and_its_successor_found(node: RosNode, domain: int, at_once: bool) -> None:
     peer = Peer(domain)
     picker = node.action_client("pick", PICK)
     reach(node, picker)

@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from golem.middleware.dds.base import ENCAPSULATION, Qos
 from golem.middleware.ros.codec import dds_name, serialize, service
 from golem.middleware.ros.message import CodecError
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.middleware.ros.request_header import Header, pack, unpack
 
 from .conftest import SET_BOOL, World
@@ -82,17 +82,17 @@ def test_a_reply_waits_until_its_reader_is_known(world: World) -> None:
 
 
 @pytest.fixture
-def cyclone(domain: int) -> Iterator[DdsNode]:
+def cyclone(domain: int) -> Iterator[RosNode]:
     pytest.importorskip("cyclonedds")
     from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
 
     participant = connect(DdsConfig(domain=domain))
-    yield DdsNode(participant, "here")
+    yield RosNode(participant, "here")
     participant.close()
 
 
-def until(node: DdsNode, condition: Callable[[], object]) -> Any:
+def until(node: RosNode, condition: Callable[[], object]) -> Any:
     """Spin `node` until `condition()` is something, and return that."""
     for _ in range(1000):
         node.spin_once(0.01)
@@ -101,7 +101,7 @@ def until(node: DdsNode, condition: Callable[[], object]) -> Any:
     raise AssertionError("nothing happened for too long")
 
 
-def test_another_implementation_is_answered(cyclone: DdsNode, domain: int) -> None:
+def test_another_implementation_is_answered(cyclone: RosNode, domain: int) -> None:
     from .typed_peer import Endpoints, Request
 
     cyclone.service("set", SET_BOOL, lambda request: SetBool.Response(request.data, "here"))
@@ -112,7 +112,7 @@ def test_another_implementation_is_answered(cyclone: DdsNode, domain: int) -> No
     assert (reply.guid, reply.seq, reply.success, reply.message) == (2**63 + 5, 77, True, "here")
 
 
-def test_another_implementation_answers(cyclone: DdsNode, domain: int) -> None:
+def test_another_implementation_answers(cyclone: RosNode, domain: int) -> None:
     from .typed_peer import Endpoints, Response
 
     client = cyclone.client("set", SET_BOOL)

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("rosbags")
 
-from golem.middleware.ros.base import ServerGoal
+from golem.middleware.ros.action_server import ServerGoal
 from golem.middleware.ros.codec import action
 from golem.middleware.ros.goals import CancelCode, GoalStatus
 from golem.middleware.ros.msgs import golem_interfaces as msgs

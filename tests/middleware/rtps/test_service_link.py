@@ -19,7 +19,7 @@ from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros import codec
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.middleware.rtps import announcements, submessages
 from golem.middleware.rtps.announcements import SPDP_READER, SPDP_WRITER, WRITERS_READER, WRITERS_WRITER
 from golem.middleware.rtps.service_link import GROUP
@@ -81,14 +81,14 @@ class Client:
 
 
 @pytest.fixture
-def server(domain: int) -> Iterator[tuple[DdsNode, int]]:
+def server(domain: int) -> Iterator[tuple[RosNode, int]]:
     with closing(connect(DdsConfig(domain=domain), PARTICIPANT_USER_DATA)) as participant:
-        with closing(DdsNode(participant, "server")) as node:
+        with closing(RosNode(participant, "server")) as node:
             node.service("/set", "std_srvs/srv/SetBool", lambda asked: SetBool_Response(asked.data, "done"))
             yield node, domain
 
 
-def until(node: DdsNode, client: Client, condition: Any) -> None:
+def until(node: RosNode, client: Client, condition: Any) -> None:
     end = time.monotonic() + 10.0
     while not condition():
         assert time.monotonic() < end, "nothing came for too long"
@@ -96,7 +96,7 @@ def until(node: DdsNode, client: Client, condition: Any) -> None:
         client.listen()
 
 
-def test_a_request_is_answered_once_and_to_its_client(server: tuple[DdsNode, int]) -> None:
+def test_a_request_is_answered_once_and_to_its_client(server: tuple[RosNode, int]) -> None:
     node, domain = server
     client = Client(domain)
     client.announce()
@@ -114,7 +114,7 @@ def test_a_request_is_answered_once_and_to_its_client(server: tuple[DdsNode, int
     }
 
 
-def test_a_server_that_closes_says_goodbye(server: tuple[DdsNode, int]) -> None:
+def test_a_server_that_closes_says_goodbye(server: tuple[RosNode, int]) -> None:
     node, domain = server
     client = Client(domain)
     client.announce()
@@ -125,7 +125,7 @@ def test_a_server_that_closes_says_goodbye(server: tuple[DdsNode, int]) -> None:
     assert client.server + announcements.PARTICIPANT in {part.key for part in gone}
 
 
-def test_noise_is_counted_and_changes_nothing(server: tuple[DdsNode, int]) -> None:
+def test_noise_is_counted_and_changes_nothing(server: tuple[RosNode, int]) -> None:
     node, domain = server
     client = Client(domain)
     client.announce()

@@ -14,7 +14,7 @@ from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import GateState
 from golem.middleware.dds.local import LocalDomain, LocalParticipant
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, Trigger_Request
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.runtime.live.safety_process import SafetyProcess
 from golem.runtime.live.stack_process import StackProcess
 from golem.runtime.live.twin import Twin
@@ -41,12 +41,12 @@ class Live:
     gate: SafetyProcess | None = None
     up: StackProcess | None = None
     robot: Any = None
-    members: list[tuple[LocalParticipant, DdsNode]] = field(default_factory=list)
+    members: list[tuple[LocalParticipant, RosNode]] = field(default_factory=list)
 
-    def member(self, name: str) -> tuple[LocalParticipant, DdsNode]:
+    def member(self, name: str) -> tuple[LocalParticipant, RosNode]:
         """Return a new participant and its node."""
         participant = self.domain.participant()
-        node = DdsNode(participant, name)
+        node = RosNode(participant, name)
         self.members.append((participant, node))
         return participant, node
 
@@ -114,7 +114,7 @@ class Live:
         response = answer.result()
         return response.success, response.message
 
-    def leave_quietly(self, node: DdsNode) -> None:
+    def leave_quietly(self, node: RosNode) -> None:
         """Take a member off the domain that is none of the three processes."""
         for member in self.members:
             if member[1] is node:

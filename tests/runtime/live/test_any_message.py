@@ -29,7 +29,7 @@ from golem.interfaces.payloads import GateState
 from golem.interfaces.public import TopicRow
 from golem.middleware.dds.base import DdsError, Qos
 from golem.middleware.ros import codec, names
-from golem.middleware.ros.base import ClientGoal
+from golem.middleware.ros.action_client import ClientGoal
 from golem.middleware.ros.definitions import EMPTY_MEMBER
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.goals import GoalStatus

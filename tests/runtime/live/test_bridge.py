@@ -21,7 +21,7 @@ from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.sensor_msgs import Imu as ImuMessage
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.runtime.live.bridge import StreamIn, StreamOut, outgoing
 from golem.runtime.live.broadcast import broadcast
 from golem.runtime.live.node_setup import until
@@ -82,8 +82,8 @@ def shaking(row: TopicRow, monkeypatch: pytest.MonkeyPatch) -> None:
 def ends(domain: LocalDomain) -> tuple[RoleEndpoints, RoleEndpoints]:
     """Return the endpoints of a robot and of a stack."""
     robot, stack = domain.participant(), domain.participant()
-    return RoleEndpoints("robot", robot, DdsNode(robot, "robot")), RoleEndpoints(
-        "stack", stack, DdsNode(stack, "stack")
+    return RoleEndpoints("robot", robot, RosNode(robot, "robot")), RoleEndpoints(
+        "stack", stack, RosNode(stack, "stack")
     )
 
 
@@ -101,8 +101,8 @@ def test_it_crosses_dds(row: TopicRow, domain: int) -> None:
     robot, stack = connect(DdsConfig(domain)), connect(DdsConfig(domain))
     bus, there = Bus(), Bus()
     try:
-        node = DdsNode(stack, "stack")
-        sender = RoleEndpoints("robot", robot, DdsNode(robot, "robot"), only=[row.name])
+        node = RosNode(stack, "stack")
+        sender = RoleEndpoints("robot", robot, RosNode(robot, "robot"), only=[row.name])
         listener = RoleEndpoints("stack", stack, node, only=())
         StreamIn(there, listener, row, lambda: 0.0)
         assert until(node, lambda: sender.heard(row.name), 10.0)

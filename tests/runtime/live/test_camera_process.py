@@ -11,7 +11,7 @@ from golem.interfaces import images, public, ros_convert
 from golem.interfaces.payloads import Exposure
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.robots.sensors.cameras import HEAD
 from golem.runtime.live.camera_process import CameraProcess
 
@@ -31,8 +31,8 @@ class Source:
 def test_images_bear_the_robots_time_and_faults_are_said() -> None:
     domain = LocalDomain()
     here, there = domain.participant(), domain.participant()
-    listener, source, lines, now = DdsNode(there, "listener"), Source(), list[str](), 1000.0
-    process = CameraProcess(here, DdsNode(here, "camera"), "head", source, lambda: now, lines.append)
+    listener, source, lines, now = RosNode(there, "listener"), Source(), list[str](), 1000.0
+    process = CameraProcess(here, RosNode(here, "camera"), "head", source, lambda: now, lines.append)
     heard: dict[str, list[Any]] = {what: [] for what in (public.COLOR, public.DEPTH, public.CAMERA_INFO)}
     for what, messages in heard.items():
         row = public.topic(public.image("head", what))

@@ -12,7 +12,7 @@ from golem.hardware.drivers.magpie_servos import MagpieServoConfig, MagpieServos
 from golem.interfaces import public, ros_convert
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.runtime.live.hand_process import HandProcess
 from golem.types import SIDES, TICK, HandCommand, HandState, Side
 
@@ -37,12 +37,12 @@ class Rig:
     def __post_init__(self) -> None:
         domain = LocalDomain()
         here, there = domain.participant(), domain.participant()
-        self.stack = DdsNode(there, "stack")
+        self.stack = RosNode(there, "stack")
         self.drivers: dict[Side, MagpieServos] = {
             side: MagpieServos(MagpieServoConfig(bus.line.name), bus.connect)
             for side, bus in self.buses.items()
         }
-        node = DdsNode(here, "hands")
+        node = RosNode(here, "hands")
         self.process = HandProcess(here, node, self.drivers, lambda: self.now, self.told.append)
         row = public.topic("/clock")
         self.clock = self.stack.publisher(row.name, row.type, row.qos)

@@ -14,7 +14,7 @@ from golem.interfaces import public, ros_convert
 from golem.interfaces.images import to_points
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.runtime.live.lidar_process import CLOUD, IMU, LidarProcess
 
 BEGIN, ROBOT_TIME = 1000.0, 50.0
@@ -32,9 +32,9 @@ class Rig:
         self.lines: list[str] = []
         self.lidar = Mid360("127.0.0.1", point_port=0, imu_port=0)
         self.peer = Mid360Peer(self.lidar.ports)
-        self.listener = DdsNode(there, "listener")
+        self.listener = RosNode(there, "listener")
         self.process = LidarProcess(
-            here, DdsNode(here, "lidar"), self.lidar, lambda: self.now, self.lines.append
+            here, RosNode(here, "lidar"), self.lidar, lambda: self.now, self.lines.append
         )
         row = public.topic("/clock")
         self.clock = self.listener.publisher(row.name, row.type, row.qos)

@@ -16,11 +16,11 @@ from golem.interfaces import topics
 from golem.interfaces.nav_payloads import NavGoal, NavStep
 from golem.middleware.bus import Bus
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.ros.base import ServerGoal
+from golem.middleware.ros.action_server import ServerGoal
 from golem.middleware.ros.codec import action
 from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs import geometry_msgs
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.runtime.live.nav2_bridge import ACTION, TYPE, VELOCITY, Nav2Bridge
 from golem.runtime.nav2_link import BusNav2
 from golem.types import PlanarPose, Twist
@@ -32,7 +32,7 @@ class FakeNav2:
     """Takes goals on and leaves them to the test."""
 
     def __init__(self, domain: LocalDomain) -> None:
-        self.node = DdsNode(domain.participant(), "bt_navigator")
+        self.node = RosNode(domain.participant(), "bt_navigator")
         self.goals: list[ServerGoal] = []
         self.accepts = True
         self.node.action_server(ACTION, TYPE, self)
@@ -60,7 +60,7 @@ class Robot:
         domain = LocalDomain()
         self.nav2 = FakeNav2(domain) if nav2 else None
         self.bus, self.t = Bus(), 0.0
-        self.node = DdsNode(domain.participant(), "stack")
+        self.node = RosNode(domain.participant(), "stack")
         self.bridge = Nav2Bridge(self.bus, self.node, lambda: self.t)
         self.navigator = Nav2(config, BusNav2(self.bus))
         self.pose = PlanarPose(0.0, 0.0, 0.0)

@@ -11,7 +11,7 @@ from golem.interfaces.payloads import LegCommand
 from golem.interfaces.unitree_api import LOCO_APIS, OK, decode_int, encode
 from golem.middleware.bus import Bus
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.middleware.wire import hg
 from golem.middleware.wire.api import ApiRequest, Response
 from golem.robots.unitree import motion_switcher
@@ -118,8 +118,8 @@ def legs(tau: Array | None) -> LegCommand:
 def test_targets_of_the_legs_cross_over(tau: Array | None) -> None:
     domain, bus, there = LocalDomain(), Bus(), Bus()
     ours, theirs = domain.participant(), domain.participant()
-    robot = RoleEndpoints("robot", ours, DdsNode(ours, "robot"))
-    stack = RoleEndpoints("stack", theirs, DdsNode(theirs, "stack"))
+    robot = RoleEndpoints("robot", ours, RosNode(ours, "robot"))
+    stack = RoleEndpoints("stack", theirs, RosNode(theirs, "stack"))
     row = public.topic("/onboard/lowcmd")
     out, incoming = StreamOut(bus, robot, row), StreamIn(there, stack, row, lambda: 0.0, print)
     bus.publish(topics.ONBOARD_LEGS, legs(tau), 0.0)

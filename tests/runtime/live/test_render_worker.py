@@ -14,7 +14,7 @@ from golem.interfaces import public, topics
 from golem.middleware.bus import Bus
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.robots.base import Restorable
 from golem.runtime.live import render_worker as live_darkroom
 from golem.runtime.live.bridge import outgoing
@@ -42,14 +42,14 @@ def test_another_robot_shows_the_same_moment() -> None:
 def test_nothing_is_rendered_unless_somebody_listens() -> None:
     domain = LocalDomain()
     participant = domain.participant()
-    endpoints = RoleEndpoints("robot", participant, DdsNode(participant, "cameras"), image_topics())
+    endpoints = RoleEndpoints("robot", participant, RosNode(participant, "cameras"), image_topics())
     robot = build_robot(Stack(profile="ideal"), 0)
     bus = Bus()
     streams = outgoing(bus, endpoints)
     topic, save_state = topics.exposures("left_hand"), robot.save_state()
     expose(robot, endpoints, bus, streams, "left_hand", 0.5, save_state)
     assert bus.count(topic) == 0
-    listener = DdsNode(domain.participant(), "listener")
+    listener = RosNode(domain.participant(), "listener")
     row = public.topic(public.image("left_hand", public.COLOR_JPEG))
     subscription = listener.subscription(row.name, row.type, None, row.qos)
     expose(robot, endpoints, bus, streams, "left_hand", 1.5, save_state)

@@ -15,7 +15,7 @@ from golem.interfaces.payloads import GateState
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Qos, Writer
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import answered, encode_low_command
 from golem.runtime.live.motor_bridge import CommandIn
@@ -35,9 +35,9 @@ class Drives:
         robot, safety = domain.participant(), domain.participant()
         self.bus = Bus()
         self.commands = CommandIn(
-            self.bus, RoleEndpoints("robot", robot, DdsNode(robot, "twin")), print, patience
+            self.bus, RoleEndpoints("robot", robot, RosNode(robot, "twin")), print, patience
         )
-        self._writer: Writer = RoleEndpoints("safety", safety, DdsNode(safety, "safety")).writer("/lowcmd")
+        self._writer: Writer = RoleEndpoints("safety", safety, RosNode(safety, "safety")).writer("/lowcmd")
 
     def send(self, answers: float, kp: float = 0.0) -> None:
         """Send a command that answers the state of a time [s]."""

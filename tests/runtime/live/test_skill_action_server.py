@@ -15,7 +15,7 @@ from golem import registry
 from golem.interfaces import public, topics
 from golem.interfaces import ros_convert as convert
 from golem.interfaces.payloads import HandGoal
-from golem.middleware.ros.base import ClientGoal
+from golem.middleware.ros.action_client import ClientGoal
 from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs.geometry_msgs import PoseStamped
 from golem.middleware.ros.msgs.golem_interfaces import (
@@ -27,7 +27,7 @@ from golem.middleware.ros.msgs.golem_interfaces import (
     Walk_Goal,
 )
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.runtime.live.skill_messages import read_list
 from golem.runtime.live.velocity import LET_GO
 from golem.skills.spec import schema_of
@@ -41,7 +41,7 @@ class Client:
     """Somebody who gives goals, in simulated time."""
 
     live: Live
-    node: DdsNode
+    node: RosNode
     said: list[str] = field(default_factory=list)
 
     def until(self, condition: Callable[[], bool], seconds: float = 2.0) -> None:

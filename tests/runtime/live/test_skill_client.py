@@ -15,7 +15,7 @@ from golem.errors import ConfigError
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.msgs.golem_interfaces import RunSkill_Goal
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.runtime.live import skill_client
 from golem.runtime.live.skill_client import BAD_INPUT, CANCELED, DONE, SkillClientConfig, compose, read_words
 from golem.stack import Choice
@@ -123,7 +123,7 @@ def test_help_lists_the_shipped_skills_where_there_is_no_stack(
     assert "pose of base_link on the floor [m], [rad]." in capsys.readouterr().out.replace("\n", " ")
 
 
-class Impatient(DdsNode):
+class Impatient(RosNode):
     """A node that lets the robot's time pass while it waits."""
 
     live: Live

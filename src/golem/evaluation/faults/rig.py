@@ -20,7 +20,7 @@ from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import dds_name
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.middleware.wire import convert
 from golem.middleware.wire.struct_layout import WireError
 from golem.robots.mujoco.engine import MujocoRobot
@@ -96,7 +96,7 @@ class FaultRig:
             limits = limits.still()
         self.gate = SafetyProcess(
             safety,
-            DdsNode(safety, "safety"),
+            RosNode(safety, "safety"),
             limits,
             self.estop,
             clock=lambda: 1000.0 + self.t + self.clock,
@@ -107,7 +107,7 @@ class FaultRig:
         self._motors = self._member.reader(
             names.topic(row.name), dds_name(row.type), Qos(reliable=False, depth=64)
         )
-        node, base = DdsNode(self._member, "others"), public.topic("/base_estimate")
+        node, base = RosNode(self._member, "others"), public.topic("/base_estimate")
         self._base = node.publisher(base.name, base.type, base.qos)
         self._activate = node.client("/safety/activate", public.TRIGGER)
         nodes = RobotNodes(self.bus, stack, robot, None, None)

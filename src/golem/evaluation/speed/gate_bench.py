@@ -23,7 +23,7 @@ from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import dds_name
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.middleware.wire.convert import encode_low_command, encode_low_state
 from golem.runtime.live.safety_process import SafetyProcess
 from golem.runtime.lockstep import start_posture
@@ -50,12 +50,12 @@ def gate_ticks(n: int) -> Array:
     domain, clock = LocalDomain(), 0.0
     safety, robot = domain.participant(), domain.participant()
     limits, estop = SafetyLimits.from_profile(), VirtualEstop()
-    gate = SafetyProcess(safety, DdsNode(safety, "safety"), limits, estop, clock=lambda: clock)
+    gate = SafetyProcess(safety, RosNode(safety, "safety"), limits, estop, clock=lambda: clock)
     states, commands = (
         robot.writer(names.topic(row.name), dds_name(row.type), row.qos)
         for row in (public.topic("/lowstate"), public.topic("/safety/lowcmd_in"))
     )
-    node, base = DdsNode(robot, "others"), public.topic("/base_estimate")
+    node, base = RosNode(robot, "others"), public.topic("/base_estimate")
     estimates = node.publisher(base.name, base.type, base.qos)
     activate = node.client("/safety/activate", public.TRIGGER)
     q, zeros = start_posture(), np.zeros(NUM_JOINTS)

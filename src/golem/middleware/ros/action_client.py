@@ -9,7 +9,6 @@ from typing import Any
 
 from golem.middleware.dds.base import DEFAULT, LATCHED, Sample
 from golem.middleware.ros import codec, names
-from golem.middleware.ros.base import Canceling, ClientGoal, Outcome
 from golem.middleware.ros.future import Future, RosError
 from golem.middleware.ros.goal_info import (
     CANCEL_GOAL,
@@ -20,63 +19,51 @@ from golem.middleware.ros.goal_info import (
     goal_status,
     to_uuid,
 )
-from golem.middleware.ros.goals import NO_ID, GoalStatus
+from golem.middleware.ros.goals import NO_ID, Canceling, GoalStatus, Outcome
 from golem.middleware.ros.message import NANO, CodecError
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, GoalStatusArray
 from golem.middleware.ros.node_endpoints import NodeEndpoints
-from golem.middleware.ros.service import DdsClient
+from golem.middleware.ros.service import Client
 from golem.middleware.ros.typed import check
 
 
-class DdsClientGoal:
-    """A goal as its client sees it; see `base.ClientGoal`.
+class ClientGoal:
+    """A goal as its client sees it. Keep it as long as its feedback or status matters.
 
     Attributes:
+        id: 16 bytes.
+        accepted: whether the server took the goal on.
+        status: the newest the server said; UNKNOWN before that.
         on_feedback: called with each feedback message.
     """
 
-    def __init__(self, client: DdsActionClient, id: bytes, on_feedback: Callable[[Any], None] | None) -> None:
+    def __init__(self, client: ActionClient, id: bytes, on_feedback: Callable[[Any], None] | None) -> None:
         """Belong to `client`, which is about to send it."""
-        self._client, self._id = client, id
-        self._accepted, self._status = False, GoalStatus.UNKNOWN
+        self._client, self.id = client, id
+        self.accepted, self.status = False, GoalStatus.UNKNOWN
         self.on_feedback = on_feedback
 
-    @property
-    def id(self) -> bytes:
-        """16 bytes."""
-        return self._id
-
-    @property
-    def accepted(self) -> bool:
-        """Whether the server took the goal on."""
-        return self._accepted
-
-    @property
-    def status(self) -> GoalStatus:
-        """The newest the server said."""
-        return self._status
-
     def result(self) -> Future[Outcome]:
-        """Ask for the outcome."""
+        """Ask for the outcome; the future brings it once the goal has ended."""
         return self._client.get_result(self)
 
     def cancel(self) -> Future[Canceling]:
         """Ask the server to cancel the goal."""
-        return self._client.cancel(self._id)
+        return self._client.cancel(self.id)
 
     def answered(self, response: Any) -> ClientGoal:
         """Take in the server's decision and return itself."""
-        self._accepted = bool(response.accepted)
+        self.accepted = bool(response.accepted)
         return self
 
     def learn(self, status: GoalStatus) -> None:
         """Take in the status; what the status topic says late does not bring an ended goal back."""
-        if not self._status.terminal:
-            self._status = status
+        if not self.status.terminal:
+            self.status = status
 
 
-class DdsActionClient:
-    """Gives goals to one action; see `base.ActionClient`.
+class ActionClient:
+    """Gives goals to one action.
 
     Attributes:
         malformed: feedback and status messages that could not be read.
@@ -86,11 +73,11 @@ class DdsActionClient:
         """Use the action with absolute `name`."""
         self.name, self.malformed = name, 0
         self._type, self._endpoints = codec.action(type), endpoints
-        self._goals: weakref.WeakValueDictionary[bytes, DdsClientGoal] = weakref.WeakValueDictionary()
+        self._goals: weakref.WeakValueDictionary[bytes, ClientGoal] = weakref.WeakValueDictionary()
         parts = names.action(name)
-        self._goal = DdsClient(endpoints, parts.send_goal, f"{type}_SendGoal")
-        self._cancel = DdsClient(endpoints, parts.cancel_goal, CANCEL_GOAL)
-        self._result = DdsClient(endpoints, parts.get_result, f"{type}_GetResult")
+        self._goal = Client(endpoints, parts.send_goal, f"{type}_SendGoal")
+        self._cancel = Client(endpoints, parts.cancel_goal, CANCEL_GOAL)
+        self._result = Client(endpoints, parts.get_result, f"{type}_GetResult")
         self._feedback = endpoints.inbox(
             names.topic(parts.feedback), f"{type}_FeedbackMessage", DEFAULT, self._on_feedback
         )
@@ -104,7 +91,12 @@ class DdsActionClient:
     def send_goal(
         self, goal: Any, feedback: Callable[[Any], None] | None = None, id: bytes | None = None
     ) -> Future[ClientGoal]:
-        """Propose a goal; see `base.ActionClient.send_goal`.
+        """Propose a goal; the future brings the server's decision.
+
+        Args:
+            goal: the action's goal message.
+            feedback: called with each of the goal's feedback messages.
+            id: 16 bytes to know it by; random if None.
 
         Raises:
             CodecError: it is not of the action's type.
@@ -116,17 +108,22 @@ class DdsActionClient:
             raise RosError(
                 f"A goal needs an id of its own, 16 bytes and not all zero; {id.hex()} cannot be it."
             )
-        proposed = DdsClientGoal(self, id, feedback)
+        proposed = ClientGoal(self, id, feedback)
         answer = self._goal.call(self._type.SendGoal.Request(to_uuid(id), goal))
         self._goals[id] = proposed
         return answer.map(proposed.answered)
 
     def cancel(self, id: bytes = NO_ID, before: float = 0.0) -> Future[Canceling]:
-        """Ask to cancel goals; see `base.ActionClient.cancel`."""
+        """Ask to cancel goals, of any client: all; or that with `id`; or those accepted at or before a time, and `id`.
+
+        Args:
+            id: 16 bytes of a goal, or `NO_ID`.
+            before: time on the server's clock [s]; 0 for none.
+        """
         request = CancelGoal_Request(goal_info(id, int(before * NANO)))
         return self._cancel.call(request).map(canceling)
 
-    def get_result(self, goal: DdsClientGoal) -> Future[Outcome]:
+    def get_result(self, goal: ClientGoal) -> Future[Outcome]:
         """Ask for the outcome of `goal`."""
 
         def outcome(response: Any) -> Outcome:
@@ -137,7 +134,7 @@ class DdsActionClient:
         return self._result.call(self._type.GetResult.Request(to_uuid(goal.id))).map(outcome)
 
     def close(self) -> None:
-        """Stop; what is unanswered fails."""
+        """Stop; what is unanswered fails. Calling it again does nothing."""
         for client in (self._goal, self._cancel, self._result):
             client.close()
         self._endpoints.close(self._feedback, self._status)

@@ -10,11 +10,10 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from golem.middleware.dds.base import DEFAULT, LATCHED
 from golem.middleware.ros import codec, names
-from golem.middleware.ros.base import RESULT_TIMEOUT, ActionHandler, ServerGoal
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.goal_info import (
     CANCEL_GOAL,
@@ -33,6 +32,8 @@ from golem.middleware.ros.node_endpoints import NodeEndpoints
 from golem.middleware.ros.service import Origin, Responder
 from golem.middleware.ros.typed import check, serialize
 
+RESULT_TIMEOUT = 10.0
+"""How long an action's result is kept after its goal has ended [s]; rcl_action's default (action_server.c)."""
 FEW = 10
 """Goals whose status is published at every change."""
 SPACING = 0.001
@@ -43,60 +44,88 @@ MAX_WAITING = 100
 """Requests for the result of one goal that are remembered; beyond it the oldest stays unanswered."""
 
 
-class DdsServerGoal:
-    """A goal as its server pursues it; see `base.ServerGoal`."""
+class ServerGoal:
+    """A goal as its server pursues it: active until it ends as succeeded, aborted or canceled.
 
-    def __init__(self, server: DdsActionServer, state: GoalState, request: Any, client: bytes) -> None:
+    Attributes:
+        id: 16 bytes.
+        request: the action's goal message.
+        client: 12 bytes, the same for all that one process of the sender's asks for; empty where nobody knows.
+    """
+
+    def __init__(self, server: ActionServer, state: GoalState, request: Any, client: bytes) -> None:
         """Belong to `server`, which has accepted it from `client`."""
-        self._server, self._state, self._request, self._client = server, state, request, client
-
-    @property
-    def id(self) -> bytes:
-        """16 bytes."""
-        return self._state.id
-
-    @property
-    def request(self) -> Any:
-        """The action's goal message."""
-        return self._request
-
-    @property
-    def client(self) -> bytes:
-        """Whose it is."""
-        return self._client
+        self._server, self._state = server, state
+        self.id, self.request, self.client = state.id, request, client
 
     def attended(self) -> bool:
         """Return whether whoever sent it is still there."""
-        return self._server.serves(self._client)
+        return self._server.serves(self.client)
 
     @property
     def status(self) -> GoalStatus:
-        """Where it stands."""
+        """Where it stands; CANCELING once a request to cancel was accepted."""
         return self._state.status
 
     def execute(self) -> None:
-        """Say that work on it begins."""
+        """Say that work on it begins; needed before it can succeed or be aborted, unless it is canceling.
+
+        Raises:
+            RosError: it is not waiting to be executed.
+        """
         self._server.update(self._state, GoalEvent.EXECUTE)
 
     def feedback(self, feedback: Any) -> None:
-        """Send a feedback message."""
+        """Send a feedback message.
+
+        Raises:
+            RosError: the goal has ended.
+        """
         self._server.send_feedback(self._state, feedback)
 
     def succeed(self, result: Any) -> None:
-        """End it: reached."""
+        """End it: reached.
+
+        Raises:
+            RosError: it is neither executing nor canceling.
+        """
         self._server.end(self._state, GoalEvent.SUCCEED, result)
 
     def abort(self, result: Any) -> None:
-        """End it: failed."""
+        """End it: failed.
+
+        Raises:
+            RosError: it is neither executing nor canceling.
+        """
         self._server.end(self._state, GoalEvent.ABORT, result)
 
     def canceled(self, result: Any) -> None:
-        """End it: given up as was asked."""
+        """End it: given up as was asked.
+
+        Raises:
+            RosError: it is not canceling.
+        """
         self._server.end(self._state, GoalEvent.CANCELED, result)
 
 
-class DdsActionServer:
-    """Offers one action; see `base.ActionServer`."""
+class ActionHandler(Protocol):
+    """Decides about the goals of an action; pursuing them is the business of whoever keeps the `ServerGoal`s."""
+
+    def decide(self, request: Any) -> bool:
+        """Return whether to take on a goal, given its goal message."""
+        ...
+
+    def accepted(self, goal: ServerGoal) -> None:
+        """Take charge of a goal; its client knows by now that it was accepted."""
+        ...
+
+    def cancel(self, goal: ServerGoal) -> bool:
+        """Return whether to agree that `goal` be canceled; if so it is canceling when this has returned."""
+        ...
+
+
+class ActionServer:
+    """Offers one action."""
 
     def __init__(
         self,
@@ -112,7 +141,7 @@ class DdsActionServer:
         self._handler, self._now, self._endpoints = handler, now, endpoints
         self._type = codec.action(type)
         self._table = GoalTable(result_timeout)
-        self._active: dict[bytes, DdsServerGoal] = {}
+        self._active: dict[bytes, ServerGoal] = {}
         self._results: dict[bytes, bytes] = {}
         self._waiting: dict[bytes, deque[Origin]] = {}
         self._news, self._next_status = False, 0.0
@@ -141,7 +170,7 @@ class DdsActionServer:
             self._publish_status()
 
     def close(self) -> None:
-        """Stop."""
+        """Stop; goals that have not ended never will. Calling it again does nothing."""
         self._endpoints.dismiss(self)
         for service in (self._goal, self._cancel, self._result):
             service.close()
@@ -195,7 +224,7 @@ class DdsActionServer:
         known = id == NO_ID or id in self._table
         accepted = not known and self._agrees(self._handler.decide, request.goal)
         state = self._table.accept(id, stamp) if accepted else None
-        goal = None if state is None else DdsServerGoal(self, state, request.goal, self._goal.client(origin))
+        goal = None if state is None else ServerGoal(self, state, request.goal, self._goal.client(origin))
         response = self._type.SendGoal.Response(accepted, to_time(stamp if accepted else 0))
         self._goal.reply(origin, codec.serialize(response))
         if goal is not None:
@@ -215,7 +244,7 @@ class DdsActionServer:
             self._endpoints.guard.caught(f"Action '{self.name}'", error)
             return False
 
-    def _give_up(self, goal: DdsServerGoal) -> None:
+    def _give_up(self, goal: ServerGoal) -> None:
         """Abort a goal that its handler failed to take charge of."""
         if goal.status is GoalStatus.ACCEPTED:
             goal.execute()

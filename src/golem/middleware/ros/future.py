@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 from golem.errors import GolemError
 
 T = TypeVar("T")
 U = TypeVar("U")
-LOOK = 0.02
-"""How often a waiting node looks after what no sample announces, e.g. that a server has gone [s]."""
 
 
 class RosError(GolemError):
@@ -90,27 +87,3 @@ class Future(Generic[T]):
         callbacks, self._callbacks = self._callbacks, []
         for callback in callbacks:
             callback(self)
-
-
-class Spun(Protocol):
-    """What can be spun: a node."""
-
-    def spin_once(self, timeout: float) -> int:
-        """See `base.Node.spin_once`."""
-        ...
-
-
-def spin_until(node: Spun, future: Future[T], timeout: float) -> T:
-    """Spin `node` until `future` is done and return its value; after `timeout` [s] it is given up.
-
-    Raises:
-        RosError: it failed, or did not arrive in time.
-    """
-    end = time.monotonic() + timeout
-    while not future.done:
-        left = end - time.monotonic()
-        if left <= 0.0:
-            future.cancel(f"No answer within {timeout:g} s.")
-        else:
-            node.spin_once(min(left, LOOK))
-    return future.result()

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.middleware.ros.base import Canceling
-from golem.middleware.ros.goals import CancelCode, GoalStatus
+from golem.middleware.ros.goals import CancelCode, Canceling, GoalStatus
 from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Response, GoalInfo
 from golem.middleware.ros.msgs.builtin_interfaces import Time

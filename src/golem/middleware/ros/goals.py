@@ -9,8 +9,10 @@ design (design.ros2.org, "Actions", result caching) and rcl since PR 1121 have i
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 from enum import Enum, IntEnum
 from itertools import islice
+from typing import Any
 
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.message import NANO
@@ -38,6 +40,19 @@ class GoalStatus(IntEnum):
         return self >= GoalStatus.SUCCEEDED
 
 
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a goal ended.
+
+    Attributes:
+        status: SUCCEEDED, CANCELED or ABORTED; UNKNOWN if the server does not know the goal (any more).
+        result: the action's result message; of no meaning if the status is UNKNOWN.
+    """
+
+    status: GoalStatus
+    result: Any
+
+
 class GoalEvent(Enum):
     """What may happen to a goal."""
 
@@ -59,6 +74,19 @@ class CancelCode(IntEnum):
     """No goal with that id."""
     GOAL_TERMINATED = 3
     """The goal with that id cannot be canceled: it has ended, or is canceling already."""
+
+
+@dataclass(frozen=True, slots=True)
+class Canceling:
+    """Answer to a request to cancel.
+
+    Attributes:
+        code: whether the server agreed.
+        goals: ids of the goals that are canceling now; whether they end so, their outcomes tell.
+    """
+
+    code: CancelCode
+    goals: tuple[bytes, ...]
 
 
 TRANSITIONS = {

@@ -1,4 +1,10 @@
-"""A ROS 2 node over the DDS transport, without ROS."""
+"""A ROS 2 node over the DDS transport, without ROS: topics, services and actions, between machines or in one process.
+
+Nodes are passive: nothing of the user's runs but inside `poll` and `spin_once`, in the caller's thread. What a callback
+raises is logged and goes no further: a service then answers with zeros, a goal is aborted. Types go by their ROS names
+(`std_msgs/msg/String`, `std_srvs/srv/SetBool`, `golem_interfaces/action/Pick`); messages are the classes of
+`golem.middleware.ros.codec`. Names are absolute, relative to the node's namespace, or private (`~/x`).
+"""
 
 from __future__ import annotations
 
@@ -8,22 +14,23 @@ from typing import Any, TypeVar
 
 from golem.middleware.dds.base import DEFAULT, Participant, Qos
 from golem.middleware.ros import names, parameters
-from golem.middleware.ros.action_client import DdsActionClient
-from golem.middleware.ros.action_server import DdsActionServer
-from golem.middleware.ros.base import RESULT_TIMEOUT, ActionHandler
+from golem.middleware.ros.action_client import ActionClient
+from golem.middleware.ros.action_server import RESULT_TIMEOUT, ActionHandler, ActionServer
 from golem.middleware.ros.callback_guard import CallbackGuard, log_error
 from golem.middleware.ros.codec import DEFAULT_DISTRO
-from golem.middleware.ros.future import LOOK, Future, spin_until
+from golem.middleware.ros.future import Future
 from golem.middleware.ros.graph import DiscoveryInfo
 from golem.middleware.ros.node_endpoints import NodeEndpoints
-from golem.middleware.ros.pubsub import DdsPublisher, DdsSubscription
-from golem.middleware.ros.service import DdsClient, DdsService
+from golem.middleware.ros.pubsub import Publisher, Subscription
+from golem.middleware.ros.service import Client, Service
 
 T = TypeVar("T")
+LOOK = 0.02
+"""How often a waiting node looks after what no sample announces, e.g. that a server has gone [s]."""
 
 
-class DdsNode:
-    """The one node of a participant; see `base.Node`.
+class RosNode:
+    """A named member of the ROS graph, the one node of its participant.
 
     Attributes:
         name: without namespace.
@@ -61,38 +68,40 @@ class DdsNode:
         for service, (kind, answer) in parameters.SERVICES.items():
             self.service(f"~/{service}", f"rcl_interfaces/srv/{kind}", answer)
 
-    def publisher(self, topic: str, type: str, qos: Qos = DEFAULT) -> DdsPublisher:
-        """Publish messages of `type` on `topic`."""
-        return DdsPublisher(self._endpoints, self._resolve(topic), type, qos)
+    def publisher(self, topic: str, type: str, qos: Qos = DEFAULT) -> Publisher:
+        """Publish messages of `type` on `topic`.
+
+        Raises:
+            ConfigError: the name is invalid, or the type unknown; so for everything below.
+        """
+        return Publisher(self._endpoints, self._resolve(topic), type, qos)
 
     def subscription(
         self, topic: str, type: str, callback: Callable[[Any], None] | None = None, qos: Qos = DEFAULT
-    ) -> DdsSubscription:
-        """Receive messages of `type` on `topic`."""
-        return DdsSubscription(self._endpoints, self._resolve(topic), type, callback, qos)
+    ) -> Subscription:
+        """Receive messages of `type` on `topic`; `callback` gets each of the last `qos.depth` when the node is spun."""
+        return Subscription(self._endpoints, self._resolve(topic), type, callback, qos)
 
-    def client(self, service: str, type: str) -> DdsClient:
+    def client(self, service: str, type: str) -> Client:
         """Call a service."""
-        return DdsClient(self._endpoints, self._resolve(service), type)
+        return Client(self._endpoints, self._resolve(service), type)
 
-    def service(self, service: str, type: str, callback: Callable[[Any], Any]) -> DdsService:
-        """Offer a service."""
-        return DdsService(self._endpoints, self._resolve(service), type, callback)
+    def service(self, service: str, type: str, callback: Callable[[Any], Any]) -> Service:
+        """Offer a service; `callback` returns the response to a request."""
+        return Service(self._endpoints, self._resolve(service), type, callback)
 
-    def action_client(self, action: str, type: str) -> DdsActionClient:
+    def action_client(self, action: str, type: str) -> ActionClient:
         """Give goals to an action."""
-        return DdsActionClient(self._endpoints, self._resolve(action), type)
+        return ActionClient(self._endpoints, self._resolve(action), type)
 
     def action_server(
         self, action: str, type: str, handler: ActionHandler, result_timeout: float = RESULT_TIMEOUT
-    ) -> DdsActionServer:
-        """Offer an action."""
-        return DdsActionServer(
-            self._endpoints, self._resolve(action), type, handler, self.now, result_timeout
-        )
+    ) -> ActionServer:
+        """Offer an action whose results are kept for `result_timeout` [s] after their goals have ended."""
+        return ActionServer(self._endpoints, self._resolve(action), type, handler, self.now, result_timeout)
 
     def poll(self) -> int:
-        """Handle what has arrived; see `base.Node.poll`."""
+        """Handle what has arrived, and return how many messages, requests and answers that was."""
         return self._endpoints.poll()
 
     def spin_once(self, timeout: float) -> int:
@@ -106,11 +115,22 @@ class DdsNode:
             self._endpoints.waitset.wait(min(left, LOOK))
 
     def wait(self, future: Future[T], timeout: float) -> T:
-        """Spin until `future` is done; see `base.Node.wait`."""
-        return spin_until(self, future, timeout)
+        """Spin until `future` is done and return its value; after `timeout` [s] it is given up.
+
+        Raises:
+            RosError: it failed, or did not arrive in time.
+        """
+        end = time.monotonic() + timeout
+        while not future.done:
+            left = end - time.monotonic()
+            if left <= 0.0:
+                future.cancel(f"No answer within {timeout:g} s.")
+            else:
+                self.spin_once(min(left, LOOK))
+        return future.result()
 
     def close(self) -> None:
-        """Close everything the node has made and leave the graph."""
+        """Close everything the node has made and leave the graph; calling it again does nothing."""
         self._endpoints.close_all()
 
     def _resolve(self, name: str) -> str:

@@ -12,8 +12,8 @@ from golem.middleware.ros.node_endpoints import NodeEndpoints
 from golem.middleware.ros.typed import serialize
 
 
-class DdsPublisher:
-    """Sends messages on one topic; see `base.Publisher`."""
+class Publisher:
+    """Sends messages on one topic."""
 
     def __init__(self, endpoints: NodeEndpoints, name: str, type: str, qos: Qos) -> None:
         """Publish messages of `type` on the topic with absolute `name`."""
@@ -34,12 +34,12 @@ class DdsPublisher:
         return self.writer.matched()
 
     def close(self) -> None:
-        """Stop."""
+        """Stop; calling it again does nothing."""
         self._endpoints.close(self.writer)
 
 
-class DdsSubscription:
-    """Receives the messages of one topic; see `base.Subscription`.
+class Subscription:
+    """Receives the messages of one topic.
 
     Attributes:
         malformed: samples that were no message of the topic's type.
@@ -56,7 +56,7 @@ class DdsSubscription:
         self.inbox = endpoints.inbox(names.topic(name), type, qos, self._take)
 
     def latest(self) -> Any | None:
-        """Return the newest message, or None before the first."""
+        """Return the newest message, or None before the first; this needs no spinning."""
         sample = self.inbox.newest
         if sample is not None and sample is not self._seen:
             self._seen = sample
@@ -65,7 +65,7 @@ class DdsSubscription:
         return self._latest
 
     def count(self) -> int:
-        """Return how many messages have come so far."""
+        """Return how many messages have come so far: a reader sees by it that one is new."""
         return self.inbox.count
 
     def matched(self) -> int:
@@ -73,7 +73,7 @@ class DdsSubscription:
         return self.inbox.matched()
 
     def close(self) -> None:
-        """Stop."""
+        """Stop; calling it again does nothing."""
         self._endpoints.close(self.inbox)
 
     def _take(self, sample: Sample) -> None:

@@ -46,8 +46,8 @@ class Origin(NamedTuple):
     linked: bool = False
 
 
-class DdsClient:
-    """Calls one service; see `base.Client`.
+class Client:
+    """Calls one service.
 
     Attributes:
         malformed: replies that could not be read.
@@ -73,7 +73,10 @@ class DdsClient:
         return self._writer.matched() > 0 and self._inbox.matched() > 0
 
     def call(self, request: Any) -> Future[Any]:
-        """Send a request; see `base.Client.call`.
+        """Send a request; the future brings the response.
+
+        It fails when no server is there or the server goes away; a server that does not answer is the caller's to
+        give up on, with `RosNode.wait` or `Future.cancel`.
 
         Raises:
             CodecError: it is not of the service's type.
@@ -104,7 +107,7 @@ class DdsClient:
             future.cancel(f"The server of '{self.name}' has gone.")
 
     def close(self) -> None:
-        """Stop; what is unanswered fails."""
+        """Stop; what is unanswered fails. Calling it again does nothing."""
         self._endpoints.dismiss(self)
         self._endpoints.close(self._writer, self._inbox)
         self._give_up(f"The client of '{self.name}' was closed.")
@@ -224,8 +227,8 @@ class Responder:
         self._handle(Origin(header, sample.writer, linked), request)
 
 
-class DdsService:
-    """Answers the requests of one service at once; see `base.Service`.
+class Service:
+    """Answers the requests of one service at once.
 
     A callback that raises is answered for, by a response of zeros that says why where its type has a `message`.
     """

@@ -18,11 +18,13 @@ from golem.middleware.dds.base import Qos
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.ros import names
-from golem.middleware.ros.base import Client, Publisher, RosNode
 from golem.middleware.ros.codec import dds_name
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
+from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.pubsub import Publisher
+from golem.middleware.ros.service import Client
 from golem.middleware.wire import convert
 from golem.middleware.wire.struct_layout import WireError
 from golem.runtime.live.exclusive_writers import owner

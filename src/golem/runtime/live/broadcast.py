@@ -17,7 +17,7 @@ from golem.middleware.bags.base import Sink
 from golem.middleware.bags.recorder import PERIOD, Recorder
 from golem.middleware.bus import Bus, News
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
 from golem.middleware.wire.convert import MODE_MACHINE, encode_low_command
 from golem.robots.base import Robot
 from golem.runtime.executor import Executor, Node, Phase
@@ -86,7 +86,7 @@ def _nodes(bus: Bus, robot: Robot, domain: LocalDomain) -> list[Node]:
 
     def endpoints(role: Role) -> RoleEndpoints:
         participant = domain.participant()
-        return RoleEndpoints(role, participant, DdsNode(participant, role))
+        return RoleEndpoints(role, participant, RosNode(participant, role))
 
     body, safety, stack = endpoints("robot"), endpoints("safety"), endpoints("stack")
     robot_out.describe(body, robot.calibration)

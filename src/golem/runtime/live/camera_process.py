@@ -17,7 +17,7 @@ from golem.interfaces.payloads import Exposure
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.interrupt import interrupted
-from golem.middleware.ros.base import RosNode
+from golem.middleware.ros.node import RosNode
 from golem.robots.sensors.cameras import CAMERAS
 from golem.runtime.live.node_setup import AsyncLogger, log_line, member
 from golem.runtime.live.robot_time import RobotTime

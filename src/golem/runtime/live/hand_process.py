@@ -16,7 +16,7 @@ from golem.interfaces import public
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.interrupt import interrupted
-from golem.middleware.ros.base import RosNode
+from golem.middleware.ros.node import RosNode
 from golem.runtime.live.node_setup import AsyncLogger, log_line, member
 from golem.runtime.live.robot_time import RobotTime
 from golem.runtime.live.role_endpoints import RoleEndpoints

@@ -22,9 +22,9 @@ from golem.interfaces import public
 from golem.interfaces.payloads import GateState, GateStatus
 from golem.interfaces.ros_safety import to_gate_status
 from golem.middleware.interrupt import LIFELINE, interrupted
-from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
+from golem.middleware.ros.node import RosNode
 from golem.robots.sensors.profiles import load_profile
 from golem.runtime.live.damper import Damper
 from golem.runtime.live.exclusive_writers import LAUNCH, refuse_second_launch

@@ -9,10 +9,11 @@ from golem.interfaces import topics
 from golem.interfaces.nav_payloads import Nav2Goal, Nav2Reply, Nav2State, Nav2Twist
 from golem.middleware.bus import Bus, News
 from golem.middleware.ros import codec
-from golem.middleware.ros.base import ClientGoal, RosNode
+from golem.middleware.ros.action_client import ClientGoal
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs import geometry_msgs
+from golem.middleware.ros.node import RosNode
 from golem.types import TICK
 
 ACTION, TYPE = "/navigate_to_pose", "nav2_msgs/action/NavigateToPose"

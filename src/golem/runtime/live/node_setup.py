@@ -13,10 +13,11 @@ from golem.middleware.dds import discovery
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.participant import CycloneParticipant
-from golem.middleware.ros.base import ActionClient, Client, RosNode
+from golem.middleware.ros.action_client import ActionClient
 from golem.middleware.ros.callback_guard import log_error
 from golem.middleware.ros.future import RosError
-from golem.middleware.ros.node import DdsNode
+from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.service import Client
 from golem.runtime.live.exclusive_writers import identity
 
 SEARCH = 5.0
@@ -28,7 +29,7 @@ ANSWER = 30.0
 @contextmanager
 def member(
     name: str, dds: DdsConfig, log: Callable[[str], None] = log_error
-) -> Iterator[tuple[CycloneParticipant, DdsNode]]:
+) -> Iterator[tuple[CycloneParticipant, RosNode]]:
     """Join a domain as the process called `name`; what callbacks of its node raise is said by `log`.
 
     Raises:
@@ -36,7 +37,7 @@ def member(
         ConfigError, DdsError: the domain cannot be joined.
     """
     with closing(connect(dds, identity(name))) as participant:
-        with closing(DdsNode(participant, name, distro=dds.distro, log=log)) as node:
+        with closing(RosNode(participant, name, distro=dds.distro, log=log)) as node:
             yield participant, node
 
 

@@ -14,9 +14,9 @@ from golem.interfaces.payloads import GateState
 from golem.interfaces.ros_safety import to_gate_status
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.future import RosError
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, Trigger_Request
+from golem.middleware.ros.node import RosNode
 from golem.runtime.live.motion_switcher_client import CALLS, MotionSwitcherClient
 from golem.runtime.live.node_setup import ANSWER, SEARCH, find, log_line, member, until
 from golem.runtime.live.role_endpoints import RoleEndpoints

@@ -12,8 +12,9 @@ from typing import Any
 
 from golem.errors import GolemError, unknown_name
 from golem.interfaces import public
-from golem.middleware.ros.base import Client, RosNode
 from golem.middleware.ros.future import Future
+from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.service import Client
 from golem.runtime.live.node_setup import ANSWER, find, log_line, member, settle
 from golem.runtime.live.operator import REQUESTS, RequestConfig
 

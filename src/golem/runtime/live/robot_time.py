@@ -7,7 +7,7 @@ from typing import Any
 
 from golem.interfaces import public
 from golem.interfaces.ros_convert import seconds
-from golem.middleware.ros.base import RosNode
+from golem.middleware.ros.node import RosNode
 
 SILENCE = 0.2
 """Time without a /clock after which nobody knows the robot's time [s]."""

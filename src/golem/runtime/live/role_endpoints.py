@@ -11,9 +11,11 @@ from golem.interfaces import public
 from golem.interfaces.rows import Role, TopicRow
 from golem.middleware.dds.base import Participant, Qos, Reader, Sample, Writer
 from golem.middleware.ros import names
-from golem.middleware.ros.base import ActionHandler, ActionServer, Publisher, RosNode, Subscription
+from golem.middleware.ros.action_server import ActionHandler, ActionServer
 from golem.middleware.ros.codec import dds_name
 from golem.middleware.ros.message import CodecError
+from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.pubsub import Publisher, Subscription
 from golem.middleware.ros.waitset import Inbox, WaitSet
 from golem.middleware.wire.struct_layout import WireError
 from golem.types import TICK

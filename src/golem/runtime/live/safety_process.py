@@ -15,9 +15,9 @@ from golem.hardware.safety.standing_gate import StandingController, StandingGate
 from golem.interfaces.payloads import EstopMessage, Fault, GateState, GateStatus, Reason
 from golem.interfaces.ros_convert import diagnostic, diagnostics
 from golem.middleware.dds.base import Participant, Qos, Sample
-from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.msgs.diagnostic_msgs import DiagnosticStatus
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response, Trigger_Response
+from golem.middleware.ros.node import RosNode
 from golem.middleware.wire import convert
 from golem.runtime.live import sim_sync
 from golem.runtime.live.clock import Every, Rate, time_since_boot

@@ -10,7 +10,7 @@ from golem.errors import GolemError
 from golem.interfaces import topics
 from golem.interfaces.payloads import Feedback, GateState
 from golem.middleware.bus import News
-from golem.middleware.ros.base import ServerGoal
+from golem.middleware.ros.action_server import ServerGoal
 from golem.middleware.ros.callback_guard import CallbackGuard, log_error
 from golem.middleware.ros.goals import GoalStatus
 from golem.runtime.live.role_endpoints import RoleEndpoints

@@ -16,11 +16,12 @@ from golem.interfaces import public
 from golem.interfaces import ros_convert as convert
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.interrupt import interrupted
-from golem.middleware.ros.base import ClientGoal, RosNode
+from golem.middleware.ros.action_client import ClientGoal
 from golem.middleware.ros.future import Future, RosError
 from golem.middleware.ros.goals import GoalStatus
 from golem.middleware.ros.msgs.golem_interfaces import RunSkill_Goal
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
+from golem.middleware.ros.node import RosNode
 from golem.runtime.goal_parser import HELP, parse_goal
 from golem.runtime.live.node_setup import ANSWER, SEARCH, find, log_line, member, until
 from golem.runtime.live.operator import ask

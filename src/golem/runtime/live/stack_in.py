@@ -12,10 +12,12 @@ from golem.interfaces import images, public, topics
 from golem.interfaces import ros_convert as convert
 from golem.interfaces.payloads import Exposure, GateState, GateStatus
 from golem.middleware.bus import Bus, Topic
-from golem.middleware.ros.base import Client, RosNode, Subscription
 from golem.middleware.ros.future import Future
 from golem.middleware.ros.msgs import sensor_msgs
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request, Trigger_Response
+from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.pubsub import Subscription
+from golem.middleware.ros.service import Client
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.pairing import Pairing
 from golem.runtime.live.node_setup import log_line

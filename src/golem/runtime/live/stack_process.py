@@ -17,8 +17,8 @@ from golem.errors import ConfigError
 from golem.interfaces import public, topics
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant, Sample
-from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.msgs.std_srvs import Trigger_Response
+from golem.middleware.ros.node import RosNode
 from golem.middleware.ros.waitset import WaitSet
 from golem.middleware.wire import convert
 from golem.middleware.wire.api import request_topic, response_topic

@@ -10,8 +10,8 @@ from typing import Any
 from golem.interfaces import public, topics
 from golem.middleware.bus import Bus
 from golem.middleware.dds.base import Participant
-from golem.middleware.ros.base import RosNode
 from golem.middleware.ros.msgs.std_srvs import Trigger_Response
+from golem.middleware.ros.node import RosNode
 from golem.middleware.wire.api import request_topic, response_topic
 from golem.middleware.wire.rpc import RpcServer
 from golem.robots.base import HasGantry, Robot
