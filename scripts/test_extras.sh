@@ -24,7 +24,7 @@ probe() {
         realsense) echo "from golem.hardware.drivers.realsense_camera import library; library()" ;;
         vision) echo "from pathlib import Path; from golem.capabilities.perception.hub_model import load_model; load_model(Path('none'), 'clip', 'CLIPModel', 'CLIPProcessor')" ;;
         graspgen) echo "from golem.registry import create; create('grasp_method', 'graspgen', {})" ;;
-        cluster) echo "from golem.evaluation.harness.dask_executor import DaskExecutor; DaskExecutor('no scheduler')" ;;
+        cluster) echo "from golem.evaluation.harness.trial_executor import DaskExecutor; DaskExecutor('no scheduler')" ;;
         lidar) echo "from golem.registry import create; create('odometry', 'kiss_icp', {}); create('odometry', 'rko_lio', {})" ;;
         physx) echo "from golem.robots.physx.bodies import load_sapien; load_sapien()" ;;
         *) echo "There is no extra '$1' to try." >&2; exit 2 ;;

@@ -10,7 +10,7 @@ from golem.capabilities.arms.postures import posture
 from golem.capabilities.grasping.base import Grasp
 from golem.capabilities.grasping.centroid import grasp_pose
 from golem.skills.context import Context
-from golem.skills.grasp_order import reached_first
+from golem.skills.take import reached_first
 from golem.types import Array, Side
 
 

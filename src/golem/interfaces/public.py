@@ -13,16 +13,54 @@ from typing import Any
 
 import numpy as np
 
-from golem.interfaces import images, lidar_convert, nav_convert, onboard_legs, ros_safety, topics
+from golem.interfaces import images, lidar_convert, nav_convert, ros_safety, topics
 from golem.interfaces import ros_convert as convert
-from golem.interfaces.payloads import Exposure
+from golem.interfaces.payloads import Exposure, LegCommand
 from golem.interfaces.rows import ActionRow, Role, ServiceRow, TopicRow
-from golem.middleware.dds.base import CALLS, DEFAULT, LATCHED, SENSOR, Qos
+from golem.middleware.dds.base import CALLS, DEFAULT, LATCHED, SENSOR, Payload, Qos
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
-from golem.middleware.wire.convert import decode_low_state, encode_low_state
-from golem.types import SIDES, BaseEstimate, LowState, Side
+from golem.middleware.wire import hg
+from golem.middleware.wire.convert import (
+    decode_low_command,
+    decode_low_state,
+    encode_low_command,
+    encode_low_state,
+)
+from golem.types import LEGS, NUM_JOINTS, SIDES, BaseEstimate, LowCommand, LowState, Side
+
+_TO_SERVO = 1
+"""Index in `reserve` of the word that says whether the feed-forward torque is left to the servo."""
+
+
+def encode_legs(command: LegCommand) -> bytes:
+    """Return leg targets as a `LowCmd_` whose other motors get zero gains and zero torque.
+
+    Raises:
+        WireError: a value is not finite in single precision.
+    """
+    whole = {name: np.zeros(NUM_JOINTS) for name in ("q", "dq", "tau", "kp", "kd")}
+    for name in ("q", "kp", "kd"):
+        whole[name][LEGS] = getattr(command, name)
+    if command.tau is not None:
+        whole["tau"][LEGS] = command.tau
+    payload = bytearray(encode_low_command(LowCommand(0.0, **whole), 0))
+    hg.LOW_CMD.read(payload)["reserve"][_TO_SERVO] = command.tau is None
+    hg.COMMAND_CHECKSUM.seal(payload)
+    return bytes(payload)
+
+
+def decode_legs(payload: Payload) -> LegCommand:
+    """Return the leg targets in a `LowCmd_`.
+
+    Raises:
+        WireError: see `decode_low_command`.
+    """
+    whole = decode_low_command(payload, 0.0)
+    to_servo = bool(hg.LOW_CMD.read(payload)["reserve"][_TO_SERVO])
+    return LegCommand(whole.q[LEGS], whole.kp[LEGS], whole.kd[LEGS], None if to_servo else whole.tau[LEGS])
+
 
 CAMERAS = ("head", "left_hand", "right_hand")
 LIDAR = ("/livox/lidar", "/livox/pointcloud", "/livox/imu")
@@ -195,7 +233,7 @@ TOPICS: tuple[TopicRow, ...] = (
     TopicRow("/onboard/lowcmd", "unitree_hg/msg/LowCmd", "robot", ("stack",), LOW, 500, "",
           "What the on-board leg controller wants of the 12 leg motors while it is on, the others off. Simulation "
           "only: there it takes the way of every other command, through the gate.",
-          topics.ONBOARD_LEGS, onboard_legs.encode_legs, onboard_legs.decode_legs),
+          topics.ONBOARD_LEGS, encode_legs, decode_legs),
     TopicRow("/skill/list", "golem_interfaces/msg/SkillList", "stack", (), LATCHED, None, "",
           "The skills of the stack, with the fields of their goals."),
     *(TopicRow(f"/objects/{camera}", "golem_interfaces/msg/Sightings", "stack", (), DEFAULT, None, "odom",

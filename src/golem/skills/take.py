@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.postures import posture
+from golem.capabilities.arms.quick_ik import TURNS, QuickIK
 from golem.capabilities.grasping.base import Grasp, GraspMethod
 from golem.capabilities.grasping.object_cloud import bounds, room_around
 from golem.capabilities.planning.base import PlanRefused
@@ -26,6 +28,32 @@ from golem.types import SIDES, Array, LocalizedObject, Side
 
 if TYPE_CHECKING:
     from golem.skills.planned_motion import PlannedMotion
+
+
+def reached_first(context: Context, side: Side, grasps: Sequence[Grasp], before: float) -> list[Grasp]:
+    """Return the same `grasps`, first those that an arm reaches with the least turn of the torso.
+
+    Args:
+        context: where the arms are.
+        side: which hand.
+        grasps: best first.
+        before: distance from a grasp, along its approach, from which the hand comes [m].
+    """
+    ik, q = QuickIK(), context.commanded_joints
+    T = np.linalg.inv(context.T_odom_base)
+    starts = np.array([q, posture(f"ready_{side}"), posture(f"forward_{side}")])
+
+    def reached(grasp: Grasp) -> bool:
+        return ik.approach(side, T @ grasp.T_odom_gripper, before, starts) is not None
+
+    for turn in TURNS:
+        starts[:, 0] = q[0] + turn
+        found = [reached(grasp) for grasp in grasps]
+        if any(found):
+            order = sorted(range(len(grasps)), key=lambda k: not found[k])
+            return [grasps[k] for k in order]
+    return list(grasps)
+
 
 SPARE = 0.024
 """How much wider than the grasp asks for the hand arrives [m]: encoders and palm camera are off by a centimetre."""
@@ -227,7 +255,6 @@ class Take:
 
         Those that the arm alone reaches from where it is are tried first: a planner takes longer to refuse.
         """
-        from golem.skills.grasp_order import reached_first
         from golem.skills.planned_motion import Then
         from golem.skills.travel import APPROACH, failed
 

@@ -11,8 +11,8 @@ import pytest
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.obstacles import Obstacle, World, cloud_grid
+from golem.capabilities.collision.pack_robot import sample_postures
 from golem.capabilities.collision.packing_report import spheres_collide
-from golem.capabilities.collision.pair_table import sample_postures
 from golem.capabilities.collision.sphere_packer import Packing
 from golem.capabilities.collision.sphere_robot import SphereRobot, holding, load_spheres
 from golem.errors import ConfigError

@@ -12,8 +12,7 @@ import pytest
 
 from golem import registry
 from golem.capabilities.memory.base import Observation
-from golem.capabilities.memory.frame_index import FrameIndex, FrameIndexConfig
-from golem.capabilities.memory.image_text_encoder import ImageTextEncoder
+from golem.capabilities.memory.frame_index import FrameIndex, FrameIndexConfig, ImageTextEncoder
 from golem.capabilities.perception import hub_model
 from golem.errors import ConfigError, MissingExtra
 from golem.evaluation.conformance import samples

@@ -11,9 +11,8 @@ import pytest
 
 from golem.capabilities.perception import hub_model
 from golem.capabilities.perception.grounding_dino import GroundingDino
-from golem.capabilities.perception.open_words import OpenWordsConfig
+from golem.capabilities.perception.open_words import OpenWordsConfig, Sam
 from golem.capabilities.perception.owlv2 import Owlv2
-from golem.capabilities.perception.sam import Sam
 from golem.errors import ConfigError, MissingExtra
 from golem.evaluation.conformance import samples
 

@@ -11,7 +11,7 @@ import pytest
 
 from golem.errors import GolemError, ModuleFault
 from golem.evaluation.conformance.base import Candidate, Inapplicable
-from golem.evaluation.conformance.domain_stops import TRIES, DomainStops
+from golem.evaluation.conformance.domain_command import TRIES, DomainStops
 from golem.interfaces.payloads import GateState, GateStatus, Reason
 from golem.middleware.ros.future import RosError
 

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from golem.evaluation.conformance.base import FAILED, SKIPPED, Candidate, Report
 from golem.evaluation.conformance.examine import run_suite
-from golem.evaluation.conformance.robot_measures import RobotMeasures
+from golem.evaluation.conformance.robot_measures import RobotMeasures, floor_normal, rotated, up_in_base
 from golem.evaluation.conformance.robot_rig import LockstepRig, Path, RobotRig
-from golem.evaluation.conformance.robot_views import floor_normal, rotated, up_in_base
 from golem.evaluation.conformance.still_robot import StillRobot
 from golem.hardware.servo.gravity import Gravity
 from golem.robots.model.imu_mount import TORSO

@@ -10,8 +10,7 @@ import pytest
 
 from golem.evaluation.harness.ladder import LadderConfig, run_ladder
 from golem.evaluation.harness.run_folder import read_costs
-from golem.evaluation.metrics.gate_hours import GateHours
-from golem.evaluation.metrics.results import ResultsConfig, run_results
+from golem.evaluation.metrics.results import GateHours, ResultsConfig, run_results
 
 
 def test_hours_and_stops_add_up() -> None:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.hardware.drivers.magpie_force import force_from_load, load_from_force
+from golem.hardware.drivers.magpie_servos import force_from_load, load_from_force
 from golem.hardware.hands.magpie import FORCE_STEP, clamp_force
 from golem.robots.model.magpie_model import MAX_FORCE, MIN_FORCE
 

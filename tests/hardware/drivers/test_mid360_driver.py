@@ -19,8 +19,13 @@ from tests.hardware.drivers.mid360_peer import (
 )
 
 from golem.hardware.drivers.device_clock import DeviceClock
-from golem.hardware.drivers.mid360_driver import LidarError, Mid360
-from golem.hardware.drivers.mid360_packets import ImuDatagram, PointDatagram, decode_datagram
+from golem.hardware.drivers.mid360_driver import (
+    ImuDatagram,
+    LidarError,
+    Mid360,
+    PointDatagram,
+    decode_datagram,
+)
 from golem.interfaces.lidar import LidarImu, LidarScan
 
 OURS = 100.0

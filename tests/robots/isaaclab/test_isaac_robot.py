@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from golem.options import fill
-from golem.robots.isaaclab.isaac_robot import IsaacLabConfig, IsaacLabRobot
-from golem.robots.isaaclab.worker_link import VARIABLE
+from golem.robots.isaaclab.isaac_robot import VARIABLE, IsaacLabConfig, IsaacLabRobot
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.lockstep import start_posture

@@ -9,9 +9,15 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError, MissingEnvironment
-from golem.robots.isaaclab.isaac_robot import IsaacLabConfig, IsaacLabRobot
+from golem.robots.isaaclab.isaac_robot import (
+    VARIABLE,
+    IsaacLabConfig,
+    IsaacLabRobot,
+    Layers,
+    WorkerLink,
+    isaac_python,
+)
 from golem.robots.isaaclab.isaac_worker import WorkerScene, reply_type, request_type
-from golem.robots.isaaclab.worker_link import VARIABLE, Layers, WorkerLink, isaac_python
 from golem.runtime.lockstep import start_posture
 
 SCENE: WorkerScene = {

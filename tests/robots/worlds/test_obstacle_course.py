@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from golem.robots.worlds.obstacle_course import GOAL, START, CourseObstacle, draw_course, outline, passable
+from golem.robots.worlds.furnished import GOAL, START, CourseObstacle, draw_course, outline, passable
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -7,8 +7,7 @@ import pytest
 
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
-from golem.runtime.bringup.hand_moves import hand_move, wrong_with
-from golem.runtime.bringup.joint_motion_words import motion_words
+from golem.runtime.bringup.bringup_command import hand_move, motion_words, wrong_with
 from golem.types import NUM_JOINTS, TICK, Imu, LowState
 
 IMU = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from golem.runtime.live.command_lease import CommandLease
+from golem.runtime.live.safety_process import CommandLease
 
 FIRST, SECOND, THIRD = b"first", b"second", b"third"
 

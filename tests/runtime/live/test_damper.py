@@ -5,7 +5,7 @@ from __future__ import annotations
 from tests.runtime.live.conftest import Live
 
 from golem.hardware.safety.base import SafetyLimits
-from golem.runtime.live.damper import Damper
+from golem.runtime.live.launch import Damper
 
 
 def test_motors_whose_gate_was_killed_are_damped_and_then_limp(live: Live) -> None:

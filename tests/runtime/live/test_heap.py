@@ -11,7 +11,7 @@ import pytest
 MAPPED = """
 import ctypes, sys
 import numpy as np
-from golem.runtime.live.heap import map_large_blocks
+from golem.runtime.live.process import map_large_blocks
 
 class Info(ctypes.Structure):
     _fields_ = [(name, ctypes.c_size_t) for name in "arena ordblks smblks hblks hblkhd".split() + list("abcde")]

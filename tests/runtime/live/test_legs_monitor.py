@@ -11,8 +11,8 @@ from tests.runtime.live.conftest import BLIND, Live
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState, GateStatus
 from golem.middleware.bus import Bus
-from golem.runtime.live.legs_monitor import BLIND as PATIENCE
-from golem.runtime.live.legs_monitor import LegsMonitor
+from golem.runtime.live.stack_process import BLIND as PATIENCE
+from golem.runtime.live.stack_process import LegsMonitor
 from golem.stack import Choice, Stack
 from golem.types import BaseEstimate
 

@@ -6,8 +6,8 @@ from tests.middleware.wire.rpc import reach, serve
 
 from golem.capabilities.legs.hold import JointHold
 from golem.interfaces import public, topics
-from golem.interfaces.onboard_legs import decode_legs, encode_legs
 from golem.interfaces.payloads import LegCommand
+from golem.interfaces.public import decode_legs, encode_legs
 from golem.interfaces.unitree_api import LOCO_APIS, OK, decode_int, encode
 from golem.middleware.bus import Bus
 from golem.middleware.dds.local import LocalDomain

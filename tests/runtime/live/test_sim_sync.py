@@ -18,9 +18,9 @@ from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.node import RosNode
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import answered, encode_low_command
-from golem.runtime.live.motor_bridge import CommandIn
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.sim_sync import LAG, PATIENCE, SILENCE, relaxed_limits
+from golem.runtime.live.twin import CommandIn
 from golem.types import NUM_JOINTS, TICK, LowCommand
 
 LONG = 100.0

@@ -29,7 +29,7 @@ from golem.middleware.ros.msgs.golem_interfaces import (
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.ros.node import RosNode
 from golem.runtime.live.skill_messages import read_list
-from golem.runtime.live.velocity import LET_GO
+from golem.runtime.live.stack_process import LET_GO
 from golem.skills.spec import schema_of
 from golem.skills.walk import WalkGoal
 from golem.stack import Choice

@@ -10,8 +10,8 @@ from tests.runtime.live.conftest import Live
 from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import GateState
+from golem.runtime.live.safety_main import commands
 from golem.runtime.live.safety_process import SafetyProcess
-from golem.runtime.live.unknown_senders import commands
 from golem.stack import Choice, Stack
 
 
@@ -59,7 +59,7 @@ def test_a_foreign_process_is_found_and_ours_is_not(domain: int) -> None:
     from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
     from golem.runtime.live.exclusive_writers import identity
-    from golem.runtime.live.unknown_senders import unknown_senders
+    from golem.runtime.live.safety_main import unknown_senders
 
     dds = DdsConfig(domain)
     watch, ours, theirs = connect(dds, identity("safety")), connect(dds, identity("up")), connect(dds, "")

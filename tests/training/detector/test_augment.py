@@ -10,7 +10,7 @@ torch = pytest.importorskip("torch", reason="training needs the extra 'train'")
 from golem.capabilities.perception.classes import CLASSES  # noqa: E402
 from golem.capabilities.perception.peaks import STRIDE, find_peaks  # noqa: E402
 from golem.training.detector import augment  # noqa: E402
-from golem.training.detector.heat_targets import targets  # noqa: E402
+from golem.training.detector.train_detector import targets  # noqa: E402
 
 
 def test_the_labelled_spot_is_in_the_crop_where_the_label_says() -> None:

@@ -14,9 +14,8 @@ from golem.capabilities.legs.gait import GaitConfig
 from golem.hardware.safety.base import SafetyLimits
 from golem.training.legs.batch_world import WorldConfig
 from golem.training.legs.disturbances import Difficulty
-from golem.training.legs.env import PERIOD, TASKS, EnvConfig, LegsEnv
+from golem.training.legs.env import PERIOD, TASKS, EnvConfig, LegsEnv, landing_errors
 from golem.training.legs.export_policy import load_actor
-from golem.training.legs.placement import landing_errors
 from golem.training.legs.rewards import RewardWeights
 from golem.training.legs.training_model import KP, STANCE
 

@@ -6,17 +6,123 @@ After ReMEmbR (Anwar et al., 2025) without its language model: what was true onc
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 
 from golem.capabilities.memory.base import Observation, Place, When, apart, check_observation, check_query
-from golem.capabilities.memory.frame_encoder import BagOfLabels, FrameEncoder
-from golem.capabilities.memory.image_text_encoder import NETWORKS, ImageTextEncoder, Network
+from golem.capabilities.memory.words import label_scores
+from golem.capabilities.perception.hub_model import load_model
 from golem.errors import ConfigError, unknown_name
 from golem.types import Array
+
+Network = Literal["siglip", "clip"]
+NETWORKS: dict[str, tuple[str, str]] = {
+    "siglip": ("SiglipModel", "SiglipProcessor"),
+    "clip": ("CLIPModel", "CLIPProcessor"),
+}
+"""Type of model -> classes of its network and its processor. SigLIP 2 of fixed size is of type `siglip`."""
+assert set(NETWORKS) == set(get_args(Network))
+PROMPT = "a photo of a {}"
+"""What the networks were trained to tell from other words."""
+WORDS = 256
+"""Words whose vectors are kept."""
+
+
+class ImageTextEncoder:
+    """Images and words as vectors whose angle says how well they fit; see `FrameEncoder`."""
+
+    def __init__(self, network: Network, weights: Path) -> None:
+        """Load network and processor.
+
+        Raises:
+            MissingExtra: the extra `vision` is not installed.
+            ConfigError: there is no such network, or the folder `weights` holds none.
+        """
+        if network not in NETWORKS:
+            raise unknown_name("encoder", network, NETWORKS)
+        self._model, self._processor = load_model(weights, network, *NETWORKS[network])
+        self._words: OrderedDict[str, Array] = OrderedDict()
+
+    def frame(self, observation: Observation) -> Array:
+        """Return the (d,) unit vector of a frame's image."""
+        given = self._processor(images=observation.frame.rgb, return_tensors="pt")
+        return self._vector(self._model.get_image_features, given)
+
+    def text(self, text: str) -> Array:
+        """Return the (d,) unit vector of words."""
+        words = " ".join(text.lower().replace("_", " ").split())
+        if words not in self._words:
+            given = self._processor(
+                text=[PROMPT.format(words)], return_tensors="pt", padding="max_length", truncation=True
+            )
+            self._words[words] = self._vector(self._model.get_text_features, given)
+            if len(self._words) > WORDS:
+                self._words.popitem(last=False)
+        return self._words[words]
+
+    def _vector(self, features: Any, given: Any) -> Array:
+        import torch
+
+        with torch.inference_mode():
+            answer = features(**given)
+        found = getattr(answer, "pooler_output", answer)  # transformers 5; before, it is the vector
+        vector = np.asarray(found[0].numpy(), dtype=np.float64)
+        return vector / max(float(np.linalg.norm(vector)), 1e-12)
+
+
+class FrameEncoder(Protocol):
+    """Turns frames and words into vectors of one length; the cosine of two says how well they fit."""
+
+    def frame(self, observation: Observation) -> Array:
+        """Return the (d,) unit vector of a frame; zero where nothing can be said of it."""
+        ...
+
+    def text(self, text: str) -> Array:
+        """Return the (d,) unit vector of words; zero where nothing can be said of them."""
+        ...
+
+
+class BagOfLabels:
+    """What a localizer found in a frame, as a vector with a component for each label: no network is needed.
+
+    A label weighs by its scores and the root of the share of the image that its boxes take. Labels get a component
+    when they are met first, up to `SIZE`.
+    """
+
+    SIZE = 256
+
+    def __init__(self) -> None:
+        """Begin without labels."""
+        self._component: dict[str, int] = {}
+
+    def frame(self, observation: Observation) -> Array:
+        """Return the (d,) unit vector of a frame; zero where nothing is in it."""
+        vector = np.zeros(self.SIZE)
+        area = observation.frame.info.width * observation.frame.info.height
+        for found in observation.objects:
+            component = self._component.setdefault(found.label, len(self._component))
+            if component < self.SIZE:
+                sides = found.detection.box[2:] - found.detection.box[:2]
+                vector[component] += found.detection.score * np.sqrt(max(float(sides.prod()), 1.0) / area)
+        return _unit(vector)
+
+    def text(self, text: str) -> Array:
+        """Return the (d,) unit vector of words; zero where none of the labels met so far answers to them."""
+        vector = np.zeros(self.SIZE)
+        for label, score in label_scores(text, self._component).items():
+            if self._component[label] < self.SIZE:
+                vector[self._component[label]] = score
+        return _unit(vector)
+
+
+def _unit(vector: Array) -> Array:
+    norm = np.linalg.norm(vector)
+    return vector / norm if norm > 0.0 else vector
+
 
 WINDOW = 0.25
 """Share of the image's width and height, about its middle, whose median depth tells where a frame looks."""

@@ -5,6 +5,14 @@ beyond its stop by as much as the servo is soft, so that both press with their f
 
 Everything a servo forgets without power is written again and again: one that has been off would else come back with its
 full torque and speed. What was not read is no report: a hand that does not answer raises.
+
+Registers and units are those of the ROBOTIS e-manual, AX-12A. The force law, load of an AX-12A <-> force of one finger,
+was measured by the lab (its driver magpie_control), F in N, L the load or torque limit, 0 to 1023:
+
+    F = 0.0025 L - 7e-7 L^2                          for L < 100
+    F = -1.889e-5 L^2 + 0.038399 L - 3.4073          from there on
+
+The second parabola has its top, 16.1 N, at L = 1016; from there on F stays at it, so that the law is monotone.
 """
 
 from __future__ import annotations
@@ -16,7 +24,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.errors import ConfigError, GolemError
-from golem.hardware.drivers import ax12
 from golem.hardware.drivers.dynamixel import (
     CHECKSUM_ERROR,
     StatusPacket,
@@ -24,10 +31,110 @@ from golem.hardware.drivers.dynamixel import (
     read_packet,
     sync_write_packet,
 )
-from golem.hardware.drivers.magpie_force import force_from_load, load_from_force
 from golem.hardware.drivers.serial_port import PortError, SerialPort
 from golem.robots.model import magpie_model
+from golem.robots.model.magpie_model import MAX_FORCE
 from golem.types import HandCommand, HandState
+
+KNEE = 100
+"""Load at which one law gives way to the other."""
+_A, _B, _C = -1.889e-5, 0.038399, -3.4073
+_TOP = -_B / (2.0 * _A)
+_LOW_A, _LOW_B = -7e-7, 0.0025
+
+
+def force_from_load(load: float) -> float:
+    """Return the force of one finger [N] at a load of 0 to 1023; no less for more load, and at most `MAX_FORCE`."""
+    if load < KNEE:
+        return (_LOW_A * load + _LOW_B) * load
+    load = min(load, _TOP)
+    return min((_A * load + _B) * load + _C, MAX_FORCE)
+
+
+def load_from_force(force: float) -> int:
+    """Return the torque limit, 0 to 1023, whose force is nearest to `force` [N], 0 to `MAX_FORCE`."""
+    if force < force_from_load(KNEE):
+        exact = (-_LOW_B + math.sqrt(_LOW_B**2 + 4.0 * _LOW_A * force)) / (2.0 * _LOW_A)
+    else:
+        exact = (-_B + math.sqrt(max(_B**2 - 4.0 * _A * (_C - force), 0.0))) / (2.0 * _A)
+    below = math.floor(exact)
+    return min((below, below + 1), key=lambda load: abs(force_from_load(load) - force))
+
+
+BAUD = 1_000_000
+"""Factory setting [1/s]."""
+TICKS = 1023
+"""Largest position; also the largest load and torque limit."""
+RANGE = 300.0
+"""Angle that `TICKS` stands for [degrees]."""
+
+SETTINGS = 24
+"""Address of what `settings` writes: torque enable to torque limit."""
+STATE = 36
+"""Address of what `decode` reads: present position to present temperature."""
+STATE_SIZE = 8
+"""Bytes of it."""
+MAX_READ = 14
+"""Bytes from `STATE` to the end of the table."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ax12State:
+    """What a servo reports.
+
+    Attributes:
+        position: 0 to 1023, over `RANGE` degrees, counter-clockwise.
+        speed: 0 to 1023; counter-clockwise positive.
+        load: share of the largest torque that it applies, -1023 to 1023; counter-clockwise positive. 0 is no load:
+            where nothing was read there is no `Ax12State`.
+        voltage: [V].
+        temperature: [degrees C].
+    """
+
+    position: int
+    speed: int
+    load: int
+    voltage: float
+    temperature: float
+
+
+def decode(data: bytes) -> Ax12State:
+    """Return what the `STATE_SIZE` bytes from `STATE` say; more bytes may follow.
+
+    Raises:
+        ValueError: they say something that no AX-12A reports.
+    """
+    if len(data) < STATE_SIZE:
+        raise ValueError(f"{len(data)} bytes instead of {STATE_SIZE}")
+    position, speed, load = (int.from_bytes(data[i : i + 2], "little") for i in (0, 2, 4))
+    if position > TICKS or speed > 2 * TICKS + 1 or load > 2 * TICKS + 1:
+        raise ValueError(f"position {position}, speed {speed}, load {load}")
+    return Ax12State(position, _signed(speed), _signed(load), 0.1 * data[6], float(data[7]))
+
+
+def servo_settings(goal: int, speed: int, limit: int, margin: int, slope: int) -> bytes:
+    """Return what is written from `SETTINGS`: all that a servo forgets when its power fails, so that none of it is old.
+
+    Args:
+        goal: position to go to, 0 to 1023.
+        speed: at most, 1 to 1023; 1023 is 114 rpm. 0, which is no limit, is refused.
+        limit: torque limit, 0 to 1023.
+        margin: positions on either side of the goal without torque, 0 to 255.
+        slope: how soft it is around the goal, 2 to 128.
+
+    Raises:
+        ValueError: a number is out of range.
+    """
+    if not (0 <= goal <= TICKS and 1 <= speed <= TICKS and 0 <= limit <= TICKS):
+        raise ValueError(f"goal {goal}, speed {speed}, torque limit {limit}")
+    words = b"".join(value.to_bytes(2, "little") for value in (goal, speed, limit))
+    return bytes((1, 0, margin, margin, slope, slope)) + words
+
+
+def _signed(value: int) -> int:
+    """Return a number whose bit 10 says that it is clockwise."""
+    return -(value & TICKS) if value & (TICKS + 1) else value & TICKS
+
 
 PERIOD = 0.010
 """Time between two reports [s]."""
@@ -92,7 +199,7 @@ class _Finger:
 
     def __init__(self, config: FingerConfig) -> None:
         self.config = config
-        self.state: ax12.Ax12State | None = None
+        self.state: Ax12State | None = None
         self.heard = -math.inf
         self.trouble = ""
 
@@ -108,13 +215,13 @@ class _Finger:
         c = self.config
         return _ticks(c.upper) + slope if c.closes > 0 else _ticks(c.lower) - slope
 
-    def pad(self, state: ax12.Ax12State) -> float:
+    def pad(self, state: Ax12State) -> float:
         """Return the distance of the pad from the hand's centre plane [m]."""
         c = self.config
-        angle = c.closes * (state.position * ax12.RANGE / ax12.TICKS - c.upright)
+        angle = c.closes * (state.position * RANGE / TICKS - c.upright)
         return float(magpie_model.pad_offset(math.radians(angle) + 0.5 * math.pi - magpie_model.ANGLE_OPEN))
 
-    def force(self, state: ax12.Ax12State) -> float:
+    def force(self, state: Ax12State) -> float:
         """Return the force with which the pad presses [N]; 0 for a load that opens."""
         return force_from_load(max(self.config.closes * state.load, 0))
 
@@ -143,7 +250,7 @@ class MagpieServos:
         self.config = config
         self.lost = self.strays = 0
         self._connect = connect
-        self._port: SerialPort | None = connect(config.port, ax12.BAUD)
+        self._port: SerialPort | None = connect(config.port, BAUD)
         self._parser = StatusParser()
         self._fingers = (_Finger(config.a), _Finger(config.b))
         self._settings: bytes = b""
@@ -171,8 +278,8 @@ class MagpieServos:
         settings: dict[int, bytes] = {}
         for finger in self._fingers:
             goal = finger.goal(command.gap) if command.gap > 0.0 else finger.closed(c.slope)
-            settings[finger.config.id] = ax12.settings(goal, c.speed, limit, c.margin, c.slope)
-        self._settings = sync_write_packet(ax12.SETTINGS, settings)
+            settings[finger.config.id] = servo_settings(goal, c.speed, limit, c.margin, c.slope)
+        self._settings = sync_write_packet(SETTINGS, settings)
 
     def step(self, t: float) -> HandState | None:
         """Exchange what there is to exchange at `t` [s]; return a report when one is complete, every 10 ms.
@@ -215,7 +322,7 @@ class MagpieServos:
         if self._port is None:
             if t < self._retry:
                 return
-            self._port, self._gone, self._started = self._connect(self.config.port, ax12.BAUD), "", t
+            self._port, self._gone, self._started = self._connect(self.config.port, BAUD), "", t
         for packet in self._parser.feed(self._port.read()):
             self._answer(packet, t)
         if self._asked is not None and t - self._asked[2] > ANSWER:
@@ -228,10 +335,10 @@ class MagpieServos:
     def _ask(self, port: SerialPort, t: float) -> None:
         finger = self._fingers[self._turn]
         # Each question asks for another number of bytes, so that the answer to an earlier one is known as such.
-        self._size = (self._size + 1) % (ax12.MAX_READ - ax12.STATE_SIZE + 1)
-        size = ax12.STATE_SIZE + self._size
+        self._size = (self._size + 1) % (MAX_READ - STATE_SIZE + 1)
+        size = STATE_SIZE + self._size
         settings = self._settings if self._turn == 0 else b""
-        port.write(settings + read_packet(finger.config.id, ax12.STATE, size))
+        port.write(settings + read_packet(finger.config.id, STATE, size))
         self._asked, self._turn = (finger, size, t), 1 - self._turn
 
     def _answer(self, packet: StatusPacket, t: float) -> None:
@@ -244,7 +351,7 @@ class MagpieServos:
             self.lost += 1
             return
         try:
-            finger.state = ax12.decode(packet.parameters)
+            finger.state = decode(packet.parameters)
         except ValueError as error:
             finger.trouble = f"reports nonsense ({error})"
             return
@@ -253,4 +360,4 @@ class MagpieServos:
 
 def _ticks(angle: float) -> int:
     """Return the position at an angle [degrees], within the servo's range."""
-    return round(min(max(angle, 0.0), ax12.RANGE) * ax12.TICKS / ax12.RANGE)
+    return round(min(max(angle, 0.0), RANGE) * TICKS / RANGE)

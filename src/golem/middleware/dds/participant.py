@@ -1,17 +1,143 @@
-"""Membership of a DDS domain through Cyclone, with one thread that calls back when there is something to take."""
+"""Membership of a DDS domain through Cyclone, with one thread that calls back when there is something to take.
+
+Topics advertise no type information: a Cyclone 11 topic with type information makes Cyclone 0.10 peers (the vendor's
+SDK, ROS 2 Humble to Kilted) crash if its type has an octet, and newer peers check assignability when both sides
+advertise it. Without it matching is by topic and type name, as between ROS 2 nodes up to Kilted. The descriptor is that
+of a final struct with one octet (Cyclone wants at least one member): Cyclone checks that there is one byte after the
+encapsulation header, swaps nothing and hands on whatever follows, so one descriptor serves all types. The encoding must
+be little endian, which that of every peer of ours is.
+"""
 
 from __future__ import annotations
 
 import atexit
+import ctypes
+import logging
 import threading
 from collections.abc import Callable
+from typing import Protocol
 
-from golem.middleware.dds.base import DdsError, NetworkPlace, Qos
-from golem.middleware.dds.dispatcher import Dispatcher
+from golem.middleware.dds.base import DdsError, NetworkPlace, Qos, Sample
 from golem.middleware.dds.endpoints import CycloneReader, CycloneWriter, entity_guid
-from golem.middleware.dds.library import Cyclone
+from golem.middleware.dds.library import ANY_STATE, INFINITY, Cyclone, TopicDescriptor
 from golem.middleware.dds.qos import cyclone_qos
-from golem.middleware.dds.topic import create_topic
+
+_RESTRICT_DATA_REPRESENTATION = 1 << 7
+"""DDS_TOPIC_RESTRICT_DATA_REPRESENTATION of dds_public_impl.h."""
+_XCDR1 = 1 << 0
+"""DDS_DATA_REPRESENTATION_FLAG_XCDR1."""
+_PROGRAM = (0x01 << 24 | 0x01 << 16, 0, 0x00 << 24)
+"""Marshalling program of dds_opcodes.h: DDS_OP_ADR | DDS_OP_TYPE_1BY, its offset; DDS_OP_RTS."""
+
+
+def create_topic(library: Cyclone, participant: int, name: str, type_name: str) -> int:
+    """Create a topic of opaque samples and return its entity.
+
+    Raises:
+        DdsError: Cyclone refuses, e.g. because the name has a character that topics cannot have.
+    """
+    program = (ctypes.c_uint32 * len(_PROGRAM))(*_PROGRAM)
+    descriptor = TopicDescriptor(
+        size=1,
+        align=1,
+        flags=_RESTRICT_DATA_REPRESENTATION,
+        type_name=type_name.encode(),
+        op_count=len(_PROGRAM),
+        ops=program,
+        data_representation=_XCDR1,
+    )
+    topic = library.blocking.dds_create_topic(
+        participant, ctypes.byref(descriptor), name.encode(), None, None
+    )
+    return library.check(topic, f"Topic '{name}' cannot be created; check its name")
+
+
+_log = logging.getLogger(__name__)
+_AT_ONCE = 64
+"""Readers that one waiting reports; the others follow in the next."""
+_STOP = 0
+"""What the waitset reports for its own guard condition; Cyclone's entities are positive."""
+
+
+class Watched(Protocol):
+    """A reader with a callback."""
+
+    topic: str
+    entity: int
+    on_data: Callable[[], None] | None
+
+    def take(self, maximum: int = 64) -> list[Sample]:
+        """Remove and return up to `maximum` samples."""
+        ...
+
+
+class Dispatcher:
+    """Calls `on_data` of the readers that have something to take, one after the other, in a thread of its own.
+
+    A callback that raises is logged, and what its reader held is thrown away: else it would be called for the same
+    samples for ever.
+    """
+
+    def __init__(self, library: Cyclone, participant: int) -> None:
+        """Start the thread for `participant`, an entity."""
+        self._library = library
+        self._readers: dict[int, Watched] = {}
+        calls = library.blocking
+        self._entity = library.check(calls.dds_create_waitset(participant), "A waitset cannot be created")
+        self._stop = library.check(
+            calls.dds_create_guardcondition(participant), "A waitset cannot be stopped"
+        )
+        self._attach(self._stop, _STOP)
+        self._thread = threading.Thread(target=self._run, name="dds-waitset", daemon=True)
+        self._thread.start()
+
+    def attach(self, reader: Watched) -> None:
+        """Call back for `reader` from now on."""
+        condition = self._library.blocking.dds_create_readcondition(reader.entity, ANY_STATE)
+        self._library.check(condition, f"The reader of '{reader.topic}' cannot be waited for")
+        self._readers[reader.entity] = reader
+        self._attach(condition, reader.entity)
+
+    def detach(self, entity: int) -> None:
+        """Call back no more for the reader `entity`; a call under way goes on."""
+        self._readers.pop(entity, None)
+
+    def close(self) -> None:
+        """End the thread, once the present callback has returned; a callback may call it too."""
+        self._library.blocking.dds_set_guardcondition(self._stop, True)
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+
+    def _attach(self, condition: int, label: int) -> None:
+        code = self._library.blocking.dds_waitset_attach(self._entity, condition, label)
+        self._library.check(code, "A condition cannot be waited for")
+
+    def _run(self) -> None:
+        labels = (ctypes.c_ssize_t * _AT_ONCE)()
+        wait = self._library.blocking.dds_waitset_wait
+        while True:
+            n = wait(self._entity, labels, _AT_ONCE, INFINITY)
+            if n < 0:  # The participant has gone without closing: with its whole domain.
+                return
+            for label in labels[: min(n, _AT_ONCE)]:
+                if label == _STOP:
+                    return
+                self._call(self._readers.get(label))
+
+    def _call(self, reader: Watched | None) -> None:
+        if reader is None or reader.on_data is None:
+            return
+        try:
+            reader.on_data()
+        except Exception:
+            if reader.entity not in self._readers:
+                return  # It was closed meanwhile.
+            _log.exception("The callback of '%s' failed; the samples it was to take are lost.", reader.topic)
+            try:
+                while reader.take():
+                    pass
+            except DdsError:
+                return
 
 
 class CycloneParticipant:

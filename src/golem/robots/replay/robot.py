@@ -2,15 +2,156 @@
 
 from __future__ import annotations
 
+import math
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from golem.errors import RobotGone
-from golem.robots.replay.log import Log
-from golem.types import Array, HandCommand, HandState, Imu, LowCommand, LowState, Side
+from golem.interfaces import images, public
+from golem.middleware.bags.base import BagError, BagMessage
+from golem.middleware.bags.reader import Bag
+from golem.middleware.ros import codec
+from golem.middleware.ros.goal_info import from_time
+from golem.middleware.ros.message import NANO
+from golem.middleware.ros.msgs.sensor_msgs import CameraInfo as InfoMessage
+from golem.middleware.ros.msgs.sensor_msgs import Image
+from golem.middleware.ros.msgs.tf2_msgs import TFMessage
+from golem.robots.base import STAMP_TOLERANCE
+from golem.robots.sensors.calibration import calibrations
+from golem.robots.sensors.cameras import CAMERAS
+from golem.robots.sensors.pairing import Pairing
+from golem.types import SIDES, Array, CameraInfo, HandCommand, HandState, Imu, LowCommand, LowState, Side
+
+T = TypeVar("T")
+STATE, STATIC = "/lowstate", "/tf_static"
+AHEAD = 0.5
+"""How far the log is read ahead [s] [own]: an image is recorded when it arrives, up to so long after its exposure."""
+RESTART = 1.0
+"""Step back in time that means another robot, or one that was restarted [s] [own]."""
+
+Picture = tuple[NDArray[np.uint8], NDArray[np.float32]]
+"""Colour (height, width, 3) and depth (height, width) [m] of one exposure."""
+
+
+class Track(Generic[T]):
+    """One measured quantity over time."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._samples: deque[tuple[float, T]] = deque()
+
+    def add(self, t: float, value: T) -> None:
+        """Append what was measured at `t` [s]."""
+        self._samples.append((t, value))
+
+    def at(self, t: float) -> T | None:
+        """Return the newest of up to `t` [s], and forget those before it; None where there is none yet."""
+        samples = self._samples
+        while len(samples) > 1 and samples[1][0] <= t + STAMP_TOLERANCE:
+            samples.popleft()
+        return samples[0][1] if samples and samples[0][0] <= t + STAMP_TOLERANCE else None
+
+
+class Log:
+    """A bag that is read as time passes; times are seconds since its first state.
+
+    States and hands have the time at which they were recorded, images that of their exposure. Both are the domain's.
+
+    Attributes:
+        cameras: those that were recorded.
+        calibration: per camera the (4, 4) pose of its optical frame, as the recorded robot's calibration claims it, in
+            that of the nominal model.
+        states: motors and IMU.
+        hands: each hand.
+        pictures: what each camera saw.
+        end: time of the last state; None until it has been read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open the bag at `path`.
+
+        Raises:
+            BagError: there is none, it is damaged, or it holds no state of a robot.
+            CodecError, WireError: a message is not what its topic says.
+        """
+        self._bag = bag = Bag(path)
+        if STATE not in bag.topics:
+            raise BagError(
+                f"The bag {path} has no messages on {STATE}, so it cannot stand in for a robot; it has "
+                f"{', '.join(sorted(bag.topics)) or 'none at all'}."
+            )
+        self.states: Track[LowState] = Track()
+        self.hands: dict[Side, Track[HandState]] = {side: Track() for side in SIDES}
+        self.end: float | None = None
+        self.cameras, self.calibration = _cameras(bag)
+        self.pictures: dict[str, Track[Picture]] = {name: Track() for name in self.cameras}
+        self._take: dict[str, Callable[[BagMessage], None]] = {STATE: self._state}
+        for side in SIDES:
+            self._take[public.gripper(side, "state")] = partial(self._hand, side)
+        for name in self.cameras:
+            pairing = Pairing(partial(self._picture, name))
+            self._take[public.image(name, public.COLOR)] = partial(_image, pairing.color)
+            self._take[public.image(name, public.DEPTH)] = partial(_image, pairing.depth)
+        self._origin = next(bag.messages([STATE])).log_time
+        self._messages = bag.messages(self._take)
+        self._read = self._newest = -math.inf
+        self.read(0.0)
+
+    def read(self, t: float) -> None:
+        """Read on until everything measured up to `t` [s] is there, and forget what it replaces; errors as above."""
+        while self.end is None and self._read < t + AHEAD:
+            message = next(self._messages, None)
+            at = -math.inf if message is None else self._time(message.log_time)
+            if message is None or at < self._read - RESTART:
+                self.end = self._newest
+            else:
+                self._read = at
+                self._take[message.topic.name](message)
+        for track in (self.states, *self.hands.values(), *self.pictures.values()):
+            track.at(t)
+
+    def _time(self, time: int) -> float:
+        return (time - self._origin) / NANO
+
+    def _state(self, message: BagMessage) -> None:
+        self._newest = self._time(message.log_time)
+        self.states.add(self._newest, public.topic(STATE).value(message.payload))
+
+    def _hand(self, side: Side, message: BagMessage) -> None:
+        state: HandState = public.topic(message.topic.name).value(message.payload)
+        self.hands[side].add(self._time(message.log_time), state)
+
+    def _picture(self, camera: str, color: Image, depth: Image) -> None:
+        t = self._time(from_time(color.header.stamp))
+        self.pictures[camera].add(t, (images.to_rgb(color), images.to_depth(depth)))
+
+
+def _image(take: Callable[[Image], None], message: BagMessage) -> None:
+    take(codec.deserialize(message.payload, Image))
+
+
+def _cameras(bag: Bag) -> tuple[dict[str, CameraInfo], dict[str, Array]]:
+    """Return the recorded cameras and their calibration; what ROS does not say of a camera, its table does."""
+    infos = {public.image(name, public.CAMERA_INFO): name for name in CAMERAS}
+    recorded = [topic for topic in infos if topic in bag.topics]
+    found: dict[str, CameraInfo] = {}
+    claimed: dict[str, Array] = {}
+    for message in bag.messages((STATIC,)):
+        claimed |= calibrations(codec.deserialize(message.payload, TFMessage))
+    for message in bag.messages(recorded):
+        nominal = CAMERAS[infos[message.topic.name]]
+        info = codec.deserialize(message.payload, InfoMessage)
+        found[nominal.name] = images.to_camera(info, nominal.name, nominal.near, nominal.far, nominal.rate)
+        if len(found) == len(recorded):
+            break
+    return found, {name: claimed.get(name, np.eye(4)) for name in found}
 
 
 @dataclass(frozen=True)

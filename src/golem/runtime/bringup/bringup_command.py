@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from golem.errors import unknown_name
+from golem.robots.model.kinematics import Kinematics
+from golem.robots.model.spatial import skew
+from golem.robots.model.table import JOINT_NAMES, JOINTS
 from golem.runtime.bringup.base import (
+    Act,
     BringupConfig,
     BringupPerson,
     BringupStep,
@@ -16,13 +23,168 @@ from golem.runtime.bringup.base import (
     Workbench,
 )
 from golem.runtime.bringup.bringup_report import BringupReport
-from golem.runtime.bringup.joint_checks import check_joints
 from golem.runtime.bringup.listening_checks import check_domain, check_state
 from golem.runtime.bringup.motor_checks import check_estop, check_hoist, check_motion, check_release
 from golem.runtime.bringup.robot_link import RobotLink
 from golem.runtime.bringup.sensor_checks import check_sensors
 from golem.runtime.live.launch import Process
 from golem.runtime.live.node_setup import log_line, member
+from golem.types import NUM_JOINTS, Array, LowState
+
+LEVER = 0.08
+"""Distance from the axis from which a part visibly moves [m per rad]."""
+_AHEAD = (np.array([1.0, 0.0, 0.0]), "forward", "backward")
+_LEFT = (np.array([0.0, 1.0, 0.0]), "to the left", "to the right")
+_UP = (np.array([0.0, 0.0, 1.0]), "up", "down")
+
+
+def motion_words(joint: int, q: Array, positive: bool = True) -> str:
+    """Return what a person sees when a joint turns, as seen by the robot.
+
+    Args:
+        joint: its index in motor order.
+        q: (27,) joints of the robot now [rad].
+        positive: whether it turns in its positive direction.
+
+    Returns:
+        E.g. "the left foot goes backward": of the parts that it moves the first that visibly does.
+    """
+    kinematics = Kinematics()
+    kinematics.update(q)
+    row = JOINTS[joint]
+    T = kinematics.pose(row.child)
+    axis = T[:3, :3] @ row.axis
+    moves = [(name, skew(axis) @ (point - T[:3, 3])) for name, point in _parts(joint, kinematics)]
+    name, move = next(
+        (m for m in moves if np.linalg.norm(m[1]) >= LEVER), max(moves, key=lambda m: np.linalg.norm(m[1]))
+    )
+    axis, towards, away = max((_AHEAD, _LEFT, _UP), key=lambda d: abs(move @ d[0]))
+    return f"{name} goes {towards if (move @ axis > 0.0) == positive else away}"
+
+
+def _parts(joint: int, kinematics: Kinematics) -> list[tuple[str, Array]]:
+    """Return points at the far end of the joint's limb, in base_link [m]."""
+    name = JOINT_NAMES[joint]
+    side = name.partition("_")[0]
+    if name.startswith("torso"):
+        return [("the chest", kinematics.pose("torso_link")[:3, 3] + (0.2, 0.0, 0.3))]
+    leg = any(part in name for part in ("hip", "knee", "ankle"))
+    if leg:
+        end = kinematics.pose(f"{side}_ankle_roll_link")[:3, 3]
+        return [
+            (f"the {side} foot", end),
+            (f"the toes of the {side} foot", end + (0.15, 0.0, -0.05)),
+            (f"the left edge of the {side} foot", end + (0.0, 0.08, -0.05)),
+        ]
+    end = kinematics.pose(f"{side}_gripper")[:3, 3]
+    return [
+        (f"the {side} hand", end),
+        (f"the front of the {side} hand", end + (0.1, 0.0, 0.0)),
+        (f"the left of the {side} hand", end + (0.0, 0.1, 0.0)),
+        (f"the top of the {side} hand", end + (0.0, 0.0, 0.1)),
+    ]
+
+
+ENOUGH = 0.12
+"""Angle from which a joint counts as moved by hand [rad]: half the range of the ankle's roll."""
+ALONE = 2.0
+"""How many times as far as any other it has to have moved."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandMove:
+    """A joint that was moved.
+
+    Attributes:
+        joint: its index.
+        angle: by how much its position changed [rad].
+        integral: by how much its speed says that it did [rad].
+    """
+
+    joint: int
+    angle: float
+    integral: float
+
+
+def hand_move(states: Sequence[LowState], start: Array) -> HandMove | None:
+    """Return the joint that has moved from `start` alone, once one has.
+
+    Args:
+        states: since then, oldest first.
+        start: (27,) joints before the motion [rad].
+
+    Returns:
+        None while none has moved by `ENOUGH`, or another more than half as far.
+    """
+    if len(states) < 2:
+        return None
+    moved = states[-1].q - start
+    order = np.argsort(np.abs(moved))
+    first, second = int(order[-1]), int(order[-2])
+    if abs(moved[first]) < max(ENOUGH, ALONE * abs(moved[second])):
+        return None
+    t = np.array([s.t for s in states])
+    speed = np.array([s.dq[first] for s in states])
+    return HandMove(first, float(moved[first]), float(np.trapezoid(speed, t)))
+
+
+def wrong_with(move: HandMove, wanted: int, positive: bool, names: Sequence[str]) -> str:
+    """Return what is wrong with what was reported of a joint that a person moved; empty if nothing is.
+
+    Args:
+        move: what the robot reported.
+        wanted: index of the joint that the person moved.
+        positive: whether in its positive direction.
+        names: of the `NUM_JOINTS` joints.
+    """
+    assert len(names) == NUM_JOINTS
+    if move.joint != wanted:
+        return f"{names[wanted]} was moved, and {names[move.joint]} reports it: the joint order is another"
+    if (move.angle > 0.0) != positive:
+        direction = "positive" if positive else "negative"
+        return f"{names[wanted]} was moved in its {direction} direction and reports {move.angle:+.2f} rad: wrong sign"
+    if abs(move.integral - move.angle) > 0.5 * abs(move.angle):
+        return f"{names[wanted]} moved by {move.angle:.2f} rad, and its speed says {move.integral:+.2f} rad"
+    return ""
+
+
+def check_joints(bench: Workbench) -> StepFinding:
+    """Each joint, moved by hand, is the one that reports it, with the right sign."""
+    bench.person.tell("The robot hangs in its own damping mode. Move one joint at a time, by about 0.2 rad.")
+    angles: dict[str, float | str] = {}
+    for joint, name in enumerate(JOINT_NAMES):
+        wrong, angle = _move(bench, joint)
+        if wrong:
+            return StepFinding(False, wrong, angles)
+        angles[name] = round(angle, 3)
+    return StepFinding(True, f"{len(angles)} joints report what was done to them", angles)
+
+
+def _move(bench: Workbench, joint: int) -> tuple[str, float]:
+    """Have one joint moved; return what is wrong, empty if nothing is, and how far it moved [rad]."""
+    link, person, name = bench.link, bench.person, JOINT_NAMES[joint]
+    link.spin(bench.config.patience, link.calm)
+    before = link.state
+    if before is None:
+        return "the robot fell silent", 0.0
+    # Away from the nearer end of its range, where it may hang already.
+    positive = bool(before.q[joint] < 0.5 * (JOINTS[joint].lower + JOINTS[joint].upper))
+    words = motion_words(joint, before.q, positive)
+    link.states.clear()
+    move: HandMove | None = None
+
+    def seen() -> bool:
+        nonlocal move
+        move = hand_move([s for _, s in link.states], before.q)
+        return move is not None
+
+    person.act(Task(Act.MOVE, f"Move {name}, so that {words}.", joint, positive))
+    link.spin(bench.config.patience, seen)
+    person.act(Task(Act.LET_GO, "Let go.", joint))
+    if move is None:
+        return f"{name} was to be moved, and no joint reports that it alone was", 0.0
+    return wrong_with(move, joint, positive, JOINT_NAMES), move.angle
+
 
 CHECKS: tuple[BringupStep, ...] = (
     BringupStep("domain", "The robot alone on its domain", check_domain),

@@ -6,6 +6,7 @@ restarted finds a stack that was built anew.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -13,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from golem.capabilities.legs.locomotion import LocomotionConfig
 from golem.errors import ConfigError
 from golem.interfaces import public, topics
 from golem.middleware.bus import Bus
@@ -29,7 +31,6 @@ from golem.runtime.executor import Executor, Phase, Placed, in_order
 from golem.runtime.live import stack_out as out
 from golem.runtime.live.bridge import incoming, outgoing
 from golem.runtime.live.clock import RobotClock
-from golem.runtime.live.legs_monitor import LegsMonitor
 from golem.runtime.live.nav2_bridge import Nav2Bridge
 from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.onboard_bridge import AnswersIn, CallsOut, Identities
@@ -40,13 +41,83 @@ from golem.runtime.live.sim_sync import CATCH_UP, SILENCE
 from golem.runtime.live.skill_action_server import SkillActionServer
 from golem.runtime.live.skill_messages import list_message
 from golem.runtime.live.stack_in import CameraIn, GateIn, OnePerTick, RemoteGantry
-from golem.runtime.live.velocity import Velocities
 from golem.runtime.node_groups import StackNodes, hears_lidar
 from golem.runtime.nodes import moving
 from golem.runtime.onboard_nodes import stack_loco_api
 from golem.runtime.skill_table import SkillTable
 from golem.stack import Stack
-from golem.types import SIDES, Array
+from golem.types import SIDES, Array, Twist
+
+_LEGS = LocomotionConfig()
+LET_GO = 2.0 * _LEGS.timeout
+"""Silence after which a velocity is of a new intention [s]: twice the longest time in which one has to be repeated."""
+STILL = _LEGS.dead_band
+"""Size of (vx, vy, wz) below which nobody is asked to move [m/s, rad/s]: sticks are never quite at rest."""
+
+
+class Velocities:
+    """Passes velocities on, unless whoever sends them began while the robot was not to be driven.
+
+    A joystick that is held while the robot is stopped, or a planner that runs on, would else set it in motion the
+    moment it is released. They have to let go first: send less than `STILL`, or nothing for `LET_GO`. Who sends is not
+    told apart: where two do, one of them lets go for both.
+    """
+
+    def __init__(self, bus: Bus, now: Callable[[], float], closed: Callable[[], bool]) -> None:
+        """Publish on `bus`, at time `now()` [s], what comes while not `closed()`."""
+        self._bus, self._now, self._closed = bus, now, closed
+        self._heard = -LET_GO
+        self._held = False
+
+    def take(self, twist: Twist) -> None:
+        """Pass `twist` on, or not."""
+        t, still = self._now(), math.hypot(twist.vx, twist.vy, twist.wz) < STILL  # false for nan
+        # A robot that was restarted begins its time anew.
+        if still or not 0.0 <= t - self._heard <= LET_GO:
+            self._held = False
+        self._heard = t
+        closed = self._closed()
+        self._held |= closed and not still
+        if not (closed or self._held):
+            self._bus.publish(topics.TWIST, twist, t)
+
+
+BLIND = 3.0
+"""Time from the gate's activation on after which an estimator that has found no floor is worth a word [s]: one that
+loses it is stopped, one that never had it is not, since a robot that hangs has its feet in the air."""
+
+
+class LegsMonitor:
+    """Tells of the fallback that took the legs, and of legs without a base estimate."""
+
+    period = 0.1
+
+    def __init__(self, bus: Bus, tell: Callable[[str], None]) -> None:
+        """Watch `bus`; `tell` says a line to a person."""
+        self._bus, self._tell = bus, tell
+        self._fault: str | None = None
+        self._blind_since: float | None = None
+
+    def step(self, t: float) -> None:
+        """Look at the legs' newest report and the newest base estimate at time `t` [s]."""
+        legs = self._bus.latest(topics.LEG_STATUS)
+        if legs is not None and legs.fault is not None and legs.fault != self._fault:
+            self._fault = legs.fault
+            self._tell(
+                f"{legs.fault}. '{legs.controller}' has the legs now, and stands until a new twist comes."
+            )
+        base = self._bus.latest(topics.BASE)
+        if not moving(self._bus):
+            self._blind_since = t
+        elif base is not None and not base.stale:
+            self._blind_since = None
+        if self._blind_since is not None and t - self._blind_since > BLIND:
+            self._blind_since = None
+            self._tell(
+                "The estimator has found no foot on the floor since the gate was activated: do not put the robot's "
+                "weight on its feet."
+            )
+
 
 IMU_BACKLOG = 40
 """Samples of the LiDAR's IMU that may wait for their ticks: 0.2 s."""

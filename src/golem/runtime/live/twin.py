@@ -2,34 +2,113 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from golem.interfaces import public, topics
-from golem.middleware.bus import Bus
-from golem.middleware.dds.base import Participant
+from golem.interfaces.unitree_api import LocoApi
+from golem.middleware.bus import Bus, News
+from golem.middleware.dds.base import Participant, Sample
 from golem.middleware.ros.msgs.std_srvs import Trigger_Response
 from golem.middleware.ros.node import RosNode
+from golem.middleware.ros.waitset import WaitSet
 from golem.middleware.wire.api import request_topic, response_topic
+from golem.middleware.wire.convert import answered, decode_low_command
 from golem.middleware.wire.rpc import RpcServer
+from golem.middleware.wire.struct_layout import WireError
 from golem.robots.base import HasGantry, Robot
 from golem.robots.unitree import motion_switcher
 from golem.runtime import nodes
 from golem.runtime.executor import Executor, Phase, Placed, in_order
 from golem.runtime.live.bridge import incoming, outgoing
-from golem.runtime.live.motor_bridge import CommandIn
 from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.onboard_bridge import AnswersOut, CallsIn
+from golem.runtime.live.rejected import RejectedMessages
 from golem.runtime.live.render_worker import RenderWorker, image_topics
 from golem.runtime.live.robot_out import describe, encoders, images_wanted, lidar_wanted
 from golem.runtime.live.role_endpoints import RoleEndpoints
-from golem.runtime.live.sim_sync import PATIENCE
-from golem.runtime.live.unanswered_calls import UnansweredCalls
+from golem.runtime.live.sim_sync import LAG, PATIENCE
 from golem.runtime.node_groups import ModuleFactory, RobotNodes
 from golem.runtime.onboard_nodes import stack_loco_api
 from golem.stack import Stack
+from golem.types import TICK
+
+
+class CommandIn:
+    """Takes what the motors are told, as the robot does: what is damaged or for another machine is ignored.
+
+    The robot's time stands still while an active stack is more than `LAG` behind it: see `golem.runtime.live.sim_sync`.
+
+    Attributes:
+        refused: those.
+    """
+
+    period = TICK
+
+    def __init__(
+        self, bus: Bus, endpoints: RoleEndpoints, tell: Callable[[str], None], patience: float = PATIENCE
+    ) -> None:
+        """Bring commands to `bus`; `tell` what is refused; wait for one up to `patience` [s] by the wall clock."""
+        self._bus, self._patience = bus, patience
+        self._t = 0.0
+        self._answered = self._given_up = 0.0
+        self.refused = RejectedMessages("motor commands", tell)
+        self._waitset = WaitSet()
+        self._inbox = endpoints.receive("/lowcmd", self._waitset, self._take)
+
+    def step(self, t: float) -> None:
+        """Take what has come, and wait for what should have."""
+        self._t = t
+        self._waitset.poll()
+        end = time.monotonic() + self._patience
+        while self._late():
+            left = end - time.monotonic()
+            if left <= 0.0:
+                self._given_up = self._answered
+                return
+            self._waitset.wait(left)
+            self._waitset.poll()
+
+    def _late(self) -> bool:
+        """Return whether whoever has answered states, and was not given up since, has yet to answer one long past."""
+        answered = self._answered
+        return answered not in (0.0, self._given_up) and self._t - answered > LAG + TICK / 2.0
+
+    def _take(self, sample: Sample) -> None:
+        try:
+            command = decode_low_command(sample.payload, self._t)
+            self._answered = answered(sample.payload)
+        except WireError as error:
+            self.refused.add(error)
+            return
+        self._bus.publish(topics.LOW_CMD, command, self._t)
+
+
+class UnansweredCalls:
+    """Reads the calls to the loco service of a robot that has no such service, and says so at the first."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus, api: LocoApi, tell: Callable[[str], None]) -> None:
+        """Read the calls to the service of `api` on `bus`; `tell` says a line to a person."""
+        self._news, self._api, self._tell = News(bus, topics.api_request(api.service)), api, tell
+        self._reported = False
+
+    def step(self, t: float) -> None:
+        """Look for a call."""
+        call = self._news.read()
+        if call is None or self._reported:
+            return
+        self._reported = True
+        self._tell(
+            f"A LocoClient calls {self._api.function(call.api_id)} of the service '{self._api.service}'. "
+            "Nobody answers it: this robot has no legs on board. "
+            "They come with this line in the stack file: lower_body: {use: vendor}."
+        )
+
 
 FOREVER = 1e9
 """A time nobody sees [s]."""
