@@ -147,15 +147,6 @@ TRAINERS = {
 """What can be trained, and the module that does it."""
 
 
-def _twin(words: list[str]) -> int:
-    """Put the simulated robot on a DDS domain, with the wall clock."""
-    _prepare_graphics()
-    from golem.runtime.live.process import TwinConfig, run_twin
-
-    run_twin(_parse(TwinConfig, "twin", words))
-    return 0
-
-
 def _safety(words: list[str]) -> int:
     """Run a robot's safety gate; `safety activate|stop|reset|...` asks it, `safety console` is quick."""
     from golem.runtime.live import operator
@@ -182,27 +173,12 @@ def _drivers(words: list[str]) -> int:
 
 
 DEVICES = {
-    "camera": ("golem.runtime.live.camera_process", "CameraConfig", "run_camera"),
+    "camera": ("golem.runtime.live.device_process", "CameraConfig", "run_camera"),
     "estop": ("golem.runtime.estop_check", "EstopCheckConfig", "run_estop_check"),
-    "hands": ("golem.runtime.live.hand_process", "HandsConfig", "run_hands"),
-    "lidar": ("golem.runtime.live.lidar_process", "LidarConfig", "run_lidar"),
+    "hands": ("golem.runtime.live.device_process", "HandsConfig", "run_hands"),
+    "lidar": ("golem.runtime.live.device_process", "LidarConfig", "run_lidar"),
 }
 """What has a driver."""
-
-
-def _up(words: list[str]) -> int:
-    """Run the modules of a stack file for the robot on a domain."""
-    from golem.runtime.live.process import UpConfig, run_up
-
-    run_up(_parse(UpConfig, "up", words))
-    return 0
-
-
-def _launch(words: list[str]) -> int:
-    """Start twin, safety and up for a stack file, and supervise them."""
-    from golem.runtime.live.launch import LaunchConfig, run_launch
-
-    return 0 if run_launch(_parse(LaunchConfig, "launch", words)) else FAILED
 
 
 def _skill(words: list[str]) -> int:
@@ -292,15 +268,18 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "reach": _command("Show where the hands can be: table, picture, and the map that skills ask.",
                       "golem.evaluation.speed.reach_command", "ReachConfig:run_reach"),
     "train": _train,
-    "twin": _twin,
+    "twin": _command("Put the simulated robot on a DDS domain, with the wall clock.",
+                     "golem.runtime.live.process", "TwinConfig:run_twin", True),
     "safety": _safety,
     "bringup": _command("Bring a robot up step by step, each one checked; --rehearse: with a twin that has a fault.",
                         "golem.evaluation.rehearsal.rehearse", "BringupCommandConfig:run_bringup_command"),
     "calibrate": _command("Calibrate cameras and the arms' encoders by tags on the hands.",
                           "golem.runtime.calibrate_command", "CalibrateConfig:run_calibrate", True),
     "drivers": _drivers,
-    "up": _up,
-    "launch": _launch,
+    "up": _command("Run the modules of a stack file for the robot on a domain.",
+                   "golem.runtime.live.process", "UpConfig:run_up"),
+    "launch": _command("Start twin, safety and up for a stack file, and supervise them.",
+                       "golem.runtime.live.launch", "LaunchConfig:run_launch"),
     "restart": _command("Restart one process of a launched robot: twin, safety or up.",
                         "golem.runtime.live.operator", "RestartConfig:run_restart"),
     "skill": _skill,

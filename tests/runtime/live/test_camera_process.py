@@ -13,7 +13,7 @@ from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.node import RosNode
 from golem.robots.sensors.cameras import HEAD
-from golem.runtime.live.camera_process import CameraProcess
+from golem.runtime.live.device_process import CameraProcess
 
 
 class Source:

@@ -13,7 +13,7 @@ from golem.interfaces import public, ros_convert
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.node import RosNode
-from golem.runtime.live.hand_process import HandProcess
+from golem.runtime.live.device_process import HandProcess
 from golem.types import SIDES, TICK, HandCommand, HandState, Side
 
 ROBOT_TIME = 50.0

@@ -15,7 +15,7 @@ from golem.interfaces.images import to_points
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.node import RosNode
-from golem.runtime.live.lidar_process import CLOUD, IMU, LidarProcess
+from golem.runtime.live.device_process import CLOUD, IMU, LidarProcess
 
 BEGIN, ROBOT_TIME = 1000.0, 50.0
 """What our clock and the robot's show when the LiDAR begins."""
