@@ -38,11 +38,6 @@ class CalibrateHandsGoal:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one is outside its range.
-        """
         require(
             "",
             ("number of views per camera", self.views, 6 <= self.views <= 60, "6 to 60"),

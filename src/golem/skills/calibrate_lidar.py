@@ -47,11 +47,6 @@ class CalibrateLidarGoal:
     settle: float = 0.5
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one is outside its range.
-        """
         require(
             "",
             ("number of views", self.views, 1 <= self.views <= 20, "1 to 20"),

@@ -40,11 +40,6 @@ class DisassembleGoal:
     pick: PickGoal = field(default_factory=lambda: PickGoal(side="either"))
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require(
             "goal of disassembling: ",
             ("count", self.count, 1 <= self.count <= 100, "from 1 to 100"),

@@ -60,11 +60,6 @@ class DockGoal:
     avoid: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         near, angle = "a positive distance of at most 0.2 m", "a positive angle of at most 0.5 rad"
         require(
             "goal of docking: ",

@@ -45,11 +45,6 @@ class ExploreGoal:
     timeout: float = 600.0
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require(
             "goal of exploring: ",
             ("most", self.most, self.most >= 0, "not negative"),

@@ -68,11 +68,6 @@ class FetchGoal:
     search: bool = True
 
     def __post_init__(self) -> None:
-        """Check that it can be meant.
-
-        Raises:
-            ConfigError: there is no thing, or a number cannot be meant.
-        """
         if not self.text.strip():
             raise ConfigError("Fetching needs the name of a thing, such as 'mug'.")
         if len(self.to) not in (0, 2) or not all(map(math.isfinite, self.to)):

@@ -36,11 +36,6 @@ class NavigateGoal:
     content: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one is not finite, or there is no time to walk in.
-        """
         check_numbers(self.x, self.y, self.yaw, self.timeout)
         require(
             "", ("content of a goal", self.content, 0.0 <= self.content <= 1.0, "a distance of at most 1 m")

@@ -53,11 +53,6 @@ class OpenGoal:
     side: Literal["left", "right", "either"] = "either"
 
     def __post_init__(self) -> None:
-        """Check that it can be meant.
-
-        Raises:
-            ConfigError: there is no class, or the angle is none to open a door by.
-        """
         if not self.label:
             raise ConfigError("Opening needs the class of the handle.")
         require("goal of opening: ", ("angle", self.angle, 0.02 <= self.angle <= 1.2, "from 0.02 to 1.2 rad"))

@@ -30,11 +30,6 @@ class PickGoal:
     avoid: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check that there is something to look for.
-
-        Raises:
-            ConfigError: a class is empty, or a place is none.
-        """
         if not (self.label and self.container):
             raise ConfigError("A pick names the class of the object and that of its container.")
         floor_places("a pick", self.avoid)

@@ -86,11 +86,6 @@ class PlaceGoal:
     radius: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         if not (math.isfinite(self.x) and math.isfinite(self.y)):
             raise ConfigError("A place to set something down is two finite numbers, x and y.")
         if any(len(v) not in (0, 2) or not all(map(math.isfinite, v)) for v in (self.aside, self.off)):

@@ -29,11 +29,6 @@ class RecallGoal:
     limit: int = 5
 
     def __post_init__(self) -> None:
-        """Check the question.
-
-        Raises:
-            ConfigError: it has no answer.
-        """
         try:
             check_query(self.text, self.when, self.ago, self.limit)
         except GolemError as refusal:

@@ -31,11 +31,6 @@ class RememberGoal:
     camera: Literal["head", "left_hand", "right_hand"] = "head"
 
     def __post_init__(self) -> None:
-        """Check the goal.
-
-        Raises:
-            ConfigError: nothing is looked for, or no time is left for it.
-        """
         if not self.labels or not all(label.strip() for label in self.labels):
             raise ConfigError("Name at least one kind of thing to remember, such as 'screw'.")
         require(

@@ -26,11 +26,6 @@ class TakeGoal:
     near: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        """Check that it can be meant.
-
-        Raises:
-            ConfigError: there is no class, or the place is none.
-        """
         if not self.label:
             raise ConfigError("Taking needs the class of the thing.")
         if len(self.near) not in (0, 2) or not all(map(math.isfinite, self.near)):

@@ -32,11 +32,6 @@ class WalkGoal:
     timeout: float = 60.0
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one is not finite, or there is no time to walk in.
-        """
         check_numbers(self.x, self.y, self.yaw, self.timeout)
 
 
@@ -82,11 +77,6 @@ class StandGoal:
     seconds: float = 60.0
 
     def __post_init__(self) -> None:
-        """Check the time.
-
-        Raises:
-            ConfigError: it is not finite, or negative.
-        """
         require(
             "", ("time to stand for", self.seconds, 0.0 <= self.seconds < math.inf, "zero or more seconds")
         )

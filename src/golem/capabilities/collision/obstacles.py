@@ -37,11 +37,6 @@ class Obstacle:
     name: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse what is no solid.
-
-        Raises:
-            ConfigError: unknown kind, sizes that are not positive numbers, or a pose that is not finite.
-        """
         if self.kind not in OBSTACLE_KINDS:
             raise unknown_name("kind of obstacle", self.kind, OBSTACLE_KINDS)
         if len(self.size) != SIZES[self.kind] or not all(0.0 < x < np.inf for x in self.size):

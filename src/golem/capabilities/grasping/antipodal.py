@@ -99,11 +99,6 @@ class AntipodalConfig:
     latency: float = 0.06
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require(
             "antipodal ",
             ("friction", self.friction, 0.0 < self.friction <= 2.0, "from 0 to 2"),

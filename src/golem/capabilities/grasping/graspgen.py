@@ -53,11 +53,6 @@ class GraspGenConfig:
     latency: float = 0.10
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require(
             "graspgen ",
             ("port", self.port, 0 < self.port < 65536, "from 1 to 65535"),

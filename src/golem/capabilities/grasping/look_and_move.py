@@ -56,11 +56,6 @@ class LookAndMoveConfig(VisualServoConfig):
     step: float = 0.05
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require(
             "look_and_move ",
             ("move", self.move, 0.0 <= self.move <= 30.0, "from 0 to 30 s"),

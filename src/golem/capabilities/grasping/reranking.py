@@ -75,11 +75,6 @@ class RerankingConfig:
     latency: float = 0.1
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require(
             "reranked ",
             ("comfort", self.comfort, 0.0 <= self.comfort <= 1.0, "from 0 to 1"),

@@ -41,11 +41,6 @@ class ScorerConfig:
     latency: float = 0.02
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require("scorer ", ("least", self.least, 0.0 <= self.least < 1.0, "from 0 to below 1"))
 
 

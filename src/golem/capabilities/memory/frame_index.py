@@ -147,11 +147,6 @@ class FrameIndexConfig:
     most: int = 100_000
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning.
-
-        Raises:
-            ConfigError: an option is out of range.
-        """
         if not (self.spread >= 0.0 and 0.0 <= self.least <= 1.0 and self.most > 0):
             raise ConfigError(
                 "Of frame_index, spread is at least 0, least is from 0 to 1, and most is above 0."

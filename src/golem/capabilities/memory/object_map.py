@@ -119,11 +119,6 @@ class ObjectMapConfig:
     most: int = 10_000
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning.
-
-        Raises:
-            ConfigError: an option is out of range.
-        """
         if not (
             self.gate > 0 and self.depth_noise > 0 and self.found > 0 and self.ceiling > 0 and self.most > 0
         ):

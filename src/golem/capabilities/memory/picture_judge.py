@@ -47,11 +47,6 @@ class PictureJudgeConfig(GeminiServiceConfig):
     places: int = 6
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         super().__post_init__()
         if not (self.pictures >= 1 and 32 <= self.width <= 4096 and 1 <= self.places <= 50):
             raise ConfigError(

@@ -51,11 +51,6 @@ class RerankedConfig:
     gemini: PictureJudgeConfig = field(default_factory=PictureJudgeConfig)
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning.
-
-        Raises:
-            ConfigError: there is no such memory or judge, or the two do not go together.
-        """
         if self.proposer not in PROPOSERS:
             raise unknown_name("proposer", self.proposer, PROPOSERS)
         if self.judge not in JUDGES:

@@ -36,11 +36,6 @@ class TopDownMapConfig:
     most: int = 200_000
 
     def __post_init__(self) -> None:
-        """Refuse what has no meaning.
-
-        Raises:
-            ConfigError: an option is out of range.
-        """
         if not (self.cell > 0.0 and self.spread >= 0.0 and self.most > 0):
             raise ConfigError("Of top_down_map, cell and most are above 0, and spread is at least 0.")
 

@@ -49,11 +49,6 @@ class GeminiServiceConfig:
     calls: int = 100
 
     def __post_init__(self) -> None:
-        """Check the numbers and the address.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require(
             "gemini ",
             ("timeout", self.timeout, 0.0 < self.timeout <= 600.0, "from 0 to 600 s"),

@@ -92,11 +92,6 @@ class OpenWordsConfig:
     lift: LiftConfig = field(default_factory=LiftConfig)
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require(
             "the detector's ",
             ("threshold", self.threshold, 0.0 < self.threshold < 1.0, "between 0 and 1"),

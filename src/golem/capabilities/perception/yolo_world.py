@@ -49,11 +49,6 @@ class YoloWorldConfig:
     lift: LiftConfig = field(default_factory=LiftConfig)
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them cannot be meant.
-        """
         require(
             "yolo_world ",
             ("threshold", self.threshold, 0.0 < self.threshold < 1.0, "between 0 and 1"),

@@ -157,11 +157,6 @@ class PathPlannerConfig:
     attempts: int = 4
 
     def __post_init__(self) -> None:
-        """Refuse values that have no meaning.
-
-        Raises:
-            ConfigError: a value is out of range.
-        """
         for name in ("arm_speed", "torso_speed", "arm_accel", "torso_accel", "corner", "attempts"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"The planner's option {name} must be positive, not {getattr(self, name)}.")

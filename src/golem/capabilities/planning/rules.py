@@ -28,11 +28,6 @@ class HandBox:
     upper: tuple[float, float, float] = PAPER_BOX[1]
 
     def __post_init__(self) -> None:
-        """Check that the box has a volume.
-
-        Raises:
-            ConfigError: it has none.
-        """
         if not all(a < b for a, b in zip(self.lower, self.upper, strict=True)):
             raise ConfigError("The lower corner of a hand's box lies below the upper one in x, y and z.")
 
@@ -60,11 +55,6 @@ class HandUpright:
     axis: tuple[float, float, float] = (0.0, 0.0, -1.0)
 
     def __post_init__(self) -> None:
-        """Check the angle and the axis.
-
-        Raises:
-            ConfigError: the angle is not within 0 to pi, or the axis has no direction.
-        """
         if not (0.0 < self.angle <= np.pi and np.linalg.norm(self.axis) > 0.0):
             raise ConfigError("A hand is kept within an angle of 0 to pi of an axis that is not zero.")
 
@@ -89,11 +79,6 @@ class Balanced:
     shift: float = 0.04
 
     def __post_init__(self) -> None:
-        """Check the distance.
-
-        Raises:
-            ConfigError: it is not positive.
-        """
         if not self.shift > 0.0:
             raise ConfigError("The centre of mass may move by a positive distance.")
 

@@ -42,11 +42,6 @@ class PlayConfig:
     wait: float = 1.0
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them is not possible.
-        """
         if not (self.rate > 0.0 and math.isfinite(self.rate)):
             raise ConfigError(f"The rate is {self.rate:g}; give a factor above 0, e.g. 0.5 for half as fast.")
         if not 0.0 <= self.start < self.stop:

@@ -47,11 +47,6 @@ class BagConfig:
     split: int = 2**31
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ConfigError: one of them is not possible.
-        """
         if self.chunk < 1 or self.split < self.chunk:
             raise ConfigError(
                 f"A bag of chunks of {self.chunk} bytes cannot be split every {self.split}; "

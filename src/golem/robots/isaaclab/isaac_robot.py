@@ -249,11 +249,6 @@ class IsaacLabConfig(OtherEngineConfig):
     python: Path | None = None
 
     def __post_init__(self) -> None:
-        """Check the options.
-
-        Raises:
-            ConfigError: one of them is none that Isaac Lab has.
-        """
         super().__post_init__()
         if self.backend not in get_args(Backend):
             raise unknown_name("back end of Isaac Lab", self.backend, get_args(Backend))
