@@ -18,7 +18,7 @@ from golem.capabilities.properties.property_table import PropertyTable
 from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.interfaces.payloads import ArmCommand, GripState, HandStatus
-from golem.skills.counter_stance import STANDOFF, before, stance
+from golem.skills.fetch import STANDOFF, before, stance
 from golem.skills.place import PlaceGoal, SetDown
 from golem.skills.planned_motion import PlannedMotion
 from golem.skills.runner import SkillRun

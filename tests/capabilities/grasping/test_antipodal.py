@@ -9,9 +9,9 @@ from golem.capabilities.grasping.antipodal import Antipodal, AntipodalConfig, up
 from golem.capabilities.grasping.base import Gripper
 from golem.capabilities.grasping.hand_volume import collides
 from golem.capabilities.grasping.object_cloud import normals_of, object_points
-from golem.capabilities.grasping.view_shift import View, shift_between
 from golem.errors import ConfigError
 from golem.finite import NotFinite
+from golem.skills.palm_look import View, shift_between
 from golem.types import Array, LocalizedObject
 
 from . import things

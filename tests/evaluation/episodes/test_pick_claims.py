@@ -7,7 +7,7 @@ import pytest
 
 from golem.evaluation.base import TrialOutcome
 from golem.evaluation.episodes.pick_claims import Fastener, claims
-from golem.evaluation.episodes.pick_verdict import verdict, verdict_tables
+from golem.evaluation.rungs.pick_screw import verdict, verdict_tables
 from golem.skills.pick_report import PickReport, Tried
 
 

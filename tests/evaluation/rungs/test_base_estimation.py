@@ -10,10 +10,17 @@ import pytest
 from golem.capabilities.legs.hold import STANCES
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
-from golem.evaluation.episodes import walk_dataset as walks
-from golem.evaluation.episodes.walk_dataset import RecordedWalk, slipping, wrong_contacts
+from golem.evaluation.episodes import base_estimation as walks
 from golem.evaluation.harness.ladder import LadderConfig, run_ladder
-from golem.evaluation.rungs.base_estimation import BaseEstimation, _longest, _way, follow
+from golem.evaluation.rungs.base_estimation import (
+    BaseEstimation,
+    RecordedWalk,
+    _longest,
+    _way,
+    follow,
+    slipping,
+    wrong_contacts,
+)
 from golem.hardware.estimator.feet import Feet, FeetConfig
 from golem.hardware.estimator.random_walk import base_velocity
 from golem.robots.model.leg_dynamics import LegDynamics

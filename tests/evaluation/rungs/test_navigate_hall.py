@@ -9,8 +9,7 @@ import pytest
 from golem.evaluation.base import TrialSpec, make_rung, rung_class
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode
-from golem.evaluation.episodes.hall_walk import HallWalk
-from golem.evaluation.rungs.navigate_hall import NavigateOptions, NavigateRung, judge
+from golem.evaluation.rungs.navigate_hall import HallWalk, NavigateOptions, NavigateRung, judge
 from golem.interfaces import topics
 from golem.interfaces.payloads import Odometry
 from golem.robots.model.spatial import transform

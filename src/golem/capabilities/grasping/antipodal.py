@@ -29,8 +29,7 @@ from golem.capabilities.grasping.object_cloud import (
     spaced,
     thinned,
 )
-from golem.capabilities.grasping.outlines import outline
-from golem.capabilities.grasping.rims import THIN, rim_pairs
+from golem.capabilities.grasping.rims import THIN, outline, rim_pairs
 from golem.finite import check_finite
 from golem.options import require
 from golem.types import Array, LocalizedObject

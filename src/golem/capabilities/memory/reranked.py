@@ -1,14 +1,24 @@
-"""Any memory, whose answers are put into order by what is known of the present: by objects, or by a model's eyes."""
+"""Any memory, whose answers are put into order by what is known of the present: by objects, or by a model's eyes.
+
+A vision-language model is shown two pictures of each place that is proposed, then and now. After the re-ranking of the
+GOLEM paper, which gives no details of it: the model says of every look whether the thing is in it, and what is no
+longer seen where it was is history.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, get_args
+from typing import Any, Literal, Protocol, cast, get_args
 
+import cv2
 import numpy as np
 
 from golem.capabilities.memory.base import (
+    Evidence,
     Memory,
     Observation,
     Place,
@@ -16,11 +26,154 @@ from golem.capabilities.memory.base import (
     check_observation,
     check_query,
 )
-from golem.capabilities.memory.frame_index import FrameIndex, FrameIndexConfig
+from golem.capabilities.memory.frame_index import FrameIndex, FrameIndexConfig, looked_at
 from golem.capabilities.memory.object_map import ObjectMap, ObjectMapConfig
-from golem.capabilities.memory.picture_judge import PictureJudge, PictureJudgeConfig
 from golem.capabilities.memory.top_down_map import TopDownMap
+from golem.capabilities.perception.gemini_service import (
+    GeminiService,
+    GeminiServiceConfig,
+    image_part,
+    read_json,
+    to_jpeg,
+)
 from golem.errors import ConfigError, unknown_name
+from golem.types import Array
+
+SCORE = 0.9
+"""Of what the model says it sees."""
+
+
+@dataclass(frozen=True)
+class PictureJudgeConfig(GeminiServiceConfig):
+    """Options of `PictureJudge`; see `GeminiServiceConfig`, and these.
+
+    Attributes:
+        pictures: looks that are kept; the oldest are forgotten first.
+        width: of a picture that is kept and sent [px].
+        places: of which the model is asked at most, each with two pictures.
+    """
+
+    pictures: int = 500
+    width: int = 320
+    places: int = 6
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (self.pictures >= 1 and 32 <= self.width <= 4096 and 1 <= self.places <= 50):
+            raise ConfigError(
+                "Of gemini, pictures is at least 1, width from 32 to 4096, and places from 1 to 50."
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class _Picture:
+    """A look that was kept: its time [s], the (3,) point it looks at [m], and its image as JPEG."""
+
+    t: float
+    at: Array
+    jpeg: bytes
+
+
+class PictureJudge:
+    """Has Gemini look at the pictures of places."""
+
+    def __init__(
+        self, config: PictureJudgeConfig, near: float, sleep: Callable[[float], None] = time.sleep
+    ) -> None:
+        """Take the key from the environment; looks at points up to `near` [m] apart are of one place.
+
+        Raises:
+            ConfigError: there is no key.
+        """
+        self._config, self._near = config, near
+        self._service = GeminiService(config, "Re-ranking by gemini", "choose the judge objects", sleep)
+        self._pictures: deque[_Picture] = deque(maxlen=config.pictures)
+        self.last = -math.inf
+
+    def observe(self, observation: Observation) -> None:
+        """Keep a look."""
+        frame = observation.frame
+        height, width = frame.rgb.shape[:2]
+        size = self._config.width, max(1, round(height * self._config.width / width))
+        small = cv2.resize(frame.rgb, size, interpolation=cv2.INTER_AREA)
+        jpeg = to_jpeg(np.asarray(small, np.uint8))
+        self._pictures.append(_Picture(frame.t, looked_at(observation), jpeg))
+        self.last = frame.t
+
+    def order(
+        self, text: str, when: When, at: float | None, proposed: Sequence[Place], limit: int
+    ) -> list[Place]:
+        """Return those of the proposed places that answer by what the model sees.
+
+        Raises:
+            ServiceUnavailable: see `GeminiService.ask`.
+        """
+        pairs: list[tuple[_Picture, _Picture]] = []
+        for place in proposed:
+            then = next((p for p in self._pictures if p.t == place.last_seen), None)
+            if then is not None and (at is None or when != "at" or then.t <= at):
+                now = next(p for p in reversed(self._pictures) if self._same(p, then))
+                pairs.append((then, now))
+        pairs = pairs[: self._config.places]
+        if not pairs:
+            return []
+        parts: list[Mapping[str, Any]] = []
+        for k, (then, now) in enumerate(pairs):
+            for name, picture in (("then", then), ("now", now)):
+                parts += [{"text": f"Place {k}, {name} ({picture.t:.0f} s):"}, image_part(picture.jpeg)]
+        parts.append({"text": _question(text)})
+        seen = _verdicts(read_json(self._service.ask(parts)), len(pairs))
+        places = [_place(text, when, then, now, *seen[k]) for k, (then, now) in enumerate(pairs) if k in seen]
+        return _fitting([place for place in places if place is not None], when)[:limit]
+
+    def _same(self, one: _Picture, other: _Picture) -> bool:
+        return one is other or bool(np.linalg.norm(one.at[:2] - other.at[:2]) <= self._near)
+
+    def forget(self, text: str) -> int:
+        """Forget nothing: whether a picture shows it only the model could say."""
+        return 0
+
+    def close(self) -> None:
+        """Let go of nothing."""
+
+
+def _question(text: str) -> str:
+    return (
+        f"Each place was photographed twice. Is there a {text.replace('_', ' ')} in the picture? Answer with a JSON "
+        'list and nothing else; one entry per place: {"place": NUMBER, "then": true or false, "now": true or false}.'
+    )
+
+
+def _verdicts(said: Any, count: int) -> dict[int, tuple[bool, bool]]:
+    """Return place -> whether it was there then, and now; what is no verdict is left out."""
+    entries = cast("list[Any]", said if isinstance(said, list) else [said])
+    found: dict[int, tuple[bool, bool]] = {}
+    for entry in entries:
+        if isinstance(entry, Mapping):
+            k, then, now = (cast("Mapping[str, Any]", entry).get(name) for name in ("place", "then", "now"))
+            if isinstance(k, int) and 0 <= k < count and isinstance(then, bool) and isinstance(now, bool):
+                found.setdefault(k, (then, now))
+    return found
+
+
+def _place(text: str, when: When, then: _Picture, now: _Picture, was: bool, there: bool) -> Place | None:
+    if when == "at":
+        return Place(text, then.at, SCORE, then.t, then.t, "seen") if was else None
+    if there:
+        return Place(text, now.at, SCORE, min(then.t, now.t) if was else now.t, now.t, "seen")
+    gone: Evidence = "moved" if when == "now" else "gone"
+    return Place(text, then.at, SCORE, then.t, then.t, gone) if was else None
+
+
+def _fitting(places: Sequence[Place], when: When) -> list[Place]:
+    """Return the places that answer to `when`, the one seen last first; what moved only where nothing is there."""
+    kept = [p for p in places if p.evidence == "seen"]
+    if when == "history":
+        kept = [p for p in places if p.evidence == "gone"]
+    elif when == "anywhere" or not kept:
+        kept = list(places)
+    return sorted(kept, key=lambda p: -p.last_seen)
+
 
 Proposer = Literal["frame_index", "top_down_map"]
 JudgeName = Literal["objects", "gemini"]

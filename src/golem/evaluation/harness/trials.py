@@ -11,17 +11,60 @@ import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 from golem.errors import GolemError, ModuleFault
 from golem.evaluation.base import Rung, TrialOutcome, TrialSpec, make_rung
 from golem.evaluation.episodes.last_seconds import FILM, LastSeconds
 from golem.evaluation.harness.copies import CopyDied
-from golem.evaluation.harness.culprit import culprit_of
 from golem.evaluation.harness.run_folder import Finished
 from golem.provenance import changes, code_files, commit, digest, versions
+from golem.runtime.contract_check import ContractCheck
 from golem.runtime.gate_tally import GateTally, tallied
 from golem.skills.base import FAULT
+from golem.skills.runner import SLOT, SkillRun
+
+
+@dataclass(frozen=True, slots=True)
+class Culprit:
+    """Who had control.
+
+    Attributes:
+        module: `"slot: implementation"`; None where the thread was in no module.
+        trace: the frames from the module's call on, as Python prints them; all where it was in none.
+        place: file, line and function of the innermost frame.
+    """
+
+    module: str | None
+    trace: str
+    place: str
+
+
+def culprit(frames: list[tuple[FrameType, int]]) -> Culprit:
+    """Return who was in control in `frames`, each with its line, the outermost first."""
+    module, start = None, 0
+    for i, (frame, _) in enumerate(frames):
+        owner = frame.f_locals.get("self")
+        if frame.f_code is ContractCheck.call.__code__ and isinstance(owner, ContractCheck):
+            module, start = f"{owner.slot}: {owner.use}", i + 1
+        elif frame.f_code is SkillRun._guard.__code__ and isinstance(owner, SkillRun):
+            module, start = f"{SLOT}: {owner._name}", i + 1
+    stack = traceback.StackSummary.extract(iter(frames[start:] or frames))
+    last = stack[-1]
+    return Culprit(module, "".join(stack.format()), f"{last.filename}, line {last.lineno}, in {last.name}")
+
+
+def culprit_of(error: BaseException) -> Culprit:
+    """Return who raised `error`, which was caught."""
+    found = culprit(list(traceback.walk_tb(error.__traceback__)))
+    last = "".join(traceback.format_exception_only(error))
+    return Culprit(found.module, f"Traceback (most recent call last):\n{found.trace}{last}", found.place)
+
+
+def culprit_at(frame: FrameType) -> Culprit:
+    """Return who is in control of the thread whose innermost frame is `frame`."""
+    return culprit(list(traceback.walk_stack(frame))[::-1])
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from types import FrameType
 
-from golem.evaluation.harness.culprit import culprit_at
-from golem.evaluation.harness.trials import Batch, Overdue, run_batch, rung_of
+from golem.evaluation.harness.trials import Batch, Overdue, culprit_at, run_batch, rung_of
 
 STARTED = "started"
 """What is answered when a batch begins; its ending follows."""

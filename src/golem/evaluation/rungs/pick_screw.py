@@ -8,22 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from golem import registry
+from golem.capabilities.arms.goal_postures import GoalPostures
+from golem.capabilities.arms.postures import POSTURES
+from golem.capabilities.grasping.centroid import grasp_pose
+from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Case, Outcomes, Results, Rung, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.doable import doable
 from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, lost
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
-from golem.evaluation.episodes.pick_claims import claims
+from golem.evaluation.episodes.pick_claims import REFUSALS, Fastener, claims
 from golem.evaluation.episodes.pick_touches import PickTouches
-from golem.evaluation.episodes.pick_verdict import verdict, verdict_tables
 from golem.evaluation.episodes.pick_watch import PickWatch
-from golem.evaluation.episodes.pull import straightness
 from golem.evaluation.episodes.true_masks import build_seeing, with_modules
 from golem.evaluation.harness.sweep import read_sweep
 from golem.evaluation.metrics.text_table import TextTable
@@ -36,9 +38,127 @@ from golem.robots.worlds.conditions import Conditions, LayoutKind, draw_conditio
 from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import FAULT, SkillResult
 from golem.skills.pick_config import PickGoal
-from golem.skills.pick_report import PickReport
+from golem.skills.pick_report import PickOutcome, PickReport
 from golem.slots import KEYS
 from golem.stack import Stack, load_stack
+from golem.types import SIDES, Array, Side
+
+SAID = "said_"
+"""Begins the name of the figure that says how a pick ended, by its own word."""
+
+
+def verdict(said: PickReport, success: bool, doable: bool) -> dict[str, float]:
+    """Return how a trial ended, as figures.
+
+    Args:
+        said: what the pick reports.
+        success: whether a screw is in the tray.
+        doable: whether a hand reaches a loose screw and the tray.
+    """
+    series = {f"{SAID}{said.outcome}": 1.0, "doable": float(doable)}
+    if said.outcome in REFUSALS and not success:
+        series["refusal_right"] = float(not doable)
+    return series
+
+
+def verdict_tables(outcomes: Mapping[str, Sequence[TrialOutcome]]) -> list[TextTable]:
+    """Return one table per method: what was said, how often, and whether it was so."""
+    return [_table(method, rows) for method, rows in outcomes.items() if rows]
+
+
+def _table(method: str, rows: Sequence[TrialOutcome]) -> TextTable:
+    lines: list[tuple[str, ...]] = []
+    for outcome in PickOutcome:
+        mine = [row for row in rows if f"{SAID}{outcome.value}" in row.series]
+        if not mine:
+            continue
+        could = [row for row in mine if row.series["doable"]]
+        refusal = outcome in REFUSALS
+        in_tray = sum(row.success for row in mine)
+        right = len(mine) - len(could) if refusal else in_tray
+        wrong = str(len(mine) - right)
+        counts = (str(len(mine)), str(len(could)), str(in_tray))
+        lines.append((outcome.value, *counts, str(right), wrong))
+    return TextTable(
+        f"What {method} said at the end",
+        ("said", "trials", "could be done", "in the tray", "right", "wrong"),
+        tuple(lines),
+        "Could be done: by the simulator's truth, a hand reaches a loose screw and the tray. A refusal is right where "
+        "it could not; anything else where a screw is in the tray.",
+    )
+
+
+HEADING = np.pi / 2
+"""Heading of the gripper's x axis, left hand; mirrored for the right [rad]."""
+NEAREST = 10
+"""Places above the tray that are tried, those first that are near to where an arm works best."""
+TURNS = (0.0, 0.4, -0.4)
+"""Turns from it that are tried [rad]."""
+
+
+@cache
+def _tools() -> tuple[GoalPostures, PlanningRobot]:
+    return GoalPostures(), PlanningRobot()
+
+
+def reaches(side: Side, position: Array) -> bool:
+    """Return whether a hand that points straight down can be at (3,) `position` in base_link [m].
+
+    It can if a posture within the gate's range is found, from several starts, in which the robot does not touch itself.
+    """
+    goals, robot = _tools()
+    ready = POSTURES["ready"]
+    space = JointSpace(robot, ready)
+    for turn in TURNS:
+        T = grasp_pose(position, (HEADING if side == "left" else -HEADING) + turn)
+        left, right = (T if side == one else None for one in SIDES)
+        if len(goals.find(left, right, ready, lambda q: space.verdict(q) == 0, most=1)):
+            return True
+    return False
+
+
+def doable(fasteners: Sequence[Fastener], drops: Array) -> bool:
+    """Return whether a hand reaches a loose screw and a place above the tray.
+
+    Args:
+        fasteners: those of the near edge.
+        drops: (n, 3) places above the tray in base_link [m].
+    """
+    loose = [f.in_base for f in fasteners if f.loose]
+    for side in SIDES:
+        own = 1.0 if side == "left" else -1.0
+        near = sorted(drops, key=lambda p: float(np.hypot(p[0] - 0.4, p[1] - own * 0.2)))
+        if any(reaches(side, p) for p in near[:NEAREST]) and any(reaches(side, p) for p in loose):
+            return True
+    return False
+
+
+LENGTH = 0.06
+"""What is judged of a pull [m]: longer than any screw."""
+
+
+def straightness(poses: Sequence[Array]) -> tuple[float, float] | None:
+    """Return how far a hand was beside its line and how far it turned, at most, over the first 60 mm of a pull.
+
+    Args:
+        poses: (4, 4) each, of the grasp frame in the order of time. The line is the approach axis of the first.
+
+    Returns:
+        Distance [m] and angle [rad]; None where the hand did not move by a millimetre.
+    """
+    if not poses:
+        return None
+    T = np.array(poses)
+    axis = T[0, :3, 2]
+    gone = T[:, :3, 3] - T[0, :3, 3]
+    back = -gone @ axis
+    within = (np.maximum.accumulate(back) <= LENGTH) & (back >= 0.0)
+    if not within.any() or back[within].max() < 0.001:
+        return None
+    beside = np.linalg.norm(gone + back[:, None] * axis, axis=1)
+    turned = np.arccos(np.clip(T[:, :3, 2] @ axis, -1.0, 1.0))
+    return float(beside[within].max()), float(turned[within].max())
+
 
 SLOT = "grasp_method"
 """What the methods of these rungs are."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from golem.evaluation.episodes.episode import Episode
-from golem.evaluation.episodes.hall_walk import HallWalk
+from golem.evaluation.rungs.navigate_hall import HallWalk
 from golem.interfaces.nav_payloads import NavStep
 from golem.types import PlanarPose, Twist
 

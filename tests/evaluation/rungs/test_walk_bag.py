@@ -13,7 +13,7 @@ pytest.importorskip("mcap")
 from golem.errors import OutputError  # noqa: E402
 from golem.evaluation.conformance.room import ROOM, MadeWalk  # noqa: E402
 from golem.evaluation.episodes.lidar_walk import LidarWalk  # noqa: E402
-from golem.evaluation.episodes.walk_bag import TRUTH, WalkBag  # noqa: E402
+from golem.evaluation.rungs.odometry import TRUTH, WalkBag  # noqa: E402
 from golem.interfaces import lidar_convert  # noqa: E402
 from golem.interfaces.lidar import ExternalOdometry, LidarImu, LidarScan  # noqa: E402
 from golem.middleware.bags.reader import Bag  # noqa: E402

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from golem.capabilities.arms.solve import downward
-from golem.evaluation.episodes.pull import straightness
+from golem.evaluation.rungs.pick_screw import straightness
 from golem.types import Array
 
 
