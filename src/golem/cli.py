@@ -34,13 +34,9 @@ def _demo(words: list[str]) -> int:
 
     config = _parse(DemoConfig, "demo", words)
     if config.walk:
-        from golem.demo_walk import STACK, run_walk_demo
+        from golem.demo_walk import run_walk_demo
 
-        stack = STACK if config.stack == DemoConfig.stack else config.stack
-        walked = run_walk_demo(
-            stack, config.profile, config.seed or 0, config.out, config.port, config.headless, config.record
-        )
-        return 0 if walked.success else FAILED
+        return 0 if run_walk_demo(config) else FAILED
     return 0 if run_demo(config).success else FAILED
 
 

@@ -240,7 +240,7 @@ class Demo:
             "wall_time": round(wall, 1),
             **facts,
         }
-        _write(folder / "demo.json", json.dumps(figures, indent=2) + "\n")
+        write(folder / "demo.json", json.dumps(figures, indent=2) + "\n")
         print(f"{'Done' if success else 'Failed'}: {lead}")
         for film in films:
             print(f"Film:   {film}")
@@ -261,7 +261,7 @@ class Demo:
         try:
             parts = balance_section(self.recorder.trace(), self._pushed_at, balance) if balance else []
             names = [film.name for film in films]
-            _write(report, demo_page(lead, self.picks, self.picture, names, poster, facts, parts))
+            write(report, demo_page(lead, self.picks, self.picture, names, poster, facts, parts))
         except MissingExtra as missing:
             print(f"No report was written: {missing}", flush=True)
             return None
@@ -278,7 +278,7 @@ def run_demo(config: DemoConfig) -> DemoResult:
     """
     if config.screws < 1:
         raise ConfigError(f"--screws is {config.screws}; give a number from 1 on.")
-    _prepare(config.out)
+    prepare(config.out)
     drawn = secrets.randbelow(1_000_000) if config.layout == "varied" else 0
     seed = drawn if config.seed is None else config.seed
     config = replace(config, seed=seed)
@@ -374,7 +374,7 @@ def _shown(config: DemoConfig, demo: Demo, running: LockstepRunner, view: LiveVi
     return result
 
 
-def _prepare(folder: Path) -> None:
+def prepare(folder: Path) -> None:
     """Make sure that the folder can be written, before anything long begins."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -384,7 +384,7 @@ def _prepare(folder: Path) -> None:
         raise OutputError(f"Cannot write to --out {folder}: Permission denied; choose another.")
 
 
-def _write(path: Path, text: str) -> None:
+def write(path: Path, text: str) -> None:
     """Write a file whole or not at all."""
     part = path.with_name(path.name + ".part")
     try:
