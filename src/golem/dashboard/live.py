@@ -1,6 +1,6 @@
 """The live view: the robot in a browser, in real time, with its cameras, its state and the operator's buttons.
 
-A viewer of the simulation, no module of the stack: it sees the simulator's scene through `dashboard.scene`. On the
+A viewer of the simulation, no module of the stack: it sees the simulator's scene through `dashboard.stage`. On the
 robot it acts as an operator does, through the e-stop, requests to the safety gate, twists and skills; and as the world
 does, with a push.
 """

@@ -132,7 +132,7 @@ class SafetyProcess:
             estop: the emergency stop. None where a real one belongs: until there is one, the gate stays shut.
             clock: monotonic [s].
             who: names the owner of an endpoint by its guid.
-            patient: whether the robot's time may stand still for a stack that is behind; see `live.pace`.
+            patient: whether the robot's time may stand still for a stack that is behind; see `live.sim_sync`.
             real: whether the robot's own controllers must have let go of the motors first; a twin's move none. Its
                 motors must hear us then, and its time must run as ours does; that of a twin stands still at times.
             standing: makes what the legs are given to where a stop leaves them and the state sound; None damps.
