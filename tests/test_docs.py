@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from golem import registry
-from golem.capabilities.perception.classes import CLASSES
 from golem.cli import main
 from golem.errors import ConfigError
 from golem.evaluation.base import RUNGS, TrialSpec
@@ -23,6 +22,7 @@ from golem.runtime.goal_parser import parse_goal
 from golem.runtime.skill_table import SkillTable
 from golem.slots import SLOTS
 from golem.stack import Stack, load_stack, parse_stack
+from golem.training.detector.labels import CLASSES
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 

@@ -208,7 +208,7 @@ KEYS: dict[str, StackKey] = {
 """Where a stack has one module each, by key of the stack file. Skills, of which it has any number, are no key."""
 
 PARTS: dict[str, str] = {
-    "calibration": "golem.robots.sensors.calibration_file:CalibrationPart",
+    "calibration": "golem.robots.sensors.calibration:CalibrationPart",
     "estop": "golem.hardware.estop.estop_config:EstopConfig",
     "locomotion": "golem.capabilities.legs.locomotion:LocomotionConfig",
 }

@@ -10,8 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from golem.errors import ConfigError
-from golem.middleware.origin_gate import OriginGate, hidden_loopback
-from golem.middleware.token_gate import is_loopback
+from golem.middleware.web_gate import OriginGate, hidden_loopback, is_loopback
 
 
 class Hello(http.server.BaseHTTPRequestHandler):

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import pytest
 
 from golem.errors import ConfigError
-from golem.middleware.token_gate import TokenGate, is_loopback
+from golem.middleware.web_gate import TokenGate, is_loopback
 
 
 class Hello(http.server.BaseHTTPRequestHandler):

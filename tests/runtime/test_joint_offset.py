@@ -10,7 +10,7 @@ import pytest
 
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
-from golem.robots.sensors.calibration_file import Calibration
+from golem.robots.sensors.calibration import Calibration
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import ActNode, SenseNode
 from golem.stack import Stack, parse_stack

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError
-from golem.robots.sensors.calibration_file import read_calibration
+from golem.robots.sensors.calibration import read_calibration
 from golem.runtime.lockstep import build
 from golem.skills.calibrate import Calibrate, CalibrateGoal
 from golem.stack import load_stack

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError
-from golem.robots.sensors.calibration_file import read_calibration
+from golem.robots.sensors.calibration import read_calibration
 from golem.runtime.calibrate_command import CalibrateConfig, run_calibrate
 from golem.skills.calibrate_hands import CalibrateHands, CalibrateHandsGoal
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError
-from golem.robots.sensors.calibration_file import Calibration, LidarMount, read_calibration
+from golem.robots.sensors.calibration import Calibration, LidarMount, read_calibration
 from golem.robots.sensors.mid360 import draw_mount
 from golem.runtime.calibrate_command import CalibrateConfig, run_calibrate
 from golem.runtime.lockstep import build

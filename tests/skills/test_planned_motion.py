@@ -15,7 +15,6 @@ from golem.capabilities.arms.solve import downward
 from golem.capabilities.collision.obstacles import Obstacle, World
 from golem.capabilities.memory.object_map import ObjectMap
 from golem.capabilities.planning.base import PlanRefused, Refusal
-from golem.capabilities.planning.escape import FARTHEST, apart
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.plan_kernel import ITSELF
 from golem.capabilities.planning.rrt_connect import RrtConnect
@@ -29,7 +28,7 @@ from golem.runtime.contract_check import ContractCheck
 from golem.runtime.nodes import UpperBodyNode
 from golem.skills.base import REFUSED, SkillResult
 from golem.skills.context import Context, Modules
-from golem.skills.planned_motion import PlannedMotion, Then
+from golem.skills.planned_motion import FARTHEST, PlannedMotion, Then, apart
 from golem.skills.runner import SkillRun
 from golem.skills.travel import LineTravel, PlannedTravel
 from golem.types import NUM_JOINTS, UPPER, Array, BaseEstimate, Imu, LowState

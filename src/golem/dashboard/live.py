@@ -26,7 +26,7 @@ from golem.errors import GolemError
 from golem.hardware.safety.base import OperatorRequest
 from golem.interfaces import topics
 from golem.interfaces.payloads import GateState
-from golem.middleware.token_gate import TokenGate, is_loopback
+from golem.middleware.web_gate import TokenGate, is_loopback
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot

@@ -18,7 +18,7 @@ import viser
 import websockets.asyncio.server
 
 from golem.errors import ConfigError
-from golem.middleware.origin_gate import LOCAL
+from golem.middleware.web_gate import LOCAL
 
 
 def serve(host: str, port: int) -> viser.ViserServer:

@@ -19,7 +19,7 @@ from golem.errors import ConfigError
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.safety.monitor import at_rest
 from golem.interfaces.payloads import GateStatus
-from golem.interfaces.ros_safety import to_gate_status
+from golem.interfaces.ros_convert import to_gate_status
 from golem.middleware.bags.reader import Bag
 from golem.middleware.interrupt import interrupted
 from golem.middleware.ros import codec

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from golem.interfaces import images, lidar_convert, nav_convert, ros_safety, topics
+from golem.interfaces import images, lidar_convert, nav_convert, ros_convert, topics
 from golem.interfaces import ros_convert as convert
 from golem.interfaces.payloads import Exposure, LegCommand
 from golem.interfaces.rows import ActionRow, Role, ServiceRow, TopicRow
@@ -201,10 +201,10 @@ TOPICS: tuple[TopicRow, ...] = (
           topics.LOW_CMD_REQUEST),
     TopicRow("/safety/status", "golem_interfaces/msg/SafetyStatus", "safety", ("stack",), LATCHED, 20, "",
           "State of the gate, and why; at every change, and regularly.",
-          topics.SAFETY, ros_safety.gate_status, ros_safety.to_gate_status),
+          topics.SAFETY, ros_convert.gate_status, ros_convert.to_gate_status),
     TopicRow("/estop", "golem_interfaces/msg/EstopFrame", "safety", (), SENSOR, 100, "",
           "Frames of the emergency stop as the gate sees them.",
-          topics.ESTOP, ros_safety.estop_frame, on_demand=True),
+          topics.ESTOP, ros_convert.estop_frame, on_demand=True),
     TopicRow("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "safety", (), DEFAULT, 1, "",
           "State of the gate, ages of what it watches, rate of its loop."),
     TopicRow("/base_estimate", "golem_interfaces/msg/BaseEstimate", "stack", ("safety",), LOW, 500, "odom",

@@ -10,7 +10,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from golem.interfaces.payloads import Detections, HandStatus, LegStatus
+from golem.interfaces.payloads import (
+    Detections,
+    EstopMessage,
+    GateState,
+    GateStatus,
+    HandStatus,
+    LegStatus,
+    Reason,
+)
 from golem.middleware.ros.message import NANO, CodecError
 from golem.middleware.ros.msgs import diagnostic_msgs, geometry_msgs, golem_interfaces, sensor_msgs
 from golem.middleware.ros.msgs.builtin_interfaces import Duration, Time
@@ -320,3 +328,23 @@ def _rotation(x: float, y: float, z: float, w: float) -> list[list[float]]:
         [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
         [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
     ]
+
+
+def gate_status(status: GateStatus) -> golem_interfaces.SafetyStatus:
+    """Return what the gate lets everybody know."""
+    return golem_interfaces.SafetyStatus(header(status.t), status.state, status.reason or "", status.detail)
+
+
+def to_gate_status(message: golem_interfaces.SafetyStatus) -> GateStatus:
+    """Return what the gate said, at its own time; a state or a reason nobody knows is a shut gate."""
+    t = seconds(message.header.stamp)
+    try:
+        reason = Reason(message.reason) if message.reason else None
+        return GateStatus(t, GateState(message.state), reason, message.detail)
+    except ValueError:
+        return GateStatus(t, GateState.INIT, None, f"the gate says '{message.state}', '{message.reason}'")
+
+
+def estop_frame(frame: EstopMessage) -> golem_interfaces.EstopFrame:
+    """Return a frame of the emergency stop."""
+    return golem_interfaces.EstopFrame(header(frame.t), frame.sequence, frame.pressed)

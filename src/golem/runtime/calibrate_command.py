@@ -10,7 +10,7 @@ from typing import Any, Literal
 from tyro.conf import Positional
 
 from golem.errors import ConfigError
-from golem.robots.sensors.calibration_file import read_calibration
+from golem.robots.sensors.calibration import read_calibration
 from golem.runtime.lockstep import build
 from golem.skills.calibrate import CalibrateReport
 from golem.stack import Stack, load_stack

@@ -9,7 +9,7 @@ import numpy as np
 from golem.capabilities.calibration.kinematic_fit import TagView, fit
 from golem.capabilities.calibration.view_postures import view_postures
 from golem.options import require
-from golem.robots.sensors.calibration_file import read_calibration
+from golem.robots.sensors.calibration import read_calibration
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file

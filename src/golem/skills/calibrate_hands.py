@@ -8,7 +8,7 @@ from golem.capabilities.calibration.hand_fit import OTHER, fit_hand
 from golem.capabilities.calibration.hand_view_postures import hand_view_postures
 from golem.capabilities.calibration.kinematic_fit import ZERO
 from golem.options import require
-from golem.robots.sensors.calibration_file import Calibration, read_calibration
+from golem.robots.sensors.calibration import Calibration, read_calibration
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file

@@ -12,7 +12,7 @@ from golem.capabilities.planning.base import PlanRefused
 from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.options import require
-from golem.robots.sensors.calibration_file import read_calibration
+from golem.robots.sensors.calibration import read_calibration
 from golem.skills.base import SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.kept_file import KeptFileConfig, check_file_name, kept_file

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.grasping.hand_volume import FINGER
+from golem.capabilities.grasping.hand_view import FINGER
 from golem.interfaces import topics
 from golem.robots.model.magpie_model import T_HAND_CAMERA, T_HAND_GRIPPER
 from golem.robots.sensors.cameras import rays

@@ -11,15 +11,44 @@ import numpy as np
 from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.goal_postures import POSITION, GoalPostures
 from golem.capabilities.arms.line_check import LineChecker
+from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.obstacles import World, cleared
 from golem.capabilities.collision.scene_cloud import displaced, scene_world
 from golem.capabilities.planning.base import Held, Plan, PlanRefused, PlanRequest, Refusal
-from golem.capabilities.planning.escape import apart
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.plan_kernel import ITSELF, WORLD
 from golem.capabilities.planning.rules import Rule
 from golem.skills.context import Context
 from golem.types import SIDES, Array, Side
+
+ROOM = 0.002
+"""Distance that links get from each other [m]."""
+PAIRS = 8
+"""Pairs of links that are brought apart at a time."""
+ROUNDS = 40
+WITHIN = 0.3
+"""How far a joint may turn [rad]: more than hands that lean on the thighs need."""
+
+
+def apart(space: JointSpace, model: CollisionModel, q: Array) -> Array | None:
+    """Return joints (15,) near `q` at which the robot does not touch itself; None where that takes too much [rad].
+
+    Each pair of links in turn moves along the gradient of its distance (Kaczmarz' method), until all have `ROOM`.
+    """
+    out = np.ascontiguousarray(q, float).copy()
+    for _ in range(ROUNDS):
+        if space.verdict(out) != ITSELF:
+            return out
+        near = model.nearest(out, PAIRS, ROOM)
+        for distance, gradient in zip(near.distance, near.gradient, strict=True):
+            steepness = float(gradient @ gradient)
+            if steepness > 0.0:
+                out += (ROOM - distance) / steepness * gradient
+        out = np.clip(out, space.space.lower, space.space.upper)
+        if np.abs(out - q).max() > WITHIN:
+            return None
+    return None
+
 
 SCREW: Array = np.array([[0.0, 0.0, z, 0.010] for z in (-0.005, 0.005, 0.015, 0.025)])
 """Balls that hold a screw of 30 mm between the fingertips, in the grasp frame [m]."""

@@ -7,7 +7,7 @@ import pytest
 
 from golem.capabilities.grasping.antipodal import Antipodal, AntipodalConfig, upright
 from golem.capabilities.grasping.base import Gripper
-from golem.capabilities.grasping.hand_volume import collides
+from golem.capabilities.grasping.hand_view import collides
 from golem.capabilities.grasping.object_cloud import normals_of, object_points
 from golem.errors import ConfigError
 from golem.finite import NotFinite

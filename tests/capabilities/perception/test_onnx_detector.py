@@ -11,7 +11,6 @@ import pytest
 from numpy.typing import NDArray
 
 from golem.capabilities.perception.base import Localizer
-from golem.capabilities.perception.classes import CLASSES
 from golem.capabilities.perception.onnx_detector import OnnxDetector, OnnxDetectorConfig
 from golem.errors import ConfigError
 from golem.robots.mujoco.camera import CameraRig
@@ -19,6 +18,7 @@ from golem.robots.sensors.cameras import CAMERAS, T_MUJOCO_OPTICAL
 from golem.robots.worlds.layout import PackLayout
 from golem.robots.worlds.pack import PackNames, add_pack
 from golem.robots.worlds.screws import ScrewRanges, draw_screws
+from golem.training.detector.labels import CLASSES
 from golem.types import Array, CameraInfo, RgbdImage
 
 

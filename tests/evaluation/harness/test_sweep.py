@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from golem.errors import ConfigError
-from golem.evaluation.harness.sweep import read_sweep
+from golem.evaluation.harness.arguments import read_sweep
 
 
 def test_a_range_and_a_list_become_cases() -> None:

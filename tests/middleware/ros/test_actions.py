@@ -15,8 +15,7 @@ from golem.middleware.ros.action_client import ActionClient
 from golem.middleware.ros.action_server import ActionServer, ServerGoal
 from golem.middleware.ros.codec import action, dds_name
 from golem.middleware.ros.future import RosError
-from golem.middleware.ros.goal_info import STATUS_ARRAY
-from golem.middleware.ros.goals import CancelCode, GoalStatus
+from golem.middleware.ros.goals import STATUS_ARRAY, CancelCode, GoalStatus
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.golem_interfaces import SkillFeedback, SkillResult
 from golem.middleware.ros.node import RosNode

@@ -19,12 +19,12 @@ from tests.middleware.ros.samples import mutated, random_message, travelling
 from golem.interfaces import images, public
 from golem.interfaces.ros_convert import (
     to_base_estimate,
+    to_gate_status,
     to_hand_command,
     to_hand_state,
     to_twist,
     transforms,
 )
-from golem.interfaces.ros_safety import to_gate_status
 from golem.middleware.ros import codec
 from golem.middleware.ros.message import CodecError
 from golem.robots.sensors.calibration import OPTICAL_FRAMES, calibrations

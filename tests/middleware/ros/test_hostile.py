@@ -15,7 +15,7 @@ from golem.middleware.dds.base import LATCHED, Qos, Reader, Writer
 from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.action_server import MAX_WAITING
 from golem.middleware.ros.codec import action, dds_name, service
-from golem.middleware.ros.goal_info import CANCEL_GOAL, STATUS_ARRAY
+from golem.middleware.ros.goals import CANCEL_GOAL, STATUS_ARRAY
 from golem.middleware.ros.message import CodecError
 
 from .conftest import PICK, SET_BOOL, World

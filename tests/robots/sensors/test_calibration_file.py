@@ -11,7 +11,7 @@ import pytest
 
 from golem.capabilities.calibration.kinematic_fit import pose
 from golem.errors import ConfigError
-from golem.robots.sensors.calibration_file import Calibration, CalibrationPart, LidarMount, read_calibration
+from golem.robots.sensors.calibration import Calibration, CalibrationPart, LidarMount, read_calibration
 from golem.types import NUM_JOINTS
 
 

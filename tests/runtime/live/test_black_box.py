@@ -12,7 +12,7 @@ from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces import public
 from golem.interfaces.payloads import GateState
-from golem.interfaces.ros_safety import to_gate_status
+from golem.interfaces.ros_convert import to_gate_status
 from golem.middleware.bags.reader import Bag
 from golem.middleware.ros import codec
 from golem.middleware.ros.msgs.golem_interfaces import SafetyStatus

@@ -7,9 +7,9 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs the extra 'train'")
 
-from golem.capabilities.perception.classes import CLASSES  # noqa: E402
 from golem.capabilities.perception.peaks import STRIDE, find_peaks  # noqa: E402
 from golem.training.detector import augment  # noqa: E402
+from golem.training.detector.labels import CLASSES  # noqa: E402
 from golem.training.detector.train_detector import targets  # noqa: E402
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.perception.classes import CLASSES
 from golem.training.detector.dataset import CONDITIONS, Dataset
 from golem.training.detector.evaluate import condition_table, evaluate, table
+from golem.training.detector.labels import CLASSES
 from golem.types import Detection
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from golem.capabilities.perception.classes import CLASSES, KITCHEN
 from golem.training.detector import dataset
 from golem.training.detector.dataset import looking
-from golem.training.detector.labels import COLUMNS, label_image, within
+from golem.training.detector.labels import CLASSES, COLUMNS, KITCHEN, label_image, within
 from golem.training.detector.random_pack import build_pack
 from golem.training.detector.random_scene import AWAY, make_rigs, refresh
 

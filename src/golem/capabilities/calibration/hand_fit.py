@@ -15,7 +15,7 @@ from golem.errors import ConfigError
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.magpie_model import T_HAND_CAMERA, hand_name
 from golem.robots.model.tag_cuff import cuff_tags, tag_corners
-from golem.robots.sensors.calibration_file import Calibration
+from golem.robots.sensors.calibration import Calibration
 from golem.robots.sensors.cameras import CAMERAS, project
 from golem.types import SIDES, Array, CameraInfo, Side
 

@@ -22,7 +22,7 @@ from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.magpie_model import hand_name
 from golem.robots.model.table import T_TORSO_HEAD_OPTICAL
 from golem.robots.model.tag_cuff import cuff_tags, tag_corners
-from golem.robots.sensors.calibration_file import Calibration
+from golem.robots.sensors.calibration import Calibration
 from golem.robots.sensors.cameras import HEAD, project
 from golem.types import NUM_JOINTS, SIDES, Array, CameraInfo, Side
 

@@ -19,7 +19,7 @@ from golem.capabilities.calibration.kinematic_fit import pose
 from golem.errors import ConfigError
 from golem.robots.model.spatial import skew
 from golem.robots.model.table import FRAMES, T_TORSO_HEAD_OPTICAL
-from golem.robots.sensors.calibration_file import LidarMount
+from golem.robots.sensors.calibration import LidarMount
 from golem.robots.sensors.cameras import project
 from golem.types import Array, CameraInfo
 

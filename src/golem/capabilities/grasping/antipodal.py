@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from golem.capabilities.grasping.base import Grasp, Gripper, OpenLoop
 from golem.capabilities.grasping.centroid import ACROSS, UP
-from golem.capabilities.grasping.hand_volume import collides, in_hands
+from golem.capabilities.grasping.hand_view import collides, in_hands
 from golem.capabilities.grasping.object_cloud import (
     MIN_POINTS,
     across,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,11 +11,23 @@ import numpy as np
 
 from golem.capabilities.perception.open_box import OpenBox
 from golem.evaluation.episodes.pick_claims import Fastener
+from golem.interfaces import topics
+from golem.middleware.bus import Bus
 from golem.robots.model import magpie_model
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.scene import ONLOOKER
-from golem.types import Array, Side
+from golem.types import Array, PlanarPose, Side
+
+
+def place_error(bus: Bus, robot: MujocoRobot) -> float:
+    """Return how far the robot is from where map and odometry have it [m]; 0 where neither says."""
+    believed, place = bus.latest(topics.ODOMETRY), bus.latest(topics.MAP_POSE)
+    if believed is None or place is None:
+        return 0.0
+    off = robot.truth.pose().to(place.T_odom_map.to(PlanarPose.of(believed.T_odom_base)))
+    return math.hypot(off.x, off.y)
+
 
 OUT = 0.03
 """A screw whose head is farther than this from its bore is out of it [m]."""

@@ -2,11 +2,65 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from golem.errors import ConfigError
+from golem.evaluation.base import Case
 from golem.options import check_values, read_yaml
+from golem.robots.worlds.conditions import CHOICES, NAMES, Value, check_condition
+
+COUNT = 5
+"""Values of a range that names no count."""
+RATIO = 5.0
+"""A range of positive values whose ends differ by more than this factor is divided evenly in its logarithm."""
+
+
+def read_sweep(text: str) -> Sequence[Case]:
+    """Return the cases that `NAME=FROM..TO`, `NAME=FROM..TO:COUNT` or `NAME=VALUE,VALUE` stands for.
+
+    Args:
+        text: nothing is one case without a condition.
+
+    Raises:
+        ConfigError: it reads otherwise, or there is no such condition or value.
+    """
+    if not text:
+        return ({},)
+    name, equals, values = text.partition("=")
+    if not (equals and name and values):
+        raise ConfigError(
+            f"--sweep '{text}' must read NAME=FROM..TO, NAME=FROM..TO:COUNT or NAME=VALUE,VALUE; names: "
+            f"{', '.join(NAMES)}."
+        )
+    if name in CHOICES or ".." not in values:
+        found = [check_condition(name, _value(name, word)) for word in values.split(",")]
+    else:
+        found = _range(name, values)
+    if len(set(found)) != len(found):
+        raise ConfigError(f"--sweep '{text}' names a value twice.")
+    return tuple({name: value} for value in found)
+
+
+def _value(name: str, word: str) -> object:
+    return word.strip() if name in CHOICES else read_yaml(word, f"--sweep {name}")
+
+
+def _range(name: str, values: str) -> list[Value]:
+    ends, _, counted = values.partition(":")
+    first, _, last = ends.partition("..")
+    low, high = (check_condition(name, _value(name, word)) for word in (first, last))
+    count = _value(name, counted) if counted else COUNT
+    if not isinstance(count, int) or not 2 <= count <= 100:
+        raise ConfigError(
+            f"--sweep {name}: the count of a range is a whole number from 2 to 100, not '{counted}'."
+        )
+    assert isinstance(low, float) and isinstance(high, float)
+    steps = [k / (count - 1) for k in range(count)]
+    if 0.0 < low < high and high / low > RATIO:
+        return [float(f"{low * math.exp(u * math.log(high / low)):.4g}") for u in steps]
+    return [float(f"{low + u * (high - low):.4g}") for u in steps]
 
 
 def replaced_modules(words: Iterable[str]) -> dict[str, str]:

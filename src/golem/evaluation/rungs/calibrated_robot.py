@@ -18,7 +18,7 @@ from golem.evaluation.episodes.episode import episode_seed
 from golem.evaluation.rungs.pick_screw import SLOT, PickOptions, PickRung
 from golem.provenance import stack_facts
 from golem.robots.mujoco.engine import MujocoRobot
-from golem.robots.sensors.calibration_file import Calibration, LidarMount, point_moved, read_calibration
+from golem.robots.sensors.calibration import Calibration, LidarMount, point_moved, read_calibration
 from golem.robots.sensors.mid360 import draw_mount
 from golem.runtime.calibrate_command import lidar_stack
 from golem.runtime.lockstep import build, build_robot

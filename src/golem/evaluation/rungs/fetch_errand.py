@@ -11,8 +11,7 @@ import numpy as np
 
 from golem.evaluation.base import Case, Results, TrialSpec
 from golem.evaluation.episodes.counter_watch import CounterWatch
-from golem.evaluation.episodes.oracle import Oracle
-from golem.evaluation.episodes.place_error import place_error
+from golem.evaluation.episodes.oracle import Oracle, place_error
 from golem.evaluation.rungs.counter import counter_verdict, draw_errand
 from golem.evaluation.rungs.kitchen_rung import Errand, KitchenRung, Verdict
 from golem.robots.mujoco.engine import MujocoRobot

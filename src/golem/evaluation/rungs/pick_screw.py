@@ -27,7 +27,7 @@ from golem.evaluation.episodes.pick_claims import REFUSALS, Fastener, claims
 from golem.evaluation.episodes.pick_touches import PickTouches
 from golem.evaluation.episodes.pick_watch import PickWatch
 from golem.evaluation.episodes.true_masks import build_seeing, with_modules
-from golem.evaluation.harness.sweep import read_sweep
+from golem.evaluation.harness.arguments import read_sweep
 from golem.evaluation.metrics.text_table import TextTable
 from golem.evaluation.report.condition_plot import condition_plot
 from golem.provenance import stack_facts

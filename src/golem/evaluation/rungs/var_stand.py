@@ -18,11 +18,10 @@ from golem.errors import ConfigError
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.contacts import ContactWatch
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed, lost
-from golem.evaluation.episodes.oracle import Oracle
+from golem.evaluation.episodes.oracle import Oracle, place_error
 from golem.evaluation.episodes.pick_claims import claims
 from golem.evaluation.episodes.pick_touches import PickTouches
 from golem.evaluation.episodes.pick_watch import PickWatch
-from golem.evaluation.episodes.place_error import place_error
 from golem.evaluation.episodes.survey import survey
 from golem.evaluation.rungs.navigate_hall import DISTANCE, GUESS, SPREAD
 from golem.evaluation.rungs.pick_screw import SETTLE, PickOptions, PickRung, balance, judge_pick

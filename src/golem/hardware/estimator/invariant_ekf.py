@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numba import cfunc, njit
 
-from golem.hardware.estimator.attitude import Attitude, base_rotation
 from golem.finite import finite_state
+from golem.hardware.estimator.attitude import Attitude, base_rotation
 from golem.hardware.estimator.compiled import CompiledEstimator
 from golem.hardware.estimator.feet import (
     FEET,

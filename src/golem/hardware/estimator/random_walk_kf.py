@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numba import cfunc, njit
 
-from golem.hardware.estimator.attitude import GYRO_BIAS, Attitude, base_rotation, track_bias
 from golem.finite import finite_state
+from golem.hardware.estimator.attitude import GYRO_BIAS, Attitude, base_rotation, track_bias
 from golem.hardware.estimator.compiled import CompiledEstimator
 from golem.hardware.estimator.feet import (
     FEET,

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numba import cfunc, njit
 
-from golem.hardware.estimator.attitude import Attitude, base_rotation
 from golem.finite import finite_state
+from golem.hardware.estimator.attitude import Attitude, base_rotation
 from golem.hardware.estimator.compiled import CompiledEstimator
 from golem.native import ORDINARY, STAGE, UNUSUAL, Record, Stage, new_record, shared, view
 from golem.robots.model.imu_mount import TORSO

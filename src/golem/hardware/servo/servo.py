@@ -32,7 +32,6 @@ from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.leg_kernel import tree_dtype, tree_gravity
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand, LowState
 
-
 _LEGS = LEGS.stop
 
 

@@ -13,8 +13,7 @@ from typing import Any
 from golem.errors import ConfigError, MissingExtra
 from golem.middleware.bags.base import BagMessage, BagTopic
 from golem.middleware.bags.recorder import Recorder
-from golem.middleware.origin_gate import OriginGate, hidden_loopback
-from golem.middleware.token_gate import TokenGate, is_loopback
+from golem.middleware.web_gate import OriginGate, TokenGate, hidden_loopback, is_loopback
 
 try:
     import foxglove

@@ -10,16 +10,19 @@ from typing import Any
 from golem.middleware.dds.base import DEFAULT, LATCHED, Sample
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.future import Future, RosError
-from golem.middleware.ros.goal_info import (
+from golem.middleware.ros.goals import (
     CANCEL_GOAL,
+    NO_ID,
     STATUS_ARRAY,
+    Canceling,
+    GoalStatus,
+    Outcome,
     canceling,
     from_uuid,
     goal_info,
     goal_status,
     to_uuid,
 )
-from golem.middleware.ros.goals import NO_ID, Canceling, GoalStatus, Outcome
 from golem.middleware.ros.message import NANO, CodecError
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, GoalStatusArray
 from golem.middleware.ros.node_endpoints import NodeEndpoints

@@ -15,16 +15,21 @@ from typing import Any, Protocol
 from golem.middleware.dds.base import DEFAULT, LATCHED
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.future import RosError
-from golem.middleware.ros.goal_info import (
+from golem.middleware.ros.goals import (
     CANCEL_GOAL,
+    NO_ID,
     STATUS_ARRAY,
+    CancelCode,
+    GoalEvent,
+    GoalState,
+    GoalStatus,
+    GoalTable,
     from_time,
     from_uuid,
     goal_info,
     to_time,
     to_uuid,
 )
-from golem.middleware.ros.goals import NO_ID, CancelCode, GoalEvent, GoalState, GoalStatus, GoalTable
 from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.action_msgs import CancelGoal_Request, CancelGoal_Response, GoalStatusArray
 from golem.middleware.ros.msgs.action_msgs import GoalStatus as StatusMessage

@@ -2,8 +2,8 @@
 
 A client takes the replies that carry its handle. `clientid` and `serviceid` in USER_DATA, equal for the two endpoints
 of a client or a server, let a peer know which reader belongs to which writer (`rmw_init_cs`, ros2/rmw_cyclonedds,
-rmw_node.cpp). Clients of Fast DDS send no header: a server reads their requests by a `service_link.ServiceLink`, which adds
-one, and not by the transport, which lets them pass without.
+rmw_node.cpp). Clients of Fast DDS send no header: a server reads their requests by a `service_link.ServiceLink`, which
+adds one, and not by the transport, which lets them pass without.
 """
 
 from __future__ import annotations

@@ -11,7 +11,6 @@ from golem.native import Record, Records, address, floats, new_record
 from golem.robots.model.table import LINKS
 from golem.types import Array
 
-
 _MOST = len(LINKS)
 
 PUSHES = np.dtype(

@@ -18,7 +18,7 @@ from golem.interfaces import images, public
 from golem.middleware.bags.base import BagError, BagMessage
 from golem.middleware.bags.reader import Bag
 from golem.middleware.ros import codec
-from golem.middleware.ros.goal_info import from_time
+from golem.middleware.ros.goals import from_time
 from golem.middleware.ros.message import NANO
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo as InfoMessage
 from golem.middleware.ros.msgs.sensor_msgs import Image

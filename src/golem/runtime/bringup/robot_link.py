@@ -12,7 +12,7 @@ import numpy as np
 from golem.interfaces import public
 from golem.interfaces.payloads import GateStatus
 from golem.interfaces.ros_convert import time as time_message
-from golem.interfaces.ros_safety import to_gate_status
+from golem.interfaces.ros_convert import to_gate_status
 from golem.middleware.dds import discovery
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.domain import DdsConfig

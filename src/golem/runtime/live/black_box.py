@@ -15,7 +15,7 @@ from pathlib import Path
 from golem.errors import GolemError
 from golem.interfaces import public
 from golem.interfaces.payloads import GateStatus
-from golem.interfaces.ros_safety import gate_status
+from golem.interfaces.ros_convert import gate_status
 from golem.middleware.bags.base import BagMessage
 from golem.middleware.bags.catalog import topic
 from golem.middleware.bags.writer import BagWriter

@@ -5,6 +5,8 @@ A new stream is a row, its converter, and the code that puts its values on the b
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
@@ -13,9 +15,37 @@ from golem.interfaces.rows import TopicRow
 from golem.middleware.bus import Bus, News
 from golem.runtime.executor import Phase, Placed
 from golem.runtime.live.node_setup import log_line
-from golem.runtime.live.rejected import RejectedMessages
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.types import TICK
+
+QUIET = 5.0
+"""Time between two complaints of one kind [s]."""
+
+
+class RejectedMessages:
+    """Messages of one kind that were refused; the first is said at once.
+
+    Attributes:
+        count: how many.
+        why: the reason of the last one.
+    """
+
+    def __init__(
+        self, what: str, tell: Callable[[str], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Call a message `what`; `tell` a person, without being held up, on this process's own `clock` [s]."""
+        self._what, self._tell, self._clock = what, tell, clock
+        self.count, self.why = 0, ""
+        self._said = -math.inf
+
+    def add(self, error: Exception) -> None:
+        """Count one more."""
+        self.count, self.why = self.count + 1, str(error)
+        now = self._clock()
+        if now - self._said >= QUIET:
+            self._said = now
+            self._tell(f"{self.count} {self._what} refused so far, the last one because: {error}")
+
 
 AT_ONCE = {"/lowstate": Phase.ESTIMATE, "/clock": Phase.ESTIMATE, "/safety/lowcmd_in": Phase.PROTECT}
 """When in a tick what somebody waits for is sent; all else at its end."""

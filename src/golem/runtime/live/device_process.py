@@ -19,7 +19,7 @@ from golem.hardware.drivers.mid360_driver import IMU_PORT, POINT_PORT, Mid360
 from golem.hardware.drivers.realsense_camera import RealSense, device_frames
 from golem.interfaces import public
 from golem.interfaces.lidar import LidarScan
-from golem.interfaces.livox import lidar_imu, scan_cloud
+from golem.interfaces.lidar_convert import lidar_imu, scan_cloud
 from golem.interfaces.payloads import Exposure
 from golem.interfaces.ros_convert import seconds
 from golem.middleware.dds.base import Participant

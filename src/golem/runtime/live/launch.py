@@ -25,7 +25,7 @@ from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.safety.gate import passive
 from golem.interfaces import public
 from golem.interfaces.payloads import GateState, GateStatus
-from golem.interfaces.ros_safety import to_gate_status
+from golem.interfaces.ros_convert import to_gate_status
 from golem.middleware.dds.base import Participant
 from golem.middleware.interrupt import LIFELINE, interrupted
 from golem.middleware.ros import names

@@ -11,7 +11,7 @@ from tyro.conf import OmitArgPrefixes, Positional
 from golem.errors import ConfigError
 from golem.interfaces import public
 from golem.interfaces.payloads import GateState
-from golem.interfaces.ros_safety import to_gate_status
+from golem.interfaces.ros_convert import to_gate_status
 from golem.middleware.dds.base import Participant
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.ros.future import RosError

@@ -42,7 +42,7 @@ def image_topics() -> set[str]:
 class RenderWorker:
     """The twin's end: hands a snapshot over when a camera is due and the darkroom free.
 
-    Once an exposure takes longer than its camera has until the next, the robot's time waits for it: see `live.sim_sync`.
+    Once an exposure takes longer than its camera has until the next, the robot's time waits: see `live.sim_sync`.
     """
 
     period = TICK

@@ -29,12 +29,11 @@ from golem.middleware.wire.struct_layout import WireError
 from golem.robots.sensors.calibration import calibrations
 from golem.runtime.executor import Executor, Phase, Placed, in_order
 from golem.runtime.live import stack_out as out
-from golem.runtime.live.bridge import incoming, outgoing
+from golem.runtime.live.bridge import RejectedMessages, incoming, outgoing
 from golem.runtime.live.clock import RobotClock
 from golem.runtime.live.nav2_bridge import Nav2Bridge
 from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.onboard_bridge import AnswersIn, CallsOut, Identities
-from golem.runtime.live.rejected import RejectedMessages
 from golem.runtime.live.robot_out import describe, encoders
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.sim_sync import CATCH_UP, SILENCE

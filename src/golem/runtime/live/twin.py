@@ -23,10 +23,9 @@ from golem.robots.base import HasGantry, Robot
 from golem.robots.unitree import motion_switcher
 from golem.runtime import nodes
 from golem.runtime.executor import Executor, Phase, Placed, in_order
-from golem.runtime.live.bridge import incoming, outgoing
+from golem.runtime.live.bridge import RejectedMessages, incoming, outgoing
 from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.onboard_bridge import AnswersOut, CallsIn
-from golem.runtime.live.rejected import RejectedMessages
 from golem.runtime.live.render_worker import RenderWorker, image_topics
 from golem.runtime.live.robot_out import describe, encoders, images_wanted, lidar_wanted
 from golem.runtime.live.role_endpoints import RoleEndpoints

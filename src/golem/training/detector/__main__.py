@@ -11,9 +11,9 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from golem.capabilities.perception.classes import CLASSES, KITCHEN, PACK
 from golem.errors import ConfigError
 from golem.training.detector import dataset
+from golem.training.detector.labels import CLASSES, KITCHEN, PACK
 from golem.training.detector.train_detector import TrainDetectorConfig
 from golem.training.detector.train_detector import train as run_training
 from golem.types import Detection
@@ -98,7 +98,7 @@ def curve(run: Path = RUNS / "run", out: Path = RUNS / "curve.png") -> None:
         run: folder of `train`.
         out: PNG file.
     """
-    from golem.training.detector.precision_curve import draw_curve
+    from golem.training.detector.evaluate import draw_curve
 
     draw_curve(run / "curve.csv", out)
 

@@ -7,11 +7,18 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from golem.capabilities.perception.classes import CLASSES, KITCHEN
 from golem.robots.sensors.cameras import project
 from golem.robots.worlds.pack import PackPart
 from golem.training.detector.random_scene import RandomScene, camera_pose
 from golem.types import Array, CameraInfo
+
+PACK: tuple[str, ...] = ("screw", "screw_hole", "nut", "bus_bar", "tray")
+"""Classes of a pack's parts."""
+KITCHEN: tuple[str, ...] = ("handle", "mug", "bowl", "can", "bottle")
+"""Classes of a kitchen: the bar of a fridge, and tableware."""
+CLASSES: tuple[str, ...] = PACK + KITCHEN
+"""All class names, those of the shipped weights, in the order of their heatmaps."""
+
 
 MIN_SIDE = 3.0
 """A part whose box is narrower is neither asked for nor held against the detector [px]."""

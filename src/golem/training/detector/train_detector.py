@@ -18,13 +18,13 @@ from onnx import numpy_helper
 from torch import Tensor, nn
 from torch.nn import functional
 
-from golem.capabilities.perception.classes import CLASSES
 from golem.capabilities.perception.peaks import STRIDE, find_peaks, normalise
 from golem.errors import ConfigError
 from golem.robots.sensors.streams import stream
 from golem.training.detector import augment, dataset
 from golem.training.detector.augment import CROP, MEAN, STD
 from golem.training.detector.evaluate import THRESHOLD, Detector, evaluate
+from golem.training.detector.labels import CLASSES
 from golem.training.detector.part_net import MULTIPLE, PartNet
 from golem.types import Array
 

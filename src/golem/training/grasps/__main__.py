@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from golem.capabilities.grasping.grasp_net import load_net
 from golem.errors import ConfigError, MissingExtra
 from golem.robots.worlds.tableware import KINDS
-from golem.training.grasps.auc_curve import draw_curve
 from golem.training.grasps.grasp_labels import GraspLabels, label
-from golem.training.grasps.train_scorer import SCORE, TrainScorerConfig, auc, first_held, train
+from golem.training.grasps.train_scorer import SCORE, TrainScorerConfig, auc, draw_curve, first_held, train
 
 LEAST = 100
 """Labels of either outcome with which training begins to make sense."""
