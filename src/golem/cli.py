@@ -114,6 +114,7 @@ BENCHES = {
     "dds": ("golem.evaluation.speed.dds_bench", "DdsBenchConfig", "run_dds_bench"),
     "grasp": ("golem.evaluation.speed.grasp_bench", "GraspBenchConfig", "run_grasp_bench"),
     "localizer": ("golem.evaluation.speed.localizer_bench", "LocalizerBenchConfig", "run_localizer_bench"),
+    "loop": ("golem.evaluation.speed.loop_bench", "LoopBenchConfig", "run_loop_bench"),
     "memory": ("golem.evaluation.speed.memory_bench", "MemoryBenchConfig", "run_memory_bench"),
 }
 """What is measured on its own."""
