@@ -41,8 +41,8 @@ docs: venv-docs  ## build the documentation into site/
 lock: venv-dev  ## resolve the requirements again (UPGRADE=--upgrade takes newer releases)
 	scripts/lock.sh $(UPGRADE)
 
-venv:  ## create .venv with what `golem` needs to run and to write reports
-	@PYTHON="$(PYTHON)" scripts/bootstrap.sh core report
+venv:  ## create .venv with what `golem` needs to run, to be watched in a browser, and to write reports
+	@PYTHON="$(PYTHON)" scripts/bootstrap.sh core report view
 
 venv-isaac:  ## create .venv-isaac with Isaac Lab for the robot `isaaclab` (PYTHON: a Python 3.12)
 	@PYTHON="$(PYTHON)" scripts/venv_isaac.sh

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Usage: scripts/bootstrap.sh GROUP...     GROUP is the name of a lock in requirements/: cluster, core, dds, dev, docs, hardware, lidar, physx, pink, realsense, record, report, train, vision
+# Usage: scripts/bootstrap.sh GROUP...     GROUP is the name of a lock in requirements/: cluster, core, dds, dev, docs, hardware, lidar, physx, pink, realsense, record, report, train, view, vision
 #
 # Creates .venv, or $VENV, with the locked packages of every GROUP and this package itself, and sees to it that they find
 # their system libraries. Needs Python 3.11-3.13 and a network to the package index; brings everything else: uv goes to
@@ -93,6 +93,7 @@ for group in "${locks[@]}"; do
     "$uv" pip install --quiet --python "$venv/bin/python" --no-deps --require-hashes -r "requirements/$group.txt"
 done
 "$uv" pip install --quiet --python "$venv/bin/python" --no-deps --editable .
+"$venv/bin/python" scripts/slim.py "$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')"
 see_to_system
 for group in "${locks[@]}"; do
     cat "requirements/$group.txt" pyproject.toml | cksum > "$venv/.golem-$group"

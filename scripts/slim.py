@@ -1,7 +1,7 @@
 """Makes an environment smaller: `python scripts/slim.py FOLDER`, the folder of its packages.
 
-What only building C++ against it needs goes: headers, static libraries, programs. Wheels cannot hold links, so a shared
-library comes under each of its names as a file; these become one.
+What only building C++ against it needs goes: headers, static libraries, programs; and MuJoCo's window. Wheels cannot
+hold links, so a shared library comes under each of its names as a file; these become one.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ LEAST = 50_000
 
 def slim(packages: Path) -> None:
     """Remove what is not run from the folder `packages`, and keep what is there twice once."""
+    shutil.rmtree(packages / "mujoco" / "studio", ignore_errors=True)
     for prefix in packages.glob("cmeel.prefix"):
         for folder in ("include", "bin", "lib/cmake", "lib/pkgconfig"):
             shutil.rmtree(prefix / folder, ignore_errors=True)

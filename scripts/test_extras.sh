@@ -26,6 +26,7 @@ probe() {
         graspgen) echo "from golem.registry import create; create('grasp_method', 'graspgen', {})" ;;
         cluster) echo "from golem.evaluation.harness.trial_executor import DaskExecutor; DaskExecutor('no scheduler')" ;;
         lidar) echo "from golem.registry import create; create('odometry', 'kiss_icp', {}); create('odometry', 'rko_lio', {})" ;;
+        view) echo "from golem.dashboard.server import serve; serve('127.0.0.1', 0).stop()" ;;
         physx) echo "from golem.robots.physx.bodies import load_sapien; load_sapien()" ;;
         *) echo "There is no extra '$1' to try." >&2; exit 2 ;;
     esac
@@ -62,7 +63,7 @@ trap 'rm -rf "$empty"' EXIT
 python=$(.venv/bin/python -c 'import sys; print(sys._base_executable)')
 environment "$empty/core" core
 failed=0
-for extra in "${@:-pink dds train record foxglove report hardware realsense vision graspgen cluster lidar physx}"; do
+for extra in "${@:-pink dds train record foxglove report hardware realsense vision graspgen cluster view lidar physx}"; do
     for one in $extra; do
         lock=$one
         [ "$one" = foxglove ] && lock=record

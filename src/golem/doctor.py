@@ -40,6 +40,7 @@ EXTRAS = {
     "hardware": ("serial",),
     "realsense": ("pyrealsense2",),
     "cluster": ("distributed",),
+    "view": ("viser",),
     "train": ("torch", "onnx"),
     "vision": ("torch", "transformers"),
     "lidar": ("kiss_icp", "rko_lio"),

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
-import viser
 
 from golem.capabilities.legs.base import Envelope
 from golem.dashboard.status import Status
 from golem.interfaces.payloads import LegStatus
 from golem.robots.mujoco.shoves import DIRECTIONS, Push, shove
 from golem.types import BaseEstimate, Twist
+
+if TYPE_CHECKING:
+    import viser
 
 AXES = {"vx": "forward vx [m/s]", "vy": "left vy [m/s]", "wz": "turn wz [rad/s]"}
 STEP = 0.05
@@ -31,17 +34,19 @@ class LegsPanel:
 
     def __init__(self, gui: viser.GuiApi) -> None:
         """Add the controls to `gui`."""
+        from viser import Icon
+
         with gui.add_folder("Walk"):
             self._sliders = {
                 name: gui.add_slider(label, 0.0, 0.0, STEP, 0.0, disabled=True)
                 for name, label in AXES.items()
             }
-            self.stop_button = gui.add_button("Stop walking", color="gray", icon=viser.Icon.PLAYER_STOP)
+            self.stop_button = gui.add_button("Stop walking", color="gray", icon=Icon.PLAYER_STOP)
         with gui.add_folder("Push"):
             self._direction = gui.add_dropdown("to the", list(WORDS), initial_value="left")
             minimum, maximum, first = IMPULSES
             self._impulse = gui.add_slider("impulse [N s]", minimum, maximum, 5.0, first)
-            self.push_button = gui.add_button("Push", icon=viser.Icon.HAND_FINGER)
+            self.push_button = gui.add_button("Push", icon=Icon.HAND_FINGER)
         self._envelope = Envelope()
 
     @property

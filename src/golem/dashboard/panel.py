@@ -6,9 +6,9 @@ import queue
 from collections.abc import Mapping
 from enum import StrEnum
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
-import viser
 from numpy.typing import NDArray
 
 from golem.dashboard.legs_panel import LegsPanel, legs_html
@@ -16,6 +16,9 @@ from golem.dashboard.skill_panel import SkillPanel
 from golem.dashboard.status import Status
 from golem.interfaces.payloads import GateState
 from golem.skills.spec import SkillSpec
+
+if TYPE_CHECKING:
+    import viser
 
 STAGE_COLOURS = ("#3b7ea1", "#5a9367", "#e0933f", "#c2503a", "#7d5ba6", "#2b9c92", "#8a6d3b")
 SAFETY_COLOURS = {
@@ -70,6 +73,8 @@ class Panel:
             standing: whether the robot stands on its feet.
             restarts: whether the operator may start over.
         """
+        from viser import Icon
+
         self._asked: queue.SimpleQueue[Button] = queue.SimpleQueue()
         gui = server.gui
         gui.configure_theme(
@@ -80,7 +85,7 @@ class Panel:
         gui.set_panel_label("GOLEM")
         self._status = gui.add_html("")
         with gui.add_folder("Operator"):
-            self._stop = gui.add_button("Emergency stop", color="red", icon=viser.Icon.HAND_STOP)
+            self._stop = gui.add_button("Emergency stop", color="red", icon=Icon.HAND_STOP)
             self._release = gui.add_button("Release emergency stop", visible=False)
             self._revive = gui.add_button("Reset and activate", visible=False)
             self._pause = gui.add_button("Pause", color="gray")

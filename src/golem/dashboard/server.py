@@ -12,13 +12,14 @@ import functools
 import io
 import logging
 import socket
+from typing import TYPE_CHECKING
 from unittest import mock
 
-import viser
-import websockets.asyncio.server
-
-from golem.errors import ConfigError
+from golem.errors import ConfigError, MissingExtra
 from golem.middleware.web_gate import LOCAL
+
+if TYPE_CHECKING:
+    import viser
 
 
 def serve(host: str, port: int) -> viser.ViserServer:
@@ -28,7 +29,13 @@ def serve(host: str, port: int) -> viser.ViserServer:
 
     Raises:
         ConfigError: the address cannot be had.
+        MissingExtra: viser is not installed.
     """
+    try:
+        import viser
+        import websockets.asyncio.server
+    except ModuleNotFoundError as error:
+        raise MissingExtra(error.name or "viser", "view") from error
     try:
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
-
-import viser
+from typing import TYPE_CHECKING, Any
 
 from golem.skills.spec import Schema, SkillSpec
 
-Input = viser.GuiInputHandle[Any]
+if TYPE_CHECKING:
+    import viser
+
+    Input = viser.GuiInputHandle[Any]
 
 
 class SkillPanel:
@@ -22,6 +23,8 @@ class SkillPanel:
 
     def __init__(self, gui: viser.GuiApi, skills: Mapping[str, SkillSpec], first: str) -> None:
         """Add the controls to `gui`, with the skill called `first` chosen if there is one."""
+        from viser import Icon
+
         self._gui, self._skills = gui, skills
         names = sorted(skills)
         self._folder = gui.add_folder("Skill")
@@ -30,8 +33,8 @@ class SkillPanel:
                 "skill", names, initial_value=first if first in skills else names[0]
             )
             self._form = gui.add_folder("goal")
-            self.start = gui.add_button("Start", icon=viser.Icon.PLAYER_PLAY)
-            self.cancel = gui.add_button("Cancel", color="gray", icon=viser.Icon.PLAYER_STOP, disabled=True)
+            self.start = gui.add_button("Start", icon=Icon.PLAYER_PLAY)
+            self.cancel = gui.add_button("Cancel", color="gray", icon=Icon.PLAYER_STOP, disabled=True)
         self._shown: tuple[str, dict[str, Input]] = "", {}
         self._name.on_update(lambda _: self._show())
         self._show()

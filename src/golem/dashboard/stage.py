@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import viser
 from numpy.typing import NDArray
 
 from golem.robots.model.table import BASE_LINK
 from golem.robots.mujoco.spectator import SpectatorView
 from golem.types import Array
+
+if TYPE_CHECKING:
+    import viser
 
 TARGET_COLOUR = (255, 60, 160)
 PUSH_COLOUR = (232, 78, 60)
