@@ -138,7 +138,7 @@ def new_record(dtype: np.dtype[Any]) -> Records:
 
 def address(array: NDArray[Any]) -> int:
     """Return where the numbers of `array` are."""
-    return int(array.__array_interface__["data"][0])
+    return int(array.ctypes.data)
 
 
 def new_shared() -> Records:
