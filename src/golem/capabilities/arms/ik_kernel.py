@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
+from golem.robots.model.linear_kernel import cholesky, solve_cholesky
 from golem.types import Array
 
 DAMPING = 0.03
@@ -23,7 +24,7 @@ PATIENCE, PROGRESS = 8, 0.7
 """Steps in which the distance has to become as much smaller: what has hardly moved is at its limits."""
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _turn(R: Array, p: Array, axis: Array, point: Array, angle: float, at: Array) -> None:
     """Turn the frame `R`, `p` about an axis that it carries; `at` (2, 3) is written: the axis, and a point of it."""
     x, y, z = axis[0], axis[1], axis[2]
@@ -40,7 +41,7 @@ def _turn(R: Array, p: Array, axis: Array, point: Array, angle: float, at: Array
         p[i] = at[1, i] - R[i, 0] * point[0] - R[i, 1] * point[1] - R[i, 2] * point[2]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def logarithm(R: Array, p: Array, out: Array) -> None:
     """Write the twist (6,) that takes one second to the frame `R`, `p`: linear above angular."""
     # The quaternion by its largest part, so that half a turn is as exact as none.
@@ -60,7 +61,8 @@ def logarithm(R: Array, p: Array, out: Array) -> None:
         q[i] = 1.0 + R[i, i] - R[a, a] - R[b, b]
         q[a], q[b], q[3] = R[a, i] + R[i, a], R[b, i] + R[i, b], R[b, a] - R[a, b]
     if q[3] < 0.0:
-        q = -q
+        for k in range(4):
+            q[k] = -q[k]
     sine = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
     angle = 2.0 * math.atan2(sine, q[3])
     scale = angle / sine if sine > 1e-12 * q[3] else 2.0 / q[3]
@@ -74,7 +76,7 @@ def logarithm(R: Array, p: Array, out: Array) -> None:
     out[3], out[4], out[5] = x, y, z
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def descend(
     q: Array, goal: Array, axes: Array, points: Array, grip: Array, lower: Array, upper: Array, steps: int
 ) -> bool:
@@ -92,15 +94,20 @@ def descend(
     """
     n = len(q)
     R, p, at = np.empty((3, 3)), np.empty(3), np.empty((n, 2, 3))
-    here, off, gap = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    error, J, A = np.empty(6), np.empty((6, n - 1)), np.empty((6, 6))
+    here, off, gap, tip = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    error, A, J, step = np.empty(6), np.empty((6, 6)), np.empty((6, n - 1)), np.empty(n - 1)
     last = np.inf
     for i in range(steps + 1):
-        R[:], p[:] = np.eye(3), 0.0
+        for r in range(3):
+            p[r] = 0.0
+            for k in range(3):
+                R[r, k] = 1.0 if r == k else 0.0
         for j in range(n):
             _turn(R, p, axes[j], points[j], q[j], at[j])
-        here[:] = R @ np.ascontiguousarray(grip[:3, :3])
-        tip = R @ np.ascontiguousarray(grip[:3, 3]) + p
+        for r in range(3):
+            tip[r] = R[r, 0] * grip[0, 3] + R[r, 1] * grip[1, 3] + R[r, 2] * grip[2, 3] + p[r]
+            for k in range(3):
+                here[r, k] = R[r, 0] * grip[0, k] + R[r, 1] * grip[1, k] + R[r, 2] * grip[2, k]
         for r in range(3):
             gap[r] = 0.0
             for k in range(3):
@@ -117,18 +124,25 @@ def descend(
                 return False
             last = away
         for j in range(n - 1):
-            axis, arm = at[j + 1, 0], tip - at[j + 1, 1]
-            x = axis[1] * arm[2] - axis[2] * arm[1]
-            y = axis[2] * arm[0] - axis[0] * arm[2]
-            z = axis[0] * arm[1] - axis[1] * arm[0]
+            axis, point = at[j + 1, 0], at[j + 1, 1]
+            u, v, w = tip[0] - point[0], tip[1] - point[1], tip[2] - point[2]
+            x, y, z = axis[1] * w - axis[2] * v, axis[2] * u - axis[0] * w, axis[0] * v - axis[1] * u
             for r in range(3):
                 J[r, j] = here[0, r] * x + here[1, r] * y + here[2, r] * z
                 J[3 + r, j] = here[0, r] * axis[0] + here[1, r] * axis[1] + here[2, r] * axis[2]
-        A[:] = J @ J.T
         for r in range(6):
-            A[r, r] += DAMPING**2 * min(1.0, away)
-        step = J.T @ np.linalg.solve(A, error)
-        step *= min(1.0, STEP / max(np.abs(step).max(), 1e-12))
+            for k in range(r + 1):
+                A[r, k] = DAMPING**2 * min(1.0, away) if r == k else 0.0
+                for j in range(n - 1):
+                    A[r, k] += J[r, j] * J[k, j]
+        cholesky(A, 6)
+        solve_cholesky(A, 6, error)
+        most = 1e-12
         for j in range(n - 1):
-            q[j + 1] = min(max(q[j + 1] + step[j], lower[j]), upper[j])
+            step[j] = 0.0
+            for r in range(6):
+                step[j] += J[r, j] * error[r]
+            most = max(most, abs(step[j]))
+        for j in range(n - 1):
+            q[j + 1] = min(max(q[j + 1] + step[j] * min(1.0, STEP / most), lower[j]), upper[j])
     return False

@@ -187,27 +187,19 @@ class CollisionModel:
             link_pairs.append((a, b))
             allowed.append(float(depth))
             link_first.append(len(cluster_pairs))
-        head = [
-            n,
-            len(robot.links),
-            clusters,
-            len(spheres),
-            len(link_pairs),
-            len(cluster_pairs),
-            len(sphere_pairs),
-        ]
-        self.ints: NDArray[np.int32] = np.concatenate(
-            [
-                np.asarray(table, np.int32).ravel()
-                for table in (
-                    head, parents, slides, body, first, body[cluster_link], link_pairs, link_first,
-                    cluster_pairs, cluster_first, sphere_pairs,
-                )
-            ]
-        )  # fmt: skip
-        self.floats: Array = np.concatenate(
-            [t.ravel() for t in (chain, link_balls, balls, spheres, np.array(allowed))]
-        )
+        tables = [
+            np.asarray(table, np.int32).ravel()
+            for table in (
+                parents, slides, body, first, body[cluster_link], link_pairs, link_first,
+                cluster_pairs, cluster_first, sphere_pairs,
+            )
+        ]  # fmt: skip
+        numbers = [np.asarray(table, float).ravel() for table in (chain, link_balls, balls, spheres, allowed)]
+        head = [n, len(robot.links), clusters, len(spheres), len(link_pairs)]
+        head += list(sphere_kernel.HEADER + np.cumsum([len(t) for t in tables])[1:-1])
+        head += list(np.cumsum([len(t) for t in numbers])[:-1])
+        self.ints: NDArray[np.int32] = np.concatenate([np.asarray(head, np.int32), *tables])
+        self.floats: Array = np.concatenate(numbers)
 
 
 def _frame_along(axis: Array) -> Array:

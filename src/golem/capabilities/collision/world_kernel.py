@@ -5,20 +5,24 @@ A shape is a row of 16: kind, rotation (9) and position (3) of its frame in the 
 
 from __future__ import annotations
 
-from typing import Any
+import math
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from golem.capabilities.collision.sphere_kernel import (
+    BALLS,
+    CLUSTER_BALLS,
+    CLUSTER_BODY,
+    CLUSTER_FIRST,
     Indices,
     Ints,
     add_gradient,
+    farthest,
     place,
     place_spheres,
     put,
-    views,
 )
 from golem.types import Array
 
@@ -28,19 +32,17 @@ Points = NDArray[np.float64] | NDArray[np.float32]
 _BOX, _CYLINDER, _SPHERE = 0, 1, 2
 
 
-@njit(cache=True, nogil=True)
-def _cell(x: float, y: float, z: float, frame: Array, shape: tuple[int, ...]) -> Any:
+@njit(cache=True, nogil=True, error_model="numpy")
+def _cell(x: float, y: float, z: float, frame: Array, shape: tuple[int, ...]) -> int:
     """Return the flat index of the cell of a point, -1 for one that is not finite or outside."""
-    i = np.floor((x - frame[0]) / frame[3])
-    j = np.floor((y - frame[1]) / frame[3])
-    k = np.floor((z - frame[2]) / frame[3])
-    # NaN fails every comparison.
+    i, j, k = (x - frame[0]) / frame[3], (y - frame[1]) / frame[3], (z - frame[2]) / frame[3]
+    # NaN fails every comparison; what is not negative is cut to its floor.
     if not (i >= 0.0 and j >= 0.0 and k >= 0.0 and i < shape[0] and j < shape[1] and k < shape[2]):
-        return np.int64(-1)
-    return (np.int64(i) * shape[1] + np.int64(j)) * shape[2] + np.int64(k)
+        return -1
+    return (int(i) * shape[1] + int(j)) * shape[2] + int(k)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def number_cells(points: Points, frame: Array, cells: Cells) -> int:
     """Number the occupied cells in the order of their first points; return how many there are."""
     flat, count = cells.ravel(), 0
@@ -52,7 +54,7 @@ def number_cells(points: Points, frame: Array, cells: Cells) -> int:
     return count
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def fill_balls(points: Points, frame: Array, cells: Cells, balls: Array) -> int:
     """Write mean and reach of the points of each cell into `balls` (k, 4); return how many points were used."""
     flat, number = cells.ravel(), np.zeros(len(balls), np.int64)
@@ -73,59 +75,62 @@ def fill_balls(points: Points, frame: Array, cells: Cells, balls: Array) -> int:
             x, y, z = points[i, 0] - balls[b, 0], points[i, 1] - balls[b, 1], points[i, 2] - balls[b, 2]
             balls[b, 3] = max(balls[b, 3], x * x + y * y + z * z)
     for b in range(len(balls)):
-        balls[b, 3] = np.sqrt(balls[b, 3])
-    return number.sum()
+        balls[b, 3] = math.sqrt(balls[b, 3])
+    used = 0
+    for b in range(len(balls)):
+        used += number[b]
+    return used
 
 
-@njit(cache=True, nogil=True)
-def _to_shape(x: float, y: float, z: float, s: Array, out: Array) -> float:
-    """Return the signed distance of a point from a shape, and write the direction in which it grows."""
-    x, y, z = x - s[10], y - s[11], z - s[12]
-    u = s[1] * x + s[4] * y + s[7] * z
-    v = s[2] * x + s[5] * y + s[8] * z
-    w = s[3] * x + s[6] * y + s[9] * z
+@njit(cache=True, nogil=True, error_model="numpy")
+def _to_shape(x: float, y: float, z: float, shapes: Array, i: int, out: Array) -> float:
+    """Return the signed distance of a point from shape `i`, and write the direction in which it grows."""
+    x, y, z = x - shapes[i, 10], y - shapes[i, 11], z - shapes[i, 12]
+    u = shapes[i, 1] * x + shapes[i, 4] * y + shapes[i, 7] * z
+    v = shapes[i, 2] * x + shapes[i, 5] * y + shapes[i, 8] * z
+    w = shapes[i, 3] * x + shapes[i, 6] * y + shapes[i, 9] * z
     a, b, c = 0.0, 0.0, 1.0
-    if s[0] == _BOX:
-        du, dv, dw = abs(u) - s[13], abs(v) - s[14], abs(w) - s[15]
+    if shapes[i, 0] == _BOX:
+        du, dv, dw = abs(u) - shapes[i, 13], abs(v) - shapes[i, 14], abs(w) - shapes[i, 15]
         if du > 0.0 or dv > 0.0 or dw > 0.0:
             a, b, c = max(du, 0.0), max(dv, 0.0), max(dw, 0.0)
-            d = np.sqrt(a * a + b * b + c * c)
-            a, b, c = np.copysign(a / d, u), np.copysign(b / d, v), np.copysign(c / d, w)
+            d = math.sqrt(a * a + b * b + c * c)
+            a, b, c = math.copysign(a / d, u), math.copysign(b / d, v), math.copysign(c / d, w)
         else:
-            d = max(du, dv, dw)
+            d = max(max(du, dv), dw)
             a, b, c = 0.0, 0.0, 0.0
             if d == du:
-                a = np.copysign(1.0, u)
+                a = math.copysign(1.0, u)
             elif d == dv:
-                b = np.copysign(1.0, v)
+                b = math.copysign(1.0, v)
             else:
-                c = np.copysign(1.0, w)
-    elif s[0] == _CYLINDER:
-        r = np.sqrt(u * u + v * v)
+                c = math.copysign(1.0, w)
+    elif shapes[i, 0] == _CYLINDER:
+        r = math.sqrt(u * u + v * v)
         e, f = (u / r, v / r) if r > 0.0 else (1.0, 0.0)
-        dr, dw = r - s[13], abs(w) - s[14]
+        dr, dw = r - shapes[i, 13], abs(w) - shapes[i, 14]
         if dr > 0.0 or dw > 0.0:
             g, h = max(dr, 0.0), max(dw, 0.0)
-            d = np.sqrt(g * g + h * h)
-            a, b, c = e * g / d, f * g / d, np.copysign(h / d, w)
+            d = math.sqrt(g * g + h * h)
+            a, b, c = e * g / d, f * g / d, math.copysign(h / d, w)
         elif dr > dw:
             d, a, b, c = dr, e, f, 0.0
         else:
-            d, a, b, c = dw, 0.0, 0.0, np.copysign(1.0, w)
-    elif s[0] == _SPHERE:
-        r = np.sqrt(u * u + v * v + w * w)
-        d = r - s[13]
+            d, a, b, c = dw, 0.0, 0.0, math.copysign(1.0, w)
+    elif shapes[i, 0] == _SPHERE:
+        r = math.sqrt(u * u + v * v + w * w)
+        d = r - shapes[i, 13]
         if r > 0.0:
             a, b, c = u / r, v / r, w / r
     else:
         d = w
-    out[0] = s[1] * a + s[2] * b + s[3] * c
-    out[1] = s[4] * a + s[5] * b + s[6] * c
-    out[2] = s[7] * a + s[8] * b + s[9] * c
+    out[0] = shapes[i, 1] * a + shapes[i, 2] * b + shapes[i, 3] * c
+    out[1] = shapes[i, 4] * a + shapes[i, 5] * b + shapes[i, 6] * c
+    out[2] = shapes[i, 7] * a + shapes[i, 8] * b + shapes[i, 9] * c
     return d
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _to_cloud(
     x: float,
     y: float,
@@ -139,23 +144,20 @@ def _to_cloud(
 ) -> float:
     """Return the distance of a point from the nearest ball of a cloud, or `reach` if none is nearer."""
     size, h = cells.shape, frame[3]
-    low = np.empty(3, np.int64)
-    high = np.empty(3, np.int64)
-    # The nearest cell of the grid: a point may be outside of it.
+    # The block of cells to look at, and the nearest cell of the grid: a point may be outside of it.
+    low, high, near = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
     outside = 0.0
-    near = np.empty(3, np.int64)
-    point = (x, y, z)
-    for k in range(3):
-        f = (point[k] - frame[k]) / h
-        near[k] = min(max(np.int64(np.floor(f)), 0), size[k] - 1)
-        outside = max(outside, (f - size[k]) * h, -f * h)
     # Balls reach beyond their cells by less than a diagonal.
     spill = 1.74 * h
+    for k in range(3):
+        along = x if k == 0 else y if k == 1 else z
+        f = (along - frame[k]) / h
+        near[k] = min(max(int(math.floor(f)), 0), size[k] - 1)
+        outside = max(outside, max((f - size[k]) * h, -f * h))
+        low[k] = max(int(math.floor((along - reach - spill - frame[k]) / h)), 0)
+        high[k] = min(int(math.floor((along + reach + spill - frame[k]) / h)) + 1, size[k])
     if max(outside, (steps[near[0], near[1], near[2]] - 1) * h) > reach + spill:
         return reach
-    for k in range(3):
-        low[k] = max(np.int64(np.floor((point[k] - reach - spill - frame[k]) / h)), 0)
-        high[k] = min(np.int64(np.floor((point[k] + reach + spill - frame[k]) / h)) + 1, size[k])
     best = reach
     for i in range(low[0], high[0]):
         for j in range(low[1], high[1]):
@@ -167,7 +169,7 @@ def _to_cloud(
                     continue
                 b = cells[i, j, k]
                 u, v, w = x - balls[b, 0], y - balls[b, 1], z - balls[b, 2]
-                length = np.sqrt(u * u + v * v + w * w)
+                length = math.sqrt(u * u + v * v + w * w)
                 if length - balls[b, 3] < best:
                     best = length - balls[b, 3]
                     length = max(length, 1e-9)
@@ -176,9 +178,10 @@ def _to_cloud(
     return best
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _to_world(
-    ball: Array,
+    placed: Array,
+    row: int,
     shapes: Array,
     balls: Array,
     cells: Cells,
@@ -187,22 +190,23 @@ def _to_world(
     cutoff: float,
     out: Array,
 ) -> float:
+    """Return the distance of ball `row` of `placed` from the world, or `cutoff`; write the direction of its growth."""
     best, found = cutoff, np.zeros(3)
+    x, y, z, r = placed[row, 0], placed[row, 1], placed[row, 2], placed[row, 3]
     out[0] = out[1] = out[2] = 0.0
-    for i in range(len(shapes)):
-        d = _to_shape(ball[0], ball[1], ball[2], shapes[i], found) - ball[3]
+    for i in range(len(shapes) + (len(balls) > 0)):
+        if i < len(shapes):
+            d = _to_shape(x, y, z, shapes, i, found) - r
+        else:
+            d = _to_cloud(x, y, z, best + r, balls, cells, steps, frame, found) - r
         if d < best:
             best = d
-            out[0], out[1], out[2] = found[0], found[1], found[2]
-    if len(balls):
-        d = _to_cloud(ball[0], ball[1], ball[2], best + ball[3], balls, cells, steps, frame, found) - ball[3]
-        if d < best:
-            best = d
-            out[0], out[1], out[2] = found[0], found[1], found[2]
+            for k in range(3):
+                out[k] = found[k]
     return best
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def ball_distances(
     placed: Array,
     shapes: Array,
@@ -215,11 +219,14 @@ def ball_distances(
     direction: Array,
 ) -> None:
     """Write distance (n,) and direction (n, 3) of balls (n, 4), see `World.distance`."""
+    out = np.empty(3)
     for i in range(len(placed)):
-        distance[i] = _to_world(placed[i], shapes, balls, cells, steps, frame, cutoff, direction[i])
+        distance[i] = _to_world(placed, i, shapes, balls, cells, steps, frame, cutoff, out)
+        for k in range(3):
+            direction[i, k] = out[k]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def bodies_hit_world(
     R: Array,
     p: Array,
@@ -236,24 +243,24 @@ def bodies_hit_world(
 
     A cluster's ball is asked first, and its spheres only where that is near.
     """
-    tables = views(ints, floats)
-    cluster_first, cluster_body, cluster_balls, spheres = tables[1], tables[2], tables[9], tables[10]
     out, placed = np.empty(3), np.empty((1, 4))
     for c in range(ints[2]):
-        b = cluster_body[c]
+        b, first = ints[ints[CLUSTER_BODY] + c], ints[CLUSTER_FIRST] + c
         if b == 0:
             continue
-        put(R, p, b, cluster_balls, c, placed[0])
-        if _to_world(placed[0], shapes, balls, cells, steps, frame, margin + 1e-9, out) > margin:
-            continue
-        for i in range(cluster_first[c], cluster_first[c + 1]):
-            put(R, p, b, spheres, i, placed[0])
-            if _to_world(placed[0], shapes, balls, cells, steps, frame, margin + 1e-9, out) <= margin:
+        # The cluster's ball, then its spheres.
+        for i in range(ints[first] - 1, ints[first + 1]):
+            around = i < ints[first]
+            put(R, p, b, floats, ints[CLUSTER_BALLS] + 4 * c if around else ints[BALLS] + 4 * i, placed, 0)
+            far = _to_world(placed, 0, shapes, balls, cells, steps, frame, margin + 1e-9, out) > margin
+            if around and far:
+                break
+            if not (around or far):
                 return True
     return False
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def world_collides(
     q: Array,
     ints: Ints,
@@ -272,7 +279,7 @@ def world_collides(
     return bodies_hit_world(R, p, ints, floats, shapes, balls, cells, steps, frame, margin)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def world_collides_each(
     Q: Array,
     ints: Ints,
@@ -290,7 +297,7 @@ def world_collides_each(
         out[i] = world_collides(Q[i], ints, floats, shapes, balls, cells, steps, frame, margin)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def nearest_world(
     q: Array,
     ints: Ints,
@@ -314,25 +321,28 @@ def nearest_world(
     place_spheres(q, ints, floats, R, p, placed)
     best, which = np.full(links, cutoff), np.full(links, -1)
     normals, out = np.zeros((links, 3)), np.empty(3)
-    for i in moving:
+    for m in range(len(moving)):
+        i = moving[m]
         link = sphere_link[i]
-        d = _to_world(placed[i], shapes, balls, cells, steps, frame, float(best[link]), out)
+        d = _to_world(placed, i, shapes, balls, cells, steps, frame, best[link], out)
         if d < best[link]:
             best[link], which[link] = d, i
-            normals[link] = out
+            for k in range(3):
+                normals[link, k] = out[k]
     count = 0
     for link in range(links):
         if which[link] < 0:
             continue
         slot = count
         if count == most:
-            slot = int(distance[:most].argmax())
+            slot = farthest(distance)
             if distance[slot] <= best[link]:
                 continue
         else:
             count += 1
         i = which[link]
         distance[slot], spheres[slot] = best[link], i
-        gradient[slot] = 0.0
-        add_gradient(placed[i], normals[link], int(sphere_body[i]), 1.0, ints, R, p, gradient[slot])
+        for j in range(n):
+            gradient[slot, j] = 0.0
+        add_gradient(placed, i, normals[link], sphere_body[i], 1.0, ints, R, p, gradient, slot)
     return count

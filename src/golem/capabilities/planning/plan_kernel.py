@@ -6,6 +6,7 @@ joints, rules for hands and centre of mass, and two margins. A rule is a row of 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -50,24 +51,26 @@ class Space(NamedTuple):
     margins: Array
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _broken_rule(space: Space, R: Array, p: Array) -> int:
     """Return the first rule that the bodies break, or -1."""
     rules, masses = space.rules, space.masses
     for i in range(len(rules)):
         kind, b = rules[i, 0], int(rules[i, 1])
         if kind == BALANCED:
-            off = np.zeros(2)
-            for j in range(len(masses)):
-                for k in range(2):
-                    off[k] += masses[j, 3] * (
+            square = 0.0
+            for k in range(2):
+                off = 0.0
+                for j in range(len(masses)):
+                    off += masses[j, 3] * (
                         R[j, 3 * k] * masses[j, 0]
                         + R[j, 3 * k + 1] * masses[j, 1]
                         + R[j, 3 * k + 2] * masses[j, 2]
                         + p[j, k]
                     )
-            x, y = off[0] - rules[i, 2], off[1] - rules[i, 3]
-            if x * x + y * y > rules[i, 4] ** 2:
+                off -= rules[i, 2 + k]
+                square += off * off
+            if square > rules[i, 4] * rules[i, 4]:
                 return i
             continue
         along = 0.0
@@ -83,7 +86,7 @@ def _broken_rule(space: Space, R: Array, p: Array) -> int:
     return -1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def verdict(q: Array, space: Space) -> int:
     """Return `FREE`, or why the posture `q` (n,) is not, the cheapest reason first."""
     n = len(q)
@@ -106,29 +109,45 @@ def verdict(q: Array, space: Space) -> int:
     return FREE
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def verdicts(Q: Array, space: Space, out: Indices) -> None:
     """Write into `out` (m,) the verdict on each row of `Q` (m, n)."""
     for i in range(len(Q)):
         out[i] = verdict(Q[i], space)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _farthest(a: Array, b: Array) -> float:
+    """Return the largest distance of `a` (n,) from `b` in a joint."""
+    most = 0.0
+    for j in range(len(a)):
+        most = max(most, abs(b[j] - a[j]))
+    return most
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _between(a: Array, b: Array, share: float, out: Array) -> None:
+    """Write into `out` (n,) what is `share` of the way from `a` to `b`; `out` may be `b`."""
+    for j in range(len(a)):
+        out[j] = a[j] + (b[j] - a[j]) * share
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def free_steps(a: Array, b: Array, step: float, space: Space) -> tuple[int, int]:
     """Return how many steps from `a` to `b` are free, and of how many; none is longer than `step` in a joint.
 
     The steps are equal, and `a` is not looked at.
     """
-    parts = max(1, int(np.ceil(np.abs(b - a).max() / step)))
+    parts = max(1, int(math.ceil(_farthest(a, b) / step)))
     q = np.empty(len(a))
     for i in range(1, parts + 1):
-        q[:] = a + (b - a) * (i / parts)
+        _between(a, b, i / parts, q)
         if verdict(q, space) != FREE:
             return i - 1, parts
     return parts, parts
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _nearest(q: Array, nodes: Array, count: int, weight: Array) -> int:
     best, found = np.inf, 0
     for i in range(count):
@@ -141,7 +160,7 @@ def _nearest(q: Array, nodes: Array, count: int, weight: Array) -> int:
     return found
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _extend(
     q: Array, nodes: Array, parents: Indices, size: Indices, side: int, reach: float, step: float,
     weight: Array, space: Space, checks: Indices,
@@ -149,20 +168,21 @@ def _extend(
     """Grow tree `side` towards `q` by `reach` at most; return 0 if trapped, 1 if advanced, 2 if it got there."""
     near = _nearest(q, nodes[side], int(size[side]), weight)
     start = nodes[side, near]
-    far = np.abs(q - start).max()
-    goal = q.copy() if far <= reach else start + (q - start) * (reach / far)
+    far, goal = _farthest(q, start), q.copy()
+    if far > reach:
+        _between(start, q, reach / far, goal)
     free, parts = free_steps(start, goal, step, space)
     checks[0] += min(free + 1, parts)
     if free == 0 or size[side] == nodes.shape[1]:
         return 0
     at = size[side]
-    nodes[side, at] = start + (goal - start) * (free / parts)
+    _between(start, goal, free / parts, nodes[side, at])
     parents[side, at] = near
     size[side] += 1
     return 2 if free == parts and far <= reach else 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def grow(
     samples: Array,
     nodes: Array,
@@ -203,7 +223,7 @@ def grow(
     return False
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def points_of(Q: Array, bodies: Indices, offsets: Array, space: Space, out: Array) -> None:
     """Write into `out` (m, k, 3) where points at `offsets` (k, 3) of `bodies` (k,) are at each row of `Q` (m, n)."""
     n = Q.shape[1]
@@ -221,7 +241,7 @@ def points_of(Q: Array, bodies: Indices, offsets: Array, space: Space, out: Arra
                 )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def speeds_along(cap: Array, lengths: Array, tangents: Array, accel: Array) -> Array:
     """Return (m,) the fastest speed along a path at each of its points, at rest at both ends.
 
@@ -243,8 +263,8 @@ def speeds_along(cap: Array, lengths: Array, tangents: Array, accel: Array) -> A
                 most = min(most, accel[j] / t)
         pull[i] = most
     for i in range(m - 1):
-        v[i + 1] = min(v[i + 1], np.sqrt(v[i] ** 2 + 2.0 * pull[i] * lengths[i]))
+        v[i + 1] = min(v[i + 1], math.sqrt(v[i] ** 2 + 2.0 * pull[i] * lengths[i]))
     for k in range(m - 1):
         i = m - 2 - k
-        v[i] = min(v[i], np.sqrt(v[i + 1] ** 2 + 2.0 * pull[i] * lengths[i]))
+        v[i] = min(v[i], math.sqrt(v[i + 1] ** 2 + 2.0 * pull[i] * lengths[i]))
     return v
