@@ -74,7 +74,7 @@ def _near(balls: Array, a: int, b: int, margin: float) -> bool:
 @njit(cache=True, nogil=True, error_model="numpy")
 def bodies_collide(R: Array, p: Array, ints: Ints, floats: Array, margin: float) -> bool:
     """Return whether two tested spheres come as near as `margin` [m], the bodies being where `place` put them."""
-    links, clusters = ints[1], ints[2]
+    links, clusters = np.int64(ints[1]), np.int64(ints[2])
     # Links, clusters, spheres; the last two are placed when they are first asked for.
     placed, around = np.empty((links + clusters + ints[3], 4)), links + clusters
     done = np.zeros(2 * clusters, np.uint8)
@@ -87,14 +87,14 @@ def bodies_collide(R: Array, p: Array, ints: Ints, floats: Array, margin: float)
         for j in range(ints[ints[LINK_PAIR_FIRST] + i], ints[ints[LINK_PAIR_FIRST] + i + 1]):
             pair = ints[CLUSTER_PAIRS] + 2 * j
             for side in range(2):
-                c = ints[pair + side]
+                c = np.int64(ints[pair + side])
                 if not done[clusters + c]:
                     done[clusters + c] = 1
                     put(R, p, ints[ints[CLUSTER_BODY] + c], floats, ints[CLUSTER_BALLS] + 4 * c, placed, links + c)
             if not _near(placed, links + ints[pair], links + ints[pair + 1], reach):
                 continue
             for side in range(2):
-                c = ints[pair + side]
+                c = np.int64(ints[pair + side])
                 if not done[c]:
                     done[c] = 1
                     _put_spheres(R, p, c, ints, floats, placed, around)
@@ -132,7 +132,7 @@ def collides_each(Q: Array, ints: Ints, floats: Array, margin: float, out: NDArr
 def place_spheres(q: Array, ints: Ints, floats: Array, R: Array, p: Array, placed: Array) -> None:
     """Write bodies, see `place`, and all spheres (m, 4) at `q`."""
     place(q, ints, floats, R, p)
-    for c in range(ints[2]):
+    for c in range(np.int64(ints[2])):
         _put_spheres(R, p, c, ints, floats, placed, 0)
 
 
@@ -148,7 +148,7 @@ def pair_distances(
     spheres: Indices,
 ) -> None:
     """Write the distance (l,) of every tested pair of links and its nearest spheres (l, 2); `cutoff` where farther."""
-    links, clusters = ints[1], ints[2]
+    links, clusters = np.int64(ints[1]), np.int64(ints[2])
     near = np.empty((links + clusters, 4))
     for i in range(links):
         put(placed_R, placed_p, ints[ints[LINK_BODY] + i], floats, ints[LINK_BALLS] + 4 * i, near, i)
