@@ -63,7 +63,7 @@ class FloorPlane:
         return self.plane
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _close(points: Array, origin: Array, plane: Array, tolerance: float) -> tuple[Array, Array]:
     """Return the points (n, 3) less than `tolerance` from the plane and `REACH` from `origin`, and their heights."""
     out, heights = np.empty(points.shape), np.empty(len(points))
@@ -75,4 +75,4 @@ def _close(points: Array, origin: Array, plane: Array, tolerance: float) -> tupl
         if abs(off) < tolerance and u * u + v * v < REACH * REACH:
             out[n, 0], out[n, 1], out[n, 2], heights[n] = x, y, z, off
             n += 1
-    return out[:n].copy(), heights[:n].copy()
+    return out[:n], heights[:n]

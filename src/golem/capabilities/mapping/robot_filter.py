@@ -49,7 +49,7 @@ class RobotFilter:
         return _inside(points, balls, MARGIN)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _inside(points: Array, balls: Array, margin: float) -> NDArray[np.bool_]:
     """Return which points (n, 3) are within `margin` [m] of a ball (m, 4)."""
     found = np.zeros(len(points), np.bool_)

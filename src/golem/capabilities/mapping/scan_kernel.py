@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from golem.types import Array
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def sound(points: Array, offsets: Array, blind: float) -> NDArray[np.bool_]:
     """Return which points (n, 3) and offsets (n,) are finite, the point farther than `blind` [m] from the sensor."""
     out = np.zeros(len(points), np.bool_)
@@ -22,7 +22,7 @@ def sound(points: Array, offsets: Array, blind: float) -> NDArray[np.bool_]:
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def posed(points: Array, offsets: Array, duration: float, R: Array, p: Array) -> Array:
     """Return points where the sensor was at their own times, its motion between two moments taken as straight.
 

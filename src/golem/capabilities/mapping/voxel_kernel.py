@@ -25,7 +25,7 @@ UNKNOWN, FREE, FULL = -1, 0, 100
 """What a cell of the floor's map may be; see `OccupancyGrid`."""
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def within(points: Array, origin: Array, reach: float) -> Array:
     """Return the points (n, 3) less than `reach` [m] from `origin` (3,); those that are not finite are not."""
     out = np.empty(points.shape)
@@ -33,22 +33,25 @@ def within(points: Array, origin: Array, reach: float) -> Array:
     for i in range(len(points)):
         x, y, z = points[i, 0] - origin[0], points[i, 1] - origin[1], points[i, 2] - origin[2]
         if x * x + y * y + z * z < reach * reach:
-            out[n] = points[i]
+            for a in range(3):
+                out[n, a] = points[i, a]
             n += 1
-    return out[:n].copy()
+    return out[:n]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def span(points: Array, origin: Array) -> tuple[Array, Array]:
     """Return the least and the greatest x and y, (2,) each, of `origin` (3,) and points (n, 3)."""
-    low, high = origin[:2].copy(), origin[:2].copy()
+    low, high = np.empty(2), np.empty(2)
+    for a in range(2):
+        low[a] = high[a] = origin[a]
     for i in range(len(points)):
         for a in range(2):
             low[a], high[a] = min(low[a], points[i, a]), max(high[a], points[i, a])
     return low, high
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def mark(
     voxels: Voxels, stamps: Stamps, points: Array, corner: Array, resolution: float, number: int
 ) -> None:
@@ -63,7 +66,7 @@ def mark(
             voxels[r, c, k] = min(voxels[r, c, k] + HIT, MOST)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def clear(
     voxels: Voxels,
     stamps: Stamps,
@@ -112,7 +115,7 @@ def clear(
                 c += step_c
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _axis(begin: float, along: float, resolution: float) -> tuple[int, int, float, float]:
     """Return where a ray begins on one axis, its step, the way to the next border, and from border to border [m].
 
@@ -126,7 +129,7 @@ def _axis(begin: float, along: float, resolution: float) -> tuple[int, int, floa
     return position, step, (border - begin) * resolution / along, abs(resolution / along)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def flatten(
     voxels: Voxels,
     cells: NDArray[np.int8],

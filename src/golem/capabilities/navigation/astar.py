@@ -54,7 +54,7 @@ def astar(
     return np.array(way[::-1], np.int64), total
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _search(
     cost: Array, start: int, goal: int, beta: float, closed: float, parents: NDArray[np.int32]
 ) -> float:
@@ -106,7 +106,8 @@ def _search(
                 if size == room:
                     room *= 2
                     more_keys, more_items = np.empty(room), np.empty(room, np.int64)
-                    more_keys[:size], more_items[:size] = keys, items
+                    for i in range(size):
+                        more_keys[i], more_items[i] = keys[i], items[i]
                     keys, items = more_keys, more_items
                 estimate = through + math.sqrt(float((r - goal_row) ** 2 + (c - goal_column) ** 2))
                 i = size

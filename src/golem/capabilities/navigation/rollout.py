@@ -19,7 +19,7 @@ DOUBT = 0.1
 """By how much more space somebody who walks needs per second that is looked ahead [m/s] [own]."""
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def score(
     twists: Array,
     pose: Array,
@@ -56,7 +56,7 @@ def score(
     rows, columns = clearance.shape
     steps, last = int(round(horizon[0] / horizon[1])), int(round(horizon[2] / horizon[1]))
     for i in range(len(twists)):
-        vx, vy, wz = twists[i]
+        vx, vy, wz = twists[i, 0], twists[i, 1], twists[i, 2]
         x, y, yaw = pose[0], pose[1], pose[2]
         nearest, hits[i], spare[i] = 10.0, np.inf, 10.0
         first = beside = 10.0

@@ -168,7 +168,7 @@ def about_z(angle: float) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _series(square: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Return sin(a) / a and (1 - cos(a)) / a^2 of the angle whose square is given [rad^2]."""
     if square < 1e-8:
@@ -177,7 +177,7 @@ def _series(square: float) -> tuple[float, float]:  # pragma: no cover - compile
     return math.sin(angle) / angle, (1.0 - math.cos(angle)) / square
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def exp(v: Array) -> Array:  # pragma: no cover - compiled
     """Return the (3, 3) rotation of a rotation vector (3,) [rad]."""
     s, c = _series(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
@@ -189,7 +189,7 @@ def exp(v: Array) -> Array:  # pragma: no cover - compiled
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _skew(v: Array) -> Array:  # pragma: no cover - compiled
     out = np.zeros((3, 3))
     out[0, 1], out[0, 2], out[1, 2] = -v[2], v[1], -v[0]
@@ -197,45 +197,71 @@ def _skew(v: Array) -> Array:  # pragma: no cover - compiled
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _predict(
     R: Array, x: Array, P: Array, gyro: Array, acc: Array, dt: float, noise: Array
 ) -> None:  # pragma: no cover - compiled
-    omega, force = gyro - x[6:9], acc - x[9:12]
-    middle = R @ exp(0.5 * dt * omega)
-    turn = exp(dt * omega)
+    omega, force, half = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(3):
+        omega[i] = dt * (gyro[i] - x[6 + i])
+        half[i] = 0.5 * omega[i]
+        force[i] = acc[i] - x[9 + i]
+    middle, turn, a = _product(R, exp(half)), exp(omega), np.empty(3)
     vertical = math.sqrt(GRAVITY * GRAVITY - x[12] * x[12] - x[13] * x[13])
-    a = middle @ force
+    F = np.zeros((SIZE, SIZE))
+    for i in range(SIZE):
+        F[i, i] = 1.0
+    tilt = _product(middle, _skew(force))
+    for i in range(3):
+        a[i] = middle[i, 0] * force[0] + middle[i, 1] * force[1] + middle[i, 2] * force[2]
+        for j in range(3):
+            F[i, j] = turn[j, i]
+            F[6 + i, j] = -dt * tilt[i, j]
+            F[3 + i, j] = -0.5 * dt * dt * tilt[i, j]
+            F[6 + i, 12 + j] = -dt * middle[i, j]
+            F[3 + i, 12 + j] = -0.5 * dt * dt * middle[i, j]
+        F[i, 9 + i] = -dt
+        F[3 + i, 6 + i] = dt
     a[0] += x[12]
     a[1] += x[13]
     a[2] -= vertical
-    F = np.eye(SIZE)
-    F[0:3, 0:3] = turn.T
-    tilt = -dt * (middle @ _skew(force))
-    F[6:9, 0:3] = tilt
-    F[3:6, 0:3] = 0.5 * dt * tilt
-    F[6:9, 12:15] = -dt * middle
-    F[3:6, 12:15] = -0.5 * dt * dt * middle
-    for i in range(3):
-        F[i, 9 + i] = -dt
-        F[3 + i, 6 + i] = dt
     for i in range(2):
         F[6 + i, 15 + i] = dt
         F[3 + i, 15 + i] = 0.5 * dt * dt
         F[8, 15 + i] = dt * x[12 + i] / vertical
         F[5, 15 + i] = 0.5 * dt * dt * x[12 + i] / vertical
-    P[:] = F @ P @ F.T
+    half_way = _product(F, P)
+    for i in range(SIZE):
+        for j in range(SIZE):
+            P[i, j] = 0.0
+            for k in range(SIZE):
+                P[i, j] += half_way[i, k] * F[j, k]
+    turned = _product(R, turn)
     for i in range(3):
         P[i, i] += (noise[0] * dt) ** 2
         P[6 + i, 6 + i] += (noise[1] * dt) ** 2
-        P[9 + i, 9 + i] += noise[2] ** 2 * dt
-        P[12 + i, 12 + i] += noise[3] ** 2 * dt
-    x[0:3] += dt * x[3:6] + 0.5 * dt * dt * a
-    x[3:6] += dt * a
-    R[:] = R @ turn
+        P[9 + i, 9 + i] += noise[2] * noise[2] * dt
+        P[12 + i, 12 + i] += noise[3] * noise[3] * dt
+        x[i] += dt * x[3 + i] + 0.5 * dt * dt * a[i]
+        x[3 + i] += dt * a[i]
+        for j in range(3):
+            R[i, j] = turned[i, j]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _product(A: Array, B: Array) -> Array:  # pragma: no cover - compiled
+    """Return the product of two (n, n) matrices, the first mostly zeros."""
+    n = len(A)
+    out = np.zeros((n, n))
+    for i in range(n):
+        for k in range(n):
+            if A[i, k] != 0.0:
+                for j in range(n):
+                    out[i, j] += A[i, k] * B[k, j]
+    return out
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def deskew(
     points: Array, times: Array, t: Array, R: Array, p: Array, v: Array, omega: Array, arm: Array
 ) -> Array:  # pragma: no cover - compiled

@@ -61,13 +61,13 @@ class PlaneMap:
         _move(keys, cells, self.keys, self.cells)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _key(x: float, y: float, z: float, size: float) -> int:  # pragma: no cover - compiled
     i, j, k = int(math.floor(x / size)), int(math.floor(y / size)), int(math.floor(z / size))
     return ((i + 1048576) << 42) | ((j + 1048576) << 21) | (k + 1048576)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _slot(keys: NDArray[np.int64], key: int) -> int:  # pragma: no cover - compiled
     """Return where `key` is, or the empty place where it belongs."""
     mask = len(keys) - 1
@@ -78,7 +78,7 @@ def _slot(keys: NDArray[np.int64], key: int) -> int:  # pragma: no cover - compi
     return h
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _move(
     keys: NDArray[np.int64], cells: Array, to_keys: NDArray[np.int64], to_cells: Array
 ) -> None:  # pragma: no cover - compiled
@@ -87,10 +87,11 @@ def _move(
             if keys[level, i] != _EMPTY:
                 h = _slot(to_keys[level], keys[level, i])
                 to_keys[level, h] = keys[level, i]
-                to_cells[level, h] = cells[level, i]
+                for k in range(_WIDTH):
+                    to_cells[level, h, k] = cells[level, i, k]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _insert(
     points: Array, birth: float, keys: NDArray[np.int64], cells: Array, used: NDArray[np.int64], sizes: Array
 ) -> None:  # pragma: no cover - compiled
@@ -127,7 +128,7 @@ def _insert(
                 _fit(cell, points[n], size)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fit(cell: Array, point: Array, size: float) -> None:  # pragma: no cover - compiled
     """Fit the plane of a cell that holds `point`: the eigenvector of the smallest eigenvalue of its covariance."""
     n = cell[_COUNT]
@@ -178,7 +179,7 @@ def _fit(cell: Array, point: Array, size: float) -> None:  # pragma: no cover - 
     cell[_PLANE] = 1.0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def accumulate(
     points: Array,
     R: Array,
@@ -195,10 +196,14 @@ def accumulate(
     told: Array,
 ) -> None:  # pragma: no cover - compiled
     """Sum up what the distances of points from their planes say of a pose; see `match`."""
-    A[:] = 0.0
-    b[:] = 0.0
-    N[:] = 0.0
-    told[:] = 0.0
+    for out in (A, N):
+        for i in range(out.shape[0]):
+            for j in range(out.shape[1]):
+                out[i, j] = 0.0
+    for i in range(6):
+        b[i] = 0.0
+    for i in range(4):
+        told[i] = 0.0
     h = np.zeros(6)
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]

@@ -10,7 +10,7 @@ from numba import njit
 from golem.types import Array
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def turned(q: Array, rotvec: Array) -> Array:  # pragma: no cover - compiled
     """Return the orientation (4,) after the turn `rotvec` (3,) [rad], which is given in the axes of `q` (4,)."""
     angle = math.sqrt(rotvec[0] ** 2 + rotvec[1] ** 2 + rotvec[2] ** 2)
@@ -24,7 +24,7 @@ def turned(q: Array, rotvec: Array) -> Array:  # pragma: no cover - compiled
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def turn(p: Array, q: Array) -> Array:  # pragma: no cover - compiled
     """Return the turn (3,) [rad] that takes orientation `p` (4,) to `q` (4,), in the axes of `p`."""
     w = p[0] * q[0] + p[1] * q[1] + p[2] * q[2] + p[3] * q[3]
@@ -32,13 +32,14 @@ def turn(p: Array, q: Array) -> Array:  # pragma: no cover - compiled
     v[0] = p[0] * q[1] - p[1] * q[0] - p[2] * q[3] + p[3] * q[2]
     v[1] = p[0] * q[2] + p[1] * q[3] - p[2] * q[0] - p[3] * q[1]
     v[2] = p[0] * q[3] - p[1] * q[2] + p[2] * q[1] - p[3] * q[0]
-    if w < 0.0:
-        w, v = -w, -v
     size = math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
-    return v * (2.0 if size < 1e-12 else 2.0 * math.atan2(size, w) / size)
+    scale = 2.0 if size < 1e-12 else 2.0 * math.atan2(size, abs(w)) / size
+    for i in range(3):
+        v[i] *= -scale if w < 0.0 else scale
+    return v
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def matrix(q: Array) -> Array:  # pragma: no cover - compiled
     """Return the (3, 3) rotation of an orientation `q` (4,)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -49,7 +50,7 @@ def matrix(q: Array) -> Array:  # pragma: no cover - compiled
     return R
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def between(
     q0: Array, rate0: Array, v0: Array, q1: Array, rate1: Array, v1: Array, arm: Array, share: float
 ) -> tuple[Array, Array]:  # pragma: no cover - compiled
@@ -59,11 +60,28 @@ def between(
     one moment, `q1`, `rate1` and `v1` at the next. `arm` (3,) is the point in the body [m], `share` how far it is from
     one moment to the next.
     """
-    p0, p1 = v0 + matrix(q0) @ np.cross(rate0, arm), v1 + matrix(q1) @ np.cross(rate1, arm)
-    return turned(q0, share * turn(q0, q1)), p0 + share * (p1 - p0)
+    rotvec, p0, p1 = turn(q0, q1), _point_rate(q0, rate0, v0, arm), _point_rate(q1, rate1, v1, arm)
+    for i in range(3):
+        rotvec[i] *= share
+        p0[i] += share * (p1[i] - p0[i])
+    return turned(q0, rotvec), p0
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _point_rate(q: Array, rate: Array, v: Array, arm: Array) -> Array:  # pragma: no cover - compiled
+    """Return the velocity (3,) of a point of a body: v + R (rate x arm)."""
+    R, out = matrix(q), np.empty(3)
+    x, y, z = (
+        rate[1] * arm[2] - rate[2] * arm[1],
+        rate[2] * arm[0] - rate[0] * arm[2],
+        rate[0] * arm[1] - rate[1] * arm[0],
+    )
+    for i in range(3):
+        out[i] = v[i] + (R[i, 0] * x + R[i, 1] * y + R[i, 2] * z)
+    return out
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def sensed(
     q0: Array, v0: Array, q1: Array, v1: Array, mount: Array, gravity: Array, dt: float
 ) -> tuple[Array, Array]:  # pragma: no cover - compiled
@@ -72,6 +90,17 @@ def sensed(
     `q0`, `v0` and `q1`, `v1` are orientation of the body and velocity of the IMU at both, `dt` the time between them
     [s], `mount` (3, 3) the IMU's axes in the body, `gravity` (3,) in the world [m/s^2].
     """
-    rotvec, axes = turn(q0, q1), np.ascontiguousarray(mount.T)
-    R = axes @ np.ascontiguousarray(matrix(turned(q0, 0.5 * rotvec)).T)
-    return axes @ rotvec / dt, R @ ((v1 - v0) / dt - gravity)
+    rotvec, half = turn(q0, q1), np.empty(3)
+    for i in range(3):
+        half[i] = 0.5 * rotvec[i]
+    R = matrix(turned(q0, half))
+    body, rate, force = np.zeros(3), np.zeros(3), np.zeros(3)
+    for i in range(3):
+        for k in range(3):
+            body[i] += R[k, i] * ((v1[k] - v0[k]) / dt - gravity[k])
+    for i in range(3):
+        for k in range(3):
+            rate[i] += mount[k, i] * rotvec[k]
+            force[i] += mount[k, i] * body[k]
+        rate[i] /= dt
+    return rate, force

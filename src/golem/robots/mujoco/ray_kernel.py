@@ -25,7 +25,7 @@ NONE = -1.0
 _TINY = 1e-15
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def cast(
     origin: Array,
     R: Array,
@@ -54,9 +54,11 @@ def cast(
         frames: (., 9) its axes in the world.
         distance: (n,) written [m].
     """
-    distance[:] = np.inf
+    for i in range(len(rays)):
+        distance[i] = np.inf
     o, d = np.zeros(3), np.zeros(3)
-    for g in shapes:
+    for s in range(len(shapes)):
+        g = shapes[s]
         cx, cy, cz = places[g, 0] - origin[0], places[g, 1] - origin[1], places[g, 2] - origin[2]
         r = bounds[g]
         if r > 0.0:
@@ -95,7 +97,7 @@ def cast(
             distance[i] = NONE
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def shaken(rays: Array, noise: Array, deviation: float) -> Array:  # pragma: no cover - compiled
     """Return unit directions (n, 3) off by `noise` (n, 3), standard normal, of `deviation` [rad]."""
     out = np.empty(rays.shape)
@@ -110,7 +112,7 @@ def shaken(rays: Array, noise: Array, deviation: float) -> Array:  # pragma: no 
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def carried(rays: Array, rate: Array, dt: Array, R: Array) -> Array:  # pragma: no cover - compiled
     """Return directions (n, 3) in the world of a sensor that turns.
 
@@ -131,7 +133,7 @@ def carried(rays: Array, rate: Array, dt: Array, R: Array) -> Array:  # pragma: 
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _plane(o: Array, d: Array, size: Array) -> float:  # pragma: no cover - compiled
     if d[2] > -_TINY:
         return NONE
@@ -142,7 +144,7 @@ def _plane(o: Array, d: Array, size: Array) -> float:  # pragma: no cover - comp
     return t
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _box(o: Array, d: Array, size: Array) -> float:  # pragma: no cover - compiled
     """Return the distance to a box by its slabs."""
     enter, leave = -np.inf, np.inf
@@ -158,7 +160,7 @@ def _box(o: Array, d: Array, size: Array) -> float:  # pragma: no cover - compil
     return enter if enter >= 0.0 else leave
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _ball(o: Array, d: Array, z: float, radius: float) -> float:  # pragma: no cover - compiled
     """Return the distance to a ball whose middle is `z` above that of the shape."""
     b = o[0] * d[0] + o[1] * d[1] + (o[2] - z) * d[2]
@@ -170,7 +172,7 @@ def _ball(o: Array, d: Array, z: float, radius: float) -> float:  # pragma: no c
     return -b - root if -b - root >= 0.0 else -b + root
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _round(o: Array, d: Array, size: Array, capsule: bool) -> float:  # pragma: no cover - compiled
     """Return the distance to a cylinder about z of radius `size[0]` and half length `size[1]`, or to a capsule."""
     radius, half, best = size[0], size[1], np.inf
@@ -179,10 +181,12 @@ def _round(o: Array, d: Array, size: Array, capsule: bool) -> float:  # pragma: 
     root = b * b - a * c
     if a > _TINY and root > 0.0:
         root = math.sqrt(root)
-        for t in ((-b - root) / a, (-b + root) / a):
+        for sign in range(-1, 2, 2):
+            t = (-b + sign * root) / a
             if 0.0 <= t < best and abs(o[2] + t * d[2]) <= half:
                 best = t
-    for end in (-half, half):
+    for side in range(-1, 2, 2):
+        end = side * half
         if capsule:
             # The half of the ball beyond the end; both of its crossings may be on it.
             b = o[0] * d[0] + o[1] * d[1] + (o[2] - end) * d[2]
@@ -190,7 +194,8 @@ def _round(o: Array, d: Array, size: Array, capsule: bool) -> float:  # pragma: 
             root = b * b - c
             if root > 0.0:
                 root = math.sqrt(root)
-                for t in (-b - root, -b + root):
+                for sign in range(-1, 2, 2):
+                    t = -b + sign * root
                     beyond = (o[2] + t * d[2] - end) * end
                     if 0.0 <= t < best and beyond >= 0.0:
                         best = t
