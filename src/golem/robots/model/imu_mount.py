@@ -42,7 +42,7 @@ def sensed_base_rate(state: LowState) -> Array:
     return rate
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def torso_motion(quat: Array, rate: Array, waist: float, waist_rate: float) -> tuple[Array, Array]:
     """Return the orientation (4,) wxyz of imu_link and its angular rate (3,) in imu_link [rad/s].
 
@@ -54,7 +54,9 @@ def torso_motion(quat: Array, rate: Array, waist: float, waist_rate: float) -> t
     """
     w, x, y, z = quat[0], quat[1], quat[2], quat[3]
     c, s = math.cos(0.5 * waist), math.sin(0.5 * waist)
-    turned = np.array([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s])
+    turned, turning = np.empty(4), np.empty(3)
+    turned[0], turned[1], turned[2], turned[3] = w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s
     c, s = math.cos(waist), math.sin(waist)
     a, b, yaw = rate[0], rate[1], rate[2]
-    return turned, np.array([c * a + s * b, c * b - s * a, yaw + waist_rate])
+    turning[0], turning[1], turning[2] = c * a + s * b, c * b - s * a, yaw + waist_rate
+    return turned, turning

@@ -124,7 +124,7 @@ class ImuModel:
         return Imu(sample["quat"], sample["gyro"], sample["acc"])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _small_rotation(rotvec: Array) -> Array:
     """Return the unit quaternion of a rotation vector; exact to third order, for angles of a few degrees."""
     x, y, z = 0.5 * rotvec[0], 0.5 * rotvec[1], 0.5 * rotvec[2]
@@ -134,13 +134,13 @@ def _small_rotation(rotvec: Array) -> Array:
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _shaken(tilt: Array, quat: Array, rotvec: Array) -> Array:
     """Return the product of `tilt` (4,), `quat` (4,) and the small rotation `rotvec` (3,)."""
     return _multiply(tilt, _multiply(quat, _small_rotation(rotvec)))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _multiply(p: Array, q: Array) -> Array:
     pw, px, py, pz = p[0], p[1], p[2], p[3]
     qw, qx, qy, qz = q[0], q[1], q[2], q[3]

@@ -124,7 +124,7 @@ def draw_mount(profile: str, seed: int) -> Array:
     return lidar_errors(profile).draw_mount(stream(seed, "lidar/mount"))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def directions(t: Array) -> Array:
     """Return where the sensor looks.
 
