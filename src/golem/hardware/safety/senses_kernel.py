@@ -82,7 +82,8 @@ def looked(
         out[_N + i] = dead
         worst_dead = max(worst_dead, dead)
     if not commanded:
-        out[2 * _N : SCALARS] = numbers[asked_at:sent_at]
+        for i in range(ASKED):
+            out[2 * _N + i] = numbers[asked_at + i]
 
     imu, old = 3 * _N, STATE + 3 * _N
     w, x, y, z = numbers[imu], numbers[imu + 1], numbers[imu + 2], numbers[imu + 3]
