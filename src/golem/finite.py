@@ -43,7 +43,7 @@ def check_measured(state: LowState) -> None:
 
 @njit(cache=True, nogil=True)
 def finite_state(r: Record) -> bool:
-    """Return whether joints and IMU of the shared record are finite, as `check_measured` asks; torques may be anything."""
+    """Return whether joints and IMU of the shared record are finite, as `check_measured` asks; torques may be any."""
     total = 0.0  # x - x is 0, or NaN
     for i in range(len(r.q)):
         total += (r.q[i] - r.q[i]) + (r.dq[i] - r.dq[i])

@@ -123,7 +123,7 @@ class Bus:
         self._pending.pop(topic.name, None)
 
     def deliver(self, t: float) -> bool:
-        """Make every value that is due at time `t` visible; return whether there was one. For the executor, per tick."""
+        """Make every value that is due at time `t` visible, once per tick; return whether there was one."""
         some = False
         for name, queue in self._pending.items():
             # Half a microsecond of slack: ticks are sums of binary fractions.

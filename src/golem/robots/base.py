@@ -144,7 +144,7 @@ class HasStages(Protocol):
     """A simulated robot that offers compiled stages for the 500 Hz chain; see `golem.native`."""
 
     def native(self, joint_offset: Array | None) -> tuple[Stage, Stage] | None:
-        """Return the stages that sense and act, with the same state as the methods of `Robot`; None where there are none.
+        """Return the stages that sense and act, on the state of the methods of `Robot`; None where there are none.
 
         Args:
             joint_offset: (27,) what calibration knows of the encoders' zeros: reported minus true [rad].

@@ -195,10 +195,13 @@ def run_stages(
 
     Args:
         record: address of the shared record.
-        functions, memories: addresses, by stage.
-        first, last: which of them.
+        functions: addresses of the stages.
+        memories: addresses of what they remember.
+        first: the first stage that runs.
+        last: the one after the last.
         t: time of the first tick [s].
-        tick, offset: number of the first tick, and time of number 0 [s]: times of the others are made of these.
+        tick: its number, by which the times of the others are told.
+        offset: time of the tick number 0 [s].
         ticks: how many ticks.
 
     Returns:

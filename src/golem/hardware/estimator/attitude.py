@@ -96,6 +96,6 @@ class GyroBias:
         self._memory = new_record(GYRO_BIAS)[0]
 
     def step(self, state: LowState, dt: float) -> Array:
-        """Take the sample `state`, `dt` [s] after the previous one, and return the bias (3,), the IMU's axes [rad/s]."""
+        """Take the sample `state`, `dt` [s] after the one before; return the bias (3,), axes of the IMU [rad/s]."""
         track_bias(self._memory, state.imu.quat, state.imu.gyro, dt)
         return self._memory["value"].copy()

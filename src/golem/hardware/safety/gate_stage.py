@@ -15,8 +15,8 @@ import numpy as np
 from numba import cfunc, njit
 
 from golem.hardware.safety.base import Counters, Outgoing, SafetyLimits
-from golem.hardware.safety.kernel import UNKNOWN, limited, ordinary_command, rate_state
 from golem.hardware.safety.kernel import ORDINARY as SOUND
+from golem.hardware.safety.kernel import UNKNOWN, limited, ordinary_command, rate_state
 from golem.hardware.safety.memory import GateMemory
 from golem.hardware.safety.sender import SenderMemory
 from golem.hardware.safety.senses import CALM, EVERY, FORGET, GRAVITY_TIME, LOST, SensesMemory

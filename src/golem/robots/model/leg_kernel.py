@@ -88,7 +88,8 @@ def leg_motion(tree: Record, q: Array, dq: Array, field: Array, out: Record) -> 
 
     Args:
         tree: of the twelve leg joints, left leg first.
-        q, dq: of all motors [rad], [rad/s]; the legs are the first twelve.
+        q: of all motors [rad]; the legs are the first twelve.
+        dq: their velocities [rad/s].
         field: (3,) gravity in base_link [m/s^2].
         out: is filled.
     """

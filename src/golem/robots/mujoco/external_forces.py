@@ -22,7 +22,7 @@ PUSHES = np.dtype(
         ("point", "f8", (_MOST, 3)),
     ]
 )
-"""The forces that act: (3,) in the world [N], at a point of the link's frame [m] where they are off its centre of mass."""
+"""The forces that act: (3,) in the world [N]; where one is `off_centre`, at a point in the frame of its link [m]."""
 
 
 @njit(cache=True, nogil=True)

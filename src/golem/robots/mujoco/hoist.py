@@ -81,7 +81,7 @@ class Hoist:
     """
 
     def __init__(self, model: mujoco.MjModel, config: HoistConfig, memory: Records | None = None) -> None:
-        """Hang the body `pelvis` of `model` from its free joint `base`; `memory`, a `HOIST`, None for one of its own."""
+        """Hang `pelvis` of `model` from its free joint `base`; `memory`, a `HOIST`, None for one of its own."""
         joint, pelvis = model.joint("base"), model.body("pelvis").id
         mass = float(model.body_subtreemass[pelvis])
         self.memory = memory = new_record(HOIST) if memory is None else memory
