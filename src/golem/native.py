@@ -1,8 +1,8 @@
 """What compiled stages of the 500 Hz chain share: one record, and how one stage calls the next.
 
 A stage is one step of one module in compiled code, `int stage(record, memory)`. It reads and writes the shared record,
-keeps what it remembers in a record of its own, and returns 0. Anything else says that this tick is not ordinary: the
-stage has then changed nothing, and the module's Python code has to do the tick.
+keeps what it remembers in a record of its own, and returns `ORDINARY`. `UNUSUAL` says that this tick is not: the stage
+has then changed nothing, and the module's Python code has to do the tick.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ Record = Any
 Records = NDArray[Any]
 """A structured array of length one: what owns a record."""
 
-ORDINARY, UNUSUAL = 0, 1
-"""What a stage returns: it has done its tick; Python has to do it."""
+ORDINARY, UNUSUAL, LOOK = 0, 1, 2
+"""What a stage returns: it has done its tick; Python has to do it; it has, and somebody wants to look at the result."""
 STATE = 3 * NUM_JOINTS + 10
 """Numbers of a state: q, dq, tau (27 each), then quat wxyz (4), gyro (3) and acc (3) of the IMU."""
 COMMAND = 5 * NUM_JOINTS
@@ -185,6 +185,8 @@ floats = _pointer(types.float64)
 """In compiled code: the float64 numbers at an address, to be indexed without any check."""
 ints = _pointer(types.int64)
 """The same for int64."""
+words = _pointer(types.int32)
+"""The same for int32."""
 
 
 @intrinsic

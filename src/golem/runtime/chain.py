@@ -18,7 +18,7 @@ from numba import njit
 from golem.interfaces import topics
 from golem.interfaces.payloads import ArmCommand, EstopMessage, GateState, GateStatus, LegCommand
 from golem.middleware.bus import Bus, Deferred, Topic
-from golem.native import ORDINARY, Records, Stage, address, call_stage, new_shared, shared
+from golem.native import LOOK, UNUSUAL, Records, Stage, address, call_stage, new_shared, shared
 from golem.native_messages import base_of, command_of, put_command, put_legs, put_state, state_of
 from golem.runtime.executor import Node
 from golem.types import SIDES, TICK, BaseEstimate, HandState, LowCommand
@@ -210,9 +210,14 @@ def run_stages(
     r = shared(record)
     for k in range(ticks):
         r.t = t if k == 0 else offset + (tick + k) * TICK
+        look = False
         for s in range(first, last):
-            if call_stage(functions[s], record, memories[s]) != ORDINARY:
+            answer = call_stage(functions[s], record, memories[s])
+            if answer == UNUSUAL:
                 return k * _STAGES + s
+            look = look or answer == LOOK
+        if look:
+            return (k + 1) * _STAGES + last
     return ticks * _STAGES + last
 
 

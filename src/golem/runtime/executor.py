@@ -96,6 +96,11 @@ def in_order(placed: Iterable[Placed]) -> list[Node]:
 _NEVER = 1 << 62
 
 
+def when_stepped() -> float:
+    """Return when somebody wants to be asked who only wants to be after a node had its turn; see `Executor.run`."""
+    return math.inf
+
+
 class _Entry:
     """When one node is due: its k-th step happens at the first tick at or after k periods, and when it is woken.
 

@@ -23,7 +23,7 @@ from golem.robots.base import HasGantry, HasLivingSensors, Robot
 from golem.robots.sensors.profiles import load_profile
 from golem.runtime.chain import chain_of
 from golem.runtime.contract_check import ContractCheck
-from golem.runtime.executor import FOREVER, Executor, in_order
+from golem.runtime.executor import FOREVER, Executor, in_order, when_stepped
 from golem.runtime.node_groups import RobotNodes, SafetyNodes, StackNodes, hears_lidar
 from golem.runtime.perception_nodes import LATENCY, detection_requested
 from golem.runtime.skill_table import SkillTable
@@ -142,7 +142,7 @@ class LockstepRunner:
         goal: object,
         timeout: float | None = None,
         realtime: bool = False,
-        watch: Callable[[], None] = lambda: None,
+        watch: Callable[[], None] | None = None,
     ) -> SkillResult:
         """Run a skill to its end in robot time.
 
@@ -151,7 +151,8 @@ class LockstepRunner:
             goal: its goal, or the fields of one of the stack's skills.
             timeout: robot time after which it is given up [s]; see `StackNodes.start`.
             realtime: pace by the wall clock.
-            watch: called after every tick, for judges and viewers.
+            watch: called after every tick, for judges and viewers. One with a method `due` says until when it may be
+                left out, see `Executor.run`.
 
         Returns:
             The result; a safety stop, a timeout or the end of a recording that stands in for the robot ends the skill
@@ -162,12 +163,14 @@ class LockstepRunner:
         self._stack.legs.realtime = realtime
 
         def over() -> bool:
-            watch()
+            if watch is not None:
+                watch()
             ended = run.result is not None and not self._stack.legs.recovering(self.executor.t)
             return ended or self._stack.stopped
 
         try:
-            self.executor.run(FOREVER, over, realtime)
+            due = when_stepped if watch is None else getattr(watch, "due", None)
+            self.executor.run(FOREVER, over, realtime, due)
         except RobotGone as gone:
             result = run.result
             run.cancel()

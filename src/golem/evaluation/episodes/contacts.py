@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from golem.robots.model.table import BASE_LINK
@@ -25,10 +27,16 @@ class ContactWatch:
         self._robot = robot
         mine = (model.body_rootid == model.body(BASE_LINK).id)[model.geom_bodyid]
         floor = np.array([model.geom(i).name == FLOOR for i in range(model.ngeom)])
-        # 1 for what is the robot's, 2 for what it may touch with its feet, 0 for the rest.
-        self._kind: list[int] = np.where(floor, 2, mine).tolist()
+        # 1 for what is the robot's, 8 for what it may touch with its feet, 0 for the rest.
+        kinds = np.where(floor, 8, mine).astype(np.int64)
+        self._kind: list[int] = kinds.tolist()
+        self._told = robot.watch_contacts(kinds)
         self.touched: dict[str, float] = {}
         self.places: dict[str, tuple[float, float, float]] = {}
+
+    def due(self) -> float:
+        """Return when it has to look again [s]: after every tick, unless the robot tells of contacts."""
+        return math.inf if self._told else -math.inf
 
     def __call__(self, t: float) -> None:
         """Look at time `t` [s]."""

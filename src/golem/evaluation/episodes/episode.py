@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,7 @@ from golem.interfaces import topics
 from golem.robots.mujoco.balance import BalanceRecorder
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.shoves import Push, Pusher
+from golem.runtime.executor import when_stepped
 from golem.runtime.lockstep import LockstepRunner, build
 from golem.skills.base import FAULT, Routine, SkillResult
 from golem.skills.context import Context
@@ -193,14 +195,34 @@ class Episode:
 
     def stand(self, seconds: float) -> None:
         """Let the robot take over its weight, then let `seconds` pass; one that never does so is lost."""
-        self.run(READY, until=lambda: not self.robot.on_gantry)
+        self.run(READY, until=lambda: not self.robot.on_gantry, due=when_stepped)
         self._hangs = self.robot.on_gantry
         self.run(seconds)
 
-    def run(self, seconds: float, until: Callable[[], bool] = lambda: False) -> None:
-        """Let up to `seconds` of robot time pass; a fall, a stop or `until()` ends it early."""
+    def run(
+        self,
+        seconds: float,
+        until: Callable[[], bool] | None = None,
+        due: Callable[[], float] | None = None,
+    ) -> None:
+        """Let up to `seconds` of robot time pass; a fall, a stop or `until()` ends it early.
+
+        Args:
+            seconds: how long [s].
+            until: asked after every tick.
+            due: until when `until` may be left out [s], see `Executor.run`; None asks it after every tick.
+        """
+        if until is None:
+            until, due = lambda: False, when_stepped
+        ask, later = until, due
+        both = None if later is None else lambda: min(later(), self._due())
         if not self.over:
-            self.running.executor.run(self.t + seconds, lambda: self._look() or until())
+            self.running.executor.run(self.t + seconds, lambda: self._look() or ask(), due=both)
+
+    def _due(self) -> float:
+        """Return when the judges want to look again [s]."""
+        odometry = math.inf if self._odometry is None else self._odometry.due
+        return min(self.recorder.due, self._pusher.due, odometry)
 
     def push(self, push: Push) -> None:
         """Begin `push` now; it goes on while the episode runs."""

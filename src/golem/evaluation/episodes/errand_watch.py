@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from golem.evaluation.episodes.oracle import Oracle
 from golem.interfaces import topics
 from golem.middleware.bus import News
@@ -28,6 +30,10 @@ class ErrandWatch:
         if self.recorder is not None:
             self.recorder(self._running.executor.t)
         return False
+
+    def due(self) -> float:
+        """Return when it has to look again [s], at the latest."""
+        return math.inf if self.recorder is None else self.recorder.due
 
     def last_picture(self) -> bytes:
         """Return the picture of the decisive moment; else of now."""

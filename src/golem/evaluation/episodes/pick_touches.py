@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import mujoco
@@ -44,12 +45,18 @@ class PickTouches:
         ignored = np.array([model.geom(i).name == FLOOR for i in range(model.ngeom)])
         ignored |= np.isin(model.geom_bodyid, list(screws))
         self._mine, self._ignored = mine, ignored
+        # A contact counts if one of its two is the robot's, 1, and none is ignored, 8.
+        self._told = robot.watch_contacts(np.where(ignored, 8, mine).astype(np.int64))
         spots = np.array([f.position for f in fasteners]).reshape(-1, 3)
         self._spots = spots @ T_world_odom[:3, :3].T + T_world_odom[:3, 3]
         self._force: Array = np.zeros(6)
         self.itself: set[str] = set()
         self.world: set[str] = set()
         self.force = 0.0
+
+    def due(self) -> float:
+        """Return when it has to look again [s]: after every tick, unless the robot tells of contacts."""
+        return math.inf if self._told else -math.inf
 
     def __call__(self) -> None:
         """Look now."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from golem.evaluation.base import DONE
@@ -46,6 +48,10 @@ class PickWatch(ErrandWatch):
         self._side: Side = "right"
         self._attempt = 0
         self._stage = ""
+
+    def due(self) -> float:
+        """Return when it has to look again [s]; the way of a hand that pulls is kept by the tick."""
+        return -math.inf if self._stage == "extract" else min(super().due(), self._touches.due())
 
     def __call__(self) -> None:
         """Look on."""

@@ -37,6 +37,11 @@ class SimulatedOdometry:
         self._T_odom_world = np.linalg.inv(robot.truth.T_world_odom)
         self._next = 0.0
 
+    @property
+    def due(self) -> float:
+        """When the next pose is due [s]."""
+        return self._next
+
     def __call__(self, t: float) -> None:
         """Publish a pose, if one is due at time `t` [s]."""
         if t < self._next - 1e-9:

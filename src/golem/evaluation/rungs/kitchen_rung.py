@@ -133,7 +133,7 @@ class KitchenRung(Rung[O]):
             if hangs is not None:
                 return hangs
             errand = self.errand(spec, running, robot, robot.scene.kitchen, oracle)
-            running.executor.run(running.executor.t + SETTLE, errand.watch.look)
+            running.executor.run(running.executor.t + SETTLE, errand.watch.look, due=errand.watch.due)
             recorder = errand.watch.recorder
             if artefacts is not None and recorder is not None:
                 recorder.trace().save(artefacts / TRACE)

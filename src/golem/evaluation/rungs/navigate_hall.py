@@ -57,6 +57,10 @@ class HallWalk:
         self._step: NavStep | None = None
         self._since = self._drawn = -np.inf
 
+    def due(self) -> float:
+        """Return when the next place of the track is due [s]."""
+        return self._drawn + EVERY
+
     def __call__(self, episode: Episode) -> None:
         """Look at the newest step of the navigator, and at the robot."""
         step, before, t = episode.running.bus.latest(topics.NAV_STEP), self._step, episode.t
@@ -186,7 +190,7 @@ class NavigateRung(Rung[NavigateOptions]):
         if not episode.over:
             frame = "map" if known else "odom"
             episode.start("navigate", NavigateGoal(goal.x, goal.y, goal.yaw, frame, TIMEOUT))
-        episode.run(TIMEOUT + SETTLE, look)
+        episode.run(TIMEOUT + SETTLE, look, lambda: min(contacts.due(), walked.due()))
         return judge(spec, episode, goal, walked, contacts)
 
     def _stack(self, method: str, profile: str, overrides: Mapping[str, str]) -> Stack:

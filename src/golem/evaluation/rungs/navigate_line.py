@@ -18,6 +18,7 @@ from golem.evaluation.episodes.simulated_odometry import SimulatedOdometry
 from golem.evaluation.rungs.leg_rung import NO_WALKER, LegRung, PlantOptions
 from golem.interfaces import topics
 from golem.robots.mujoco.balance import TRACE
+from golem.runtime.executor import when_stepped
 from golem.skills.walk import WalkGoal
 from golem.types import PlanarPose
 
@@ -74,8 +75,10 @@ class NavigateLine(LegRung[LineOptions]):
                 episode.start("walk", goal)
             for _ in range(PICTURES - 1):
                 strip.keep(episode.t, np.zeros(3))
-                episode.run(DISTANCE / PICTURES / 0.4, until=lambda: episode.result is not None)
-            episode.run(TIMEOUT, until=lambda: episode.result is not None)
+                episode.run(
+                    DISTANCE / PICTURES / 0.4, until=lambda: episode.result is not None, due=when_stepped
+                )
+            episode.run(TIMEOUT, until=lambda: episode.result is not None, due=when_stepped)
             strip.keep(episode.t, np.zeros(3))
             if artefacts is not None:
                 episode.recorder.trace().save(artefacts / TRACE)

@@ -35,6 +35,7 @@ from golem.robots.mujoco.balance import TRACE, BalanceRecorder, BalanceTrace
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.gl import shared_context
 from golem.robots.worlds.conditions import Conditions, LayoutKind, draw_conditions, world_stream
+from golem.runtime.executor import when_stepped
 from golem.runtime.lockstep import LockstepRunner
 from golem.skills.base import FAULT, SkillResult
 from golem.skills.pick_config import PickGoal
@@ -194,11 +195,11 @@ def conditions_of(layout: LayoutKind, spec: TrialSpec) -> Conditions:
 
 def let_go(running: LockstepRunner, robot: MujocoRobot) -> TrialOutcome | None:
     """Wait until a robot stands without its band, and for a while more; return the outcome of one that stays in it."""
-    running.executor.run(READY, lambda: not robot.on_gantry)
+    running.executor.run(READY, lambda: not robot.on_gantry, due=when_stepped)
     if robot.on_gantry:
         legs = f"lower_body: {running.stack.choice('lower_body').use}"
         return TrialOutcome(False, HANGS.stage, legs, HANGS.detail)
-    running.executor.run(running.executor.t + RELEASED)
+    running.executor.run(running.executor.t + RELEASED, due=when_stepped)
     return None
 
 
@@ -258,7 +259,7 @@ class PickRung(Rung[PickOptions]):
             touches = PickTouches(robot, before, oracle.T_world_odom)
             watch = PickWatch(running, oracle, BalanceRecorder(robot) if self.balances else None, touches)
             result = running.execute("pick", self._goal, watch=watch)
-            running.executor.run(running.executor.t + SETTLE, watch.look)
+            running.executor.run(running.executor.t + SETTLE, watch.look, due=watch.due)
             if artefacts is not None and watch.recorder is not None:
                 watch.recorder.trace().save(artefacts / TRACE)
             outcome = judge_pick(stack, result, oracle, watch, lost(running, watch.recorder))

@@ -17,6 +17,7 @@ from golem.evaluation.episodes.scripted_motion import ArmMotion, ScriptedMotion
 from golem.evaluation.rungs.leg_rung import LegRung, PlantOptions
 from golem.robots.mujoco.balance import TRACE, BalanceTrace
 from golem.robots.mujoco.shoves import DIRECTIONS, Push, rod
+from golem.runtime.executor import when_stepped
 from golem.skills.runner import FAULT
 
 PEAK = (22.1, 6.9)
@@ -60,7 +61,7 @@ class PushRung(LegRung[PlantOptions]):
             start = episode.t
             episode.push(push)
             self.pursue(episode, strip)
-            episode.run(PATIENCE, until=lambda: episode.recorder.quiet >= QUIET)
+            episode.run(PATIENCE, until=lambda: episode.recorder.quiet >= QUIET, due=when_stepped)
             strip.keep(episode.t, episode.force)
             trace = episode.recorder.trace()
             if artefacts is not None:

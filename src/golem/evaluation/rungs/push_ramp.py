@@ -11,6 +11,7 @@ from golem.evaluation.episodes.episode import Episode
 from golem.evaluation.episodes.film_strip import FilmStrip
 from golem.evaluation.rungs.push import MOMENTS, SETTLE, PushRung
 from golem.robots.mujoco.shoves import DIRECTIONS, Push, ramp
+from golem.runtime.executor import when_stepped
 
 RATE = 40.0
 """Growth of the force [N/s] [own: a person's; the paper does not say]."""
@@ -40,7 +41,7 @@ class PushRampRung(PushRung):
     def pursue(self, episode: Episode, strip: FilmStrip) -> None:
         """Push until the balance is lost, and keep pictures of what comes then."""
         strip.keep(episode.t, episode.force)
-        episode.run(MAX_FORCE / RATE, until=lambda: episode.recorder.margin < 0.0)
+        episode.run(MAX_FORCE / RATE, until=lambda: episode.recorder.margin < 0.0, due=when_stepped)
         strip.keep(episode.t, episode.force)
         episode.let_go()
         for seconds in MOMENTS[:-1]:

@@ -11,6 +11,7 @@ from golem.evaluation.episodes.episode import Episode, Loss
 from golem.evaluation.episodes.simulated_odometry import SimulatedOdometry
 from golem.evaluation.rungs.leg_rung import LegRung, PlantOptions, judged
 from golem.evaluation.rungs.walk_twist import SETTLE
+from golem.runtime.executor import when_stepped
 from golem.skills.walk import WalkGoal
 from golem.types import PlanarPose
 
@@ -38,7 +39,7 @@ class WalkStop(LegRung[PlantOptions]):
         if episode.loss is not None:
             return judged(spec.method, episode.loss, {})
         episode.start("walk", WalkGoal(goal.x, goal.y, goal.yaw, "odom", TIMEOUT))
-        episode.run(TIMEOUT + 1.0, until=lambda: episode.result is not None)
+        episode.run(TIMEOUT + 1.0, until=lambda: episode.result is not None, due=when_stepped)
         episode.run(AFTER)
         result, loss = episode.result, episode.loss
         if loss is not None or result is None:

@@ -186,6 +186,11 @@ class BalanceRecorder:
         self.quiet = 0.0
         self.contact: NDArray[np.bool_] = np.zeros(2, dtype=bool)
 
+    @property
+    def due(self) -> float:
+        """When the next sample is due [s]."""
+        return self._next
+
     def __call__(self, t: float, force: Array | None = None) -> None:
         """Sample at time `t` [s], if a sample is due, with the (3,) `force` of the push [N]."""
         if t < self._next - 1e-9:

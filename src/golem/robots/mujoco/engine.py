@@ -25,7 +25,7 @@ from golem.robots.mujoco.lidar_sensor import LidarMoment, LidarSensor
 from golem.robots.mujoco.motors import Motors
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP, Scene, build_scene
 from golem.robots.mujoco.truth import Truth
-from golem.robots.mujoco.twin_stages import TWIN, act_code, delicate, put_simulation, sense_code
+from golem.robots.mujoco.twin_stages import TWIN, act_code, delicate, put_simulation, put_watch, sense_code
 from golem.robots.sensors.auto_exposure import AutoExposure
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import StereoDepth
@@ -109,6 +109,7 @@ class MujocoRobot:
             memory["motors"],
         )
         self._rig: CameraRig | None = None
+        self._watched: NDArray[np.int64] | None = None
         self._seed = seed
         self._lidar: LidarSensor | None = None
 
@@ -149,10 +150,30 @@ class MujocoRobot:
 
     def native(self, joint_offset: Array | None) -> tuple[Stage, Stage] | None:
         """Return the compiled stages that sense and act; see `HasStages`. None where the world needs Python."""
-        if self.scene.people or type(self)._step is not MujocoRobot._step:
+        if not self._compiled:
             return None
         self._memory["joint_offset"] = 0.0 if joint_offset is None else joint_offset
         return Stage(sense_code(), self._memory), Stage(act_code(), self._memory)
+
+    @property
+    def _compiled(self) -> bool:
+        """Whether nothing in this world needs Python while time passes."""
+        return not self.scene.people and type(self)._step is MujocoRobot._step
+
+    def watch_contacts(self, kinds: NDArray[np.int64]) -> bool:
+        """Have compiled ticks end where a contact is to be looked at: for judges.
+
+        Args:
+            kinds: by geom; a contact counts if the sum of its two is 1 or 2. Kept, and read at every tick.
+
+        Returns:
+            Whether they do; where not, or where ticks are not compiled, who wants to see every contact looks at every
+            tick.
+        """
+        if self._watched is not None or not self._compiled:
+            return False
+        self._watched = kinds
+        return put_watch(self._memory, self.data, kinds)
 
     def take_hand_command(self, side: Side, command: HandCommand) -> None:
         """Take the command of one hand; see `HasStages`."""

@@ -119,6 +119,11 @@ class Pusher:
             self._apply(self._push[0], np.zeros(3))
         self._push = None
 
+    @property
+    def due(self) -> float:
+        """When `drive` has to be called next [s]: at once while a push goes on."""
+        return math.inf if self._push is None else -math.inf
+
     def drive(self, t: float) -> None:
         """Apply the push for the tick that begins at `t` [s]; call it at every tick."""
         if self._push is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 from functools import cache
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 from numba import cfunc, njit
 
 from golem.native import (
+    LOOK,
     ORDINARY,
     STAGE,
     UNUSUAL,
@@ -23,8 +25,10 @@ from golem.native import (
     library_function,
     shared,
     view,
+    words,
 )
 from golem.robots.model.imu_mount import TORSO, torso_motion
+from golem.robots.mujoco.c_structs import data_struct, struct
 from golem.robots.mujoco.external_forces import PUSHES, apply_pushes, clear_pushes
 from golem.robots.mujoco.hand_servos import HAND, drive_hand, move_reference, read_hand
 from golem.robots.mujoco.hoist import HOIST, pull
@@ -62,6 +66,12 @@ TWIN = np.dtype(
         ("fingers", "i8", (4,)),
         ("near", "f8"),
         ("fine", "i8"),
+        # Contacts that somebody wants to see; see `MujocoRobot.watch_contacts`.
+        ("kinds", "i8"),
+        ("contact_count", "i8"),
+        ("contacts", "i8"),
+        ("contact_size", "i8"),
+        ("contact_geoms", "i8"),
         ("sealed", "i8"),
         ("seal_q", "i8"),
         ("seal_v", "i8"),
@@ -80,6 +90,30 @@ def put_simulation(memory: np.ndarray[Any, Any], model: mujoco.MjModel, data: mu
     memory["model"], memory["data"] = model._address, data._address
     for name in _ARRAYS:
         memory[name] = address(getattr(data, name))
+
+
+def put_watch(memory: np.ndarray[Any, Any], data: mujoco.MjData, kinds: np.ndarray[Any, Any]) -> bool:
+    """Write into `memory`, a `TWIN`, that contacts by `kinds` are watched; return whether that can be."""
+    found, contact = data_struct(data), struct("mjContact")
+    if found is None:
+        return False
+    place = ctypes.addressof(found)
+    memory["kinds"] = address(kinds)
+    memory["contact_count"] = place + type(found).ncon.offset
+    memory["contacts"] = place + type(found).contact.offset
+    memory["contact_size"], memory["contact_geoms"] = ctypes.sizeof(contact), contact.geom.offset
+    return True
+
+
+@njit(cache=True, nogil=True)
+def touching(m: Record) -> bool:
+    """Return whether there is a contact that is watched; `m` is a `TWIN`."""
+    kinds, first = ints(m.kinds), ints(m.contacts)[0] + m.contact_geoms
+    for i in range(words(m.contact_count)[0]):
+        geoms = words(first + i * m.contact_size)
+        if 1 <= kinds[geoms[0]] + kinds[geoms[1]] <= 2:
+            return True
+    return False
 
 
 @njit(cache=True, nogil=True)
@@ -166,7 +200,7 @@ def _act(record: int, memory: int) -> int:
     if r.t - r.command_t > COMMAND_AGE or delicate(m) != (m.fine != 0):
         return UNUSUAL
     let_pass(r, m)
-    return ORDINARY
+    return LOOK if m.kinds and touching(m) else ORDINARY
 
 
 @cache
