@@ -13,7 +13,6 @@ from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-from golem.evaluation.speed.plan_queries import queries
 
 from golem.capabilities.arms.postures import POSTURES
 from golem.capabilities.arms.quick_ik import QuickIK
@@ -27,6 +26,7 @@ from golem.capabilities.planning.base import PlanRefused
 from golem.capabilities.planning.joint_space import PlanningRobot
 from golem.capabilities.planning.rrt_connect import RrtConnect
 from golem.evaluation.speed.navigation_bench import navigation_times
+from golem.evaluation.speed.plan_bench import queries
 from golem.runtime.lockstep import build
 from golem.stack import load_stack
 from golem.types import Array
