@@ -217,7 +217,7 @@ class Executor:
                     return 0
                 if entry.due < due:
                     due = entry.due
-        if came or due <= self._tick:
+        if came or due <= self._tick or until <= t:
             return min(1, due - self._tick)
         delivery = self._bus.next_delivery()
         ticks = min(due - self._tick, math.ceil((until - t) / TICK - 1e-6))
