@@ -90,10 +90,10 @@ FAULTS = {
         "cap = (1.2 * limits.speed / both).min(axis=1)",
         ("tests/capabilities/planning/test_rrt_connect.py",),
     ),
-    "memory-learns-slowly": PlantedFault(
-        "capabilities/memory/object_update.py",
-        "row[PLACE] += fused / variance * (place - row[PLACE])",
-        "row[PLACE] += 0.1 * fused / variance * (place - row[PLACE])",
+    "memory-rivals-itself": PlantedFault(
+        "capabilities/memory/rivals.py",
+        "for k in chosen if records.label(k) != label",
+        "for k in chosen if records.label(k) == label",
         ("tests/capabilities/memory/test_object_map.py",),
     ),
     "skill-feels-late": PlantedFault(
@@ -120,10 +120,10 @@ FAULTS = {
         "mean(axis=0) - (t - then) * self.velocity",
         ("tests/capabilities/navigation/test_movers.py",),
     ),
-    "collision-thin-cells": PlantedFault(
+    "collision-clears-the-rest": PlantedFault(
         "capabilities/collision/obstacles.py",
-        "off, reach = balls[:, :3] - sphere[:3], sphere[3] + margin + balls[:, 3]",
-        "off, reach = balls[:, :3] - sphere[:3], sphere[3] + margin",
+        'near |= np.einsum("ij,ij->i", off, off) < reach * reach',
+        'near |= np.einsum("ij,ij->i", off, off) > reach * reach',
         ("tests/capabilities/collision/test_scene_cloud.py",),
     ),
     "odometry-begins-moving": PlantedFault(

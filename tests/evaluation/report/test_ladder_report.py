@@ -9,6 +9,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from tests.evaluation.conftest import fakes
 
 from golem.errors import MissingExtra
 from golem.evaluation.harness.ladder import LadderConfig, LadderResult, run_ladder
@@ -58,10 +59,12 @@ def read(result: LadderResult) -> tuple[str, Page]:
     return html, page
 
 
-@pytest.fixture
-def compared(fake: Callable[..., LadderConfig], monkeypatch: pytest.MonkeyPatch) -> LadderResult:
-    monkeypatch.setitem(PAPER, ("fake", "good"), PAPER["tether", "visual_servo"])
-    return run_ladder(fake("poor", "good", "faulty", n=20))
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory: pytest.TempPathFactory) -> LadderResult:
+    """A ladder that was run once, for tests that only read."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(PAPER, ("fake", "good"), PAPER["tether", "visual_servo"])
+        return run_ladder(fakes(patch, tmp_path_factory.mktemp("ladder"))("poor", "good", "faulty", n=20))
 
 
 def test_the_report_is_one_file_without_scripts(compared: LadderResult) -> None:
@@ -73,6 +76,7 @@ def test_the_report_is_one_file_without_scripts(compared: LadderResult) -> None:
     assert re.search(r"fill: ?#(?!f)", html.partition("</style>")[2]) is None, "colours follow light and dark"
 
 
+@pytest.mark.usefixtures("fake")  # the command asks the rung for its options
 def test_the_report_says_what_was_run_and_found(compared: LadderResult) -> None:
     _, page = read(compared)
     assert compared.config.command() in page.words
