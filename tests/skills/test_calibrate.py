@@ -25,7 +25,6 @@ def test_more_views_get_more_time() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.long
 @pytest.mark.timeout(900)
 def test_a_robot_finds_its_errors_and_uses_them(tmp_path: Path) -> None:
     file = tmp_path / "calibration.json"

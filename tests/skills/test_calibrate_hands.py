@@ -35,6 +35,7 @@ def test_the_head_comes_first(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(1800)
 def test_a_robot_finds_where_its_palm_cameras_sit(tmp_path: Path) -> None:
     file = tmp_path / "calibration.json"

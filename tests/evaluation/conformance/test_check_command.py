@@ -24,6 +24,10 @@ class Mine(Centroid):
 """
 
 
+LONG = {"physx": pytest.mark.long}
+"""Modules whose promises take half a minute, and that have tests of their own."""
+
+
 def test_every_slot_has_a_suite_whose_promises_are_sentences() -> None:
     assert set(SUITES) == set(SLOTS)
     for slot in SUITES:
@@ -35,7 +39,12 @@ def test_every_slot_has_a_suite_whose_promises_are_sentences() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("slot", "use"),
-    [(slot, use) for slot in SUITES for use in registry.names(slot) if (slot, use) not in UNCHECKED],
+    [
+        pytest.param(slot, use, marks=LONG.get(use, ()))
+        for slot in SUITES
+        for use in registry.names(slot)
+        if (slot, use) not in UNCHECKED
+    ],
 )
 def test_every_shipped_module_keeps_its_promises(slot: str, use: str) -> None:
     report = examine(candidate(slot, use))
