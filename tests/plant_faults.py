@@ -48,11 +48,7 @@ FAULTS = {
         "hardware/safety/monitor.py",
         "return q + dq * np.abs(dq) / (deceleration + deceleration)",
         "return q + dq * np.abs(dq) / (4.0 * deceleration)",
-        (
-            "tests/hardware/safety/test_monitor.py",
-            "tests/hardware/safety/test_kernel.py",
-            "tests/hardware/safety",
-        ),
+        ("tests/hardware/safety/test_monitor.py", "tests/hardware/safety/test_kernel.py"),
     ),
     "estimator-turns-backwards": PlantedFault(
         "hardware/estimator/random_walk.py",
