@@ -27,13 +27,13 @@ kernels: venv-dev  ## compile the numba kernels, once for all tests
 	scripts/compile_kernels.sh
 
 lint: venv-dev  ## style and types
-	$(BIN)/ruff check src tests
-	$(BIN)/ruff format --check src tests
+	$(BIN)/ruff check src tests scripts
+	$(BIN)/ruff format --check src tests scripts
 	$(BIN)/pyright
 
 format: venv-dev  ## rewrite the sources in the project's style
-	$(BIN)/ruff check --fix src tests
-	$(BIN)/ruff format src tests
+	$(BIN)/ruff check --fix src tests scripts
+	$(BIN)/ruff format src tests scripts
 
 docs: venv-docs  ## build the documentation into site/
 	$(BIN)/mkdocs build --strict

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections import Counter
 
 import pytest
+from scripts.topics_page import page
 from tests.conftest import REPOSITORY
 
 from golem.interfaces import public
-from golem.interfaces.public_page import page
 from golem.robots.sensors.cameras import CAMERAS
 
 
 def test_the_documentation_is_that_of_the_table() -> None:
     path = REPOSITORY / "docs" / "reference" / "topics.md"
-    advice = "write it anew: python -m golem.interfaces.public_page docs/reference/topics.md"
+    advice = "write it anew: python scripts/topics_page.py docs/reference/topics.md"
     assert path.read_text(encoding="utf-8") == page(), advice
 
 

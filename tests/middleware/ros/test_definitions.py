@@ -17,8 +17,10 @@ import pytest
 
 pytest.importorskip("rosbags")
 
+from scripts import generate_messages as generate
+
 from golem.interfaces.payloads import GateState, GripState
-from golem.middleware.ros import definitions, generate, msgs
+from golem.middleware.ros import definitions, msgs
 
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGE = definitions.SHARE / "golem_interfaces"
@@ -87,7 +89,7 @@ def test_states_are_those_of_the_software(name: str, states: type[StrEnum]) -> N
 
 
 def test_the_generated_files_are_current() -> None:
-    # If this fails: python -m golem.middleware.ros.generate
+    # If this fails: python scripts/generate_messages.py
     kept = {path.name: path.read_text() for path in generate.MSGS.glob("*.*") if path.suffix != ".py"}
     assert kept == generate.files()
 

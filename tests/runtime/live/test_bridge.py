@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from scripts.topics_page import page
 from tests.runtime.live.conftest import Live
 
 from golem.interfaces import public
-from golem.interfaces.public_page import page
 from golem.interfaces.ros_convert import header, seconds
 from golem.interfaces.rows import TopicRow
 from golem.middleware.bags.reader import Bag

@@ -1,6 +1,6 @@
 """Message classes by ROS package, e.g. `from golem.middleware.ros.msgs.sensor_msgs import Image`.
 
-A class is made when it is first asked for, from `definitions.json`; `golem.middleware.ros.generate` writes it and the
+A class is made when it is first asked for, from `definitions.json`; `scripts/generate_messages.py` writes it and the
 stubs of the packages.
 """
 

@@ -1,4 +1,4 @@
-"""The page of the faults that were tried, from a run of `golem faults`: `python -m golem.evaluation.faults.page`."""
+"""The page of the faults that were tried, from a run of `golem faults`: `python scripts/faults_page.py`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def page(records: Sequence[TrialRecord]) -> str:
         f"is {', '.join(postures)}, one trial each.\n"
         f"{_missing(len(records), len(by_fault) * len(postures))}"
         f"{_commits(records)}"
-        "`python -m golem.evaluation.faults.page` writes this page from its records.\n",
+        "`python scripts/faults_page.py` writes this page from its records.\n",
         CRITERIA,
         _summary(records, postures).markdown() + "\n",
     ]

@@ -7,8 +7,8 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scripts.gate_margins import ROWS, MarginWatch
 
-from golem.evaluation.faults.margins import ROWS, MarginWatch
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.types import NUM_JOINTS, TICK, Imu, LowState

@@ -1,4 +1,4 @@
-"""Takes the pictures of the documentation: `python -m golem.dashboard.pictures docs/images`."""
+"""Takes the pictures of the documentation: `python scripts/pictures.py docs/images`."""
 
 from __future__ import annotations
 

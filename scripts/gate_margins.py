@@ -1,4 +1,4 @@
-"""How near ordinary work comes to the gate's plausibility limits: `python -m golem.evaluation.faults.margins`.
+"""How near ordinary work comes to the gate's plausibility limits: `python scripts/gate_margins.py`.
 
 A second judge of the senses looks on, with the gate's own code and a memory of its own, while robots pick, stand, walk
 and are shoved. What it prints is the table of docs/decisions/control.md.

@@ -1,4 +1,4 @@
-"""Writes docs/reference/topics.md from the table: `python -m golem.interfaces.public_page docs/reference/topics.md`."""
+"""Writes docs/reference/topics.md from the table: `python scripts/topics_page.py docs/reference/topics.md`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WHO: dict[Role, str] = {
 SHORT: dict[Role, str] = {"robot": "robot", "safety": "safety", "stack": "up", "user": "you"}
 INTRODUCTION = """# Interfaces
 
-`python -m golem.interfaces.public_page docs/reference/topics.md` writes this page from `golem.interfaces.public`.
+`python scripts/topics_page.py docs/reference/topics.md` writes this page from `golem.interfaces.public`.
 The processes create their endpoints from the same table, and tests compare the table with running processes. Names are
 those of ROS 2. On the wire the topic `/x` is `rt/x`: `/lowstate` is the vendor's `rt/lowstate`.
 

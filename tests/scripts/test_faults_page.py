@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from scripts.faults_page import page
+
 from golem.evaluation.faults.catalogue import FAULTS
-from golem.evaluation.faults.page import page
 from golem.evaluation.harness.records import SCHEMA, TrialRecord
 
 NAMES = list(FAULTS)[:2]
