@@ -184,7 +184,7 @@ def page() -> str:
     """Return the page, in Markdown."""
     lines = [
         "# Safety: every reason\n",
-        "`python -m golem.hardware.safety.reasons docs/reference/safety.md` writes this page from the gate's own",
+        "`python scripts/safety_page.py docs/reference/safety.md` writes this page from the gate's own",
         "numbers (profile `urdf`).\n",
         "| state | what the motors are told |",
         "| --- | --- |",
