@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.dds.participant import connect
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.node import RosNode
 

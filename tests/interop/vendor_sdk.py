@@ -91,8 +91,8 @@ def call_loco(domain: int, calls: int) -> dict[str, float]:
 def read_with_ours(domain: int, seconds: float) -> dict[str, float]:
     """Read with golem.middleware, which checks every state."""
     from golem.middleware.dds.base import Qos
+    from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
-    from golem.middleware.dds.participant import connect
     from golem.middleware.wire import convert, hg
     from golem.middleware.wire.struct_layout import WireError
 

@@ -22,8 +22,9 @@ pytest.importorskip("rosbags")
 from golem.interfaces.public import topic
 from golem.middleware.bags.reader import Bag
 from golem.middleware.dds.base import Qos, Reader, Sample, Writer
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.dds.participant import CycloneParticipant, connect
+from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.msgs.sensor_msgs import Image
 from golem.middleware.ros.msgs.std_msgs import Header, String

@@ -32,8 +32,8 @@ def pair(request: pytest.FixtureRequest, domain: int) -> Iterator[Pair]:
         members: Pair = shared.participant(), shared.participant()
     else:
         pytest.importorskip("cyclonedds")
+        from golem.middleware.dds.connect import connect
         from golem.middleware.dds.domain import DdsConfig
-        from golem.middleware.dds.participant import connect
 
         members = connect(DdsConfig(domain)), connect(DdsConfig(domain))
     yield members

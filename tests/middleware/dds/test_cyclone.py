@@ -22,9 +22,10 @@ from tests.middleware.dds.test_contract import TYPE, eventually, texts
 from golem.errors import ConfigError, MissingExtra
 from golem.middleware.dds import checks, discovery, domain, endpoints, library
 from golem.middleware.dds.base import ENCAPSULATION, DdsError, Qos, Sample
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig, configuration
 from golem.middleware.dds.interfaces import Interface, find_interface, interfaces
-from golem.middleware.dds.participant import CycloneParticipant, connect
+from golem.middleware.dds.participant import CycloneParticipant
 
 SAMPLE = ENCAPSULATION + b"text"
 
@@ -226,7 +227,7 @@ def test_another_series_of_cyclone_is_refused(monkeypatch: pytest.MonkeyPatch) -
 STALLED = """
 import sys
 from golem.middleware.dds.base import Qos
-from golem.middleware.dds.participant import connect
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 reader = connect(DdsConfig(int(sys.argv[1]))).reader("rt/a", sys.argv[2], Qos(depth=1))
 sys.stdin.read()
@@ -255,7 +256,7 @@ OTHER = """
 import sys
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.checks import wait_for_peer
-from golem.middleware.dds.participant import connect
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 participant = connect(DdsConfig(int(sys.argv[1])))
 writer = participant.writer("rt/a", sys.argv[2], Qos(depth=None))

@@ -22,7 +22,7 @@ VICTIM = """
 import sys
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.checks import wait_for_peer
-from golem.middleware.dds.participant import connect
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 own, others = sys.argv[2:]
 participant = connect(DdsConfig(int(sys.argv[1])))

@@ -24,8 +24,8 @@ from tests.middleware.ros.samples import random_message
 
 from golem.interfaces import public
 from golem.middleware.dds.base import Qos
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.dds.participant import connect
 from golem.middleware.ros.codec import codec, serialize
 
 PEER = Path(__file__).parent / "peer"

@@ -20,7 +20,7 @@ WRITER = """
 import json, sys, time
 from golem.middleware.dds.base import ENCAPSULATION, SENSOR, Qos
 from golem.middleware.dds.checks import wait_for_peer
-from golem.middleware.dds.participant import connect
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 participant = connect(DdsConfig(7, sys.argv[1]))
 states, images = participant.writer("rt/state", "T", Qos(depth=8)), participant.writer("rt/image", "T", SENSOR)
@@ -45,7 +45,7 @@ READER = """
 import json, sys, time
 from golem.middleware.dds.base import SENSOR, Qos
 from golem.middleware.dds.checks import wait_for_peer
-from golem.middleware.dds.participant import connect
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 participant = connect(DdsConfig(7, sys.argv[1]))
 times, images = [], []
@@ -69,7 +69,7 @@ FINDER = """
 import sys, time
 from golem.middleware.dds.base import Qos
 from golem.middleware.dds.checks import wait_for_peer
-from golem.middleware.dds.participant import connect
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 _, interface, kind, *peers = sys.argv
 participant = connect(DdsConfig(7, interface, tuple(peers)))

@@ -99,8 +99,8 @@ def world(request: pytest.FixtureRequest, domain: int) -> Iterator[World]:
         world = World(LocalDomain().participant, 0.0)
     else:
         pytest.importorskip("cyclonedds")
+        from golem.middleware.dds.connect import connect
         from golem.middleware.dds.domain import DdsConfig
-        from golem.middleware.dds.participant import connect
 
         config = DdsConfig(domain=domain)
         world = World(lambda: connect(config, PARTICIPANT_USER_DATA), 0.005)

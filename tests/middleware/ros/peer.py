@@ -6,8 +6,8 @@ import select
 import sys
 from typing import Any
 
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.dds.participant import connect
 from golem.middleware.ros.action_server import ServerGoal
 from golem.middleware.ros.codec import action, service
 from golem.middleware.ros.goals import GoalStatus

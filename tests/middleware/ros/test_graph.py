@@ -96,8 +96,8 @@ def test_an_unknown_distro_is_refused() -> None:
 
 def test_peers_are_told_hashes_and_identities(domain: int) -> None:
     pytest.importorskip("cyclonedds")
+    from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
-    from golem.middleware.dds.participant import connect
 
     participant = connect(DdsConfig(domain=domain), PARTICIPANT_USER_DATA)
     node = RosNode(participant, "twin")

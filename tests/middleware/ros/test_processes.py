@@ -53,8 +53,8 @@ class Peer:
 
 @pytest.fixture
 def node(domain: int) -> Iterator[RosNode]:
+    from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
-    from golem.middleware.dds.participant import connect
 
     participant = connect(DdsConfig(domain=domain), PARTICIPANT_USER_DATA)
     node = RosNode(participant, "here")

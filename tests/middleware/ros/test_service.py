@@ -84,8 +84,8 @@ def test_a_reply_waits_until_its_reader_is_known(world: World) -> None:
 @pytest.fixture
 def cyclone(domain: int) -> Iterator[RosNode]:
     pytest.importorskip("cyclonedds")
+    from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
-    from golem.middleware.dds.participant import connect
 
     participant = connect(DdsConfig(domain=domain))
     yield RosNode(participant, "here")

@@ -14,8 +14,8 @@ import pytest
 pytest.importorskip("cyclonedds")
 pytest.importorskip("rosbags")
 
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.dds.participant import connect
 from golem.middleware.ros import codec
 from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, SetBool_Response

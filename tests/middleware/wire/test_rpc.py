@@ -32,8 +32,8 @@ def join(request: pytest.FixtureRequest) -> Iterator[Callable[[], Participant]]:
         yield LocalDomain().participant
         return
     pytest.importorskip("cyclonedds")
+    from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
-    from golem.middleware.dds.participant import connect
 
     with free_domain() as number:
 

@@ -36,8 +36,8 @@ class Twin:
     """
 
     def __init__(self, domain: int) -> None:
+        from golem.middleware.dds.connect import connect
         from golem.middleware.dds.domain import DdsConfig
-        from golem.middleware.dds.participant import connect
 
         self.payloads: list[bytes] = []
         self.calls: list[int] = []

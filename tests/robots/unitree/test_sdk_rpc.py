@@ -28,8 +28,8 @@ DEADLINE = 40.0
 
 
 def test_the_vendors_clients_are_answered(sdk: Started, domain: int) -> None:
+    from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
-    from golem.middleware.dds.participant import connect
 
     participant, bus = connect(DdsConfig(domain)), Bus()
     try:
@@ -67,8 +67,8 @@ def test_the_vendors_clients_are_answered(sdk: Started, domain: int) -> None:
 
 
 def test_the_vendors_server_is_called(sdk: Started, domain: int) -> None:
+    from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
-    from golem.middleware.dds.participant import connect
 
     participant = connect(DdsConfig(domain))
     try:

@@ -29,8 +29,8 @@ Moment = tuple[LowState, LowCommand]
 
 def watch(domain: int, twin: subprocess.Popen[str], example: subprocess.Popen[str]) -> list[Moment]:
     """Return every state of the twin with the command that was valid then, until the ankles have swung."""
+    from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
-    from golem.middleware.dds.participant import connect
 
     participant, whole = connect(DdsConfig(domain)), Qos(depth=1000)
     states = participant.reader("rt/lowstate", hg.LOW_STATE.type_name, whole)

@@ -16,9 +16,9 @@ from golem.interfaces.rows import TopicRow
 from golem.middleware.bags.reader import Bag
 from golem.middleware.bus import Bus, Topic
 from golem.middleware.dds.base import SENSOR
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.local import LocalDomain
-from golem.middleware.dds.participant import connect
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.sensor_msgs import Imu as ImuMessage
 from golem.middleware.ros.node import RosNode

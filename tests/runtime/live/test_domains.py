@@ -18,8 +18,8 @@ from golem.errors import ConfigError
 from golem.interfaces import public
 from golem.middleware.dds import discovery
 from golem.middleware.dds.base import Qos
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.dds.participant import connect
 from golem.middleware.wire import hg
 from golem.runtime.live.exclusive_writers import LAUNCH, owner, refuse_second
 from golem.runtime.live.launch import LaunchConfig, commands, run_launch

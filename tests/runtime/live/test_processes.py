@@ -17,8 +17,8 @@ import pytest
 from tests.runtime.live.conftest import BLIND
 
 from golem.middleware.dds.base import Qos
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.dds.participant import connect
 from golem.middleware.wire import hg
 
 pytest.importorskip("cyclonedds")

@@ -56,8 +56,8 @@ def test_the_gate_names_them_while_it_has_no_other_reason() -> None:
 
 def test_a_foreign_process_is_found_and_ours_is_not(domain: int) -> None:
     pytest.importorskip("cyclonedds")
+    from golem.middleware.dds.connect import connect
     from golem.middleware.dds.domain import DdsConfig
-    from golem.middleware.dds.participant import connect
     from golem.runtime.live.exclusive_writers import identity
     from golem.runtime.live.safety_main import unknown_senders
 

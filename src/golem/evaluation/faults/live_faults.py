@@ -25,8 +25,9 @@ from golem.interfaces import public
 from golem.interfaces.payloads import GateState, Reason
 from golem.middleware.dds import discovery
 from golem.middleware.dds.base import ENCAPSULATION
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.dds.participant import CycloneParticipant, connect
+from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.ros import names
 from golem.middleware.ros.codec import dds_name
 from golem.middleware.ros.msgs.std_srvs import SetBool_Request, Trigger_Request

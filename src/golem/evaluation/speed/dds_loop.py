@@ -20,9 +20,10 @@ import numpy as np
 from golem.errors import GolemError
 from golem.middleware.dds.base import SENSOR, DdsError, Qos
 from golem.middleware.dds.checks import wait_for_peer
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 from golem.middleware.dds.endpoints import CycloneReader, CycloneWriter
-from golem.middleware.dds.participant import CycloneParticipant, connect
+from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.message import Message
 from golem.middleware.wire import convert, hg

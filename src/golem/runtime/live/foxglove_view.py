@@ -16,8 +16,8 @@ from golem.middleware.bags.base import BagTopic
 from golem.middleware.bags.foxglove_server import FoxgloveServer, ServerConfig
 from golem.middleware.bags.recorder import Recorder
 from golem.middleware.dds.base import Participant
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.dds.participant import connect
 from golem.middleware.interrupt import interrupted
 from golem.runtime.live.exclusive_writers import identity
 

@@ -10,8 +10,9 @@ from contextlib import closing, contextmanager, suppress
 from queue import SimpleQueue
 
 from golem.middleware.dds import discovery
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.dds.participant import CycloneParticipant, connect
+from golem.middleware.dds.participant import CycloneParticipant
 from golem.middleware.ros.action_client import ActionClient
 from golem.middleware.ros.callback_guard import log_error
 from golem.middleware.ros.future import RosError

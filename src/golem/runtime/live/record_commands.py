@@ -20,8 +20,8 @@ from golem.middleware.bags.reader import Bag, repair
 from golem.middleware.bags.recorder import Recorder
 from golem.middleware.bags.writer import BagConfig, BagWriter, Compression
 from golem.middleware.dds import discovery
+from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
-from golem.middleware.dds.participant import connect
 from golem.middleware.interrupt import interrupted
 from golem.runtime.live.exclusive_writers import SOLE, identity, refuse_second
 from golem.runtime.live.node_setup import log_line
