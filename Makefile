@@ -27,13 +27,13 @@ kernels: venv-dev  ## compile the numba kernels, once for all tests
 	scripts/compile_kernels.sh
 
 lint: venv-dev  ## style and types
-	$(BIN)/ruff check src tests scripts
-	$(BIN)/ruff format --check src tests scripts
+	$(BIN)/ruff check src tests scripts examples
+	$(BIN)/ruff format --check src tests scripts examples
 	$(BIN)/pyright
 
 format: venv-dev  ## rewrite the sources in the project's style
-	$(BIN)/ruff check --fix src tests scripts
-	$(BIN)/ruff format src tests scripts
+	$(BIN)/ruff check --fix src tests scripts examples
+	$(BIN)/ruff format src tests scripts examples
 
 docs: venv-docs  ## build the documentation into site/
 	$(BIN)/mkdocs build --strict
