@@ -7,6 +7,7 @@ It imports only what golem has long had, so that a checkout of before runs it, t
 from __future__ import annotations
 
 import importlib
+import inspect
 import json
 import os
 import resource
@@ -15,7 +16,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -128,7 +129,7 @@ class Probe:
 
 @contextmanager
 def timed_nodes(spent: Counter[str]) -> Iterator[None]:
-    """Count the thread CPU time in `step` of every node of the executors that are made meanwhile [ns]."""
+    """Count the thread CPU time of every node, and of the chain, of the executors that are made meanwhile [ns]."""
     from golem.runtime.executor import Executor
 
     original = Executor.__init__
@@ -136,6 +137,10 @@ def timed_nodes(spent: Counter[str]) -> Iterator[None]:
     def start(self: Executor, bus: Any, nodes: Any, *rest: Any, **named: Any) -> None:
         for node in nodes:
             node.step = _timed(type(node).__name__, node.step, spent)
+        for chain in (*rest, *named.values()):  # one with a chain runs some of the nodes in it
+            for method in ("run", "run_ticks"):
+                if hasattr(chain, method):
+                    setattr(chain, method, _timed("the chain", getattr(chain, method), spent))
         original(self, bus, nodes, *rest, **named)
 
     Executor.__init__ = start
@@ -145,11 +150,13 @@ def timed_nodes(spent: Counter[str]) -> Iterator[None]:
         Executor.__init__ = original
 
 
-def _timed(name: str, step: Callable[[float], None], spent: Counter[str]) -> Callable[[float], None]:
-    def timed(t: float) -> None:
+def _timed(name: str, step: Callable[..., Any], spent: Counter[str]) -> Callable[..., Any]:
+    def timed(*arguments: Any) -> Any:
         start = time.thread_time_ns()
-        step(t)
-        spent[name] += time.thread_time_ns() - start
+        try:
+            return step(*arguments)
+        finally:
+            spent[name] += time.thread_time_ns() - start
 
     return timed
 
@@ -164,16 +171,9 @@ def measure(name: str, mode: Mode, seconds: float, seed: int) -> dict[str, Any]:
     """
     case = CASES[name]
     probe = Probe(mode, case.warm, seconds)
-    try:
-        if mode == "nodes":
-            with timed_nodes(probe.spent):
-                _trial(case, seed, probe)
-        else:
-            _trial(case, seed, probe)
-    except Measured:
-        pass
-    finally:
-        sys.setprofile(None)
+    with suppress(Measured), timed_nodes(probe.spent) if mode == "nodes" else nullcontext():
+        _trial(case, seed, probe)
+    sys.setprofile(None)  # for a trial that ended by itself
     spans = len(probe.stack)
     if not spans:
         raise RuntimeError(f"the trial of {name} ended before its {case.warm:g} s of warming.")
@@ -200,7 +200,9 @@ def _trial(case: LoopCase, seed: int, probe: Probe) -> None:
     running, robot = build(legs_stack(case.method, "field"), seed)
     try:
         probe.begin(running, robot)
-        running.executor.run(1e9)
+        run: Callable[..., None] = running.executor.run
+        # Where an executor can be told so, nobody has to be asked after every tick.
+        run(1e9, **({"due": lambda: 1e9} if "due" in inspect.signature(run).parameters else {}))
     finally:
         robot.close()
 
