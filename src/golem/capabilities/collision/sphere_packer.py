@@ -14,7 +14,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from golem.capabilities.collision.surface import DENSITY, LinkSurface, spread
 from golem.types import Array
@@ -154,5 +153,7 @@ def _descend(points: Array, packing: Packing, gap_weight: float) -> Packing:
     bounds = [(float(a), float(b)) for _ in range(n) for a, b in zip(low, high, strict=True)]
     bounds += [(SMALLEST, largest)] * n
     start = np.concatenate([packing.centres.ravel(), packing.radii])
+    from scipy.optimize import minimize  # 13 MB, for packing only
+
     found = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": ITERATIONS})
     return Packing(found.x[: 3 * n].reshape(n, 3), found.x[3 * n :].copy())

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import KDTree
@@ -17,6 +17,9 @@ from scipy.spatial import KDTree
 from golem.errors import ConfigError
 from golem.robots.model.link_geometry import SurfacePart
 from golem.types import Array
+
+if TYPE_CHECKING:
+    import trimesh
 
 Mask = NDArray[np.bool_]
 
@@ -68,6 +71,8 @@ def link_surface(name: str, parts: Sequence[SurfacePart], seed: int = 0) -> Link
     Raises:
         ConfigError: a mesh is not finite, or is open.
     """
+    import trimesh  # 27 MB, for packing only
+
     if not all(np.isfinite(p.vertices).all() for p in parts):
         raise ConfigError(f"Link '{name}' has a mesh with vertices that are not finite.")
     meshes = [trimesh.Trimesh(p.vertices, p.faces, process=True) for p in parts]

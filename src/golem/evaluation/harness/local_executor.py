@@ -26,9 +26,12 @@ SINGLE_THREAD = {
         "MKL_NUM_THREADS",
         "VECLIB_MAXIMUM_THREADS",
         "NUMEXPR_NUM_THREADS",
+        "LP_NUM_THREADS",
+        "MALLOC_ARENA_MAX",
     )
 }
-"""Environment of a worker: one thread each, so that `-j` alone sets the load and sums are in one order."""
+"""Environment of a worker: one thread each, the software renderer's too, so that `-j` alone sets the load and sums are
+in one order; and one heap."""
 START = 300.0
 """Time in which a process has to have begun its batch [s]."""
 GRACE = 5.0

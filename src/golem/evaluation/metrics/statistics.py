@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import binom, binomtest
-from scipy.stats import t as student
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +83,8 @@ def wilson(successes: int, n: int, confidence: float = 0.95) -> Interval:
         n: number of independent trials, > 0.
         confidence: coverage, 0 to 1.
     """
+    from scipy.stats import binomtest
+
     bounds = binomtest(successes, n).proportion_ci(confidence, method="wilson")
     return Interval(float(bounds.low), float(bounds.high))
 
@@ -94,6 +94,8 @@ def mcnemar(table: PairedTable) -> float:
     discordant = table.only_a + table.only_b
     if discordant == 0:
         return 1.0
+    from scipy.stats import binomtest
+
     return float(binomtest(table.only_a, discordant, 0.5).pvalue)
 
 
@@ -160,6 +162,8 @@ def mean_interval(values: Sequence[float], confidence: float = 0.95) -> Interval
     n = len(values)
     if n < 2:
         return None
+    from scipy.stats import t as student
+
     half = float(student.ppf(0.5 + confidence / 2, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
     mean = float(np.mean(values))
     return Interval(mean - half, mean + half)
@@ -181,5 +185,7 @@ def bootstrap_interval(values: Sequence[float], confidence: float = 0.95, draws:
 def _median_interval(ordered: Sequence[float], confidence: float = 0.95) -> Interval | None:
     """Return the interval of the median between two order statistics (Conover, Practical Nonparametric Statistics)."""
     n = len(ordered)
+    from scipy.stats import binom
+
     rank = int(binom.ppf((1 - confidence) / 2, n, 0.5))
     return Interval(ordered[rank - 1], ordered[n - rank]) if rank >= 1 else None

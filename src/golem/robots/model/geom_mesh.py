@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import mujoco
 import numpy as np
-import trimesh
 
 from golem.types import Array
+
+if TYPE_CHECKING:
+    import trimesh
 
 
 def geom_mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
@@ -15,6 +19,8 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
     Raises:
         NotImplementedError: a kind of geom no world here uses.
     """
+    import trimesh  # 40 MB, which a robot that only runs does without
+
     kind = mujoco.mjtGeom(int(model.geom_type[geom]))
     x, y, z = (float(v) for v in model.geom_size[geom])
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
