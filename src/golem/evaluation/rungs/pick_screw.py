@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,8 @@ import numpy as np
 from golem import registry
 from golem.capabilities.arms.goal_postures import GoalPostures
 from golem.capabilities.arms.postures import POSTURES
+from golem.capabilities.arms.quick_ik import TURNS as TORSO
+from golem.capabilities.arms.quick_ik import QuickIK
 from golem.capabilities.grasping.centroid import grasp_pose
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.errors import ConfigError
@@ -98,8 +100,17 @@ TURNS = (0.0, 0.4, -0.4)
 
 
 @cache
-def _tools() -> tuple[GoalPostures, PlanningRobot]:
-    return GoalPostures(), PlanningRobot()
+def _tools() -> tuple[QuickIK, GoalPostures, PlanningRobot]:
+    return QuickIK(), GoalPostures(), PlanningRobot()
+
+
+def glimpsed(side: Side, position: Array) -> bool:
+    """Return whether quick inverse kinematics find a posture as in `reaches`: where they do not, it may still be."""
+    ik, _, robot = _tools()
+    space, ready = JointSpace(robot, POSTURES["ready"]), POSTURES["ready"][1:]
+    starts = [np.append(turn, ready)[None] for turn in TORSO]
+    found = (ik.solve(side, T, start) for T in _poses(side, position) for start in starts)
+    return any(q is not None and space.verdict(q) == 0 for q in found)
 
 
 def reaches(side: Side, position: Array) -> bool:
@@ -107,15 +118,14 @@ def reaches(side: Side, position: Array) -> bool:
 
     It can if a posture within the gate's range is found, from several starts, in which the robot does not touch itself.
     """
-    goals, robot = _tools()
-    ready = POSTURES["ready"]
-    space = JointSpace(robot, ready)
-    for turn in TURNS:
-        T = grasp_pose(position, (HEADING if side == "left" else -HEADING) + turn)
-        left, right = (T if side == one else None for one in SIDES)
-        if len(goals.find(left, right, ready, lambda q: space.verdict(q) == 0, most=1)):
-            return True
-    return False
+    _, goals, robot = _tools()
+    ready, space = POSTURES["ready"], JointSpace(robot, POSTURES["ready"])
+    pairs = ((T, None) if side == "left" else (None, T) for T in _poses(side, position))
+    return any(len(goals.find(*pair, ready, lambda q: space.verdict(q) == 0, most=1)) for pair in pairs)
+
+
+def _poses(side: Side, position: Array) -> list[Array]:
+    return [grasp_pose(position, (HEADING if side == "left" else -HEADING) + turn) for turn in TURNS]
 
 
 def doable(fasteners: Sequence[Fastener], drops: Array) -> bool:
@@ -125,12 +135,19 @@ def doable(fasteners: Sequence[Fastener], drops: Array) -> bool:
         fasteners: those of the near edge.
         drops: (n, 3) places above the tray in base_link [m].
     """
-    loose = [f.in_base for f in fasteners if f.loose]
-    for side in SIDES:
-        own = 1.0 if side == "left" else -1.0
-        near = sorted(drops, key=lambda p: float(np.hypot(p[0] - 0.4, p[1] - own * 0.2)))
-        if any(reaches(side, p) for p in near[:NEAREST]) and any(reaches(side, p) for p in loose):
-            return True
+    loose = np.array([f.in_base for f in fasteners if f.loose])
+    return _doable(loose.tobytes(), np.asarray(drops, float).tobytes())
+
+
+@lru_cache(maxsize=8)
+def _doable(loose: bytes, drops: bytes) -> bool:
+    """Answer once for all methods of a run, who see the same scene."""
+    screws, places = np.frombuffer(loose).reshape(-1, 3), np.frombuffer(drops).reshape(-1, 3)
+    for reached in (glimpsed, reaches):
+        for side, y in zip(SIDES, (0.2, -0.2), strict=True):
+            near = sorted(places, key=lambda p: float(np.hypot(p[0] - 0.4, p[1] - y)))
+            if any(reached(side, p) for p in near[:NEAREST]) and any(reached(side, p) for p in screws):
+                return True
     return False
 
 
