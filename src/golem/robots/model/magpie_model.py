@@ -84,7 +84,8 @@ def pad_offset(theta: _T) -> _T:
 
 def crank_from_gap(gap: _T) -> _T:
     """Return the crank angle [rad] for an opening [m], clipped to what the hand can do (0 to `MAX_GAP`)."""
-    cosine = (np.clip(gap, 0.0, MAX_GAP) / 2.0 + _PAD_FACE - CRANK_PIVOT[1]) / ARM
+    clipped = np.minimum(np.maximum(gap, 0.0), MAX_GAP)  # np.clip takes five times as long
+    cosine = (clipped / 2.0 + _PAD_FACE - CRANK_PIVOT[1]) / ARM
     return np.maximum(np.arccos(cosine) - ANGLE_OPEN, 0.0)  # the arc cosine may round to just below
 
 
