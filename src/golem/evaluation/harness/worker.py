@@ -7,6 +7,7 @@ reaches it; the death of its parent ends it with all that it started, and so doe
 from __future__ import annotations
 
 import faulthandler
+import gc
 import os
 import queue
 import signal
@@ -50,6 +51,7 @@ class Watchdog:
             over.set()
             self._connection.send(ending)
         watch.join()
+        gc.collect()  # modules of a stack refer to each other, and keep their robot
 
     def _watch(self, limit: float, over: threading.Event) -> None:
         if over.wait(limit):
