@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import njit
 
 from golem.types import GRAVITY, Array
 
@@ -12,6 +15,33 @@ def heading_frame(R: Array) -> Array:
     norm = np.hypot(R[..., 0, 0], R[..., 1, 0])
     c, s = R[..., 0, 0] / norm, R[..., 1, 0] / norm
     return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
+
+
+@njit(cache=True, nogil=True)
+def heading(R: Array) -> tuple[float, float]:
+    """Return cosine and sine of the heading of `R` (3, 3)."""
+    norm = math.hypot(R[0, 0], R[1, 0])
+    return R[0, 0] / norm, R[1, 0] / norm
+
+
+@njit(cache=True, nogil=True)
+def stand_errors(R: Array, com: Array, velocity: Array, soles: Array, stance: Array, out: Array) -> None:
+    """Write what `balance_errors` returns of one robot into `out` (3,): capture point, misplacement."""
+    height = max(com[2] - min(soles[0, 2], soles[1, 2]), 0.1)
+    lead = math.sqrt(height / GRAVITY)
+    x = com[0] + velocity[0] * lead - (soles[0, 0] + soles[1, 0]) / 2.0
+    y = com[1] + velocity[1] * lead - (soles[0, 1] + soles[1, 1]) / 2.0
+    c, s = heading(R)
+    out[0], out[1] = c * x + s * y, c * y - s * x
+    x, y = soles[0, 0] - soles[1, 0], soles[0, 1] - soles[1, 1]
+    ahead, sideways = c * x + s * y - stance[0], c * y - s * x - stance[1]
+    out[2] = math.sqrt(ahead * ahead + sideways * sideways)
+
+
+@njit(cache=True, nogil=True)
+def _all_errors(R: Array, com: Array, velocity: Array, soles: Array, stance: Array, out: Array) -> None:
+    for i in range(len(com)):
+        stand_errors(R[i], com[i], velocity[i], soles[i], stance, out[i])
 
 
 def balance_errors(R: Array, com: Array, velocity: Array, soles: Array, stance: Array) -> tuple[Array, Array]:
@@ -26,9 +56,8 @@ def balance_errors(R: Array, com: Array, velocity: Array, soles: Array, stance: 
         soles: (..., 2, 3) centres of the left and the right sole, same frame and origin [m].
         stance: (2,) where the left sole belongs relative to the right one, x ahead, y left [m].
     """
-    height = np.maximum(com[..., 2] - soles[..., 2].min(axis=-1), 0.1)
-    point = com[..., :2] + velocity[..., :2] * np.sqrt(height / GRAVITY)[..., None]
-    heading = heading_frame(R)
-    capture = np.einsum("...ji,...j->...i", heading, point - soles[..., :2].mean(axis=-2))
-    apart = np.einsum("...ji,...j->...i", heading, soles[..., 0, :2] - soles[..., 1, :2])
-    return capture, np.linalg.norm(apart - stance, axis=-1)
+    out = np.empty(com.shape)
+    shaped = ((R, (3, 3)), (com, (3,)), (velocity, (3,)), (soles, (2, 3)))
+    rows = [np.ascontiguousarray(x).reshape(-1, *shape) for x, shape in shaped]
+    _all_errors(*rows, np.ascontiguousarray(stance), out.reshape(-1, 3))
+    return out[..., :2], out[..., 2]

@@ -12,13 +12,16 @@ stands on one leg; feet that are a little off do not keep it running for long, i
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from math import inf
 from typing import Literal
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
+from golem.native import Record, Records, new_record
 from golem.options import require
 from golem.types import Array
 
@@ -84,32 +87,90 @@ class GaitConfig:
         return replace(self, start="balance" if self.recovers else "never")
 
 
+GAIT = np.dtype([("phase", "f8"), ("idle", "f8"), ("stepping", "?")], align=True)
+"""One clock: phase of the left leg, periods since there was a reason to step, whether it runs."""
+GAIT_OPTIONS = np.dtype(
+    [
+        *((name, "f8") for name in ("period", "stance", "ahead", "sideways", "capture_stop")),
+        *((name, "f8") for name in ("feet_start", "feet_stop", "patience")),
+        *((name, "?") for name in ("follows", "recovers", "always")),
+    ]
+)
+"""A `GaitConfig`; `ahead` and `sideways` are its `capture_start`."""
+
+
+@njit(cache=True, nogil=True)
+def step_gait(g: Record, o: Record, commanded: bool, x: float, y: float, misplaced: float, dt: float) -> None:
+    """Do what `Gait.step` does for the clock `g`, a `GAIT`, under the options `o`; the capture point is at `x`, `y`."""
+    commanded = commanded and o.follows
+    lost = o.recovers and (math.hypot(x / o.ahead, y / o.sideways) > 1.0 or misplaced > o.feet_start)
+    wanted = o.always or commanded or lost
+    g.idle = 0.0 if wanted else g.idle + dt / o.period
+    if not g.stepping:
+        if wanted:
+            # The unloaded foot swings first: the right one, from phase 0, while the body leans to the left. Who falls
+            # has no time for the double support before it.
+            g.phase = (0.0 if y >= 0.0 else 0.5) + (o.stance - 0.5 if lost and not commanded else 0.0)
+            g.stepping = True
+        return
+    content = misplaced < o.feet_stop or g.idle >= o.patience
+    settled = not o.recovers or (content and math.hypot(x, y) < o.capture_stop)
+    after = g.phase + dt / o.period
+    halves = math.floor(2.0 * after)
+    if halves > math.floor(2.0 * g.phase) and not wanted and settled:
+        g.phase, g.stepping = halves / 2.0 % 1.0, False
+    else:
+        g.phase = after % 1.0
+
+
+@njit(cache=True, nogil=True)
+def _step_gaits(
+    gaits: Records, options: Records, commanded: Bools, capture: Array, misplaced: Array, dt: float
+) -> None:
+    for i in range(len(gaits)):
+        step_gait(gaits[i], options[0], commanded[i], capture[i, 0], capture[i, 1], misplaced[i], dt)
+
+
 class Gait:
     """The gait clocks of `shape` robots.
 
     Attributes:
-        config: the clock's parameters.
+        memory, options: (*shape,) of `GAIT`, (1,) of `GAIT_OPTIONS`.
         phase: (*shape,) phase of the left leg.
         stepping: (*shape,) whether the clock runs.
     """
 
     def __init__(self, config: GaitConfig, shape: tuple[int, ...] = ()) -> None:
         """Begin with every robot standing."""
+        self.memory: Records = np.zeros(shape, GAIT)
+        self.options = new_record(GAIT_OPTIONS)
+        self.phase: Array = self.memory["phase"]
+        self.stepping: Bools = self.memory["stepping"]
         self.config = config
-        self.phase: Array = np.zeros(shape)
-        self.stepping: Bools = np.zeros(shape, dtype=bool)
-        self._idle: Array = np.zeros(shape)  # periods since there was a reason to step
+
+    @property
+    def config(self) -> GaitConfig:
+        """The clock's parameters."""
+        return self._config
+
+    @config.setter
+    def config(self, c: GaitConfig) -> None:
+        self._config = c
+        lengths = (*c.capture_start, c.capture_stop, c.feet_start, c.feet_stop)
+        flags = (c.follows, c.recovers, c.start == "always")
+        self.options[0] = (c.period, c.stance, *lengths, c.patience, *flags)
 
     @property
     def phases(self) -> Array:
         """(*shape, 2) phase of the left and the right leg."""
-        return np.stack([self.phase, (self.phase + 0.5) % 1.0], axis=-1)
+        out = np.empty((*self.phase.shape, 2))
+        out[..., 0], out[..., 1] = self.phase, (self.phase + 0.5) % 1.0
+        return out
 
     def reset(self, where: Bools | None = None) -> None:
         """Let the robots `where` stand; None is all."""
-        chosen = np.ones_like(self.stepping) if where is None else where
-        self.phase = np.where(chosen, 0.0, self.phase)
-        self.stepping = self.stepping & ~chosen
+        chosen = ... if where is None else where
+        self.phase[chosen], self.stepping[chosen] = 0.0, False
 
     def step(self, commanded: Bools, capture: Array, misplaced: Array, dt: float) -> None:
         """Advance by `dt` [s].
@@ -120,28 +181,6 @@ class Gait:
             misplaced: (*shape,) how far the feet are from where they belong relative to each other [m].
             dt: time since the previous tick [s].
         """
-        config = self.config
-        error = np.hypot(capture[..., 0], capture[..., 1])
-        ahead, sideways = config.capture_start
-        lost = np.hypot(capture[..., 0] / ahead, capture[..., 1] / sideways) > 1.0
-        lost = lost | (misplaced > config.feet_start)
-        commanded = commanded & config.follows
-        lost = lost & config.recovers
-        wanted = np.ones_like(self.stepping) if config.start == "always" else commanded | lost
-        # The unloaded foot swings first: the right one, from phase 0, while the body leans to the left. Who falls has
-        # no time for the double support before it.
-        begins = wanted & ~self.stepping
-        skipped = np.where(lost & ~commanded, config.stance - 0.5, 0.0)
-        first = np.where(capture[..., 1] >= 0.0, 0.0, 0.5) + skipped
-        self.phase = np.where(begins, first, self.phase)
-        self._idle = np.where(wanted, 0.0, self._idle + dt / config.period)
-        content = (misplaced < config.feet_stop) | (self._idle >= config.patience)
-        settled = (error < config.capture_stop) & content
-        may_stop = ~wanted & (settled | (not config.recovers))
-        after = self.phase + dt / config.period
-        half = np.floor(2.0 * after) > np.floor(2.0 * self.phase)
-        ends = self.stepping & half & may_stop
-        running = (self.stepping | begins) & ~ends
-        self.phase = np.where(running & ~begins, after % 1.0, self.phase)
-        self.phase = np.where(ends, np.floor(2.0 * after) / 2.0 % 1.0, self.phase)
-        self.stepping = running
+        points = np.ascontiguousarray(capture).reshape(-1, 2)
+        gaits = self.memory.reshape(-1)
+        _step_gaits(gaits, self.options, np.ravel(commanded), points, np.ravel(misplaced), dt)

@@ -10,25 +10,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from golem.capabilities.legs.balance_errors import balance_errors
 from golem.capabilities.legs.base import LocomotionCommand, LowerBody, follows
 from golem.capabilities.legs.command_blender import CommandBlender
 from golem.capabilities.legs.foot_separation import FootSeparation, FootSeparationConfig
 from golem.capabilities.legs.gait import Gait
+from golem.capabilities.legs.gait_clock import GaitClock
 from golem.capabilities.legs.rate_divider import RateDivider
 from golem.capabilities.legs.stop_predictor import StopPredictor
 from golem.capabilities.legs.velocity_integrator import VelocityIntegrator, VelocityIntegratorConfig
 from golem.interfaces.payloads import LegCommand
 from golem.options import require
-from golem.robots.model.imu_mount import sensed_base_rate
-from golem.robots.model.kinematics import Kinematics
-from golem.robots.model.leg_kinematics import SOLE_CENTER
-from golem.types import NUM_JOINTS, SIDES, Array, BaseEstimate, LowState, PlanarPose, Twist
+from golem.types import BaseEstimate, LowState, PlanarPose, Twist
 
 ZERO = Twist()
-_ANKLES = tuple(f"{side}_ankle_roll_link" for side in SIDES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,10 +89,7 @@ class Locomotion:
         self._trim = None if trim is None else VelocityIntegrator(trim)
         self._separation = None if separation is None else FootSeparation(separation)
         self._rest = StopPredictor()
-        self._kinematics = Kinematics()
-        left, right = self._feet(np.zeros(NUM_JOINTS))[:, :3, 3]
-        # With both hips straight and level the distance of the feet does not depend on how far the knees are bent.
-        self._stance: Array = (left - right)[:2]
+        self._gait_clock = GaitClock(self.gait, self._rest, self._trim)
         self._grounded = False
         self._forget()
 
@@ -115,8 +106,7 @@ class Locomotion:
     @property
     def moving(self) -> bool:
         """Whether the robot changes its place; see `LegStatus`."""
-        resting = self.gait.config.start == "always" or not self.gait.stepping
-        return self.applied != ZERO or not resting
+        return self._moves or (bool(self.gait.stepping) and self.gait.config.start != "always")
 
     @property
     def rest(self) -> PlanarPose:
@@ -161,7 +151,7 @@ class Locomotion:
         self._listen(twist, dt)
         self._grounded = self._grounded or not base.stale
         wanted = self._wanted()
-        waits = wanted != ZERO and self.applied == ZERO and not follows(self.controller)
+        waits = wanted is not ZERO and not self._moves and not follows(self._paced.controller)
         if waits:
             self.reason = "who walks does not have the legs yet"
         self._slew(ZERO if waits else wanted, dt)
@@ -171,16 +161,17 @@ class Locomotion:
             self._clock(state, base, self._since_gate)
             self._until_gate = max(self._until_gate + 1.0 / self.config.gate_rate, 0.0)
             self._since_gate = 0.0
-        commanded = waits or self.applied != ZERO
-        motion = LocomotionCommand(self._trimmed, self.gait.phases, bool(self.gait.stepping), commanded)
+        stepping = bool(self.gait.stepping)
+        motion = LocomotionCommand(self._trimmed, self.gait.phases, stepping, waits or self._moves)
         command = self._blend.step(self._paced.step(state, base, motion, dt), dt)
-        if self._separation is None:
+        if self._separation is None or not stepping:
             return command
-        swings = self.gait.stepping & (motion.phase >= self.gait.config.stance)
+        swings = motion.phase >= self.gait.config.stance
         return self._separation.step(command, state, swings & (base.contact < 0.5))
 
     def _forget(self) -> None:
         self.commanded = self.applied = self._trimmed = ZERO
+        self._moves = False  # whether `applied` is anything else than zero
         self._forget_trim()
         self.clamped = False
         self.reason = ""
@@ -207,7 +198,7 @@ class Locomotion:
         if not self._finite:
             self.reason = "the commanded twist is not finite"
             return ZERO
-        if asked == ZERO:
+        if asked is ZERO or asked == ZERO:
             self.reason = ""
             return ZERO
         if not self._grounded:
@@ -222,63 +213,45 @@ class Locomotion:
         wanted = self.controller.envelope.clamp(asked)
         self.clamped = wanted != asked
         self.reason = "the commanded twist is outside the envelope" if self.clamped else ""
-        if _size(wanted) < self._threshold:
+        size = _size(wanted)
+        if size < (self.config.minimum if self._moves else self.config.dead_band):
             self.reason = self.reason or "the commanded twist is inside the dead band"
             return ZERO
-        return wanted
-
-    @property
-    def _threshold(self) -> float:
-        """Norm below which a twist counts as zero now."""
-        return self.config.minimum if self.applied != ZERO else self.config.dead_band
+        return wanted if size else ZERO
 
     def _slew(self, wanted: Twist, dt: float) -> None:
         """Bring the applied twist towards `wanted`; on its way to a stop it ends at the dead band."""
-        steps = (a * dt for a in self.config.acceleration)
-        now, goal = self.applied, wanted
-        applied = Twist(
-            *(
-                x + min(max(y - x, -step), step)
-                for x, y, step in zip(_values(now), _values(goal), steps, strict=True)
-            )
-        )
-        stopped = wanted == ZERO and _size(applied) < self.config.dead_band
-        self.applied = ZERO if stopped else applied
+        if wanted is ZERO and not self._moves:
+            return
+        now, (ax, ay, aw) = self.applied, self.config.acceleration
+        vx = _toward(now.vx, wanted.vx, ax * dt)
+        vy = _toward(now.vy, wanted.vy, ay * dt)
+        wz = _toward(now.wz, wanted.wz, aw * dt)
+        stopped = wanted is ZERO and math.hypot(vx, vy, wz) < self.config.dead_band
+        self.applied = ZERO if stopped else Twist(vx, vy, wz)
+        self._moves = bool(self.applied.vx or self.applied.vy or self.applied.wz)
 
     def _clock(self, state: LowState, base: BaseEstimate, dt: float) -> None:
         """Advance the gait clock by `dt` [s] from how well the measured robot stands."""
-        R = base.T_odom_base[:3, :3]
-        feet = self._feet(state.q)
-        soles = feet[:, :3, 3]
-        com = R @ self._kinematics.com()
-        rate = R @ sensed_base_rate(state)
-        velocity = base.velocity + np.cross(rate, com)
-        capture, misplaced = balance_errors(R, com, velocity, soles @ R.T, self._stance)
-        if self.gait.config != self.controller.gait:
-            # Another controller has the legs, as in a hand-over: what was learned about the last one is void.
-            self._forget_trim()
-            self.gait.config = self.controller.gait
-        self.gait.step(np.asarray(self.applied != ZERO), capture, misplaced, dt)
-        self._rest.step(base.T_odom_base, feet, base.contact, self.moving, dt)
-        if self.applied == ZERO and not self.gait.stepping:
-            self._forget_trim()
+        controller = self._paced.controller
+        if self.gait.config is not controller.gait:
+            if self.gait.config != controller.gait:
+                # Another controller has the legs, as in a hand-over: what was learned about the last one is void.
+                self._forget_trim()
+            self.gait.config = controller.gait
+        trimmed = self._gait_clock.step(state, base, self.applied, dt)
+        if not self._moves and not self.gait.stepping:
             self._trimmed = ZERO
-        elif self._trim is None:
-            self._trimmed = self.applied
         else:
-            # Also through the last steps of a stop, and those after a push: they shall not carry it away.
-            wanted = np.array(_values(self.applied))
-            trimmed = self._trim.step(wanted, R, base.velocity, rate, dt)
-            self._trimmed = Twist(*np.where(self.controller.envelope.axes, trimmed, wanted).tolist())
-
-    def _feet(self, q: Array) -> Array:
-        """Return the (2, 4, 4) poses of the soles' centres in base_link at the joints `q` (27,)."""
-        self._kinematics.update(q)
-        return np.array([self._kinematics.pose(ankle) @ _SOLE for ankle in _ANKLES])
+            wanted = _values(self.applied)
+            axes = controller.envelope.axes
+            self._trimmed = Twist(
+                *(new if on else old for new, old, on in zip(trimmed, wanted, axes, strict=True))
+            )
 
 
-_SOLE: Array = np.eye(4)
-_SOLE[:3, 3] = SOLE_CENTER
+def _toward(x: float, goal: float, step: float) -> float:
+    return x + min(max(goal - x, -step), step)
 
 
 def _values(twist: Twist) -> tuple[float, float, float]:

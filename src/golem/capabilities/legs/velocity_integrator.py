@@ -9,8 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
-from golem.capabilities.legs.balance_errors import heading_frame
+from golem.capabilities.legs.balance_errors import heading
+from golem.native import Record, new_record
 from golem.types import Array
 
 
@@ -33,19 +35,49 @@ class VelocityIntegratorConfig:
     smoothing: float = 0.7
 
 
+TRIM = np.dtype(
+    [
+        *(("gain", "f8"), ("smoothing", "f8"), ("maximum", "f8", (3,)), ("heed", "f8", (3,))),
+        *(("surplus", "f8", (3,)), ("correction", "f8", (3,))),
+    ]
+)
+"""Options, then what was learned: the filtered velocity error and its integral."""
+
+
+@njit(cache=True, nogil=True)
+def step_trim(m: Record, twist: Array, R: Array, velocity: Array, turn: float, dt: float, out: Array) -> None:
+    """Do what `VelocityIntegrator.step` does with `m`, a `TRIM`; `turn` is the rate about z, `out` (3,) is filled."""
+    c, s = heading(R)
+    share = dt / (m.smoothing + dt)
+    for a in range(3):
+        if a == 0:
+            measured = c * velocity[0] + s * velocity[1]
+        else:
+            measured = c * velocity[1] - s * velocity[0] if a == 1 else turn
+        # Command and measurement pass the same filter, so that its lag is no error.
+        m.surplus[a] += (twist[a] - measured - m.surplus[a]) * share
+        change = m.gain * dt * min(max(m.surplus[a], -m.heed[a]), m.heed[a])
+        m.correction[a] = min(max(m.correction[a] + change, -m.maximum[a]), m.maximum[a])
+        out[a] = twist[a] + m.correction[a]
+
+
 class VelocityIntegrator:
-    """The correction of one robot's twist."""
+    """The correction of one robot's twist.
+
+    Attributes:
+        memory: (1,) of `TRIM`.
+    """
 
     def __init__(self, config: VelocityIntegratorConfig | None = None) -> None:
         """Begin without a correction."""
-        self.config = config or VelocityIntegratorConfig()
-        self._maximum, self._heed = np.array(self.config.maximum), np.array(self.config.heed)
-        self.reset()
+        self.config = c = config or VelocityIntegratorConfig()
+        self.memory = new_record(TRIM)
+        for name in ("gain", "smoothing", "maximum", "heed"):
+            self.memory[name] = getattr(c, name)
 
     def reset(self) -> None:
         """Forget what was learned: the robot stands, or another controller took over."""
-        self._surplus: Array = np.zeros(3)
-        self._correction: Array = np.zeros(3)
+        self.memory["surplus"] = self.memory["correction"] = 0.0
 
     def step(self, twist: Array, R: Array, velocity: Array, rate: Array, dt: float) -> Array:
         """Return the (3,) twist to command so that `twist` is what comes of it.
@@ -57,10 +89,6 @@ class VelocityIntegrator:
             rate: (3,) angular, in that frame [rad/s].
             dt: time since the previous step [s].
         """
-        config = self.config
-        measured = np.append(heading_frame(R).T @ velocity[:2], rate[2])
-        # Command and measurement pass the same filter, so that its lag is no error.
-        self._surplus += (twist - measured - self._surplus) * (dt / (config.smoothing + dt))
-        change = config.gain * dt * np.clip(self._surplus, -self._heed, self._heed)
-        self._correction = np.clip(self._correction + change, -self._maximum, self._maximum)
-        return twist + self._correction
+        out = np.empty(3)
+        step_trim(self.memory[0], twist, np.ascontiguousarray(R), velocity, float(rate[2]), dt, out)
+        return out

@@ -201,19 +201,10 @@ def _backward(
 
 
 @njit(cache=True, nogil=True)
-def tree_gravity(tree: Record, q: Array, field: Array, out: Array) -> None:
-    """Write the torque that holds every joint against gravity into `out` (n,) [N m].
-
-    Args:
-        tree: of n hinges, parents before children.
-        q: (n,) [rad].
-        field: (3,) gravity in the base [m/s^2].
-        out: is filled.
-    """
-    n = len(tree.mass)
-    R, p, axes = np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, 3))
-    mass, moment, A = np.empty(n), np.empty((n, 3)), np.empty((3, 3))
-    for i in range(n):
+def tree_frames(tree: Record, q: Array, R: Array, p: Array) -> None:
+    """Write rotation and position of n hinges in the base at `q` (n,) [rad] into `R` (n, 3, 3) and `p` (n, 3) [m]."""
+    A = np.empty((3, 3))
+    for i in range(len(tree.mass)):
         k = tree.parent[i]
         for a in range(3):
             if k < 0:
@@ -229,6 +220,23 @@ def tree_gravity(tree: Record, q: Array, field: Array, out: Array) -> None:
                     for c in range(3):
                         A[a, b] += R[k, a, c] * tree.R[i, c, b]
         turned(A, tree.axis[i], q[i], R[i])
+
+
+@njit(cache=True, nogil=True)
+def tree_gravity(tree: Record, q: Array, field: Array, out: Array) -> None:
+    """Write the torque that holds every joint against gravity into `out` (n,) [N m].
+
+    Args:
+        tree: of n hinges, parents before children.
+        q: (n,) [rad].
+        field: (3,) gravity in the base [m/s^2].
+        out: is filled.
+    """
+    n = len(tree.mass)
+    R, p, axes = np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, 3))
+    mass, moment = np.empty(n), np.empty((n, 3))
+    tree_frames(tree, q, R, p)
+    for i in range(n):
         mass[i] = tree.mass[i]
         for a in range(3):
             axes[i, a] = R[i, a, tree.axis[i]]

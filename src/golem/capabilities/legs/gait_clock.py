@@ -1,0 +1,152 @@
+"""What the base layer does with the measured robot: how well it stands, when it steps, where it rests, how it drifts.
+
+One compiled step for one robot at up to 100 Hz, over the records of `Gait`, `StopPredictor` and `VelocityIntegrator`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from golem.capabilities.legs.balance_errors import stand_errors
+from golem.capabilities.legs.gait import GAIT, GAIT_OPTIONS, Gait, step_gait
+from golem.capabilities.legs.stop_predictor import REST, StopPredictor, planar, step_rest
+from golem.capabilities.legs.velocity_integrator import TRIM, VelocityIntegrator, step_trim
+from golem.hardware.servo.gravity import body_tree
+from golem.native import address, new_record, view
+from golem.robots.model.imu_mount import TORSO, turn_to_base
+from golem.robots.model.leg_kernel import LEG, SOLE, tree_dtype, tree_frames
+from golem.robots.model.table import BASE_LINK, LINKS
+from golem.types import LEGS, NUM_JOINTS, Array, BaseEstimate, LowState, Twist
+
+SEEN = np.dtype(
+    [
+        *(("q", "f8", (NUM_JOINTS,)), ("waist_rate", "f8"), ("gyro", "f8", (3,))),
+        *(("base", "f8", (4, 4)), ("velocity", "f8", (3,)), ("contact", "f8", (2,))),
+        *(("twist", "f8", (3,)), ("trims", "?"), ("out", "f8", (3,)), ("stance", "f8", (2,))),
+    ]
+)
+"""What the clock reads: the measured robot, the twist to apply and whether it is to be corrected, where the left sole
+belongs relative to the right one; and what it writes, `out`, the corrected twist."""
+_seen_at, _gait_at, _options_at = view(SEEN), view(GAIT), view(GAIT_OPTIONS)
+_rest_at, _trim_at, _tree_at = view(REST), view(TRIM), view(tree_dtype(NUM_JOINTS))
+_BASE_MASS, _BASE_COM = LINKS[BASE_LINK].mass, tuple(LINKS[BASE_LINK].com.tolist())
+_ANKLES = (LEG - 1, LEGS.stop - 1)
+
+
+@njit(cache=True, nogil=True)
+def soles_and_com(tree: int, q: Array, soles: Array, rotations: Array, com: Array) -> None:
+    """Write where the soles and the centre of mass of the whole robot, hands empty, are in base_link.
+
+    Args:
+        tree: address of the tree of all joints; see `leg_kernel`.
+        q: (27,) joint positions [rad].
+        soles: (2, 3) their centres [m]; is filled, like the following.
+        rotations: (2, 3, 3) of the ankle_roll links.
+        com: (3,) centre of mass [m].
+    """
+    t = _tree_at(tree)
+    n = len(t.mass)
+    R, p = np.empty((n, 3, 3)), np.empty((n, 3))
+    tree_frames(t, q, R, p)
+    mass = _BASE_MASS
+    for a in range(3):
+        com[a] = _BASE_MASS * _BASE_COM[a]
+    for i in range(n):
+        mass += t.mass[i]
+        for a in range(3):
+            at = p[i, a]
+            for c in range(3):
+                at += R[i, a, c] * t.com[i, c]
+            com[a] += t.mass[i] * at
+    for a in range(3):
+        com[a] /= mass
+        for k in range(2):
+            i = _ANKLES[k]
+            soles[k, a] = p[i, a]
+            for c in range(3):
+                soles[k, a] += R[i, a, c] * SOLE[c]
+                rotations[k, a, c] = R[i, a, c]
+
+
+@njit(cache=True, nogil=True)
+def _level(R: Array, x: Array, out: Array) -> None:
+    for a in range(3):
+        out[a] = R[a, 0] * x[0] + R[a, 1] * x[1] + R[a, 2] * x[2]
+
+
+@njit(cache=True, nogil=True)
+def _advance(seen: int, tree: int, gait: int, options: int, rest: int, trim: int, dt: float) -> None:
+    """Advance everything by `dt` [s]; the others are addresses of the records above."""
+    s, g, o, m = _seen_at(seen), _gait_at(gait), _options_at(options), _trim_at(trim)
+    T = s.base
+    soles, rotations, level = np.empty((2, 3)), np.empty((2, 3, 3)), np.empty((2, 3))
+    com, at, errors = np.empty(3), np.empty(3), np.empty(3)
+    rate, spin, velocity = np.empty(3), np.empty(3), np.empty(3)
+    soles_and_com(tree, s.q, soles, rotations, com)
+    _level(T, com, at)
+    turn_to_base(s.gyro, s.q[TORSO], s.waist_rate, rate)
+    _level(T, rate, spin)
+    velocity[0] = s.velocity[0] + (spin[1] * at[2] - spin[2] * at[1])
+    velocity[1] = s.velocity[1] + (spin[2] * at[0] - spin[0] * at[2])
+    velocity[2] = s.velocity[2] + (spin[0] * at[1] - spin[1] * at[0])
+    for k in range(2):
+        _level(T, soles[k], level[k])
+    stand_errors(T, at, velocity, level, s.stance, errors)
+    commanded = s.twist[0] != 0.0 or s.twist[1] != 0.0 or s.twist[2] != 0.0
+    step_gait(g, o, commanded, errors[0], errors[1], errors[2], dt)
+
+    here, feet = np.empty(3), np.empty((2, 3))
+    planar(T, here)
+    for k in range(2):
+        feet[k, 0], feet[k, 1] = level[k, 0] + T[0, 3], level[k, 1] + T[1, 3]
+        R = rotations[k]
+        x = T[0, 0] * R[0, 0] + T[0, 1] * R[1, 0] + T[0, 2] * R[2, 0]
+        y = T[1, 0] * R[0, 0] + T[1, 1] * R[1, 0] + T[1, 2] * R[2, 0]
+        feet[k, 2] = math.atan2(y, x)
+    moving = commanded or (g.stepping and not o.always)
+    step_rest(_rest_at(rest), here, feet, s.contact, moving, dt)
+    for a in range(3):
+        s.out[a] = s.twist[a]
+    if not (commanded or g.stepping):
+        for a in range(3):
+            m.surplus[a] = m.correction[a] = 0.0
+    elif s.trims:
+        # Also through the last steps of a stop, and those after a push: they shall not carry it away.
+        step_trim(m, s.twist, T, s.velocity, spin[2], dt, s.out)
+
+
+class GaitClock:
+    """Runs gait, stop predictor and, if there is one, trim of one robot on one measurement."""
+
+    def __init__(self, gait: Gait, rest: StopPredictor, trim: VelocityIntegrator | None) -> None:
+        """Advance `gait`, `rest` and `trim`."""
+        tree, self._records = body_tree(), new_record(SEEN)
+        self._seen = seen = self._records[0]
+        learned = VelocityIntegrator() if trim is None else trim
+        self._kept = (gait, rest, learned)
+        records = (self._records, tree, gait.memory, gait.options, rest.memory, learned.memory)
+        self._places = [address(record) for record in records]
+        seen["trims"] = trim is not None
+        soles, com = np.empty((2, 3)), np.empty(3)
+        soles_and_com(self._places[1], np.zeros(NUM_JOINTS), soles, np.empty((2, 3, 3)), com)
+        # With both hips straight and level the distance of the feet does not depend on how far the knees are bent.
+        seen["stance"] = (soles[0] - soles[1])[:2]
+
+    def step(self, state: LowState, base: BaseEstimate, twist: Twist, dt: float) -> list[float]:
+        """Advance by `dt` [s]; return what to command so that the robot moves at `twist`: vx, vy, wz.
+
+        Args:
+            state: measured joints and IMU.
+            base: estimated pose and velocity of base_link.
+            twist: what the robot shall move at.
+            dt: time since the previous step [s].
+        """
+        seen = self._seen
+        seen["q"], seen["waist_rate"], seen["gyro"] = state.q, state.dq[TORSO], state.imu.gyro
+        seen["base"], seen["velocity"], seen["contact"] = base.T_odom_base, base.velocity, base.contact
+        seen["twist"] = twist.vx, twist.vy, twist.wz
+        _advance(*self._places, dt)
+        return seen["out"].tolist()
