@@ -14,7 +14,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
+from numba.extending import intrinsic as _intrinsic
 from numba.np.numpy_support import from_dtype
 from numpy.typing import NDArray
 
@@ -25,6 +25,7 @@ Record = Any
 Records = NDArray[Any]
 """A structured array of length one: what owns a record."""
 
+intrinsic: Any = _intrinsic
 ORDINARY, UNUSUAL, LOOK = 0, 1, 2
 """What a stage returns: it has done its tick; Python has to do it; it has, and somebody wants to look at the result."""
 STATE = 3 * NUM_JOINTS + 10

@@ -140,7 +140,9 @@ class Bus:
     def latest(self, topic: Topic[T]) -> T | None:
         """Return the newest delivered value of `topic`, or None before the first."""
         value = self._now.get(topic.name)
-        return cast("T | None", value.value() if value.__class__ is Deferred else value)
+        if value.__class__ is Deferred:
+            return cast("Deferred[T]", value).value()
+        return cast("T | None", value)
 
     def count(self, topic: Topic[Any]) -> int:
         """Return how many values of `topic` were delivered so far: a reader sees by it that a value is new."""

@@ -37,13 +37,12 @@ class Node(Protocol):
 
 
 class Chain(Protocol):
-    """Nodes that have their turn at every tick, and can have it in compiled code; see `runtime.chain`.
+    """Nodes that have their turn at every tick, and can have it in compiled code; see `runtime.chain`."""
 
-    Attributes:
-        members: the nodes, in the order of their turns.
-    """
-
-    members: Sequence[Node]
+    @property
+    def members(self) -> Sequence[Node]:
+        """The nodes, in the order of their turns."""
+        ...
 
     def run(self, t: float, first: int, last: int) -> None:
         """Let the members from `first` up to `last` have their turns of the tick at `t` [s]."""
