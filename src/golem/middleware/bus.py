@@ -11,7 +11,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar, cast
+from typing import Any, Generic, Protocol, TypeVar
 
 from golem.errors import GolemError
 
@@ -67,7 +67,7 @@ class Bus:
 
     def __init__(self) -> None:
         """Start with no streams."""
-        self._now: dict[str, object] = {}
+        self._now: dict[str, Any] = {}
         self._count: dict[str, int] = {}
         self._pending: dict[str, deque[tuple[float, object]]] = {}
         self._wakers: dict[str, list[Waker]] = {}
@@ -140,9 +140,7 @@ class Bus:
     def latest(self, topic: Topic[T]) -> T | None:
         """Return the newest delivered value of `topic`, or None before the first."""
         value = self._now.get(topic.name)
-        if value.__class__ is Deferred:
-            return cast("Deferred[T]", value).value()
-        return cast("T | None", value)
+        return value.value() if value.__class__ is Deferred else value
 
     def count(self, topic: Topic[Any]) -> int:
         """Return how many values of `topic` were delivered so far: a reader sees by it that a value is new."""

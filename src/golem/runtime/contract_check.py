@@ -16,6 +16,7 @@ from golem.runtime.call_times import CallTimes
 from golem.types import Array
 
 T = TypeVar("T")
+_FLOAT = np.dtype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,8 @@ class ContractCheck:
         Raises:
             ModuleFault: it is something else.
         """
+        if type(value) is float and minimum <= value and -math.inf < value < math.inf:
+            return value
         if not isinstance(value, numbers.Real) or not math.isfinite(value) or value < minimum:
             bound = "" if minimum == -math.inf else f" of at least {minimum:g}"
             raise self.fault(f"{name} is {value!r}, the contract asks for a finite number{bound}")
@@ -104,6 +107,24 @@ class ContractCheck:
         if not math.isfinite(np.vdot(value, value)) and not np.isfinite(value).all():
             raise self.fault(f"{name} contains NaN or infinity")
         return value
+
+    def arrays(self, length: int, **values: object) -> None:
+        """Check that all `values` are arrays as `array` asks for, (length,) each; for ordinary ones in one go.
+
+        Raises:
+            ModuleFault: one is something else.
+        """
+        total = 0.0
+        for name in values:
+            value = values[name]
+            if type(value) is not np.ndarray or value.dtype is not _FLOAT or value.shape != (length,):
+                break
+            total += float(value.dot(value))
+        else:
+            if math.isfinite(total):
+                return
+        for name, value in values.items():
+            self.array(name, value, length)
 
     def fault(self, reason: str) -> ModuleFault:
         """Return the fault of this module for `reason`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 from golem.capabilities.legs.base import Envelope, LowerBody
@@ -50,7 +51,9 @@ class CheckedLowerBody:
         Raises:
             ModuleFault: it is none.
         """
-        latency = self.contract.call(lambda: self.controller.latency)
+        latency = self.contract.call(getattr, self.controller, "latency")
+        if type(latency) is float and 0.0 <= latency < math.inf:
+            return latency
         return self.contract.number("latency", latency, minimum=0.0)
 
     def check(self, command: object) -> LegCommand:
@@ -59,12 +62,14 @@ class CheckedLowerBody:
         Raises:
             ModuleFault: it is none, not finite, or leaves the torque of a robot on the ground to the servo.
         """
-        checked = self.contract.kind("the leg command", command, LegCommand)
-        for name in ("q", "kp", "kd"):
-            self.contract.array(name, getattr(checked, name), JOINTS)
+        checked = command
+        if type(checked) is not LegCommand:
+            checked = self.contract.kind("the leg command", command, LegCommand)
         if checked.tau is not None:
-            self.contract.array("tau", checked.tau, JOINTS)
-        elif self._on_ground:
+            self.contract.arrays(JOINTS, q=checked.q, kp=checked.kp, kd=checked.kd, tau=checked.tau)
+            return checked
+        self.contract.arrays(JOINTS, q=checked.q, kp=checked.kp, kd=checked.kd)
+        if self._on_ground:
             raise self.contract.fault(
                 "tau is None, with which the servo carries legs that hang; on the ground the contract asks for a "
                 "torque, zero where there is none to add"
@@ -93,6 +98,7 @@ class LowerBodyNode:
         self._fault: ModuleFault | None = None
         self._failed_at = -RECOVERY
         self._overruns = 0
+        self._reported, self._speed = self.envelope, self.envelope.speed
         self.realtime = False
         self.period = 1.0 / max(legs.rate, fallback.rate)
 
@@ -138,7 +144,7 @@ class LowerBodyNode:
     def _control(self, state: LowState, base: BaseEstimate, twist: Twist | None) -> tuple[LegCommand, float]:
         """Run the controller in charge for one tick; return its command and latency. A fault of it is raised."""
         contract = self._legs.contract
-        started, runs = time.perf_counter(), self._locomotion.runs
+        started, runs = time.perf_counter() if self.realtime else 0.0, self._locomotion.runs
         if not moving(self._bus):
             contract.call(self._locomotion.reset, state)
             twist = None
@@ -164,20 +170,22 @@ class LowerBodyNode:
         )
 
     def _report(self, t: float) -> None:
-        locomotion = self._locomotion
+        locomotion, envelope = self._locomotion, self._legs.controller.envelope
+        if envelope is not self._reported:
+            self._reported, self._speed = envelope, envelope.speed
         status = LegStatus(
             t,
             locomotion.commanded,
             locomotion.applied,
             locomotion.clamped,
             locomotion.reason,
-            bool(locomotion.gait.stepping),
+            locomotion.motion.stepping,
             locomotion.moving,
             locomotion.rest,
-            locomotion.gait.phases,
+            locomotion.motion.phase,
             self._legs.contract.use,
             None if self._fault is None else str(self._fault),
-            self.envelope.speed,
+            self._speed,
             None if self._fault is None else self._fault.trace,
         )
         self._bus.publish(topics.LEG_STATUS, status, t)

@@ -27,7 +27,8 @@ def robots(rng: np.random.Generator, shake: float) -> tuple[LowState, BaseEstima
     q = crouching().q + rng.normal(0.0, 0.03 * shake, 27)
     imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), rng.normal(0.0, 0.1 * shake, 3), np.zeros(3))
     T = np.eye(4)
-    T[:3, :3] = rotation_rpy(*rng.normal(0.0, 0.03 * shake, 2).tolist(), rng.uniform(-3.2, 3.2))
+    roll, pitch = rng.normal(0.0, 0.03 * shake, 2)
+    T[:3, :3] = rotation_rpy(roll, pitch, rng.uniform(-3.2, 3.2))
     T[:3, 3] = rng.normal(0.0, 2.0, 3)
     base = BaseEstimate(0.0, T, rng.normal(0.0, 0.1 * shake, 3), 0.9, rng.uniform(0.0, 1.0, 2))
     return LowState(0.0, q, rng.normal(0.0, 0.1, 27), np.zeros(27), imu), base

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from golem.capabilities.legs.base import STANDING, LocomotionCommand
-from golem.capabilities.legs.observation import TERMS, ObservationLayout, Signals, Term, measure
+from golem.capabilities.legs.observation import TERMS, ObservationLayout, Signals, Term
 from golem.errors import ConfigError
 from golem.robots.model.spatial import rotation_rpy, transform
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
@@ -117,20 +117,41 @@ def test_one_robots_signals_are_in_base_link() -> None:
     # The torso turns with the base and, by its joint, about their common z.
     gyro = rotation_rpy(0, 0, turn).T @ (rate + [0, 0, 2.0])
     motion = LocomotionCommand(Twist(0.1, 0.2, 0.3), np.array([0.25, 0.75]), True, True)
-    s = measure(low_state(q, dq, gyro), BaseEstimate(0.0, T, R @ velocity), motion, np.arange(12.0))
-    np.testing.assert_allclose(s.velocity, velocity)
-    np.testing.assert_allclose(s.gyro, rate)
-    np.testing.assert_allclose(s.gravity, R.T @ [0, 0, -1])
-    np.testing.assert_allclose(s.twist, [0.1, 0.2, 0.3])
-    terms = (Term("phase_sin"), Term("phase_cos", 1.0, ("left",)))
-    np.testing.assert_allclose(ObservationLayout(terms, POSTURE).observe(s), [1.0, -1.0, 0.0], atol=1e-15)
+    state, base = low_state(q, dq, gyro), BaseEstimate(0.0, T, R @ velocity)
+
+    def seen(*terms: Term) -> Array:
+        return ObservationLayout(terms, POSTURE).look(state, base, motion, np.arange(12.0))
+
+    np.testing.assert_allclose(seen(Term("base_velocity")), velocity)
+    np.testing.assert_allclose(seen(Term("base_rate")), rate)
+    np.testing.assert_allclose(seen(Term("gravity")), R.T @ [0, 0, -1])
+    np.testing.assert_allclose(seen(Term("twist")), [0.1, 0.2, 0.3])
+    phases = (Term("phase_sin"), Term("phase_cos", 1.0, ("left",)))
+    np.testing.assert_allclose(seen(*phases), [1.0, -1.0, 0.0], atol=1e-15)
+
+
+def test_one_robot_sees_what_each_of_many_would() -> None:
+    rng = np.random.default_rng(2)
+    terms = [Term(name, rng.uniform(0.5, 2.0)) for name in rng.permutation(list(TERMS))]
+    layout = ObservationLayout(terms, POSTURE)
+    for stepping in (False, True):
+        R, q, dq, gyro = rotation_rpy(*rng.normal(size=3)), *rng.normal(size=(2, 27)), rng.normal(size=3)
+        velocity, twist, phase, action = *rng.normal(size=(2, 3)), rng.uniform(size=2), rng.normal(size=12)
+        c, s = np.cos(q[JOINT_INDEX["torso_joint"]]), np.sin(q[JOINT_INDEX["torso_joint"]])
+        rate = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ gyro
+        rate[2] -= dq[JOINT_INDEX["torso_joint"]]
+        many = Signals(q, dq, rate, -R[2], R.T @ velocity, twist, action, phase, np.float64(stepping))
+        motion = LocomotionCommand(Twist(*twist), phase, stepping, True)
+        base = BaseEstimate(0.0, transform((1.0, 2.0, 0.9), R), velocity)
+        one = layout.look(low_state(q, dq, gyro), base, motion, action)
+        np.testing.assert_allclose(one, layout.observe(many), rtol=0.0, atol=1e-12)
 
 
 def test_the_clock_shows_zero_while_it_rests() -> None:
     zero = np.zeros(NUM_JOINTS)
-    s = measure(low_state(zero, zero, np.zeros(3)), BaseEstimate(0.0, np.eye(4)), STANDING, np.zeros(12))
+    state, base = low_state(zero, zero, np.zeros(3)), BaseEstimate(0.0, np.eye(4))
     layout = ObservationLayout((Term("phase_sin"), Term("phase_cos")), POSTURE)
-    np.testing.assert_array_equal(layout.observe(s), 0.0)
+    np.testing.assert_array_equal(layout.look(state, base, STANDING, np.zeros(12)), 0.0)
 
 
 def test_one_robot_costs_microseconds() -> None:
@@ -140,7 +161,7 @@ def test_one_robot_costs_microseconds() -> None:
     action = np.zeros(12)
 
     def once() -> Any:
-        return layout.observe(measure(state, base, STANDING, action))
+        return layout.look(state, base, STANDING, action)
 
     best = np.inf
     for _ in range(5):

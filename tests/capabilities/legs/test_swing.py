@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.legs.swing import swing_offset
+from golem.capabilities.legs.swing import LIFT, rise, swing_offset, swing_share
 
 STIFF = np.zeros(12)
 """Lag of joints that follow at once [s]."""
@@ -32,6 +32,16 @@ def test_many_robots_are_many_single_ones() -> None:
     many = swing_offset(phase, 0.7, 0.55, 0.3, STIFF)
     assert many.shape == (5, 3, 12)
     np.testing.assert_array_equal(many[4, 1], swing_offset(phase[4, 1], 0.7, 0.55, 0.3, STIFF))
+
+
+def test_the_compiled_swing_is_that_of_the_description() -> None:
+    rng, period, stance, amplitude = np.random.default_rng(2), 0.64, 0.55, 0.3
+    phase, lag = rng.uniform(size=(200, 2)), rng.uniform(0.0, 0.1, 12)
+    swing = swing_share(phase, stance)[..., None]
+    speed = np.pi / ((1.0 - stance) * period) * np.sin(2.0 * np.pi * swing)
+    expected = amplitude * (rise(swing) + speed * lag.reshape(2, 6)) * LIFT
+    given = swing_offset(phase, period, stance, amplitude, lag).reshape(200, 2, 6)
+    np.testing.assert_allclose(given, expected, rtol=0.0, atol=1e-12)
 
 
 def test_joints_that_lag_follow_the_motion_that_was_meant() -> None:

@@ -57,7 +57,7 @@ def balance_errors(R: Array, com: Array, velocity: Array, soles: Array, stance: 
         stance: (2,) where the left sole belongs relative to the right one, x ahead, y left [m].
     """
     out = np.empty(com.shape)
-    shaped = ((R, (3, 3)), (com, (3,)), (velocity, (3,)), (soles, (2, 3)))
-    rows = [np.ascontiguousarray(x).reshape(-1, *shape) for x, shape in shaped]
-    _all_errors(*rows, np.ascontiguousarray(stance), out.reshape(-1, 3))
+    R, com, velocity, soles, stance = map(np.ascontiguousarray, (R, com, velocity, soles, stance))
+    coms, velocities = com.reshape(-1, 3), velocity.reshape(-1, 3)
+    _all_errors(R.reshape(-1, 3, 3), coms, velocities, soles.reshape(-1, 2, 3), stance, out.reshape(-1, 3))
     return out[..., :2], out[..., 2]

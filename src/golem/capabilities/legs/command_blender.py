@@ -7,7 +7,11 @@ from golem.types import Array
 
 
 class CommandBlender:
-    """Mixes the commands of the controller that was in charge with those of the one that is, for a while."""
+    """Mixes the commands of the controller that was in charge with those of the one that is, for a while.
+
+    Attributes:
+        active: whether commands are being mixed; if not, `step` changes nothing.
+    """
 
     def __init__(self, duration: float) -> None:
         """Take `duration` [s] from one controller to the next, unless `begin` says otherwise."""
@@ -18,14 +22,10 @@ class CommandBlender:
         """Let the next command pass as it is."""
         self.begin(None)
 
-    @property
-    def active(self) -> bool:
-        """Whether commands are being mixed."""
-        return self._old is not None
-
     def begin(self, old: LegCommand | None, duration: float | None = None) -> None:
         """Lead over from the command `old` to those of another controller; None lets them pass as they are."""
         self._old, self._elapsed = old, 0.0
+        self.active = old is not None
         self._duration = self._usual if duration is None else duration
 
     def step(self, command: LegCommand, dt: float, old: LegCommand | None = None) -> LegCommand:
@@ -38,7 +38,7 @@ class CommandBlender:
         """
         self._elapsed += dt
         if self._old is None or self._elapsed >= self._duration:
-            self._old = None
+            self._old, self.active = None, False
             return command
         return _mixed(old or self._old, command, self._elapsed / self._duration)
 

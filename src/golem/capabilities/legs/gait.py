@@ -135,6 +135,7 @@ class Gait:
     """The gait clocks of `shape` robots.
 
     Attributes:
+        config: the clock's parameters; see `use`.
         memory, options: (*shape,) of `GAIT`, (1,) of `GAIT_OPTIONS`.
         phase: (*shape,) phase of the left leg.
         stepping: (*shape,) whether the clock runs.
@@ -146,16 +147,11 @@ class Gait:
         self.options = new_record(GAIT_OPTIONS)
         self.phase: Array = self.memory["phase"]
         self.stepping: Bools = self.memory["stepping"]
-        self.config = config
+        self.use(config)
 
-    @property
-    def config(self) -> GaitConfig:
-        """The clock's parameters."""
-        return self._config
-
-    @config.setter
-    def config(self, c: GaitConfig) -> None:
-        self._config = c
+    def use(self, config: GaitConfig) -> None:
+        """Run by `config` from now on."""
+        self.config = c = config
         lengths = (*c.capture_start, c.capture_stop, c.feet_start, c.feet_stop)
         flags = (c.follows, c.recovers, c.start == "always")
         self.options[0] = (c.period, c.stance, *lengths, c.patience, *flags)

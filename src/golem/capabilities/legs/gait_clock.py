@@ -129,14 +129,15 @@ class GaitClock:
         self._kept = (gait, rest, learned)
         records = (self._records, tree, gait.memory, gait.options, rest.memory, learned.memory)
         self._places = [address(record) for record in records]
+        self._out: Array = self._records["out"][0]
         seen["trims"] = trim is not None
         soles, com = np.empty((2, 3)), np.empty(3)
         soles_and_com(self._places[1], np.zeros(NUM_JOINTS), soles, np.empty((2, 3, 3)), com)
         # With both hips straight and level the distance of the feet does not depend on how far the knees are bent.
         seen["stance"] = (soles[0] - soles[1])[:2]
 
-    def step(self, state: LowState, base: BaseEstimate, twist: Twist, dt: float) -> list[float]:
-        """Advance by `dt` [s]; return what to command so that the robot moves at `twist`: vx, vy, wz.
+    def step(self, state: LowState, base: BaseEstimate, twist: Twist, dt: float) -> Array:
+        """Advance by `dt` [s]; return what to command so that the robot moves at `twist`: (3,), vx, vy, wz.
 
         Args:
             state: measured joints and IMU.
@@ -148,5 +149,6 @@ class GaitClock:
         seen["q"], seen["waist_rate"], seen["gyro"] = state.q, state.dq[TORSO], state.imu.gyro
         seen["base"], seen["velocity"], seen["contact"] = base.T_odom_base, base.velocity, base.contact
         seen["twist"] = twist.vx, twist.vy, twist.wz
-        _advance(*self._places, dt)
-        return seen["out"].tolist()
+        records, tree, gait, options, rest, trim = self._places
+        _advance(records, tree, gait, options, rest, trim, dt)
+        return self._out

@@ -12,22 +12,17 @@ for, not where the command points. Once it is in place again, it walks on.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from golem import registry
-from golem.capabilities.legs.balance_errors import heading_frame
-from golem.capabilities.legs.base import Envelope, LocomotionCommand, LowerBody, Starting, follows
+from golem.capabilities.legs.base import ZERO, Envelope, LocomotionCommand, LowerBody, Starting, follows
 from golem.capabilities.legs.command_blender import CommandBlender
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.rate_divider import RateDivider
 from golem.capabilities.legs.vendor import Onboard
 from golem.interfaces.payloads import LegCommand
-from golem.types import LEGS, BaseEstimate, LowState, Twist
-
-ZERO = Twist()
+from golem.types import LEGS, BaseEstimate, LowState
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +76,7 @@ class Handover:
         rate, latency: the higher of the two controllers' rates; each runs at its own. The longer latency.
         envelope: that of the walking controller.
         gait: the clock that the controller in charge wants; while it stands, without a start at a command.
+        walking: whether the walking controller is in charge.
     """
 
     def __init__(self, config: HandoverConfig, onboard: Onboard | None = None) -> None:
@@ -101,12 +97,9 @@ class Handover:
         self.latency: float = max(controller.latency for controller in both)
         self.envelope: Envelope = both[0].envelope
         self._blend = CommandBlender(config.blend)
+        # False for what is not a number.
+        self._gyro_below, self._speed_below = float(config.gyro).__gt__, float(config.joint_speed).__gt__
         self._begin()
-
-    @property
-    def walking(self) -> bool:
-        """Whether the walking controller is in charge."""
-        return self._active is self._walk
 
     @property
     def follows(self) -> bool:
@@ -121,12 +114,13 @@ class Handover:
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Run the controller in charge, after a change of hands where one is due; see `LowerBody.step`."""
         self._healthy = self._healthy + dt if self._is_healthy(state, base) else 0.0
-        if self._is_shoved(base, motion):
+        if self.walking and self._is_shoved(base, motion):
             self._catch(state)
         # Another controller failed while it walked: the walking one ends that, if it is ready.
         found = self._last is None and motion.stepping and not self._is_in_place(base)
-        may_change = found or (self._is_calm(dt) and not self._blend.active)
-        if not (found or self._other_wanted(motion)):
+        wanted = found or self._other_wanted(motion)
+        may_change = wanted and (found or (self._is_calm(dt) and not self._blend.active))
+        if not wanted:
             self._coming = None
         elif self._coming is None and may_change:
             self._coming = self._stand if self.walking else self._walk
@@ -142,10 +136,14 @@ class Handover:
             self._take_over(self._coming)
             self._blend.begin(self._last)
         else:
-            command = self._active.step(state, base, motion if self.walking else _standing(motion), dt)
-        old = self._leaving.step(state, base, _standing(motion), dt) if self._blend.active else None
-        self._last = self._blend.step(command, dt, old)
-        return self._last
+            still = motion.twist is ZERO and not motion.commanded
+            asked = motion if self.walking or still else _standing(motion)
+            command = self._active.step(state, base, asked, dt)
+        if self._blend.active:
+            old = self._leaving.step(state, base, _standing(motion), dt)
+            command = self._blend.step(command, dt, old)
+        self._last = command
+        return command
 
     def _catch(self, state: LowState) -> None:
         """Give the legs to the standing controller in the middle of a step."""
@@ -156,6 +154,7 @@ class Handover:
 
     def _take_over(self, controller: RateDivider) -> None:
         self._active = controller
+        self.walking = controller is self._walk
         gait = controller.controller.gait
         self.gait: GaitConfig = gait if self.walking else gait.without_commands()
         self._coming: RateDivider | None = None
@@ -168,12 +167,14 @@ class Handover:
         self._blend.reset()
 
     def _is_shoved(self, base: BaseEstimate, motion: LocomotionCommand) -> bool:
-        """Return whether the robot walks, and far from as it was told."""
+        """Return whether the robot, which walks, does so far from as it was told."""
         bound = self.config.shoved
-        if bound is None or not self.walking or self._blend.active or self._last is None or base.stale:
+        if bound is None or self._blend.active or self._last is None or base.stale:
             return False
-        velocity = heading_frame(base.T_odom_base[:3, :3]).T @ base.velocity[:2]
-        return math.hypot(velocity[0] - motion.twist.vx, velocity[1] - motion.twist.vy) > bound
+        x, y = base.T_odom_base[0, 0], base.T_odom_base[1, 0]
+        vx, vy, size = base.velocity[0], base.velocity[1], math.hypot(x, y)
+        ahead, sideways = (x * vx + y * vy) / size, (x * vy - y * vx) / size
+        return math.hypot(ahead - motion.twist.vx, sideways - motion.twist.vy) > bound
 
     def _is_calm(self, dt: float) -> bool:
         """Return whether the robot has been healthy for long enough."""
@@ -185,17 +186,16 @@ class Handover:
 
     def _is_healthy(self, state: LowState, base: BaseEstimate) -> bool:
         """Return whether the measured robot is calm, upright, in place, and not on one leg."""
-        config = self.config
         w, x, y, z = state.imu.quat.tolist()
         # Gravity in the torso's frame is minus the last row of its rotation.
         lean = math.hypot(2.0 * (x * z - w * y), 2.0 * (y * z + w * x))
-        loaded = base.contact > 0.5
+        left, right = base.contact.tolist()
         return (
-            float(np.abs(state.imu.gyro).max()) < config.gyro
-            and float(np.abs(state.dq[LEGS]).max()) < config.joint_speed
-            and lean < config.lean
+            all(map(self._gyro_below, map(abs, state.imu.gyro.tolist())))
+            and all(map(self._speed_below, map(abs, state.dq[LEGS].tolist())))
+            and lean < self.config.lean
             and self._is_in_place(base)
-            and bool(loaded[0] == loaded[1])
+            and (left > 0.5) == (right > 0.5)
         )
 
     def _other_wanted(self, motion: LocomotionCommand) -> bool:
@@ -215,7 +215,7 @@ class Handover:
 
 def _standing(motion: LocomotionCommand) -> LocomotionCommand:
     """Return `motion` without its twist."""
-    return replace(motion, twist=ZERO, commanded=False)
+    return LocomotionCommand(ZERO, motion.phase, motion.stepping, False)
 
 
 def _is_ready(controller: LowerBody) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from golem.capabilities.legs.base import LocomotionCommand, LowerBody, follows
+from golem.capabilities.legs.base import STANDING, ZERO, LocomotionCommand, LowerBody, follows
 from golem.capabilities.legs.command_blender import CommandBlender
 from golem.capabilities.legs.foot_separation import FootSeparation, FootSeparationConfig
 from golem.capabilities.legs.gait import Gait
@@ -21,8 +21,6 @@ from golem.capabilities.legs.velocity_integrator import VelocityIntegrator, Velo
 from golem.interfaces.payloads import LegCommand
 from golem.options import require
 from golem.types import BaseEstimate, LowState, PlanarPose, Twist
-
-ZERO = Twist()
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +75,8 @@ class Locomotion:
         clamped: whether the commanded twist lies outside the controller's envelope.
         reason: why the controller does not get the commanded twist; empty where it does, slewing aside.
         gait: the gait clock.
+        motion: what the controller was asked for last.
+        runs: how often the controller in charge was run.
     """
 
     def __init__(self, controller: LowerBody, config: LocomotionConfig | None = None) -> None:
@@ -91,17 +91,13 @@ class Locomotion:
         self._rest = StopPredictor()
         self._gait_clock = GaitClock(self.gait, self._rest, self._trim)
         self._grounded = False
+        self.motion, self.runs = STANDING, 0
         self._forget()
 
     @property
     def controller(self) -> LowerBody:
         """The controller in charge."""
         return self._paced.controller
-
-    @property
-    def runs(self) -> int:
-        """How often the controller in charge was run."""
-        return self._paced.runs
 
     @property
     def moving(self) -> bool:
@@ -138,6 +134,7 @@ class Locomotion:
         self._blend.begin(last)
         self._paced = RateDivider(controller)
         self._paced.reset(state)
+        self.runs = 0
 
     def step(self, state: LowState, base: BaseEstimate, twist: Twist | None, dt: float) -> LegCommand:
         """Advance by one tick.
@@ -154,16 +151,23 @@ class Locomotion:
         waits = wanted is not ZERO and not self._moves and not follows(self._paced.controller)
         if waits:
             self.reason = "who walks does not have the legs yet"
-        self._slew(ZERO if waits else wanted, dt)
+        if self._moves or (wanted is not ZERO and not waits):
+            self._slew(ZERO if waits else wanted, dt)
         self._until_gate -= dt
         self._since_gate += dt
         if self._until_gate < 1e-6:
             self._clock(state, base, self._since_gate)
-            self._until_gate = max(self._until_gate + 1.0 / self.config.gate_rate, 0.0)
+            self._until_gate += 1.0 / self.config.gate_rate
+            if self._until_gate < 0.0:
+                self._until_gate = 0.0
             self._since_gate = 0.0
         stepping = bool(self.gait.stepping)
         motion = LocomotionCommand(self._trimmed, self.gait.phases, stepping, waits or self._moves)
-        command = self._blend.step(self._paced.step(state, base, motion, dt), dt)
+        self.motion = motion
+        command = self._paced.step(state, base, motion, dt)
+        self.runs = self._paced.runs
+        if self._blend.active:
+            command = self._blend.step(command, dt)
         if self._separation is None or not stepping:
             return command
         swings = motion.phase >= self.gait.config.stance
@@ -221,8 +225,6 @@ class Locomotion:
 
     def _slew(self, wanted: Twist, dt: float) -> None:
         """Bring the applied twist towards `wanted`; on its way to a stop it ends at the dead band."""
-        if wanted is ZERO and not self._moves:
-            return
         now, (ax, ay, aw) = self.applied, self.config.acceleration
         vx = _toward(now.vx, wanted.vx, ax * dt)
         vy = _toward(now.vy, wanted.vy, ay * dt)
@@ -238,16 +240,15 @@ class Locomotion:
             if self.gait.config != controller.gait:
                 # Another controller has the legs, as in a hand-over: what was learned about the last one is void.
                 self._forget_trim()
-            self.gait.config = controller.gait
+            self.gait.use(controller.gait)
         trimmed = self._gait_clock.step(state, base, self.applied, dt)
         if not self._moves and not self.gait.stepping:
             self._trimmed = ZERO
         else:
             wanted = _values(self.applied)
             axes = controller.envelope.axes
-            self._trimmed = Twist(
-                *(new if on else old for new, old, on in zip(trimmed, wanted, axes, strict=True))
-            )
+            choices = zip(axes, trimmed.tolist(), wanted, strict=True)
+            self._trimmed = Twist(*[new if own else old for own, new, old in choices])
 
 
 def _toward(x: float, goal: float, step: float) -> float:

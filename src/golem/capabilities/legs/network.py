@@ -70,20 +70,27 @@ class OnnxNetwork:
             )
         self._name, self._batched = inputs[0].name, len(inputs[0].shape) == 2
         self._session = session
+        self._x: Float32 = np.zeros((1, size) if self._batched else size, dtype=np.float32)
         try:
-            out = self(np.zeros(size, dtype=np.float32))
+            out = np.asarray(session.run(None, {self._name: self._x})[0])
         except Exception as error:  # onnxruntime's errors have no common base
             raise _wrong_input(path, size, str(inputs[0].shape)) from error
-        _check_output(path, out)
+        self._y: Float32 = np.zeros(ACTIONS, dtype=np.float32)
+        _check_output(path, out[0] if self._batched else out)
+        # Both buffers stay where they are, so that a run converts and allocates nothing.
+        self._binding = session.io_binding()
+        self._binding.bind_cpu_input(self._name, self._x)
+        place = self._y.ctypes.data
+        self._binding.bind_output(outputs[0].name, "cpu", 0, np.float32, out.shape, place)
 
     def reset(self) -> None:
         """Do nothing: the network has no memory."""
 
     def __call__(self, observation: Float32) -> Float32:
         """Return the action; see `Network`."""
-        x = observation[None] if self._batched else observation
-        out = np.asarray(self._session.run(None, {self._name: x})[0])
-        return out[0] if self._batched else out
+        self._x[...] = observation
+        self._session.run_with_iobinding(self._binding)
+        return self._y.copy()
 
 
 class TorchScriptNetwork:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from golem.capabilities.legs.base import LocomotionCommand
 from golem.errors import ConfigError, unknown_name
+from golem.native import address, new_record, view
 from golem.options import vector
-from golem.robots.model.imu_mount import sensed_base_rate
+from golem.robots.model.imu_mount import TORSO, turn_to_base
 from golem.robots.model.table import JOINT_NAMES
-from golem.types import LEGS, SIDES, UPPER, Array, BaseEstimate, LowState
+from golem.types import LEGS, NUM_JOINTS, SIDES, UPPER, Array, BaseEstimate, LowState
 
 _AXES = ("x", "y", "z")
 
@@ -32,6 +36,8 @@ TERMS: dict[str, tuple[str, ...]] = {
 joint_position is relative to the policy's default posture. phase_sin and phase_cos are of 2 pi times the gait phase,
 and 0 while the gait clock rests.
 """
+SIGNALS = sum(map(len, TERMS.values()))
+"""Components of all terms together."""
 GROUPS: dict[str, tuple[str, ...]] = {"legs": JOINT_NAMES[LEGS], "upper": JOINT_NAMES[UPPER]}
 """Words that stand for several joints in `Term.of`."""
 
@@ -77,6 +83,41 @@ class Term:
     of: tuple[str, ...] = ()
 
 
+MEASURED = np.dtype(
+    [
+        *(("gyro", "f8", (3,)), ("base", "f8", (4, 4)), ("velocity", "f8", (3,)), ("twist", "f8", (3,))),
+        *(("q", "f8", (NUM_JOINTS,)), ("dq", "f8", (NUM_JOINTS,)), ("action", "f8", (LEGS.stop,))),
+        *(("phase", "f8", (2,)), ("stepping", "f8")),
+    ]
+)
+"""What `ObservationLayout.look` is given."""
+_measured_at = view(MEASURED)
+
+
+@njit(cache=True, nogil=True)
+def _look(measured: int, columns: NDArray[np.int64], offset: Array, scale: Array, out: Array) -> None:
+    """Write the observation of the `MEASURED` at an address into `out` (size,)."""
+    m = _measured_at(measured)
+    values, R = np.empty(SIGNALS), m.base
+    turn_to_base(m.gyro, m.q[TORSO], m.dq[TORSO], values[3:6])
+    for a in range(3):
+        values[a] = m.velocity[0] * R[0, a] + m.velocity[1] * R[1, a] + m.velocity[2] * R[2, a]
+        values[6 + a] = -R[2, a]
+        values[9 + a] = m.twist[a]
+    at = 12
+    for i in range(len(m.q)):
+        values[at + i], values[at + len(m.q) + i] = m.q[i], m.dq[i]
+    at += 2 * len(m.q)
+    for i in range(len(m.action)):
+        values[at + i] = m.action[i]
+    at += len(m.action)
+    for k in range(2):
+        angle = 2.0 * np.pi * m.phase[k]
+        values[at + k], values[at + 2 + k] = math.sin(angle) * m.stepping, math.cos(angle) * m.stepping
+    for i in range(len(out)):
+        out[i] = (values[columns[i]] - offset[i]) * scale[i]
+
+
 class ObservationLayout:
     """The order, offsets and scales of an observation.
 
@@ -107,6 +148,9 @@ class ObservationLayout:
         self._scale = np.concatenate(
             [vector(f"scale of {t.term}", t.scale, len(_components(t))) for t in terms]
         )
+        memory = new_record(MEASURED)
+        self._measured, self._address = memory[0], address(memory)
+        self._memory = memory
 
     def observe(self, signals: Signals) -> Array:
         """Return the (..., size) observation."""
@@ -122,6 +166,23 @@ class ObservationLayout:
             axis=-1,
         )
         return (values.take(self._columns, axis=-1) - self._offset) * self._scale
+
+    def look(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, action: Array) -> Array:
+        """Return the (size,) observation of one robot: all about the base as estimated, its rate by the torso IMU.
+
+        Args:
+            state: joints and IMU.
+            base: estimated pose and velocity of base_link.
+            motion: what the base layer asks for.
+            action: (12,) the policy's last action.
+        """
+        m, twist = self._measured, motion.twist
+        m["q"], m["dq"], m["gyro"], m["action"] = state.q, state.dq, state.imu.gyro, action
+        m["base"], m["velocity"] = base.T_odom_base, base.velocity
+        m["twist"], m["phase"], m["stepping"] = (twist.vx, twist.vy, twist.wz), motion.phase, motion.stepping
+        out = np.empty(self.size)
+        _look(self._address, self._columns, self._offset, self._scale, out)
+        return out
 
 
 def _components(term: Term) -> tuple[str, ...]:
@@ -142,26 +203,3 @@ def _components(term: Term) -> tuple[str, ...]:
             raise unknown_name(f"component of {term.term}", word, (*groups, *names))
         out.extend(groups.get(word, (word,)))
     return tuple(out)
-
-
-def measure(state: LowState, base: BaseEstimate, motion: LocomotionCommand, action: Array) -> Signals:
-    """Return the signals of one robot: gravity and velocity from the base estimate, the rate from the torso IMU.
-
-    Args:
-        state: joints and IMU.
-        base: estimated pose and velocity of base_link.
-        motion: what the base layer asks for.
-        action: (12,) the policy's last action.
-    """
-    R = base.T_odom_base[:3, :3]
-    return Signals(
-        q=state.q,
-        dq=state.dq,
-        gyro=sensed_base_rate(state),
-        gravity=-R[2],
-        velocity=base.velocity @ R,
-        twist=np.array((motion.twist.vx, motion.twist.vy, motion.twist.wz)),
-        action=action,
-        phase=motion.phase,
-        stepping=np.asarray(motion.stepping, dtype=np.float64),
-    )

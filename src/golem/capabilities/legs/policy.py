@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from golem.capabilities.legs.base import LocomotionCommand
 from golem.capabilities.legs.description import JOINTS, load_description
 from golem.capabilities.legs.network import load_network
-from golem.capabilities.legs.observation import measure
-from golem.capabilities.legs.swing import swing_offset
+from golem.capabilities.legs.swing import swing_legs
 from golem.errors import GolemError
 from golem.interfaces.payloads import LegCommand
 from golem.types import LEGS, Array, BaseEstimate, LowState
@@ -18,6 +18,32 @@ from golem.types import LEGS, Array, BaseEstimate, LowState
 
 class BadAction(GolemError):
     """A policy network returned something that is not finite."""
+
+
+@njit(cache=True, nogil=True)
+def _targets(
+    action: Array,
+    clip: float,
+    scale: Array,
+    phase: Array,
+    period: float,
+    stance: float,
+    amplitude: float,
+    lag: Array,
+    out: Array,
+) -> bool:
+    """Clip `action` (12,) and add its part and that of the swing to the posture `out` (12,); False if not finite.
+
+    Lengths, phases and gains are those of `swing_offset`.
+    """
+    swing = np.empty(len(out))
+    swing_legs(phase, period, stance, amplitude, lag, swing)
+    for i in range(len(out)):
+        if action[i] - action[i] != 0.0:
+            return False
+        action[i] = min(max(action[i], -clip), clip)
+        out[i] = out[i] + scale[i] * action[i] + swing[i]
+    return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +100,13 @@ class Policy:
         Raises:
             BadAction: the network returned NaN or infinity.
         """
-        observation = self._layout.observe(measure(state, base, motion, self._action))
+        observation = self._layout.look(state, base, motion, self._action)
         action = self._network(observation.astype(np.float32)).astype(np.float64)
-        if not np.isfinite(action).all():
+        q, own, gait = self._q0.copy(), self.description.action, self.gait
+        finite = _targets(
+            action, own.clip, self._scale, motion.phase, gait.period, gait.stance, own.swing, self._lag, q
+        )
+        if not finite:
             culprit = np.flatnonzero(~np.isfinite(observation))
             cause = (
                 f"; it was shown {self._layout.components[culprit[0]]} that is not finite"
@@ -84,10 +114,5 @@ class Policy:
                 else ""
             )
             raise BadAction(f"The network's action is not finite{cause}.")
-        clip = self.description.action.clip
-        self._action = np.clip(action, -clip, clip)
-        swing = swing_offset(
-            motion.phase, self.gait.period, self.gait.stance, self.description.action.swing, self._lag
-        )
-        q = self._q0 + self._scale * self._action + swing
+        self._action = action
         return LegCommand(q, self._kp.copy(), self._kd.copy(), np.zeros(JOINTS))

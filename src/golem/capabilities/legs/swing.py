@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import njit
 
 from golem.types import Array
 
@@ -20,6 +23,23 @@ def rise(swing: Array) -> Array:
     return np.square(np.sin(np.pi * swing))
 
 
+@njit(cache=True, nogil=True)
+def swing_legs(phase: Array, period: float, stance: float, amplitude: float, lag: Array, out: Array) -> None:
+    """Write what `swing_offset` returns of one robot into `out` (12,)."""
+    for k in range(2):
+        swing = max(phase[k] - stance, 0.0) / (1.0 - stance)
+        lift = math.sin(math.pi * swing)
+        speed = math.pi / ((1.0 - stance) * period) * math.sin(2.0 * math.pi * swing)
+        for i in range(6):
+            out[6 * k + i] = amplitude * (lift * lift + speed * lag[6 * k + i]) * LIFT[i]
+
+
+@njit(cache=True, nogil=True)
+def _swing_all(phase: Array, period: float, stance: float, amplitude: float, lag: Array, out: Array) -> None:
+    for i in range(len(phase)):
+        swing_legs(phase[i], period, stance, amplitude, lag, out[i])
+
+
 def swing_offset(phase: Array, period: float, stance: float, amplitude: float, lag: Array) -> Array:
     """Return what swinging legs add to their joint targets [rad], (..., 12) in motor order.
 
@@ -34,7 +54,7 @@ def swing_offset(phase: Array, period: float, stance: float, amplitude: float, l
         amplitude: peak of the hip's and the ankle's share; the knee bends by twice as much [rad].
         lag: (12,) how far each joint follows behind its target, kd / kp [s].
     """
-    swing = swing_share(phase, stance)
-    speed = np.pi / ((1.0 - stance) * period) * np.sin(2.0 * np.pi * swing)
-    lead = speed[..., None] * lag.reshape(2, 6)
-    return (amplitude * (rise(swing)[..., None] + lead) * LIFT).reshape(*phase.shape[:-1], 12)
+    out = np.empty((*phase.shape[:-1], 12))
+    rows = np.ascontiguousarray(phase).reshape(-1, 2)
+    _swing_all(rows, period, stance, amplitude, np.ascontiguousarray(lag), out.reshape(-1, 12))
+    return out
