@@ -25,7 +25,6 @@ from golem.evaluation.harness.trials import facts
 from golem.evaluation.metrics.summary import Summary, summarise
 from golem.evaluation.metrics.tables import comparisons, metrics, rates
 from golem.evaluation.metrics.text_table import TextTable
-from golem.evaluation.speed.compile_ahead import compile_if_cold
 from golem.provenance import code_files, command_line, commit, versions
 
 OPEN = "(default: the rung's)"
@@ -163,6 +162,8 @@ def run_ladder(config: LadderConfig) -> LadderResult:
     assert config.out is not None
     command = config.command()
     if config.j > 1:
+        from golem.evaluation.speed.compile_ahead import compile_if_cold
+
         compile_if_cold()
     with (
         _terminable(),
