@@ -10,6 +10,7 @@ Distances are between surfaces, negative where spheres overlap by more than they
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 
 from golem.types import Array
 
-Ints = NDArray[np.int32]
+Ints = Any
+"""(n,) int32, whose numbers are indices."""
 Indices = NDArray[np.int64]
 
 LINK_BODY, CLUSTER_FIRST, CLUSTER_BODY, LINK_PAIRS, LINK_PAIR_FIRST = 5, 6, 7, 8, 9
@@ -74,20 +76,20 @@ def _near(balls: Array, a: int, b: int, margin: float) -> bool:
 @njit(cache=True, nogil=True, error_model="numpy")
 def bodies_collide(R: Array, p: Array, ints: Ints, floats: Array, margin: float) -> bool:
     """Return whether two tested spheres come as near as `margin` [m], the bodies being where `place` put them."""
-    links, clusters = np.int64(ints[1]), np.int64(ints[2])
+    links, clusters = int(np.int64(ints[1])), int(np.int64(ints[2]))
     # Links, clusters, spheres; the last two are placed when they are first asked for.
     placed, around = np.empty((links + clusters + ints[3], 4)), links + clusters
     done = np.zeros(2 * clusters, np.uint8)
     for i in range(links):
         put(R, p, ints[ints[LINK_BODY] + i], floats, ints[LINK_BALLS] + 4 * i, placed, i)
     for i in range(ints[4]):
-        reach, pair = margin - floats[ints[ALLOWED] + i], ints[LINK_PAIRS] + 2 * i
+        reach, pair = margin - float(floats[ints[ALLOWED] + i]), ints[LINK_PAIRS] + 2 * i
         if not _near(placed, ints[pair], ints[pair + 1], reach):
             continue
         for j in range(ints[ints[LINK_PAIR_FIRST] + i], ints[ints[LINK_PAIR_FIRST] + i + 1]):
             pair = ints[CLUSTER_PAIRS] + 2 * j
             for side in range(2):
-                c = np.int64(ints[pair + side])
+                c = int(np.int64(ints[pair + side]))
                 if not done[clusters + c]:
                     done[clusters + c] = 1
                     put(
@@ -102,7 +104,7 @@ def bodies_collide(R: Array, p: Array, ints: Ints, floats: Array, margin: float)
             if not _near(placed, links + ints[pair], links + ints[pair + 1], reach):
                 continue
             for side in range(2):
-                c = np.int64(ints[pair + side])
+                c = int(np.int64(ints[pair + side]))
                 if not done[c]:
                     done[c] = 1
                     _put_spheres(R, p, c, ints, floats, placed, around)
@@ -156,7 +158,7 @@ def pair_distances(
     spheres: Indices,
 ) -> None:
     """Write the distance (l,) of every tested pair of links and its nearest spheres (l, 2); `cutoff` where farther."""
-    links, clusters = np.int64(ints[1]), np.int64(ints[2])
+    links, clusters = int(np.int64(ints[1])), int(np.int64(ints[2]))
     near = np.empty((links + clusters, 4))
     for i in range(links):
         put(placed_R, placed_p, ints[ints[LINK_BODY] + i], floats, ints[LINK_BALLS] + 4 * i, near, i)
@@ -164,7 +166,7 @@ def pair_distances(
         body, ball = ints[ints[CLUSTER_BODY] + c], ints[CLUSTER_BALLS] + 4 * c
         put(placed_R, placed_p, body, floats, ball, near, links + c)
     for i in range(ints[4]):
-        allowed, pair = floats[ints[ALLOWED] + i], ints[LINK_PAIRS] + 2 * i
+        allowed, pair = float(floats[ints[ALLOWED] + i]), ints[LINK_PAIRS] + 2 * i
         best = cutoff - allowed
         spheres[i, 0] = spheres[i, 1] = -1
         if _near(near, ints[pair], ints[pair + 1], best):
@@ -246,8 +248,8 @@ def nearest_pairs(
         distance[slot], spheres[slot, 0], spheres[slot, 1] = far[i], a, b
         for j in range(n):
             gradient[slot, j] = 0.0
-        add_gradient(placed, a, normal, sphere_body[a], 1.0, ints, R, p, gradient, slot)
-        add_gradient(placed, b, normal, sphere_body[b], -1.0, ints, R, p, gradient, slot)
+        add_gradient(placed, a, normal, int(sphere_body[a]), 1.0, ints, R, p, gradient, slot)
+        add_gradient(placed, b, normal, int(sphere_body[b]), -1.0, ints, R, p, gradient, slot)
     return count
 
 

@@ -324,7 +324,7 @@ def nearest_world(
     for m in range(len(moving)):
         i = moving[m]
         link = sphere_link[i]
-        d = _to_world(placed, i, shapes, balls, cells, steps, frame, best[link], out)
+        d = _to_world(placed, i, shapes, balls, cells, steps, frame, float(best[link]), out)
         if d < best[link]:
             best[link], which[link] = d, i
             for k in range(3):
@@ -344,5 +344,5 @@ def nearest_world(
         distance[slot], spheres[slot] = best[link], i
         for j in range(n):
             gradient[slot, j] = 0.0
-        add_gradient(placed, i, normals[link], sphere_body[i], 1.0, ints, R, p, gradient, slot)
+        add_gradient(placed, i, normals[link], int(sphere_body[i]), 1.0, ints, R, p, gradient, slot)
     return count

@@ -59,7 +59,7 @@ def compile_kernels() -> float:
 
 def compile_if_cold() -> None:
     """Compile in a process of its own where the plan's kernel is not on disk, or older than its source."""
-    source, folder = Path(plan_kernel.__file__), Path(plan_kernel.verdict.stats.cache_path)
+    source, folder = Path(plan_kernel.__file__), Path(str(plan_kernel.verdict.stats.cache_path))
     kept = [file.stat().st_mtime for file in folder.glob("plan_kernel.verdict-*.nbi")]
     if not kept or max(kept) < source.stat().st_mtime:
         subprocess.run([sys.executable, "-P", "-m", __spec__.name], check=False)
