@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 
 from golem import registry
+from golem.capabilities.arms import quick_ik
 from golem.capabilities.arms.goal_postures import GoalPostures
 from golem.capabilities.arms.postures import POSTURES
-from golem.capabilities.arms.quick_ik import TURNS as TORSO
-from golem.capabilities.arms.quick_ik import QuickIK
 from golem.capabilities.grasping.centroid import grasp_pose
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.errors import ConfigError
@@ -100,15 +99,15 @@ TURNS = (0.0, 0.4, -0.4)
 
 
 @cache
-def _tools() -> tuple[QuickIK, GoalPostures, PlanningRobot]:
-    return QuickIK(), GoalPostures(), PlanningRobot()
+def _tools() -> tuple[quick_ik.QuickIK, GoalPostures, PlanningRobot]:
+    return quick_ik.QuickIK(), GoalPostures(), PlanningRobot()
 
 
 def glimpsed(side: Side, position: Array) -> bool:
     """Return whether quick inverse kinematics find a posture as in `reaches`: where they do not, it may still be."""
     ik, _, robot = _tools()
     space, ready = JointSpace(robot, POSTURES["ready"]), POSTURES["ready"][1:]
-    starts = [np.append(turn, ready)[None] for turn in TORSO]
+    starts = [np.append(turn, ready)[None] for turn in quick_ik.TURNS]
     found = (ik.solve(side, T, start) for T in _poses(side, position) for start in starts)
     return any(q is not None and space.verdict(q) == 0 for q in found)
 
