@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Usage: scripts/batch/pack.sh OUT [PYTHON [PRESENT]]
 #
-# Writes OUT/packages.tgz.00, .01, ...: the locked core for Linux on x86-64 and the interpreter PYTHON (default 3.12), in
-# pieces of at most $PIECE (default 40 MiB). PRESENT is what `python3 -m pip list --format=freeze` prints on the machine
-# they go to: what it has is left out, in whichever version. Without it everything comes from the lock, except torch.
+# Writes OUT/packages.tgz.00, .01, ...: the locked core for Linux on x86-64 and the interpreter PYTHON (default 3.12),
+# in pieces of at most $PIECE (default 40 MiB). PRESENT is what `python3 -m pip list --format=freeze` prints on the
+# machine they go to: what it has is left out, in whichever version. Without it everything comes from the lock, except
+# torch.
 set -euo pipefail
 OUT=$(realpath -m "${1:?where the pieces go}") PYTHON=${2:-3.12} PRESENT=${3:+$(realpath "$3")}
 cd "$(dirname "$0")/../.."
