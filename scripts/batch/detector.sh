@@ -20,5 +20,6 @@ within "$render" "$GOLEM" train detector render --folder "$images" --worlds "${W
     --jobs "$JOBS" ${PER_CAMERA:+--per-camera "$PER_CAMERA"}
 mkdir -p "$run"
 within "$(left)" "$GOLEM" train detector train --data "$images" --out "$run" --steps 7242 --batch 192 --rate 0.003 \
-    --check-every 200 --device "${DEVICE:-cuda}" "$@" | tee -a "$run/log.txt"
+    --check-every 200 --device "${DEVICE:-cuda}" "$@" | tee -a "$run/log.txt" || status=$?
 save run
+exit "${status:-0}"

@@ -13,5 +13,6 @@ shift 3
 . "$(dirname "$0")/common.sh"
 resume
 
-within "$(left)" "$GOLEM" train legs run --out "$WORK/$NAME" --threads "$JOBS" "$@"
+within "$(left)" "$GOLEM" train legs run --out "$WORK/$NAME" --threads "$JOBS" "$@" || status=$?
 save .
+exit "${status:-0}"
