@@ -14,6 +14,8 @@ LAYERS = (
         "types",
         "errors",
         "figures",
+        "native",
+        "native_messages",
         "finite",
         "options",
         "traces",

@@ -6,7 +6,7 @@ from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import GateState, Reason
 from golem.middleware.bus import Bus
 from golem.runtime.gate_tally import GateTally, current_tally, tallied
-from golem.runtime.nodes import SafetyNode
+from golem.runtime.safety_nodes import SafetyNode
 
 
 def test_time_and_stops_are_counted_without_those_that_were_asked_for() -> None:

@@ -12,7 +12,7 @@ from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.robots.sensors.calibration import Calibration
 from golem.runtime.contract_check import ContractCheck
-from golem.runtime.nodes import ActNode, SenseNode
+from golem.runtime.robot_nodes import ActNode, SenseNode
 from golem.stack import Stack, parse_stack
 from golem.types import NUM_JOINTS, HandState, Imu, LowCommand
 

@@ -8,7 +8,7 @@ from golem.hardware.safety.base import OperatorRequest, SafetyLimits
 from golem.interfaces import topics
 from golem.interfaces.payloads import EstopMessage, GateState, Reason
 from golem.middleware.bus import Bus
-from golem.runtime.nodes import SafetyNode
+from golem.runtime.safety_nodes import SafetyNode
 from golem.types import NUM_JOINTS, BaseEstimate, Imu, LowCommand, LowState
 
 DT = 0.002

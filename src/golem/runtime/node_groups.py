@@ -26,7 +26,7 @@ from golem.robots.base import HasGantry, HasLidar, Robot
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.unitree import motion_switcher
 from golem.robots.unitree.motion_switcher import MotionSwitcher
-from golem.runtime import nodes, perception_nodes
+from golem.runtime import nodes, perception_nodes, robot_nodes, safety_nodes
 from golem.runtime.checked import (
     CheckedGraspMethod,
     CheckedMemory,
@@ -125,8 +125,10 @@ class RobotNodes:
             ConfigError, ModuleFault: see `ModuleFactory.make`; about the on-board legs.
         """
         contract = ContractCheck("robot", stack.choice("robot").use)
-        self.act = nodes.ActNode(bus, robot, contract, joint_offset)
-        self.nodes: list[Placed] = [(Phase.MEASURE, nodes.SenseNode(bus, robot, contract, joint_offset))]
+        self.act = robot_nodes.ActNode(bus, robot, contract, joint_offset)
+        self.nodes: list[Placed] = [
+            (Phase.MEASURE, robot_nodes.SenseNode(bus, robot, contract, joint_offset))
+        ]
         if wanted is not None:
             for name in robot.cameras:
                 camera = perception_nodes.CameraNode(bus, robot, name, wanted(name), contract)
@@ -159,10 +161,10 @@ class SafetyNodes:
         standing: Callable[[], StandingController] | None = None,
     ) -> None:
         """Enforce `limits`, under `estop`; without one the gate stays shut. `standing`: see `StandingGate`."""
-        self.gate = nodes.SafetyNode(bus, limits, standing)
+        self.gate = safety_nodes.SafetyNode(bus, limits, standing)
         self.nodes: list[Placed] = [(Phase.PROTECT, self.gate)]
         if estop is not None:
-            self.nodes.append((Phase.MEASURE, nodes.EstopNode(bus, estop)))
+            self.nodes.append((Phase.MEASURE, safety_nodes.EstopNode(bus, estop)))
 
     def request(self, request: OperatorRequest) -> None:
         """Ask something of the safety gate as an operator does: activate, stop, reset; it decides."""

@@ -3,44 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
 from golem.capabilities.arms.base import UpperBody
 from golem.capabilities.arms.trajectory import TrajectoryFollower
 from golem.hardware.estimator.base import BaseEstimator
-from golem.hardware.estop.base import EmergencyStop
-from golem.hardware.estop.virtual import VirtualEstop
 from golem.hardware.hands.base import HandController
-from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
-from golem.hardware.safety.gate import Gate
-from golem.hardware.safety.gate_stage import GateStage
-from golem.hardware.safety.standing_gate import StandingController, StandingGate
 from golem.hardware.servo.base import MotorServo
 from golem.interfaces import topics
 from golem.interfaces.payloads import (
     ArmCommand,
     GateState,
-    GateStatus,
     HandStatus,
     JointTrajectory,
 )
 from golem.middleware.bus import Bus, News
-from golem.native import HasStage, Stage
-from golem.robots.base import HasStages, Robot
+from golem.native import HasStage
 from golem.runtime.arm_limits import ArmLimits
 from golem.runtime.chain import Link
 from golem.runtime.contract_check import ContractCheck
-from golem.runtime.gate_tally import current_tally
 from golem.skills.base import SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import LACKS, SkillRun
 from golem.types import (
-    COMMAND_AGE,
     LEGS,
     NUM_JOINTS,
-    SIDES,
     TICK,
     UPPER,
     Array,
@@ -58,78 +46,6 @@ MIN_RATE = 1.0
 
 
 IDENTITY = np.eye(3)
-
-
-class SenseNode:
-    """Publishes what motors, IMU and hands report."""
-
-    period = TICK
-
-    def __init__(self, bus: Bus, robot: Robot, contract: ContractCheck, offset: Array | None = None) -> None:
-        """Read `robot`, whose joints report `offset` (27,) more than they are [rad]; None believes them."""
-        self._bus, self._robot, self._contract, self._offset = bus, robot, contract, offset
-
-    def link(self) -> Link | None:
-        """Return how it takes part in the chain; None for a robot without stages."""
-        stages = _stages(self._robot, self._offset)
-        if stages is None:
-            return None
-        return Link(self, stages[0], (), (topics.LOW_STATE, *map(topics.hand_state, SIDES)))
-
-    def step(self, t: float) -> None:
-        """Publish one sample of everything."""
-        call = self._contract.call
-        q, dq, tau = call(self._robot.joints)
-        q = q if self._offset is None else q - self._offset
-        self._bus.publish(topics.LOW_STATE, LowState(t, q, dq, tau, call(self._robot.imu)), t)
-        for side in SIDES:
-            self._bus.publish(topics.hand_state(side), call(self._robot.hand, side, t), t)
-
-
-class ActNode:
-    """Lets time pass under the newest command that left the safety gate."""
-
-    period = TICK
-
-    def __init__(self, bus: Bus, robot: Robot, contract: ContractCheck, offset: Array | None = None) -> None:
-        """Drive `robot`; `offset` as for `SenseNode`."""
-        self._bus, self._robot, self._contract, self._offset = bus, robot, contract, offset
-        self._taken: dict[Side, HandCommand] = {}
-
-    def link(self) -> Link | None:
-        """Return how it takes part in the chain; None for a robot without stages."""
-        robot = self._robot
-        stages = _stages(robot, self._offset)
-        if stages is None or not isinstance(robot, HasStages):
-            return None
-
-        def prepare(t: float) -> bool:
-            for side in SIDES:
-                hand = self._bus.latest(topics.hand_command(side))
-                if hand is not None and hand is not self._taken.get(side):
-                    self._taken[side] = hand
-                    robot.take_hand_command(side, hand)
-            return True
-
-        return Link(self, stages[1], (topics.LOW_CMD,), (), prepare)
-
-    def step(self, t: float) -> None:
-        """Advance the robot by one tick; motors without a command of late are limp."""
-        command = self._bus.latest(topics.LOW_CMD)
-        if command is None or t - command.t > COMMAND_AGE:
-            command = _limp(t)
-        if self._offset is not None:
-            command = replace(command, q=command.q + self._offset)
-        hands: dict[Side, HandCommand] = {}
-        for side in SIDES:
-            hand = self._bus.latest(topics.hand_command(side))
-            if hand is not None:
-                hands[side] = hand
-        self._contract.call(self._robot.advance, command, hands, TICK)
-
-
-def _stages(robot: Robot, offset: Array | None) -> tuple[Stage, Stage] | None:
-    return robot.native(offset) if isinstance(robot, HasStages) else None
 
 
 class EstimatorNode:
@@ -332,89 +248,6 @@ class ServoNode:
         self._bus.publish(topics.LOW_CMD_REQUEST, command, t)
 
 
-class EstopNode:
-    """Publishes the frames of the emergency stop."""
-
-    def __init__(self, bus: Bus, estop: EmergencyStop) -> None:
-        """Publish what `estop` says, at its own rate if it has one."""
-        self._bus, self._estop = bus, estop
-        self.period = estop.period if isinstance(estop, VirtualEstop) else TICK
-
-    def step(self, t: float) -> None:
-        """Publish a frame when there is one."""
-        frame = self._estop.step(t)
-        if frame is not None:
-            self._bus.publish(topics.ESTOP, frame, t)
-
-
-class SafetyNode:
-    """Runs the safety gate; the only writer of the motors' command.
-
-    Attributes:
-        request: what the operator asks for; `ACTIVATE` is taken up as soon as the gate is armed.
-    """
-
-    period = TICK
-
-    def __init__(
-        self, bus: Bus, limits: SafetyLimits, standing: Callable[[], StandingController] | None = None
-    ) -> None:
-        """Enforce `limits`; what `standing` makes gets the legs where a stop leaves them sound."""
-        self._bus, self._gate = bus, StandingGate(Gate(limits), standing)
-        self._faults = News(bus, topics.TRANSPORT_FAULT)
-        self._tally = current_tally()
-        self._chained: GateStage | None = None
-        self._away = False
-        self.request = OperatorRequest.NONE
-
-    def link(self) -> Link:
-        """Return how it takes part in the chain."""
-        self._chained = chained = GateStage(self._gate.gate.limits)
-        reads = topics.LOW_STATE, topics.LOW_CMD_REQUEST, topics.ESTOP, topics.BASE
-        return Link(self, chained.stage, reads, (topics.LOW_CMD, topics.SAFETY), self._prepare, self._passed)
-
-    def _prepare(self, t: float) -> bool:
-        """Hand the gate's memory to the stage, unless the gate itself has something to decide at `t` [s]."""
-        memory, stage = self._gate.memory, self._chained
-        if self.request is not memory.request or self.request is OperatorRequest.STOP or self._faults.waiting:
-            return False
-        if not self._away:
-            self._away = stage is not None and stage.take(memory)
-        return self._away
-
-    def _passed(self, ticks: int) -> None:
-        if self._tally is not None:
-            for _ in range(ticks):
-                self._tally.add(GateState.ACTIVE, GateState.ACTIVE, None)
-
-    def step(self, t: float) -> None:
-        """Let the newest command through, limited, or stop the robot."""
-        if self._away and self._chained is not None:
-            self._away = False
-            self._gate.gate.memory = self._chained.give_back(self._gate.memory)
-        estop = self._bus.latest(topics.ESTOP)
-        # The gate acts on the edge of a request, and an activation before it is armed would be spent for nothing.
-        waiting = self.request is OperatorRequest.ACTIVATE and self._gate.memory.mode is GateState.INIT
-        if waiting and estop is not None and estop.pressed:
-            # Released later, the button must not set free what was asked for before it was pressed.
-            self.request = OperatorRequest.NONE
-        inputs = GateInputs(
-            t,
-            self._bus.latest(topics.LOW_STATE),
-            self._bus.latest(topics.LOW_CMD_REQUEST),
-            estop,
-            OperatorRequest.NONE if waiting else self.request,
-            self._bus.latest(topics.BASE),
-            self._faults.read(),
-        )
-        before = self._gate.memory.mode
-        result = self._gate.step(inputs)
-        if self._tally is not None:
-            self._tally.add(before, result.state, result.reason)
-        self._bus.publish(topics.LOW_CMD, result.command, t)
-        self._bus.publish(topics.SAFETY, GateStatus(t, result.state, result.reason, result.detail), t)
-
-
 class SkillNode:
     """Resumes the running skill, and ends it for a module's fault, or once the lower body runs on its fallback.
 
@@ -461,8 +294,3 @@ def moving(bus: Bus) -> bool:
     """
     status = bus.latest(topics.SAFETY)
     return status is not None and status.state is GateState.ACTIVE
-
-
-def _limp(t: float) -> LowCommand:
-    zero = np.zeros(NUM_JOINTS)
-    return LowCommand(t, zero, zero, zero, zero, zero)

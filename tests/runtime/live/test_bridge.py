@@ -27,7 +27,7 @@ from golem.runtime.live.broadcast import broadcast
 from golem.runtime.live.node_setup import until
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.lockstep import build
-from golem.runtime.nodes import SenseNode
+from golem.runtime.robot_nodes import SenseNode
 from golem.stack import load_stack
 
 

@@ -14,8 +14,7 @@ from golem.middleware.dds.base import Qos
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.wire import hg
 from golem.middleware.wire.convert import encode_low_command
-from golem.runtime.nodes import WATCHDOG
-from golem.types import NUM_JOINTS, TICK, LowCommand
+from golem.types import COMMAND_AGE, NUM_JOINTS, TICK, LowCommand
 
 VENDOR = Qos(depth=1)
 """What the vendor's clients offer."""
@@ -62,7 +61,7 @@ def test_drives_go_limp_when_the_safety_process_dies(live: Live) -> None:
     live.activate()
     live.run(0.5)
     live.leave("safety")
-    live.run(WATCHDOG - 0.01)
+    live.run(COMMAND_AGE - 0.01)
     assert torque(live) > 1.0
     live.run(0.03)
     assert torque(live) == 0.0

@@ -1,0 +1,101 @@
+"""The nodes that protect: the emergency stop's frames, and the gate that judges every command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from golem.hardware.estop.base import EmergencyStop
+from golem.hardware.estop.virtual import VirtualEstop
+from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
+from golem.hardware.safety.gate import Gate
+from golem.hardware.safety.gate_stage import GateStage
+from golem.hardware.safety.standing_gate import StandingController, StandingGate
+from golem.interfaces import topics
+from golem.interfaces.payloads import GateState, GateStatus
+from golem.middleware.bus import Bus, News
+from golem.runtime.chain import Link
+from golem.runtime.gate_tally import current_tally
+from golem.types import TICK
+
+
+class EstopNode:
+    """Publishes the frames of the emergency stop."""
+
+    def __init__(self, bus: Bus, estop: EmergencyStop) -> None:
+        """Publish what `estop` says, at its own rate if it has one."""
+        self._bus, self._estop = bus, estop
+        self.period = estop.period if isinstance(estop, VirtualEstop) else TICK
+
+    def step(self, t: float) -> None:
+        """Publish a frame when there is one."""
+        frame = self._estop.step(t)
+        if frame is not None:
+            self._bus.publish(topics.ESTOP, frame, t)
+
+
+class SafetyNode:
+    """Runs the safety gate; the only writer of the motors' command.
+
+    Attributes:
+        request: what the operator asks for; `ACTIVATE` is taken up as soon as the gate is armed.
+    """
+
+    period = TICK
+
+    def __init__(
+        self, bus: Bus, limits: SafetyLimits, standing: Callable[[], StandingController] | None = None
+    ) -> None:
+        """Enforce `limits`; what `standing` makes gets the legs where a stop leaves them sound."""
+        self._bus, self._gate = bus, StandingGate(Gate(limits), standing)
+        self._faults = News(bus, topics.TRANSPORT_FAULT)
+        self._tally = current_tally()
+        self._chained: GateStage | None = None
+        self._away = False
+        self.request = OperatorRequest.NONE
+
+    def link(self) -> Link:
+        """Return how it takes part in the chain."""
+        self._chained = chained = GateStage(self._gate.gate.limits)
+        reads = topics.LOW_STATE, topics.LOW_CMD_REQUEST, topics.ESTOP, topics.BASE
+        return Link(self, chained.stage, reads, (topics.LOW_CMD, topics.SAFETY), self._prepare, self._passed)
+
+    def _prepare(self, t: float) -> bool:
+        """Hand the gate's memory to the stage, unless the gate itself has something to decide at `t` [s]."""
+        memory, stage = self._gate.memory, self._chained
+        if self.request is not memory.request or self.request is OperatorRequest.STOP or self._faults.waiting:
+            return False
+        if not self._away:
+            self._away = stage is not None and stage.take(memory)
+        return self._away
+
+    def _passed(self, ticks: int) -> None:
+        if self._tally is not None:
+            for _ in range(ticks):
+                self._tally.add(GateState.ACTIVE, GateState.ACTIVE, None)
+
+    def step(self, t: float) -> None:
+        """Let the newest command through, limited, or stop the robot."""
+        if self._away and self._chained is not None:
+            self._away = False
+            self._gate.gate.memory = self._chained.give_back(self._gate.memory)
+        estop = self._bus.latest(topics.ESTOP)
+        # The gate acts on the edge of a request, and an activation before it is armed would be spent for nothing.
+        waiting = self.request is OperatorRequest.ACTIVATE and self._gate.memory.mode is GateState.INIT
+        if waiting and estop is not None and estop.pressed:
+            # Released later, the button must not set free what was asked for before it was pressed.
+            self.request = OperatorRequest.NONE
+        inputs = GateInputs(
+            t,
+            self._bus.latest(topics.LOW_STATE),
+            self._bus.latest(topics.LOW_CMD_REQUEST),
+            estop,
+            OperatorRequest.NONE if waiting else self.request,
+            self._bus.latest(topics.BASE),
+            self._faults.read(),
+        )
+        before = self._gate.memory.mode
+        result = self._gate.step(inputs)
+        if self._tally is not None:
+            self._tally.add(before, result.state, result.reason)
+        self._bus.publish(topics.LOW_CMD, result.command, t)
+        self._bus.publish(topics.SAFETY, GateStatus(t, result.state, result.reason, result.detail), t)
