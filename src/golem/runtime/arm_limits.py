@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import njit
 
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
@@ -16,6 +19,17 @@ BEGINNING = 0.1
 limits of its own, or with an encoder's offset at a limit, starts inside them."""
 
 
+@njit(cache=True, nogil=True)
+def _furthest(q: Array, lower: Array, upper: Array) -> tuple[int, float]:
+    """Return which of `q` (n,) is furthest outside its range, and by how much; negative where all are inside."""
+    worst, excess = 0, -math.inf
+    for i in range(len(q)):
+        outside = max(lower[i] - q[i], q[i] - upper[i])
+        if outside > excess:
+            worst, excess = i, outside
+    return worst, excess
+
+
 class ArmLimits:
     """Remembers the targets of the previous tick, and compares."""
 
@@ -26,6 +40,7 @@ class ArmLimits:
         self._lower: Array = limits.lower[UPPER]
         self._upper: Array = limits.upper[UPPER]
         self._step: Array = limits.velocity[UPPER] * period + ROUNDING
+        self._q: Array = np.empty(len(self._lower))
         self._last: Array | None = None
         self._slack = 0.0
 
@@ -40,22 +55,21 @@ class ArmLimits:
         Raises:
             ModuleFault: one is outside its position limits, or further from the previous one than its joint can move.
         """
-        outside = np.maximum(self._lower - q, q - self._upper)
-        if outside.max() > ROUNDING:
-            i = int(outside.argmax())
+        self._q[:] = q
+        i, excess = _furthest(self._q, self._lower, self._upper)
+        if excess > ROUNDING:
             raise self._contract.fault(
                 f"it sends {_joint(i)} to {q[i]:.3g} rad, outside its limits, "
                 f"{self._lower[i]:.3g} to {self._upper[i]:.3g} rad"
             )
         if self._last is not None:
-            excess = np.abs(q - self._last) - self._step - self._slack
-            if excess.max() > 0.0:
-                i = int(excess.argmax())
+            i, excess = _furthest(self._q - self._last, -self._step, self._step)
+            if excess > self._slack:
                 raise self._contract.fault(
                     f"its target of {_joint(i)} jumps by {abs(q[i] - self._last[i]):.3g} rad in a tick of "
                     f"{self._period:g} s; the joint moves {self._step[i] - ROUNDING:.3g} rad at most"
                 )
-        self._last, self._slack = q.copy(), 0.0
+        self._last, self._slack = self._q.copy(), 0.0
 
 
 def _joint(i: int) -> str:

@@ -37,7 +37,8 @@ class GantryReleaseNode:
     def step(self, t: float) -> None:
         """Release the band when all is ready; a stop before that starts the wait anew."""
         if not self._robot.on_gantry:
-            self._look(t)
+            if not self._found:
+                self._look(t)
             return
         legs = self._bus.latest(topics.LEG_COMMAND)
         if not moving(self._bus) or legs is None or not (legs.kp.any() or np.any(legs.tau)):
@@ -48,8 +49,6 @@ class GantryReleaseNode:
 
     def _look(self, t: float) -> None:
         """Look whether the estimator finds the floor."""
-        if self._found:
-            return
         base = self._bus.latest(topics.BASE)
         self._found = base is not None and not base.stale
         if not self._found and t - self._released > FOUND:

@@ -20,6 +20,7 @@ from golem.interfaces.payloads import (
 )
 from golem.middleware.bus import Bus, News
 from golem.native import HasStage
+from golem.robots.model.spatial import seen_from
 from golem.runtime.arm_limits import ArmLimits
 from golem.runtime.chain import Link
 from golem.runtime.contract_check import ContractCheck
@@ -127,7 +128,7 @@ class UpperBodyNode:
                 self._followed = trajectory
             command = self._follower.step(t, self.period)
         else:
-            command = self._to_palms(targets, state, base, t)
+            command = self._to_palms(targets, state, base)
         self._command = command.q
         self._bus.publish(topics.ARM_COMMAND, command, t, self._latency)
 
@@ -136,23 +137,23 @@ class UpperBodyNode:
         newest = targets is None or trajectory.t >= targets.t
         return newest and trajectory.t > self._stopped_at and len(trajectory.times) > 0
 
-    def _to_palms(
-        self, targets: PalmTargets | None, state: LowState, base: BaseEstimate, t: float
-    ) -> ArmCommand:
+    def _to_palms(self, targets: PalmTargets | None, state: LowState, base: BaseEstimate) -> ArmCommand:
         """Return what the controller wants."""
         if self._followed is not None:
             self._followed = None
             start = np.concatenate((state.q[: UPPER.start], self._follower.q))
             self._contract.call(self._arms.reset, start)
             self._limits.reset(start)
-        if targets is None or targets.t <= self._stopped_at:
-            # A target from before a stop must not set the arms in motion when the robot is released.
-            targets = PalmTargets(t)
-        T_base_odom = np.linalg.inv(base.T_odom_base)
-        left, right = (None if T is None else T_base_odom @ T for T in (targets.left, targets.right))
+        left = right = None
+        # A target from before a stop must not set the arms in motion when the robot is released.
+        if targets is not None and targets.t > self._stopped_at:
+            T = base.T_odom_base
+            left = None if targets.left is None else seen_from(T, targets.left)
+            right = None if targets.right is None else seen_from(T, targets.right)
         command = self._contract.call(self._arms.step, left, right, state.q, self.period)
         self._contract.kind("the arm command", command, ArmCommand)
-        self._limits.check(self._contract.array("q", command.q, UPPER.stop - UPPER.start))
+        self._contract.arrays(UPPER.stop - UPPER.start, q=command.q)
+        self._limits.check(command.q)
         return command
 
 
@@ -180,18 +181,22 @@ class HandNode:
         else:
             self._freeze(state)
         command = self._contract.call(self._hand.step, state, t)
-        self._contract.kind("the hand command", command, HandCommand)
+        if type(command) is not HandCommand:
+            self._contract.kind("the hand command", command, HandCommand)
         self._contract.number("gap", command.gap, minimum=0.0)
         self._contract.number("force", command.force, minimum=0.0)
         status = self._contract.call(self._hand.status)
-        self._contract.kind("the status", status, HandStatus)
+        if type(status) is not HandStatus:
+            self._contract.kind("the status", status, HandStatus)
         self._bus.publish(topics.hand_command(self._side), command, t)
         self._bus.publish(topics.hand_status(self._side), status, t)
 
     def _pass_goal(self) -> None:
-        goal = self._bus.latest(topics.hand_goal(self._side))
         count = self._bus.count(topics.hand_goal(self._side))
-        if goal is None or count == self._goals:
+        if count == self._goals:
+            return
+        goal = self._bus.latest(topics.hand_goal(self._side))
+        if goal is None:
             return
         self._goals = count
         if goal.gap is None:

@@ -285,7 +285,7 @@ class Context:
 
     def release_arms(self) -> None:
         """Forget where the arms were sent: they keep their posture, and the next motion starts from where they are."""
-        if any(arm.sent for arm in self.arms.values()):
+        if self.arms["left"].sent or self.arms["right"].sent:
             for arm in self.arms.values():
                 arm.forget()
             self.send_palms()

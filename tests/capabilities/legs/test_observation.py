@@ -140,7 +140,7 @@ def test_one_robot_sees_what_each_of_many_would() -> None:
         c, s = np.cos(q[JOINT_INDEX["torso_joint"]]), np.sin(q[JOINT_INDEX["torso_joint"]])
         rate = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ gyro
         rate[2] -= dq[JOINT_INDEX["torso_joint"]]
-        many = Signals(q, dq, rate, -R[2], R.T @ velocity, twist, action, phase, np.float64(stepping))
+        many = Signals(q, dq, rate, -R[2], R.T @ velocity, twist, action, phase, np.asarray(float(stepping)))
         motion = LocomotionCommand(Twist(*twist), phase, stepping, True)
         base = BaseEstimate(0.0, transform((1.0, 2.0, 0.9), R), velocity)
         one = layout.look(low_state(q, dq, gyro), base, motion, action)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -113,7 +114,8 @@ def check_joints(name: str, q: Array) -> Array:
     values = np.asarray(q, dtype=np.float64)
     if values.shape != (NUM_JOINTS,):
         raise TargetError(f"{name} must have shape ({NUM_JOINTS},), one value per motor, not {values.shape}.")
-    if not np.isfinite(values).all():
+    # A product with itself costs a third of isfinite and all; see `golem.finite`.
+    if not math.isfinite(values.dot(values)) and not np.isfinite(values).all():
         raise TargetError(f"{name} contains NaN or infinity; give the joint positions in radians.")
     return values
 

@@ -66,6 +66,13 @@ def transform(xyz: Sequence[float] | Array, rotation: Array | None = None) -> Ar
     return out
 
 
+def seen_from(T_a_b: Array, T_a_c: Array) -> Array:
+    """Return T_b_c, the pose of c as seen from b; both poses (4, 4) are given in one frame and rigid."""
+    R, out = T_a_b[:3, :3].T, np.zeros((4, 4))
+    out[:3, :3], out[:3, 3], out[3, 3] = R @ T_a_c[:3, :3], R @ (T_a_c[:3, 3] - T_a_b[:3, 3]), 1.0
+    return out
+
+
 def skew(v: Array) -> Array:
     """Return the (..., 3, 3) matrices of the cross product with `v` (..., 3): `skew(a) @ b` is a x b."""
     return (v @ _LEVI_CIVITA).reshape(*v.shape, 3)
