@@ -8,7 +8,8 @@ import pytest
 from golem.capabilities.arms.postures import POSTURES
 from golem.errors import ModuleFault
 from golem.robots.model.limits import load_limits
-from golem.runtime.arm_limits import BEGINNING, ArmLimits
+from golem.robots.model.table import JOINT_NAMES
+from golem.runtime.arm_limits import BEGINNING, ROUNDING, ArmLimits
 from golem.runtime.contract_check import ContractCheck
 from golem.types import NUM_JOINTS, UPPER, Array
 
@@ -73,3 +74,16 @@ def test_after_a_reset_earlier_targets_do_not_count(limits: ArmLimits) -> None:
     limits.check(measured()[UPPER])
     limits.reset(np.zeros(NUM_JOINTS))
     limits.check(np.zeros(15))
+
+
+def test_the_joint_that_is_named_is_the_one_that_is_furthest_off() -> None:
+    rng = np.random.default_rng(6)
+    lower, upper = LIMITS.lower[UPPER], LIMITS.upper[UPPER]
+    for _ in range(50):
+        q = np.clip(rng.normal(0.0, 2.0, len(lower)), lower - 1.0, upper + 1.0)
+        outside = np.maximum(lower - q, q - upper)
+        assert outside.max() > ROUNDING
+        limits = ArmLimits(ContractCheck("upper_body", "mine.py:Arms"), PERIOD)
+        with pytest.raises(ModuleFault) as caught:
+            limits.check(q)
+        assert JOINT_NAMES[UPPER][int(outside.argmax())] in str(caught.value)

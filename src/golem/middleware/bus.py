@@ -80,12 +80,13 @@ class Bus:
         Raises:
             WrongType: the value is not of the topic's kind.
         """
-        if not isinstance(value, topic.kind):
+        # Without a call of `isinstance` or `get`: nothing runs as often as this.
+        if type(value) is not topic.kind and not isinstance(value, topic.kind):
             raise WrongType(
                 f"Topic '{topic.name}' carries {topic.kind.__name__}, not {type(value).__name__}."
             )
         name = topic.name
-        if latency <= 0.0 and not self._pending.get(name):
+        if latency <= 0.0 and (name not in self._pending or not self._pending[name]):
             self._show(name, value)
         else:
             self._pending.setdefault(name, deque()).append((t + latency, value))
@@ -102,7 +103,7 @@ class Bus:
 
     def _show(self, name: str, value: object) -> None:
         self._now[name] = value
-        self._count[name] = self._count.get(name, 0) + 1
+        self._count[name] = self._count[name] + 1 if name in self._count else 1
         if name in self._wakers:
             self._wake(name)
 
@@ -140,7 +141,7 @@ class Bus:
     def latest(self, topic: Topic[T]) -> T | None:
         """Return the newest delivered value of `topic`, or None before the first."""
         value = self._now.get(topic.name)
-        return value.value() if value.__class__ is Deferred else value
+        return value.value() if type(value) is Deferred else value
 
     def count(self, topic: Topic[Any]) -> int:
         """Return how many values of `topic` were delivered so far: a reader sees by it that a value is new."""
