@@ -123,13 +123,17 @@ class Stage:
 
 @runtime_checkable
 class HasStage(Protocol):
-    """A module whose step is compiled, too.
+    """A module whose step may be compiled, too."""
 
-    Attributes:
-        stage: does what `step` does, with the same memory.
-    """
+    def native(self) -> Stage | None:
+        """Return what does the same as `step`, with the same memory; None where there is no such stage."""
+        ...
 
-    stage: Stage
+
+def own(module: object, kind: type[Any], *methods: str) -> bool:
+    """Return whether `module` has the `methods` of `kind`: a subclass of a user may have others than a stage knows."""
+    mine, given = type(module), vars(module)
+    return all(getattr(mine, name) is getattr(kind, name) and name not in given for name in methods)
 
 
 def new_record(dtype: np.dtype[Any]) -> Records:

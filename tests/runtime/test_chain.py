@@ -107,3 +107,15 @@ def test_a_plain_estimator_cuts_the_chain_and_changes_nothing(monkeypatch: Any) 
     found = run(monkeypatch, True, "stand", 2.0, None, world="open")
     assert made[0].steps == 1000
     np.testing.assert_array_equal(found, expected)
+
+
+class Other(RandomWalkKF):
+    """A subclass with a step of its own."""
+
+    def step(self, state: LowState, dt: float) -> BaseEstimate:
+        return super().step(state, dt)
+
+
+def test_a_subclass_with_a_step_of_its_own_has_no_stage() -> None:
+    assert RandomWalkKF().native() is not None
+    assert Other().native() is None

@@ -23,7 +23,8 @@ class Node(Protocol):
     """What the executor drives: connects one module to the bus.
 
     Attributes:
-        period: time between two steps [s], at least one tick; infinite for a node that only waits for news.
+        period: time between two steps [s], at least one tick; infinite for a node that only waits for news. One that
+            becomes infinite ends the node's turns by time.
 
     A node may also have `wakes`, topics: it then has its turn at every tick at which one of them has news, too. Every
     node has its turn at the first tick.
@@ -108,7 +109,7 @@ class _Entry:
         woken: whether a topic that it waits for has news.
     """
 
-    __slots__ = ("due", "k", "link", "period", "step", "woken")
+    __slots__ = ("due", "k", "link", "node", "period", "step", "woken")
 
     def __init__(self, node: Node, link: int = -1) -> None:
         if node.period < TICK - 1e-9:
@@ -116,7 +117,7 @@ class _Entry:
             raise ConfigError(
                 f"{type(node).__name__} wants to run at {rate:g} Hz; the clock allows up to {maximum:g} Hz."
             )
-        self.step = node.step
+        self.node, self.step = node, node.step
         self.period = node.period / TICK
         self.link = link
         self.k = 0
@@ -134,7 +135,8 @@ class _Entry:
             self._set_due()
 
     def _set_due(self) -> None:
-        self.due = _NEVER if self.period == math.inf else math.ceil(self.k * self.period - 1e-6)
+        ended = self.node.period == math.inf
+        self.due = _NEVER if ended else math.ceil(self.k * self.period - 1e-6)
 
 
 class Executor:

@@ -27,12 +27,11 @@ class GantryReleaseNode:
         ModuleFault: the estimator is still without an estimate some time after the release.
     """
 
-    period = 0.01
-
     def __init__(self, bus: Bus, robot: HasGantry, contract: ContractCheck, estimator: ContractCheck) -> None:
         """Watch `bus` for `robot`, whose base `estimator` watches."""
         self._bus, self._robot, self._contract, self._estimator = bus, robot, contract, estimator
         self._waiting_since, self._released, self._found = 0.0, math.inf, False
+        self.period = 0.01
 
     def step(self, t: float) -> None:
         """Release the band when all is ready; a stop before that starts the wait anew."""
@@ -51,5 +50,7 @@ class GantryReleaseNode:
         """Look whether the estimator finds the floor."""
         base = self._bus.latest(topics.BASE)
         self._found = base is not None and not base.stale
+        if self._found and self._released < math.inf:
+            self.period = math.inf  # its work is done
         if not self._found and t - self._released > FOUND:
             raise self._estimator.fault(f"it found no foot on the floor within {FOUND:g} s of the release")

@@ -72,7 +72,7 @@ class LockstepRunner:
         self.stack = stack
         self.bus = Bus()
         self.estop = VirtualEstop()
-        gantry = robot if isinstance(robot, HasGantry) else None
+        gantry = robot if isinstance(robot, HasGantry) and robot.on_gantry else None
         lidar = hears_lidar(stack)
         seen = partial(detection_requested, self.bus)
         calibration = stack.part("calibration").load()

@@ -164,7 +164,7 @@ class SafetyNodes:
         self.gate = safety_nodes.SafetyNode(bus, limits, standing)
         self.nodes: list[Placed] = [(Phase.PROTECT, self.gate)]
         if estop is not None:
-            self.nodes.append((Phase.MEASURE, safety_nodes.EstopNode(bus, estop)))
+            self.nodes.append((Phase.RECEIVE, safety_nodes.EstopNode(bus, estop)))
 
     def request(self, request: OperatorRequest) -> None:
         """Ask something of the safety gate as an operator does: activate, stop, reset; it decides."""

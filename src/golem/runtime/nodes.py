@@ -62,11 +62,12 @@ class EstimatorNode:
 
     def link(self) -> Link | None:
         """Return how it takes part in the chain; None for an estimator without a stage."""
-        if not isinstance(self._estimator, HasStage):
+        stage = self._estimator.native() if isinstance(self._estimator, HasStage) else None
+        if stage is None:
             return None
         # The first state is the node's: it resets the estimator.
         ready: Callable[[float], bool] = lambda t: self._started  # noqa: E731
-        return Link(self, self._estimator.stage, (topics.LOW_STATE,), (topics.BASE,), ready)
+        return Link(self, stage, (topics.LOW_STATE,), (topics.BASE,), ready)
 
     def step(self, t: float) -> None:
         """Publish the estimate of the base."""
@@ -225,10 +226,11 @@ class ServoNode:
 
     def link(self) -> Link | None:
         """Return how it takes part in the chain; None for a servo without a stage."""
-        if not isinstance(self._servo, HasStage):
+        stage = self._servo.native() if isinstance(self._servo, HasStage) else None
+        if stage is None:
             return None
         reads = topics.LOW_STATE, topics.SAFETY, topics.LEG_COMMAND, topics.ARM_COMMAND
-        return Link(self, self._servo.stage, reads, (topics.LOW_CMD_REQUEST,))
+        return Link(self, stage, reads, (topics.LOW_CMD_REQUEST,))
 
     def step(self, t: float) -> None:
         """Publish the command that the safety gate shall judge."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from golem.finite import check_measured
-from golem.native import Stage, new_shared
+from golem.native import Stage, new_shared, own
 from golem.native_messages import base_of, put_state
 from golem.types import BaseEstimate, LowState
 
@@ -15,6 +15,10 @@ class CompiledEstimator:
         """Run `stage`; in a chain it is called without this class, with the same memory."""
         self.stage = stage
         self._record = new_shared()
+
+    def native(self) -> Stage | None:
+        """Return the stage; see `HasStage`."""
+        return self.stage if own(self, CompiledEstimator, "step") else None
 
     def step(self, state: LowState, dt: float) -> BaseEstimate:
         """Fuse one measurement; see `BaseEstimator`."""

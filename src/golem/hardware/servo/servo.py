@@ -26,7 +26,7 @@ from golem.finite import check_finite, check_measured, finite_state
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gains import Gains, default_gains
 from golem.hardware.servo.gravity import body_tree, gravity_in_base
-from golem.native import ORDINARY, STAGE, UNUSUAL, Record, Stage, new_record, new_shared, shared, view
+from golem.native import ORDINARY, STAGE, UNUSUAL, Record, Stage, new_record, new_shared, own, shared, view
 from golem.native_messages import command_of, put_legs, put_state
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.leg_kernel import tree_dtype, tree_gravity
@@ -168,6 +168,10 @@ class Servo:
         self.bias: Array = memory["bias"][0]
         self._record = new_shared()
         self._record["moving"] = self._record["has_legs"] = self._record["has_arms"] = 1
+
+    def native(self) -> Stage | None:
+        """Return the stage; see `HasStage`."""
+        return self.stage if own(self, Servo, "step", "reset") else None
 
     def reset(self, state: LowState) -> None:
         """Start over: stiffness ramps up from zero and the bias is forgotten."""
