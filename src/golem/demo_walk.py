@@ -78,8 +78,8 @@ def run_walk_demo(config: DemoConfig) -> bool:
                     print(f"Watch it at {view.url}.", flush=True)
                     view.await_spectator()
                     figures = _errand(running, robot, contacts, view.run, watch)
-        for film in films:
-            print(f"Film:   {film}")
+        for path in films:
+            print(f"Film:   {path}")
     facts = {"stack": name, "profile": config.profile, "seed": seed}
     write(config.out / "walk.json", json.dumps(facts | figures, indent=2) + "\n")
     return bool(figures["success"])

@@ -10,8 +10,8 @@ import pytest
 from golem.capabilities.legs.hold import STANCES
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
-from golem.evaluation.episodes import base_estimation as walks
 from golem.evaluation.harness.ladder import LadderConfig, run_ladder
+from golem.evaluation.rungs import base_estimation as walks
 from golem.evaluation.rungs.base_estimation import (
     BaseEstimation,
     RecordedWalk,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from scripts.topics_page import page
@@ -22,13 +23,15 @@ from golem.middleware.dds.local import LocalDomain
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.sensor_msgs import Imu as ImuMessage
 from golem.middleware.ros.node import RosNode
+from golem.runtime.executor import Phase
 from golem.runtime.live.bridge import StreamIn, StreamOut, outgoing
 from golem.runtime.live.broadcast import broadcast
 from golem.runtime.live.node_setup import until
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.lockstep import build
-from golem.runtime.robot_nodes import SenseNode
+from golem.runtime.node_groups import RobotNodes
 from golem.stack import load_stack
+from golem.types import TICK
 
 
 @dataclass(frozen=True)
@@ -67,16 +70,28 @@ def row(monkeypatch: pytest.MonkeyPatch) -> TopicRow:
     return ROW
 
 
+class ShakeNode:
+    """The code that makes the data: a node of the robot."""
+
+    period = TICK
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus = bus
+
+    def step(self, t: float) -> None:
+        self._bus.publish(SHAKE, Shake(t, 3.0), t)
+
+
 @pytest.fixture
 def shaking(row: TopicRow, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The code that makes the data: here the node that senses everything else of a robot."""
-    sense = SenseNode.step
+    """A robot with such a node."""
+    make = RobotNodes.__init__
 
-    def step(node: SenseNode, t: float) -> None:
-        sense(node, t)
-        node._bus.publish(SHAKE, Shake(t, 3.0), t)  # pyright: ignore[reportPrivateUsage]
+    def init(nodes: RobotNodes, bus: Bus, *args: Any) -> None:
+        make(nodes, bus, *args)
+        nodes.nodes.append((Phase.MEASURE, ShakeNode(bus)))
 
-    monkeypatch.setattr(SenseNode, "step", step)
+    monkeypatch.setattr(RobotNodes, "__init__", init)
 
 
 def ends(domain: LocalDomain) -> tuple[RoleEndpoints, RoleEndpoints]:

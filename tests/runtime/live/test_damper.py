@@ -17,8 +17,8 @@ def test_motors_whose_gate_was_killed_are_damped_and_then_limp(live: Live) -> No
 
     def wait(seconds: float) -> bool:
         live.run(seconds)
-        command = live.robot._motors._command
-        gains.append(float(command.kd.min()) if not command.kp.any() else 0.0)
+        motors = live.robot._motors.memory[0]
+        gains.append(float(motors["kd"].min()) if not motors["kp"].any() else 0.0)
         return False
 
     Damper(participant, SafetyLimits.from_profile()).damp(wait)

@@ -31,7 +31,8 @@ def struct(name: str) -> type[ctypes.Structure]:
     Raises:
         KeyError: it, or the type of one of its fields, is not described.
     """
-    fields = [(field.name, _kind(field.type)) for field in structs.STRUCTS[name].fields]
+    described: Any = structs.STRUCTS[name]
+    fields = [(field.name, _kind(field.type)) for field in described.fields]
     return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 

@@ -282,7 +282,9 @@ def run_hands(config: HandsConfig) -> None:
     if not ports:
         raise ConfigError("Name the port of a hand: --left.port /dev/ttyUSB0, --right.port /dev/ttyUSB1.")
     with ExitStack() as opened:
-        hands = {side: opened.enter_context(closing(MagpieServos(hand))) for side, hand in ports.items()}
+        hands: dict[Side, MagpieServos] = {
+            side: opened.enter_context(closing(MagpieServos(hand))) for side, hand in ports.items()
+        }
         words = (
             f"Hands on {config.dds}: {', '.join(hands)}. Ctrl-C ends their driver; they keep what they hold."
         )
