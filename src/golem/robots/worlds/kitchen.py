@@ -192,6 +192,7 @@ def add_kitchen(
     # MuJoCo's native collision of convex shapes gives a can at a pad's edge a normal across the pad, which throws it
     # out of the hand; libccd gives it the right one.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     spec.option.impratio, spec.option.cone = GRIP, mujoco.mjtCone.mjCONE_ELLIPTIC
     _add_materials(spec, layout)
     sign = 1.0 if layout.fridge.handle_y < 0.0 else -1.0
