@@ -20,6 +20,8 @@ WALL = 0.004
 """Thickness of a mug's and a bowl's wall [m]."""
 FACETS = 14
 """Boxes that a round wall is made of."""
+FOOT = 0.002
+"""Radius of the balls that a mug stands on [m]."""
 MASSES = {"mug": 0.32, "bowl": 0.35, "can": 0.35, "bottle": 0.52}
 """Of a mug and a bowl of stoneware, of a full can and a full bottle of water [kg]."""
 COLOURS: dict[str, tuple[tuple[float, float, float], ...]] = {
@@ -93,7 +95,11 @@ def _mug(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str) ->
     mesh = parts.add_mesh(spec, f"{name}_shell", *parts.lathe(profile, sides=36))
     parts.visual_mesh(body, mesh, material=material, name=f"{name}_cup")
     _ring(body, radius - WALL / 2, height, 0.9 * MASSES["mug"])
-    parts.collider(body, _CYLINDER, (radius - WALL, 0.005), (0.0, 0.0, 0.005), mass=0.05 * MASSES["mug"])
+    parts.collider(body, _CYLINDER, (radius - WALL, 0.004), (0.0, 0.0, 0.006), mass=0.04 * MASSES["mug"])
+    # It stands on a ring of balls: on the corners of its wall it would have 61 contacts.
+    for turn in 2 * np.pi * np.arange(8) / 8:
+        pos = ((radius - WALL / 2) * np.cos(turn), (radius - WALL / 2) * np.sin(turn), FOOT)
+        parts.collider(body, mujoco.mjtGeom.mjGEOM_SPHERE, (FOOT,), pos, mass=0.01 * MASSES["mug"] / 8)
     names = [f"{name}_cup"]
     # Half a ring of capsules on one side: what a finger goes through.
     angles = np.linspace(-np.pi / 2, np.pi / 2, 7)
@@ -181,11 +187,11 @@ def _leaning_ring(
 
 
 def _ring(body: mujoco.MjsBody, radius: float, height: float, mass: float) -> None:
-    """Add an upright wall of boxes around the z axis."""
+    """Add an upright wall of boxes around the z axis, from `FOOT` up to `height`."""
     for k in range(FACETS):
         turn = 2 * np.pi * k / FACETS
-        size = (WALL / 2, np.pi * radius / FACETS, height / 2)
-        pos = (radius * np.cos(turn), radius * np.sin(turn), height / 2)
+        size = (WALL / 2, np.pi * radius / FACETS, (height - FOOT) / 2)
+        pos = (radius * np.cos(turn), radius * np.sin(turn), (height + FOOT) / 2)
         parts.collider(body, _BOX, size, pos, quat=_turned(turn, 0.0), mass=mass / FACETS)
 
 
