@@ -8,8 +8,8 @@ from tests.sources import SOURCE
 
 ALL = 96_500
 """Lines of the package [own: 92,000 is the goal; lower this with every line that goes]."""
-ON_A_ROBOT = 64_000
-"""Lines of what a robot runs [own: 62,000 is the goal]."""
+ON_A_ROBOT = 62_000
+"""Lines of what a robot runs [own]."""
 NOT_ON_A_ROBOT = ("evaluation", "training", "dashboard", "demo.py", "demo_walk.py", "run.py")
 ENGINES = ("mujoco", "physx", "isaaclab", "replay", "worlds")
 """Folders of `robots` that stand in for one."""
