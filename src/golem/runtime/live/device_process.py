@@ -278,7 +278,7 @@ def run_hands(config: HandsConfig) -> None:
         DdsError: the domain cannot be joined.
     """
     sides: dict[Side, MagpieServoConfig] = {"left": config.left, "right": config.right}
-    ports = {side: hand for side, hand in sides.items() if hand.port}
+    ports: dict[Side, MagpieServoConfig] = {side: hand for side, hand in sides.items() if hand.port}
     if not ports:
         raise ConfigError("Name the port of a hand: --left.port /dev/ttyUSB0, --right.port /dev/ttyUSB1.")
     with ExitStack() as opened:
