@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from itertools import islice
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from golem.robots.mujoco.truth import Truth
@@ -37,26 +37,44 @@ FINAL = 0.5
 """Length of the end of a trace over which its final margin is averaged [s]."""
 
 
+@njit(cache=True, nogil=True)
 def convex_hull(points: Array) -> Array:
-    """Return the (m, 2) corners of the convex hull of `points` (n, 2), counter-clockwise (Andrew's monotone chain)."""
-    ordered = sorted({(float(x), float(y)) for x, y in points})
-    if len(ordered) < 3:
-        return np.array(ordered).reshape(-1, 2)
+    """Return the (m, 2) corners of the convex hull of `points` (n, 2), counter-clockwise (Andrew's monotone chain).
 
-    def chain(run: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-        kept: list[tuple[float, float]] = []
-        for x, y in run:
-            while len(kept) > 1:
-                (ax, ay), (bx, by) = kept[-2], kept[-1]
+    Points that are alike count once; of fewer than three there is no hull, and they are returned in order.
+    """
+    ordered, n = np.empty((len(points), 2)), 0
+    for i in range(len(points)):  # by x, then by y
+        x, y = points[i, 0], points[i, 1]
+        k = n
+        while k > 0 and (ordered[k - 1, 0] > x or (ordered[k - 1, 0] == x and ordered[k - 1, 1] > y)):
+            k -= 1
+        if k > 0 and ordered[k - 1, 0] == x and ordered[k - 1, 1] == y:
+            continue
+        for j in range(n, k, -1):
+            ordered[j, 0], ordered[j, 1] = ordered[j - 1, 0], ordered[j - 1, 1]
+        ordered[k, 0], ordered[k, 1] = x, y
+        n += 1
+    if n < 3:
+        return ordered[:n]
+    hull, m = np.empty((2 * n, 2)), 0
+    for way in range(2):
+        first = m
+        for step in range(n):
+            i = step if way == 0 else n - 1 - step
+            x, y = ordered[i, 0], ordered[i, 1]
+            while m - first > 1:
+                ax, ay, bx, by = hull[m - 2, 0], hull[m - 2, 1], hull[m - 1, 0], hull[m - 1, 1]
                 if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
                     break
-                kept.pop()
-            kept.append((x, y))
-        return kept[:-1]
+                m -= 1
+            hull[m, 0], hull[m, 1] = x, y
+            m += 1
+        m -= 1  # the last of one chain is the first of the other
+    return hull[:m]
 
-    return np.array(chain(ordered) + chain(ordered[::-1]))
 
-
+@njit(cache=True, nogil=True)
 def signed_margin(point: Array, polygon: Array) -> float:
     """Return the distance of `point` (2,) to the edge of the convex `polygon` [m], positive inside.
 
@@ -64,13 +82,16 @@ def signed_margin(point: Array, polygon: Array) -> float:
         point: the projected centre of mass.
         polygon: (m, 2) corners, counter-clockwise; fewer than three enclose nothing.
     """
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    to_point = point - polygon
-    cross = edges[:, 0] * to_point[:, 1] - edges[:, 1] * to_point[:, 0]
-    squared = np.maximum((edges * edges).sum(axis=1), 1e-18)
-    along = np.clip((to_point * edges).sum(axis=1) / squared, 0.0, 1.0)
-    distance = float(np.hypot(*(to_point - along[:, None] * edges).T).min())
-    return distance if len(polygon) > 2 and bool((cross >= 0.0).all()) else -distance
+    n = len(polygon)
+    inside, nearest = n > 2, math.inf
+    for i in range(n):
+        j = (i + 1) % n
+        ex, ey = polygon[j, 0] - polygon[i, 0], polygon[j, 1] - polygon[i, 1]
+        px, py = point[0] - polygon[i, 0], point[1] - polygon[i, 1]
+        inside = inside and ex * py - ey * px >= 0.0
+        along = min(max((px * ex + py * ey) / max(ex * ex + ey * ey, 1e-18), 0.0), 1.0)
+        nearest = min(nearest, math.hypot(px - along * ex, py - along * ey))
+    return nearest if inside else -nearest
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +132,7 @@ class BalanceTrace:
     @property
     def base_range(self) -> float:
         """Largest horizontal distance between two places of the base [m]."""
-        corners = convex_hull(self.base[:, :2])
+        corners = convex_hull(np.ascontiguousarray(self.base[:, :2]))
         return float(np.linalg.norm(corners[:, None] - corners, axis=2).max())
 
     @property
@@ -201,7 +222,7 @@ class BalanceRecorder:
         self.contact = np.linalg.norm(self._truth.foot_forces(), axis=1) > TOUCH
         if self.contact.any():  # in flight the last polygon counts
             self._polygon = _support(self._truth.soles()[self.contact])
-        self.margin = signed_margin(self._truth.com()[0][:2], self._polygon)
+        self.margin = signed_margin(self._truth.com()[0], self._polygon)
         self.fallen |= self._truth.fallen()
         roll, pitch = math.atan2(R[2, 1], R[2, 2]), -math.asin(min(max(R[2, 0], -1.0), 1.0))
         yaw = self.yaw = math.atan2(R[1, 0], R[0, 0])
@@ -234,4 +255,4 @@ class BalanceRecorder:
 
 def _support(soles: Array) -> Array:
     """Return the polygon that `soles` (n, 4, 3) span."""
-    return convex_hull(soles.reshape(-1, 3)[:, :2])
+    return convex_hull(np.ascontiguousarray(soles.reshape(-1, 3)[:, :2]))
