@@ -20,7 +20,7 @@ def lines(paths: list[Path]) -> int:
 
 
 def on_a_robot(path: Path) -> bool:
-    parts = path.relative_to(SOURCE).parts
+    parts = list(path.relative_to(SOURCE).parts)
     simulated = parts[0] == "robots" and len(parts) > 1 and parts[1] in ENGINES
     return parts[0] not in NOT_ON_A_ROBOT and not simulated
 
