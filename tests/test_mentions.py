@@ -48,6 +48,8 @@ FOLDERS = (
     "artefacts",
     "docker",
     "docs",
+    "examples",
+    "findings",
     "firmware",
     "requirements",
     "ros",

@@ -105,7 +105,7 @@ STAGE = types.int64(types.int64, types.int64)
 
 
 @dataclass(frozen=True)
-class Stage:
+class CompiledStage:
     """The compiled part of a module.
 
     Attributes:
@@ -125,7 +125,7 @@ class Stage:
 class HasStage(Protocol):
     """A module whose step may be compiled, too."""
 
-    def native(self) -> Stage | None:
+    def native(self) -> CompiledStage | None:
         """Return what does the same as `step`, with the same memory; None where there is no such stage."""
         ...
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.interfaces.lidar import LidarImu, LidarScan
-from golem.native import Stage
+from golem.native import CompiledStage
 from golem.types import Array, CameraInfo, HandCommand, HandState, Imu, LowCommand, Side
 
 STAMP_TOLERANCE = 5e-4
@@ -143,7 +143,7 @@ class Restorable(Robot, Protocol):
 class HasStages(Protocol):
     """A simulated robot that offers compiled stages for the 500 Hz chain; see `golem.native`."""
 
-    def native(self, joint_offset: Array | None) -> tuple[Stage, Stage] | None:
+    def native(self, joint_offset: Array | None) -> tuple[CompiledStage, CompiledStage] | None:
         """Return the stages that sense and act, on the state of the methods of `Robot`; None where there are none.
 
         Args:

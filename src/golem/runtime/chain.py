@@ -18,7 +18,7 @@ from numba import njit
 from golem.interfaces import topics
 from golem.interfaces.payloads import ArmCommand, EstopMessage, GateState, GateStatus, LegCommand
 from golem.middleware.bus import Bus, Deferred, Topic
-from golem.native import LOOK, UNUSUAL, Records, Stage, address, call_stage, new_shared, shared
+from golem.native import LOOK, UNUSUAL, CompiledStage, Records, address, call_stage, new_shared, shared
 from golem.native_messages import base_of, command_of, put_command, put_legs, put_state, state_of
 from golem.runtime.executor import Node
 from golem.types import SIDES, TICK, BaseEstimate, HandState, LowCommand
@@ -38,7 +38,7 @@ class Link:
     """
 
     node: Node
-    stage: Stage
+    stage: CompiledStage
     reads: tuple[Topic[Any], ...]
     writes: tuple[Topic[Any], ...]
     prepare: Callable[[float], bool] | None = None

@@ -8,7 +8,7 @@ import numpy as np
 
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
-from golem.native import Stage
+from golem.native import CompiledStage
 from golem.robots.base import HasStages, Robot
 from golem.runtime.chain import Link
 from golem.runtime.contract_check import ContractCheck
@@ -83,7 +83,7 @@ class ActNode:
         self._contract.call(self._robot.advance, command, hands, TICK)
 
 
-def _stages(robot: Robot, offset: Array | None) -> tuple[Stage, Stage] | None:
+def _stages(robot: Robot, offset: Array | None) -> tuple[CompiledStage, CompiledStage] | None:
     return robot.native(offset) if isinstance(robot, HasStages) else None
 
 

@@ -10,7 +10,7 @@ from golem.evaluation.speed import loop_measure
 from golem.evaluation.speed.loop_measure import CASES, measure
 from golem.runtime.executor import Executor
 
-CALLS_STANDING = 148
+CALLS_STANDING = 80
 """Most Python and C functions that a tick of a standing robot may call; lower it with every change that needs fewer."""
 
 

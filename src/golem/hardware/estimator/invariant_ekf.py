@@ -30,7 +30,7 @@ from golem.hardware.estimator.invariant import (
     predict,
     update,
 )
-from golem.native import ORDINARY, STAGE, UNUSUAL, Record, Stage, new_record, shared, view
+from golem.native import ORDINARY, STAGE, UNUSUAL, CompiledStage, Record, new_record, shared, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base
 from golem.robots.model.table import FRAMES
 from golem.types import Array, LowState
@@ -171,7 +171,7 @@ class InvariantEKF(CompiledEstimator):
     def __init__(self, config: InvariantEKFConfig | None = None) -> None:
         """Start at rest."""
         self.config = config or InvariantEKFConfig()
-        super().__init__(Stage(_code(), new_record(INVARIANT_EKF)))
+        super().__init__(CompiledStage(_code(), new_record(INVARIANT_EKF)))
         memory = self.stage.memory
         put_feet(memory["feet"], self.config.feet)
         memory["stale_after"] = self.config.stale_after

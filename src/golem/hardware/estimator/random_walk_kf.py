@@ -22,7 +22,7 @@ from golem.hardware.estimator.feet import (
     sense_feet,
 )
 from golem.hardware.estimator.random_walk import FILTER, RandomWalkConfig, filter_options, fuse
-from golem.native import ORDINARY, STAGE, UNUSUAL, Record, Stage, new_record, shared, view
+from golem.native import ORDINARY, STAGE, UNUSUAL, CompiledStage, Record, new_record, shared, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base
 from golem.types import LowState
 
@@ -119,7 +119,7 @@ class RandomWalkKF(CompiledEstimator):
     def __init__(self, config: RandomWalkKFConfig | None = None) -> None:
         """Start at rest."""
         self.config = config or RandomWalkKFConfig()
-        super().__init__(Stage(_code(), new_record(RANDOM_WALK)))
+        super().__init__(CompiledStage(_code(), new_record(RANDOM_WALK)))
         memory = self.stage.memory
         put_feet(memory["feet"], self.config.feet)
         memory["filter"]["options"] = filter_options(self.config.filter)

@@ -11,7 +11,7 @@ from numba import cfunc, njit
 from golem.finite import finite_state
 from golem.hardware.estimator.attitude import Attitude, base_rotation
 from golem.hardware.estimator.compiled import CompiledEstimator
-from golem.native import ORDINARY, STAGE, UNUSUAL, Record, Stage, new_record, shared, view
+from golem.native import ORDINARY, STAGE, UNUSUAL, CompiledStage, Record, new_record, shared, view
 from golem.robots.model.imu_mount import TORSO
 from golem.types import LowState
 
@@ -51,7 +51,7 @@ class TetherEstimator(CompiledEstimator):
 
     def __init__(self) -> None:
         """Start without a heading."""
-        super().__init__(Stage(_code(), new_record(TETHER)))
+        super().__init__(CompiledStage(_code(), new_record(TETHER)))
 
     def reset(self, state: LowState) -> None:
         """Take the present heading of base_link as zero."""

@@ -22,7 +22,18 @@ from golem.hardware.safety.sender import SenderMemory
 from golem.hardware.safety.senses import CALM, EVERY, FORGET, GRAVITY_TIME, LOST, SensesMemory
 from golem.hardware.safety.senses_kernel import ASKED, GROUPS, SCALARS, looked
 from golem.interfaces.payloads import EstopMessage, GateState
-from golem.native import COMMAND, ORDINARY, STAGE, STATE, UNUSUAL, Record, Stage, new_record, shared, view
+from golem.native import (
+    COMMAND,
+    ORDINARY,
+    STAGE,
+    STATE,
+    UNUSUAL,
+    CompiledStage,
+    Record,
+    new_record,
+    shared,
+    view,
+)
 from golem.native_messages import command_of, put_command, state_of
 from golem.types import NUM_JOINTS, TICK
 
@@ -266,7 +277,7 @@ class GateStage:
 
     def __init__(self, limits: SafetyLimits) -> None:
         """Enforce `limits`."""
-        self.stage = Stage(_code(), new_record(GATE))
+        self.stage = CompiledStage(_code(), new_record(GATE))
         memory = self.stage.memory
         for name in (*_LIMITS, "gravity", "gravity_moving", "throw", "table"):
             memory[name] = getattr(limits, name)

@@ -26,7 +26,18 @@ from golem.finite import check_finite, check_measured, finite_state
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gains import Gains, default_gains
 from golem.hardware.servo.gravity import body_tree, gravity_in_base
-from golem.native import ORDINARY, STAGE, UNUSUAL, Record, Stage, new_record, new_shared, own, shared, view
+from golem.native import (
+    ORDINARY,
+    STAGE,
+    UNUSUAL,
+    CompiledStage,
+    Record,
+    new_record,
+    new_shared,
+    own,
+    shared,
+    view,
+)
 from golem.native_messages import command_of, put_legs, put_state
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.leg_kernel import tree_dtype, tree_gravity
@@ -157,7 +168,7 @@ class Servo:
             ConfigError: the limit profile does not exist.
         """
         self.config = c = config or ServoConfig()
-        self.stage = Stage(_code(), new_record(SERVO))
+        self.stage = CompiledStage(_code(), new_record(SERVO))
         memory, gains = self.stage.memory, default_gains()
         memory["tree"] = body_tree(c.hands)
         memory["gains"] = gains.kp, gains.kd, gains.ki, gains.bias
@@ -169,7 +180,7 @@ class Servo:
         self._record = new_shared()
         self._record["moving"] = self._record["has_legs"] = self._record["has_arms"] = 1
 
-    def native(self) -> Stage | None:
+    def native(self) -> CompiledStage | None:
         """Return the stage; see `HasStage`."""
         return self.stage if own(self, Servo, "step", "reset") else None
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.interfaces.lidar import LidarImu, LidarScan
-from golem.native import Stage, address, new_record, own
+from golem.native import CompiledStage, address, new_record, own
 from golem.robots.model import magpie_model
 from golem.robots.model.imu_mount import torso_motion
 from golem.robots.model.leg_kinematics import leg_poses, sole_centers
@@ -148,12 +148,12 @@ class MujocoRobot:
             memory["sealed"], memory["seal_q"], memory["seal_v"] = 1, seal.qpos, seal.dof
             memory["seal_torque"] = seal.torque
 
-    def native(self, joint_offset: Array | None) -> tuple[Stage, Stage] | None:
+    def native(self, joint_offset: Array | None) -> tuple[CompiledStage, CompiledStage] | None:
         """Return the compiled stages that sense and act; see `HasStages`. None where the world needs Python."""
         if not self._compiled:
             return None
         self._memory["joint_offset"] = 0.0 if joint_offset is None else joint_offset
-        return Stage(sense_code(), self._memory), Stage(act_code(), self._memory)
+        return CompiledStage(sense_code(), self._memory), CompiledStage(act_code(), self._memory)
 
     @property
     def _compiled(self) -> bool:

@@ -101,7 +101,7 @@ class CameraConfig:
     dds: OmitArgPrefixes[DdsConfig] = field(default_factory=DdsConfig)
 
 
-class Sample(NamedTuple):
+class Measurement(NamedTuple):
     """A measurement of a device.
 
     Attributes:
@@ -150,7 +150,7 @@ class DeviceProcess(ABC):
                 self.endpoints.send(topic, replace(value, t=t), encode)
 
     @abstractmethod
-    def measured(self, now: float) -> Iterable[Sample]:
+    def measured(self, now: float) -> Iterable[Measurement]:
         """Return what the device has measured since the last time; `now` is this process's time [s]."""
 
     def fault(self, device: str, fault: str) -> None:
@@ -177,7 +177,7 @@ class HandProcess(DeviceProcess):
         for side in hands:
             self.endpoints.listen(public.gripper(side, "command"), partial(self._command, side))
 
-    def measured(self, now: float) -> Iterable[Sample]:
+    def measured(self, now: float) -> Iterable[Measurement]:
         """Exchange what there is to exchange with each hand; see `DeviceProcess`."""
         for side, hand in self._hands.items():
             try:
@@ -187,7 +187,7 @@ class HandProcess(DeviceProcess):
                 continue
             if report is not None:
                 self.fault(f"{side} hand", "")
-                yield Sample(public.gripper(side, "state"), report)
+                yield Measurement(public.gripper(side, "state"), report)
 
     def _command(self, side: Side, command: HandCommand) -> None:
         self._hands[side].command(command)
@@ -210,14 +210,14 @@ class LidarProcess(DeviceProcess):
         self._heard, self._silent = clock(), False
         self._reports, self._lost = Every(REPORT), (0, 0)
 
-    def measured(self, now: float) -> Iterable[Sample]:
+    def measured(self, now: float) -> Iterable[Measurement]:
         """Return points and IMU; see `DeviceProcess`."""
         for value in self._lidar.step(now):
             if isinstance(value, LidarScan):
                 self._heard = now
-                yield Sample(CLOUD, value, scan_cloud)
+                yield Measurement(CLOUD, value, scan_cloud)
             else:
-                yield Sample(IMU, value, lidar_imu)
+                yield Measurement(IMU, value, lidar_imu)
         self._report(now)
 
     def _report(self, now: float) -> None:
@@ -262,11 +262,11 @@ class CameraProcess(DeviceProcess):
         self._topics = [public.image(name, what) for what in public.IMAGES]
         super().__init__(participant, node, self._topics, clock, tell)
 
-    def measured(self, now: float) -> Iterable[Sample]:
+    def measured(self, now: float) -> Iterable[Measurement]:
         """Return a new exposure; see `DeviceProcess`."""
         exposure = self._source.step()
         self.fault(f"{self._name} camera", self._source.fault)
-        return [] if exposure is None else [Sample(topic, exposure) for topic in self._topics]
+        return [] if exposure is None else [Measurement(topic, exposure) for topic in self._topics]
 
 
 def run_hands(config: HandsConfig) -> None:
