@@ -16,8 +16,8 @@ CLOSE = 1e-6
 PLACE, TIME = 2e-3, 0.1
 """For what a contact amplifies [m, rad or 1; s]. One joint moved by 1e-12 rad at the start changes where the screw
 falls into the tray by 0.04 mm, where a standing robot grasps by up to 1.2 mm, and no time."""
-AMPLIFIED = {"tether": ("drop_inside",)}
-"""What contacts amplify, where it is not everything: a robot in its hoist touches nothing before the screw falls."""
+AMPLIFIED = {"tether": ("drop_inside", "pull_beside", "pull_turn")}
+"""What contacts amplify, where it is not everything: a robot in its hoist touches nothing before it pulls."""
 COUNTS = ("claim", "said", "doable", "touches", "self_contacts", "steps", "below_zero")
 
 

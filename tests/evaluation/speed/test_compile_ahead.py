@@ -38,6 +38,8 @@ def test_only_a_cold_cache_is_filled(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.slow
+@pytest.mark.long  # it compiles all of them
+@pytest.mark.timeout(900)
 def test_no_kernel_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     found = subprocess.run([sys.executable, "-c", COUNT], capture_output=True, text=True, check=True)
