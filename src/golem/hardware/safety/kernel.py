@@ -14,14 +14,11 @@ from numba import njit
 
 from golem.hardware.safety import limit_table as rows
 from golem.hardware.safety.base import EARLY, EASE, SPACE
+from golem.native import COMMAND, STATE
 from golem.types import LEGS, NUM_JOINTS, Array
 
 BRAKE = 0.5
 """Share of the torque bound that brakes a joint which is too fast, or would come to rest beyond its range [own]."""
-STATE = 3 * NUM_JOINTS + 10
-"""Numbers of a state: q, dq, tau (27 each), then quat wxyz, gyro and acc of the IMU."""
-COMMAND = 5 * NUM_JOINTS
-"""Numbers of a command: q, dq, tau, kp, kd (27 each)."""
 UNKNOWN, STRAINED, ORDINARY = 0, 1, 2
 """What is known of a sample: nothing; it is whole, has not jumped and breaks no limit; nor is any joint strained."""
 MOST = 1e5

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from golem.hardware.safety import limit_table as rows
-from golem.hardware.safety.kernel import STATE
+from golem.native import STATE
 from golem.types import NUM_JOINTS, Array
 
 FIRST = (0, 6, 12, 13, 20, 27)
