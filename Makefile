@@ -13,11 +13,11 @@ demo: venv  ## the standing robot pulls loosened screws from the pack in the twi
 	$(BIN)/golem demo
 
 test: lint kernels  ## lint, types and the fast tests
-	$(BIN)/pytest -n 2 -m "not slow"
+	$(BIN)/pytest -n 2 -m "not slow" --durations=15
 
 test-slow: venv-dev  ## the tests that take more than a few seconds, up to a minute
-	$(BIN)/pytest -n 2 -m "slow and not alone and not long"
-	$(BIN)/pytest -m "slow and alone and not long"
+	$(BIN)/pytest -n 2 -m "slow and not alone and not long" --durations=40
+	$(BIN)/pytest -m "slow and alone and not long" --durations=15
 
 test-long: venv-dev  ## more trials and more mutations of what the others check; before a release
 	$(BIN)/pytest -n 2 -m "long and not alone"

