@@ -24,7 +24,7 @@ test-long: venv-dev  ## more trials and more mutations of what the others check;
 	$(BIN)/pytest -m "long and alone"
 
 kernels: venv-dev  ## compile the numba kernels, once for all tests
-	scripts/compile_kernels.sh
+	$(BIN)/golem doctor --compile
 
 lint: venv-dev  ## style and types
 	$(BIN)/ruff check src tests scripts examples

@@ -7,8 +7,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 # Dataclasses, type hints, enumerations and options; bytes, text and files; processes, threads, signals and asyncio;
-# command lines. compile_kernels.sh has compiled the kernels from this Python's bytecode and tried them. Left out is what
-# only calculates: the same wheels of NumPy, MuJoCo and Pinocchio do that, whatever the Python.
+# command lines. `golem doctor --compile` compiles the kernels from this Python's bytecode and tries them. Left out is
+# what only calculates: the same wheels of NumPy, MuJoCo and Pinocchio do that, whatever the Python.
 portable=(
     tests/capabilities/memory tests/dashboard/test_server.py tests/dashboard/test_status.py
     tests/evaluation/harness tests/evaluation/metrics tests/evaluation/report tests/evaluation/test_base.py
@@ -36,6 +36,6 @@ for version in "$@"; do
     fi
     echo "golem: the portable tests with Python $version"
     PYTHON=$python VENV=.venv-$version scripts/bootstrap.sh dev
-    scripts/compile_kernels.sh ".venv-$version"
+    ".venv-$version/bin/golem" doctor --compile
     ".venv-$version/bin/pytest" -n 2 -m "not slow" "${portable[@]}"
 done

@@ -171,22 +171,6 @@ def copied(tree: Path, folder: Path) -> Path:
     return target
 
 
-def forget_kernels(tree: Path, file: Path) -> None:
-    """Remove the compiled kernels of `file` and of those that call them: numba does not see that they changed."""
-    kernels = [path for path in (tree / "src").rglob("*.py") if "@njit" in path.read_text(encoding="utf-8")]
-    changed = {file}
-    while more := {
-        path
-        for path in kernels
-        if path not in changed
-        and any(re.search(rf"\b{each.stem}\b", path.read_text(encoding="utf-8")) for each in changed)
-    }:
-        changed |= more
-    for path in changed:
-        for compiled in path.parent.glob(f"__pycache__/{path.stem}.*.nb[ic]"):
-            compiled.unlink()
-
-
 def noticed(tree: Path, fault: PlantedFault, select: str) -> str | None:
     """Return the first test that fails with the fault in the copy `tree`, None if none does.
 
@@ -198,11 +182,8 @@ def noticed(tree: Path, fault: PlantedFault, select: str) -> str | None:
     if whole.count(fault.line) != 1:
         raise SystemExit(f"{fault.file} holds {whole.count(fault.line)} times: {fault.line}")
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "900"]
-    compiled = "@njit" in whole
     try:
         path.write_text(whole.replace(fault.line, fault.becomes), encoding="utf-8")
-        if compiled:
-            forget_kernels(tree, path)
         done = subprocess.run(
             [*command, "-m", select, *fault.tests],
             cwd=tree,
@@ -213,8 +194,6 @@ def noticed(tree: Path, fault: PlantedFault, select: str) -> str | None:
         )
     finally:
         path.write_text(whole, encoding="utf-8")
-        if compiled:
-            forget_kernels(tree, path)
     if done.returncode not in (0, 1):
         raise SystemExit(done.stdout + done.stderr)
     failed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.M)

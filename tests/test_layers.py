@@ -14,6 +14,7 @@ LAYERS = (
         "types",
         "errors",
         "figures",
+        "kernels",
         "native",
         "native_messages",
         "finite",

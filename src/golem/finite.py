@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from golem.errors import GolemError
+from golem.kernels import njit
 from golem.native import Record
 from golem.types import Array, LowState
 

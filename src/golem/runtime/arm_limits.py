@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from golem.kernels import njit
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
 from golem.runtime.contract_check import ContractCheck

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numba import njit
 
 from golem.interfaces import topics
 from golem.interfaces.payloads import ArmCommand, EstopMessage, GateState, GateStatus, LegCommand
+from golem.kernels import njit
 from golem.middleware.bus import Bus, Deferred, Topic
 from golem.native import LOOK, UNUSUAL, CompiledStage, Records, address, call_stage, new_shared, shared
 from golem.native_messages import base_of, command_of, put_command, put_legs, put_state, state_of

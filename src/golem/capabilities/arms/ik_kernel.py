@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from golem.kernels import njit
 from golem.robots.model.linear_kernel import cholesky, solve_cholesky
 from golem.types import Array
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from golem.capabilities.collision.sphere_kernel import (
@@ -24,6 +23,7 @@ from golem.capabilities.collision.sphere_kernel import (
     place_spheres,
     put,
 )
+from golem.kernels import njit
 from golem.types import Array
 
 Cells = NDArray[np.int32]

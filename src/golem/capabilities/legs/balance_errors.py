@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from golem.kernels import njit
 from golem.types import GRAVITY, Array
 
 

@@ -18,9 +18,9 @@ from math import inf
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from golem.kernels import njit
 from golem.native import Record, Records, new_record
 from golem.options import require
 from golem.types import Array

@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from golem.capabilities.legs.balance_errors import stand_errors
 from golem.capabilities.legs.gait import GAIT, GAIT_OPTIONS, Gait, step_gait
 from golem.capabilities.legs.stop_predictor import REST, StopPredictor, planar, step_rest
 from golem.capabilities.legs.velocity_integrator import TRIM, VelocityIntegrator, step_trim
 from golem.hardware.servo.gravity import body_tree
+from golem.kernels import njit
 from golem.native import address, new_record, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base
 from golem.robots.model.leg_kernel import LEG, SOLE, tree_dtype, tree_frames

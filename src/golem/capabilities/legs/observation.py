@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from golem.capabilities.legs.base import LocomotionCommand
 from golem.errors import ConfigError, unknown_name
+from golem.kernels import njit
 from golem.native import address, new_record, view
 from golem.options import vector
 from golem.robots.model.imu_mount import TORSO, turn_to_base

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from golem.capabilities.legs.base import LocomotionCommand
 from golem.capabilities.legs.description import JOINTS, load_description
@@ -13,6 +12,7 @@ from golem.capabilities.legs.network import load_network
 from golem.capabilities.legs.swing import swing_legs
 from golem.errors import GolemError
 from golem.interfaces.payloads import LegCommand
+from golem.kernels import njit
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from golem.kernels import njit
 from golem.types import Array
 
 LIFT = np.array([0.0, -1.0, 0.0, 2.0, -1.0, 0.0])

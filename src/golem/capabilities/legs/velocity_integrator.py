@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from golem.capabilities.legs.balance_errors import heading
+from golem.kernels import njit
 from golem.native import Record, new_record
 from golem.types import Array
 

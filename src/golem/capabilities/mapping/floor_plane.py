@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from golem.kernels import njit
 from golem.types import Array
 
 SENSOR_HEIGHT = 1.68

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.sphere_robot import load_spheres
+from golem.kernels import njit
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import SIDES, Array
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from golem.kernels import njit
 from golem.types import Array
 
 Voxels = NDArray[np.int8]

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from golem.kernels import njit
 from golem.types import Array
 
 SQRT2 = math.sqrt(2.0)

@@ -15,9 +15,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from golem.capabilities.odometry.still_start import Beginning
+from golem.kernels import njit
 from golem.types import GRAVITY, Array
 
 SIZE = 18

@@ -10,10 +10,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from golem.capabilities.collision.sphere_kernel import Indices, Ints, bodies_collide, place
 from golem.capabilities.collision.world_kernel import Cells, bodies_hit_world
+from golem.kernels import njit
 from golem.types import Array
 
 FREE, RANGE, ITSELF, WORLD, RULE = 0, 1, 2, 3, 4

@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -27,6 +27,7 @@ from golem.capabilities.planning.joint_space import PlanningRobot
 from golem.capabilities.planning.rrt_connect import RrtConnect
 from golem.evaluation.speed.navigation_bench import navigation_times
 from golem.evaluation.speed.plan_bench import queries
+from golem.kernels import stamp_of_all
 from golem.runtime.lockstep import build
 from golem.stack import load_stack
 from golem.types import Array
@@ -35,9 +36,8 @@ RUNS = {"hall": 1.5, "stand": 0.1, "fridge-stand": 0.1, "tether": 0.1}
 """Stacks whose 500 Hz chain, LiDAR and odometry run for a moment [s]."""
 
 
-def compile_kernels() -> float:
-    """Compile what is not on disk yet; return the CPU time it took [s], that of the calls included."""
-    start = time.process_time()
+def compile_kernels() -> None:
+    """Compile what is not on disk yet."""
     for name, seconds in RUNS.items():
         running, robot = build(load_stack(name, profile="field"), 0)
         running.executor.run(seconds)
@@ -54,15 +54,23 @@ def compile_kernels() -> float:
         model.collides_each(np.zeros((1, len(model.joints))), 0.0, world)
     model.nearest_world(np.zeros(len(model.joints)), cloud, 4, 1.0)
     cloud.distance(np.zeros((1, 3)), 1.0)
-    return time.process_time() - start
 
 
-def compile_if_cold() -> None:
-    """Compile in a process of its own where the plan's kernel is not on disk, or older than its source."""
-    source, folder = Path(plan_kernel.__file__), Path(str(plan_kernel.verdict.stats.cache_path))
-    kept = [file.stat().st_mtime for file in folder.glob("plan_kernel.verdict-*.nbi")]
-    if not kept or max(kept) < source.stat().st_mtime:
-        subprocess.run([sys.executable, "-P", "-m", __spec__.name], check=False)
+def compile_if_cold() -> float | None:
+    """Compile in a process of its own what is older than its source; return the CPU time [s], None: nothing was."""
+    kept = (
+        Path(str(plan_kernel.verdict.stats.cache_path))
+        / f"compiled-{sys.version_info[0]}.{sys.version_info[1]}"
+    )
+    now = stamp_of_all()
+    if kept.is_file() and kept.read_text(encoding="utf-8") == now:
+        return None
+    start = os.times()
+    code = subprocess.run([sys.executable, "-P", "-m", __spec__.name], check=False).returncode
+    end = os.times()
+    if not code:
+        kept.write_text(now, encoding="utf-8")
+    return end.children_user + end.children_system - start.children_user - start.children_system
 
 
 def _once(step: Callable[[int], object], n: int) -> Array:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from golem.kernels import njit
 from golem.native import Record, new_record
 from golem.robots.model.imu_mount import TORSO
 from golem.types import Array, LowState

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass, field
 
 import numpy as np
-from numba import njit
 
 from golem.hardware.estimator.contact import ContactConfig
 from golem.hardware.estimator.feet_kernel import contact, loads, pressed
 from golem.hardware.estimator.foot_force import FOOT_FORCE, FootForceConfig, foot_wrenches
+from golem.kernels import njit
 from golem.native import Record, Records, new_record
 from golem.robots.model.leg_dynamics import leg_tree
 from golem.robots.model.leg_kernel import LEG_MOTION, leg_motion, tree_dtype

@@ -9,9 +9,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from golem.kernels import njit
 from golem.robots.model.linear_kernel import cholesky, solve_cholesky
 from golem.types import Array
 

@@ -14,9 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from golem.hardware.estimator.feet_kernel import wrenches
+from golem.kernels import njit
 from golem.native import Record
 from golem.robots.model.leg_kernel import LEG
 from golem.types import Array

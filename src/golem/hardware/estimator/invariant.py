@@ -13,11 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from golem.hardware.estimator import invariant_kernel
 from golem.hardware.estimator.invariant_kernel import SIZE
+from golem.kernels import njit
 from golem.native import Record, Records, new_record
 from golem.robots.model.spatial import skew
 from golem.types import Array

@@ -8,7 +8,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import cfunc, njit
 
 from golem.finite import finite_state
 from golem.hardware.estimator.attitude import Attitude, base_rotation
@@ -30,6 +29,7 @@ from golem.hardware.estimator.invariant import (
     predict,
     update,
 )
+from golem.kernels import cfunc, njit
 from golem.native import ORDINARY, STAGE, UNUSUAL, CompiledStage, Record, new_record, shared, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base
 from golem.robots.model.table import FRAMES

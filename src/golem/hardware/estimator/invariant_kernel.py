@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from golem.kernels import njit
 from golem.robots.model.linear_kernel import cholesky, solve_cholesky
 from golem.types import GRAVITY, Array
 

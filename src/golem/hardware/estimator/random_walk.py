@@ -13,9 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from golem.kernels import njit
 from golem.native import Record, Records
 from golem.robots.model.spatial import skew
 from golem.types import Array

@@ -7,7 +7,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import cfunc, njit
 
 from golem.finite import finite_state
 from golem.hardware.estimator.attitude import GYRO_BIAS, Attitude, base_rotation, track_bias
@@ -22,6 +21,7 @@ from golem.hardware.estimator.feet import (
     sense_feet,
 )
 from golem.hardware.estimator.random_walk import FILTER, RandomWalkConfig, filter_options, fuse
+from golem.kernels import cfunc, njit
 from golem.native import ORDINARY, STAGE, UNUSUAL, CompiledStage, Record, new_record, shared, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base
 from golem.types import LowState

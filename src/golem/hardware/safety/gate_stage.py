@@ -12,7 +12,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import cfunc, njit
 
 from golem.hardware.safety.base import Counters, Outgoing, SafetyLimits
 from golem.hardware.safety.kernel import ORDINARY as SOUND
@@ -22,6 +21,7 @@ from golem.hardware.safety.sender import SenderMemory
 from golem.hardware.safety.senses import CALM, EVERY, FORGET, GRAVITY_TIME, LOST, SensesMemory
 from golem.hardware.safety.senses_kernel import ASKED, GROUPS, SCALARS, looked
 from golem.interfaces.payloads import EstopMessage, GateState
+from golem.kernels import cfunc, njit
 from golem.native import (
     COMMAND,
     ORDINARY,

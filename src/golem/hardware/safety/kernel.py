@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from golem.hardware.safety import limit_table as rows
 from golem.hardware.safety.base import EARLY, EASE, SPACE
+from golem.kernels import njit
 from golem.native import COMMAND, STATE
 from golem.types import LEGS, NUM_JOINTS, Array
 

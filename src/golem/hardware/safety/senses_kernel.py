@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from golem.hardware.safety import limit_table as rows
+from golem.kernels import njit
 from golem.native import STATE
 from golem.types import NUM_JOINTS, Array
 

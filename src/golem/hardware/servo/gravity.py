@@ -6,8 +6,8 @@ import math
 from functools import cache
 
 import numpy as np
-from numba import njit
 
+from golem.kernels import njit
 from golem.native import Records
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.leg_kernel import tree_gravity, tree_of

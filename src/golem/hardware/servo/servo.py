@@ -20,12 +20,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import cfunc, njit
 
 from golem.finite import check_finite, check_measured, finite_state
 from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gains import Gains, default_gains
 from golem.hardware.servo.gravity import body_tree, gravity_in_base
+from golem.kernels import cfunc, njit
 from golem.native import (
     ORDINARY,
     STAGE,

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numba import njit
 
+from golem.kernels import njit
 from golem.native import Record, Records, new_record
 from golem.robots.model.leg_kinematics import SOLE_CENTER
 from golem.robots.model.table import DOF

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from golem.kernels import njit
 from golem.types import Array
 
 

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from golem.kernels import njit
 from golem.robots.mujoco.truth import Truth
 from golem.true_runs import true_runs
 from golem.types import Array

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from numba import njit
 
 from golem.errors import ConfigError, unknown_name
+from golem.kernels import njit
 from golem.native import Record, Records, address, floats, new_record
 from golem.robots.model.table import LINKS
 from golem.types import Array

@@ -6,8 +6,8 @@ import math
 
 import mujoco
 import numpy as np
-from numba import njit
 
+from golem.kernels import njit
 from golem.native import Record, Records, address, floats, new_record
 from golem.robots.model import magpie_model
 from golem.types import Array, HandCommand, HandState, Side

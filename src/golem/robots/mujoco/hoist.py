@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numba import njit
 
+from golem.kernels import njit
 from golem.native import Record, Records, address, floats, new_record
 from golem.types import Array
 

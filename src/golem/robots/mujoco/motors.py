@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from numba import njit
 
 from golem.errors import ConfigError
+from golem.kernels import njit
 from golem.native import COMMAND, Record, Records, address, floats, new_record
 from golem.native_messages import put_command
 from golem.types import NUM_JOINTS, TICK, Array, LowCommand

@@ -10,9 +10,9 @@ import math
 
 import mujoco
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from golem.kernels import njit
 from golem.types import Array
 
 _kinds = mujoco.mjtGeom

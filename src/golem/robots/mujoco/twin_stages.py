@@ -10,8 +10,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numba import cfunc, njit
 
+from golem.kernels import cfunc, njit
 from golem.native import (
     LOOK,
     ORDINARY,

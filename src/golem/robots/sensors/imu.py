@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from golem.kernels import njit
 from golem.native import Record, Records, new_record
 from golem.types import Array, Imu
 

@@ -12,10 +12,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.spatial.transform import Rotation
 
 from golem.errors import unknown_name
+from golem.kernels import njit
 from golem.robots.sensors.imu import ImuErrors
 from golem.robots.sensors.streams import stream
 from golem.types import Array

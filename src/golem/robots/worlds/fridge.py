@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numba import njit
 
+from golem.kernels import njit
 from golem.robots.worlds import parts
 
 HINGE = "fridge_hinge"
