@@ -57,7 +57,9 @@ def test_a_kernel_follows_constants_and_kernels_of_other_files(tmp_path: Path) -
 
 
 def test_the_gate_follows_its_constants() -> None:
-    assert {Path(module.__file__) for module in (base, limit_table)} <= kernels.sources(Path(kernel.__file__))
+    assert {Path(str(module.__file__)) for module in (base, limit_table)} <= kernels.sources(
+        Path(str(kernel.__file__))
+    )
 
 
 def test_all_kernels_are_kept_so() -> None:

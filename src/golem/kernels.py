@@ -12,7 +12,7 @@ import hashlib
 import importlib.metadata
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from numba import cfunc, config, njit
 from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
@@ -109,4 +109,5 @@ class UserWide(_Stamped, UserWideCacheLocator):
 
 
 _LOCATORS = [*(f"{__name__}.{kind.__name__}" for kind in (Provided, InTree, UserWide)), "IPythonCacheLocator"]
-config.CACHE_LOCATOR_CLASSES = config.CACHE_LOCATOR_CLASSES or ",".join(_LOCATORS)
+_config: Any = config  # numba makes its options at run time
+_config.CACHE_LOCATOR_CLASSES = _config.CACHE_LOCATOR_CLASSES or ",".join(_LOCATORS)

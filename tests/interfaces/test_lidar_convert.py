@@ -44,6 +44,16 @@ def test_a_cloud_without_times_is_no_scan() -> None:
         lidar_convert.to_scan(point_cloud(1.0, POINTS, "lidar_link"))
 
 
+@pytest.mark.parametrize("first", [0.0, 5e-6])
+def test_the_first_point_may_be_at_the_scans_begin_whatever_the_stamp_is_rounded_to(first: float) -> None:
+    ends = 1.7e9 + np.random.default_rng(0).uniform(0.0, 1.0, 200)
+    for end in [*ends, *(ends - 1.7e9 + 1.0)]:
+        scan = LidarScan(float(end), POINTS, np.linspace(first, 0.1, 10, dtype=np.float32), 0.1)
+        back = lidar_convert.to_scan(lidar_convert.cloud(scan))
+        assert back.offsets.min() >= 0.0
+        np.testing.assert_allclose(back.offsets, scan.offsets, atol=1e-6)
+
+
 def test_points_of_another_clock_are_no_scan() -> None:
     points = np.zeros(3, LIVOX_POINT)
     points["timestamp"] = 5e12

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.interfaces import images
-from golem.interfaces.images import LIVOX_POINT, point_cloud
 from golem.interfaces.lidar import ExternalOdometry, LidarImu, LidarScan
 from golem.interfaces.ros_convert import header, matrix, pose, seconds, vector
 from golem.middleware.ros.message import CodecError
@@ -16,31 +15,11 @@ from golem.middleware.ros.msgs.nav_msgs import Odometry
 from golem.middleware.ros.msgs.sensor_msgs import Imu, PointCloud2
 from golem.types import Array
 
-
-def scan_cloud(scan: LidarScan) -> PointCloud2:
-    """Return a scan as the vendor's driver packs it, stamped with its begin; each point has its own time [ns]."""
-    begin = scan.t - scan.duration
-    points = np.zeros(len(scan.points), LIVOX_POINT)
-    for i, axis in enumerate("xyz"):
-        points[axis] = scan.points[:, i]
-    points["timestamp"] = 1e9 * (begin + scan.offsets.astype(np.float64))
-    return point_cloud(begin, points, FRAME)
-
-
-def lidar_imu(sample: LidarImu) -> Imu:
-    """Return a sample of the LiDAR's IMU in SI units; ROS writes its unknown orientation as a covariance of -1."""
-    message = Imu(
-        header=header(sample.t, FRAME),
-        angular_velocity=vector(sample.gyro),
-        linear_acceleration=vector(sample.acc),
-    )
-    message.orientation_covariance[0] = -1.0
-    return message
-
-
 FRAME = "lidar_link"
 LEAST_DURATION = 0.1
 """Time from the first point of a cloud to its end, where its points do not reach further [s]: that of one scan."""
+ROUNDING = 1e-6
+"""By how much a point may be before its cloud's stamp: one is rounded to ns, the other to a double of 1e18 ns [s]."""
 GOOD_RETURN = 0x10
 """Tag of a point that the vendor's driver is sure of."""
 
@@ -72,8 +51,9 @@ def to_scan(message: PointCloud2) -> LidarScan:
     order = np.argsort(offsets, kind="stable")
     xyz = np.stack([points[name] for name in ("x", "y", "z")], axis=1).astype(np.float32)
     finite = offsets[np.isfinite(offsets)]
-    if finite.size and not 0.0 <= finite.min() <= finite.max() < 1.0:
+    if finite.size and not -ROUNDING <= finite.min() <= finite.max() < 1.0:
         raise CodecError("The points of the cloud are not of the second after its stamp.")
+    offsets = np.maximum(offsets, 0.0)
     duration = max(LEAST_DURATION, float(finite.max(initial=0.0)))
     return LidarScan(begin + duration, xyz[order], offsets[order].astype(np.float32), duration)
 

@@ -17,6 +17,7 @@ from golem.evaluation.conformance.room import ROOM, MadeWalk
 from golem.interfaces.lidar import ExternalOdometry, LegOdometry, LidarImu, LidarScan
 from golem.robots.model.spatial import rotation_rpy, transform
 from golem.robots.sensors.mid360 import P_LIDAR_IMU
+from golem.types import Array
 
 
 def legs_at(t: float, x: float, **changes: object) -> LegOdometry:
@@ -136,3 +137,24 @@ def test_an_adapter_registers_scans_and_leaves_bad_ones_out(use: str) -> None:
     odometry.add_imu(LidarImu(few.t, np.zeros(3), np.array([0.0, 0.0, -9.81])))
     odometry.add_scan(few)
     assert odometry.estimate() is None and "fewer than" in odometry.why
+
+
+def test_points_without_times_of_their_own_are_not_corrected_for_motion(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("kiss_icp")
+    odometry = registry.create("odometry", "kiss_icp", {})
+    given: list[int] = []
+    register = odometry._icp.register_frame
+
+    def registered(points: Array, offsets: Array) -> None:
+        given.append(len(offsets))
+        register(points, offsets)
+
+    monkeypatch.setattr(odometry._icp, "register_frame", registered)
+    scans = [r for tenth in MadeWalk(ROOM, every=5).tenths(0.3) for r in tenth if isinstance(r, LidarScan)]
+    for scan, same in zip(scans, (False, True, True), strict=True):
+        odometry.add_scan(replace(scan, offsets=np.full_like(scan.offsets, 0.1)) if same else scan)
+    assert given[0] > 1000 and given[1:] == [0, 0]
+    estimate = odometry.estimate()
+    assert estimate is not None and np.linalg.norm(estimate.T_odom_base[:3, 3]) < 0.05

@@ -53,7 +53,8 @@ class KissIcp(ScanPoses):
         points, offsets = taken
         if self._icp.local_map.empty():
             self._icp.last_pose = lidar_in_base(self._waist)
-        self._icp.register_frame(points, offsets)
+        # Without a time per point the scan is rigid: with no times the package corrects no motion inside it.
+        self._icp.register_frame(points, offsets if offsets.max() > offsets.min() else offsets[:0])
         self.tell(scan.t, self._icp.last_pose.copy())
 
 

@@ -34,6 +34,7 @@ from golem.capabilities.odometry.error_state import (
 )
 from golem.capabilities.odometry.moving_start import MovingStart
 from golem.capabilities.odometry.plane_map import PlaneMap
+from golem.capabilities.odometry.sensor_agreement import SensorAgreement, up_in_base
 from golem.capabilities.odometry.still_start import StillStart
 from golem.interfaces.lidar import LegOdometry, LidarImu, LidarScan
 from golem.robots.sensors.mid360 import P_LIDAR_IMU
@@ -126,6 +127,7 @@ class Lio(Ignores):
         self.degenerate: Array = np.zeros(3)
         self.matched = 1.0
         self._start, self._moving = StillStart(), MovingStart()
+        self._agree = SensorAgreement()
         self._legs: LegOdometry | None = None
         self._filter: ErrorState | None = None
         self._ahead: ErrorState | None = None
@@ -149,12 +151,14 @@ class Lio(Ignores):
             begin = (None if walks else self._start.add(sample, self._waist)) or self._moving.add(
                 sample, legs
             )
-            if begin is not None:
+            if begin is not None and self._agree.stands(
+                up_in_base(begin.R, self._waist), begin.force, sample.t
+            ):
                 self._filter = ErrorState(sample.t, begin, self.config.yaw, self.config.imu)
                 self._ahead = self._filter.copy()
                 self._last_scan = self._fitted_at = sample.t
             return
-        if sample.t <= self._ahead.t:
+        if not self._agree.imu(sample, self._ahead.t):
             return
         self._buffer.append(sample)
         self._move(self._ahead, sample)
@@ -165,13 +169,14 @@ class Lio(Ignores):
         if not all(map(math.isfinite, [*legs.velocity.tolist(), legs.waist])):
             return
         self._waist, self._legs = legs.waist, legs
+        self._agree.legs(legs)
         if self._ahead is None or legs.stale or not self.config.legs:
             return
         if legs.t - self._legs_used_ahead < self.config.leg_period - 1e-6:
             return
         self._legs_used_ahead = legs.t
         self._buffer.append(legs)
-        self._walk(self._ahead, legs)
+        self._agree.velocity(self._walk(self._ahead, legs))
 
     def add_scan(self, scan: LidarScan) -> None:
         """Take one scan; see `LidarOdometry`."""
@@ -182,8 +187,8 @@ class Lio(Ignores):
             return  # a driver that repeats itself under new stamps
         self._frozen = scan.points
         start = scan.t - scan.duration
-        if start < state.t - 1e-3 or scan.t > self._ahead.t + _GAP:
-            return  # before the start, out of order, or of another clock
+        if not self._agree.scan(scan, self._ahead.t) or start < state.t - 1e-3:
+            return  # of another clock or sensor, before the start, or out of order
         track = self._advance(state, scan.t, start)
         local = self._points(scan, start, track)
         if len(local):
@@ -204,6 +209,8 @@ class Lio(Ignores):
     @property
     def why(self) -> str:
         """See `LidarOdometry`."""
+        if self._agree.why:
+            return self._agree.why
         if self._ahead is None:
             return "It waits for the LiDAR's IMU, and for a robot that stands still or whose legs tell how it moves."
         if self._lost:
@@ -263,11 +270,11 @@ class Lio(Ignores):
             state.t = sample.t - 0.005
         state.predict(sample.t, sample.gyro, sample.acc)
 
-    def _walk(self, state: ErrorState, legs: LegOdometry) -> None:
+    def _walk(self, state: ErrorState, legs: LegOdometry) -> bool:
         T_base_lidar = lidar_in_base(legs.waist)
         R_base_imu = T_base_lidar[:3, :3]
         arm = -(R_base_imu.T @ T_base_lidar[:3, 3] + P_LIDAR_IMU)
-        state.update_velocity(legs.velocity, R_base_imu, arm, self.config.leg_noise)
+        return state.update_velocity(legs.velocity, R_base_imu, arm, self.config.leg_noise)
 
     def _advance(
         self, state: ErrorState, end: float, start: float
@@ -316,21 +323,8 @@ class Lio(Ignores):
         P6: Array = np.ascontiguousarray(prior.P[:6, :6])
         fits = False
         for iteration in range(config.iterations):
-            plane_map.accumulate(
-                local,
-                state.R,
-                state.p,
-                P6,
-                self.map.keys,
-                self.map.cells,
-                _SIZES,
-                noise,
-                blind,
-                A,
-                b,
-                N,
-                told,
-            )
+            cells, result = (self.map.keys, self.map.cells, _SIZES), (A, b, N, told)
+            plane_map.accumulate(local, state.R, state.p, P6, *cells, noise, blind, *result)
             if iteration == 0:
                 fits = told[1] > _MATCHED and told[1] > config.least_matched * told[0]
                 self.matched = float(told[1] / max(told[0], 1.0))

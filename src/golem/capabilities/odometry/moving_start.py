@@ -65,4 +65,4 @@ class MovingStart:
         rate = R_base_imu @ sample.gyro
         arm = R_base_imu @ P_LIDAR_IMU + T_base_lidar[:3, 3]
         velocity = R @ (now + np.cross(rate, arm))
-        return Beginning(R @ R_base_imu, R @ arm, np.zeros(3), velocity, SPEED, TILT, BIAS)
+        return Beginning(R @ R_base_imu, R @ arm, np.zeros(3), size, velocity, SPEED, TILT, BIAS)

@@ -11,7 +11,7 @@ import numpy as np
 from golem.capabilities.odometry.base import lidar_in_base
 from golem.interfaces.lidar import LidarImu
 from golem.robots.sensors.mid360 import P_LIDAR_IMU
-from golem.types import Array
+from golem.types import GRAVITY, Array
 
 WINDOW = 200
 """Samples for which the robot must stand still: 1 s."""
@@ -31,6 +31,7 @@ class Beginning:
         R: (3, 3) rotation of the IMU's axes in a level frame in which base_link heads along x.
         p: (3,) place of the IMU in it; base_link is at the origin [m].
         gyro_bias: (3,) [rad/s].
+        force: mean specific force, of a robot at rest that of gravity [m/s^2].
         velocity: (3,) of the IMU [m/s].
         speed, tilt, bias: standard deviations per axis of the velocity [m/s], of gravity's x and y [m/s^2], and of the
             gyro's bias [rad/s]; None: that of the filter.
@@ -39,6 +40,7 @@ class Beginning:
     R: Array
     p: Array
     gyro_bias: Array
+    force: float = GRAVITY
     velocity: Array = field(default_factory=lambda: np.zeros(3))
     speed: float = 0.01
     tilt: float | None = None
@@ -75,10 +77,11 @@ class StillStart:
             return None
         T_base_lidar = lidar_in_base(waist)
         up = T_base_lidar[:3, :3] @ acc.mean(axis=0)
-        up /= np.linalg.norm(up)
+        force = float(np.linalg.norm(up))
+        up /= force
         R = level(up)
         arm = T_base_lidar[:3, 3] + T_base_lidar[:3, :3] @ P_LIDAR_IMU
-        return Beginning(R @ T_base_lidar[:3, :3], R @ arm, bias)
+        return Beginning(R @ T_base_lidar[:3, :3], R @ arm, bias, force)
 
 
 def level(up: Array) -> Array:

@@ -17,9 +17,8 @@ from golem.errors import ConfigError
 from golem.hardware.drivers.magpie_servos import HandFault, MagpieServoConfig, MagpieServos
 from golem.hardware.drivers.mid360_driver import IMU_PORT, POINT_PORT, Mid360
 from golem.hardware.drivers.realsense_camera import RealSense, device_frames
-from golem.interfaces import public
+from golem.interfaces import lidar_convert, public
 from golem.interfaces.lidar import LidarScan
-from golem.interfaces.lidar_convert import lidar_imu, scan_cloud
 from golem.interfaces.payloads import Exposure
 from golem.interfaces.ros_convert import seconds
 from golem.middleware.dds.base import Participant
@@ -215,9 +214,9 @@ class LidarProcess(DeviceProcess):
         for value in self._lidar.step(now):
             if isinstance(value, LidarScan):
                 self._heard = now
-                yield Measurement(CLOUD, value, scan_cloud)
+                yield Measurement(CLOUD, value, lidar_convert.cloud)
             else:
-                yield Measurement(IMU, value, lidar_imu)
+                yield Measurement(IMU, value, lidar_convert.imu)
         self._report(now)
 
     def _report(self, now: float) -> None:
