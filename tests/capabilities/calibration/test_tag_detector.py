@@ -24,6 +24,24 @@ def test_a_drawn_tag_is_found_where_it_is(number: int) -> None:
     assert np.abs(found[number] - wanted).max() < 0.6
 
 
+@pytest.mark.parametrize("side", [24, 30, 38])
+def test_the_corners_of_a_small_tag_are_found_to_a_third_of_a_pixel(side: int) -> None:
+    """Drawn at 16 times its size, then averaged, so that its corners lie at fractions of pixels."""
+    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+    errors = []
+    for at in np.random.default_rng(side).uniform(20.0, 60.0, (12, 2)):
+        large, corner = np.full((120 * 16, 120 * 16), 250, np.uint8), np.round(at * 16).astype(int)
+        rows, columns = (slice(c, c + side * 16) for c in corner)
+        large[rows, columns] = cv2.aruco.generateImageMarker(family, 3, side * 16)
+        image = cv2.resize(large, (120, 120), interpolation=cv2.INTER_AREA)
+        blurred = np.asarray(cv2.GaussianBlur(image, (0, 0), 0.7), np.uint8)
+        found = TagDetector().find(np.repeat(blurred[:, :, None], 3, axis=2))[3]
+        (y, x), half = corner / 16, 0.5
+        wanted = np.array([[x, y], [x + side, y], [x + side, y + side], [x, y + side]]) - half
+        errors.append(found - wanted)
+    assert np.sqrt(np.mean(np.square(errors))) < 0.33
+
+
 def test_an_empty_image_and_a_tiny_tag_show_nothing() -> None:
     detector = TagDetector()
     assert detector.find(np.full((120, 160, 3), 128, np.uint8)) == {}

@@ -28,6 +28,13 @@ def test_mjcf_comes_back_as_the_same_model(hands: bool) -> None:
         np.testing.assert_allclose(getattr(ours, field), getattr(back, field), rtol=1e-5, atol=1e-9)
 
 
+def test_pinocchio_reads_the_limits_of_torque_from_the_mjcf(tmp_path: Path) -> None:
+    (tmp_path / "h12.xml").write_text(export_mjcf(hands=False), encoding="utf-8")
+    back = pin.buildModelFromMJCF(str(tmp_path / "h12.xml"))
+    efforts = [back.effortLimit[back.joints[back.getJointId(name)].idx_v] for name in JOINT_NAMES]
+    np.testing.assert_allclose(efforts, mjcf.robot_spec(False).compile().actuator_ctrlrange[:27, 1])
+
+
 @pytest.mark.parametrize("hands", [False, True])
 def test_urdf_comes_back_in_pinocchio(hands: bool, postures: Callable[[int], Array]) -> None:
     ours = pinocchio_model.build(hands=False)

@@ -100,6 +100,13 @@ def _load(robot: MujocoRobot) -> float:
     return float(robot.truth.foot_forces()[:, 2].sum())
 
 
+def test_no_air_brakes_its_links() -> None:
+    _, robot = twins()
+    links = robot._bodies.articulation.get_links()
+    assert len(links) > NUM_JOINTS
+    assert {(link.get_linear_damping(), link.get_angular_damping()) for link in links} == {(0.0, 0.0)}
+
+
 def test_a_limp_robot_falls_and_lies_on_more_than_its_feet() -> None:
     _, robot = twins(support="ground")
     robot.release()

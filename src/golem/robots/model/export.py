@@ -85,7 +85,7 @@ def export_urdf(hands: bool) -> str:
 
     The root is `pelvis`, without a floating joint. URDF knows no capsules and no meshes without files, so both visual
     and collision are the contact primitives, a capsule being a cylinder with two spheres. A finger's hinge mimics its
-    crank; readers without mimic joints (Pinocchio by default, MuJoCo) see it as a free hinge.
+    crank; readers without mimic joints (Pinocchio by default, SAPIEN) see it as a free hinge.
     """
     robot = ElementTree.Element("robot", name="golem_h12")
     shapes: dict[str, list[Shape]] = {}

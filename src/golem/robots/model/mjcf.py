@@ -105,6 +105,9 @@ def _add_body(
 
 
 def _add_motor(spec: mujoco.MjSpec, joint: str, limit: float) -> None:
+    hinge = spec.joint(joint)
+    hinge.actfrclimited = mujoco.mjtLimited.mjLIMITED_TRUE  # Pinocchio and Newton read limits of torque here
+    hinge.actfrcrange = [-limit, limit]
     motor = spec.add_actuator(
         name=joint,
         target=joint,

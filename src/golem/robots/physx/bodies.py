@@ -132,6 +132,8 @@ class _Maker:
         link.set_mass(float(model.body_mass[body]))
         link.set_cmass_local_pose(self.pose(model.body_ipos[body], model.body_iquat[body]))
         link.set_inertia(model.body_inertia[body].astype(np.float32))
+        link.set_linear_damping(0.0)  # PhysX brakes what moves through air by 5 % a second
+        link.set_angular_damping(0.0)
         joint, inside = link.joint, self.pose(model.body_pos[body], model.body_quat[body])
         if parent is None:
             return entity, link
