@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import pytest
 
 from golem.errors import ConfigError
+from golem.middleware import relay
 from golem.middleware.web_gate import TokenGate, is_loopback
 
 
@@ -82,6 +83,31 @@ def test_garbage_ends_the_connection_and_nothing_else(gate: TokenGate) -> None:
             answer = b""
     assert answer == b"" or answer.startswith(b"HTTP/1.1 403")
     assert ask(gate, f"/?token={gate.token}").endswith("hello")
+
+
+def test_a_token_that_is_no_ascii_is_refused_as_any_other(gate: TokenGate) -> None:
+    before = threading.active_count()
+    for address in ("/?token=é", f"/?token={gate.token}é", "/?token="):
+        assert ask(gate, address).startswith("HTTP/1.1 403")
+    assert threading.active_count() <= before + 1
+
+
+def test_who_sends_slowly_takes_no_thread_and_keeps_nobody_out(
+    gate: TokenGate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = threading.active_count()
+    slow = [socket.create_connection(("127.0.0.1", gate.port), 5.0) for _ in range(3 * relay.PENDING)]
+    for connection in slow[-relay.PENDING :]:
+        connection.sendall(b"G")
+    assert ask(gate, f"/?token={gate.token}").endswith("hello")
+    assert threading.active_count() <= before + 3
+    slow[0].settimeout(5.0)
+    assert slow[0].recv(1) == b""  # the oldest were ended
+    monkeypatch.setattr(relay, "PATIENCE", -1.0)
+    late = socket.create_connection(("127.0.0.1", gate.port), 5.0)
+    assert late.recv(1) == b""
+    for connection in (*slow, late):
+        connection.close()
 
 
 def test_a_taken_port_is_said_and_tokens_differ(gate: TokenGate) -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import re
+import selectors
 import socket
 import threading
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -14,7 +17,9 @@ from golem.errors import ConfigError
 HEAD = 16_384
 """Bytes of a request's head that are read at most."""
 PATIENCE = 5.0
-"""How long a head may take to come [s]."""
+"""How long a whole head may take to come [s]."""
+PENDING = 64
+"""Connections whose heads are waited for at once; a further one ends the oldest."""
 
 
 class Relay(ABC):
@@ -65,24 +70,28 @@ class Relay(ABC):
                     connection.shutdown(socket.SHUT_RDWR)
 
     def _accept(self) -> None:
+        """Read the heads of all connections in one thread: who sends slowly, or nothing, costs the others nothing."""
+        waiting = _Waiting(self._listener)
         while True:
-            try:
-                connection, _ = self._listener.accept()
-            except OSError:
-                return
-            threading.Thread(target=self._serve, args=(connection,), daemon=True).start()
+            for connection in waiting.ready():
+                try:
+                    whole = waiting.read(connection)
+                except OSError:  # of the listener: it is closed
+                    waiting.close()
+                    return
+                if whole is not None:
+                    threading.Thread(target=self._serve, args=(connection, whole), daemon=True).start()
 
-    def _serve(self, outer: socket.socket) -> None:
+    def _serve(self, outer: socket.socket, head: bytes) -> None:
         with outer, suppress(OSError):
             outer.settimeout(PATIENCE)
-            head = _head(outer)
             if not self.admits(head):
                 outer.sendall(_REFUSED + self.refusal.encode() + b"\n")
                 return
             outer.settimeout(None)
             with socket.create_connection(self._server) as inner, self._held(outer, inner):
                 # Where the page came from has been judged. The server itself answers this machine's pages only.
-                inner.sendall(re.sub(rb"(?im)^origin:[^\r\n]*", b"Origin: http://127.0.0.1", head))
+                inner.sendall(re.sub(rb"(?im)^origin[ \t]*:[^\r\n]*", b"Origin: http://127.0.0.1", head))
                 back = threading.Thread(target=_pump, args=(outer, inner), daemon=True)
                 back.start()
                 greeting = self.greeting(head)
@@ -103,6 +112,80 @@ class Relay(ABC):
         finally:
             with self._lock:
                 self._open.difference_update(sockets)
+
+
+_PASSING = (errno.EMFILE, errno.ENFILE, errno.ECONNABORTED)
+
+
+class _Waiting:
+    """Connections whose heads have not come whole, in the order in which they were made, and the listener."""
+
+    def __init__(self, listener: socket.socket) -> None:
+        self._listener = listener
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(listener, selectors.EVENT_READ)
+        self._heads: dict[socket.socket, bytes] = {}
+        self._until: dict[socket.socket, float] = {}
+
+    def ready(self) -> list[socket.socket]:
+        """Wait for news; end what has taken too long, and return what can be read."""
+        found = self._selector.select(0.2 if self._heads else None)
+        now = time.monotonic()
+        for late in [each for each, until in self._until.items() if until < now]:
+            self._leave(late)
+            late.close()
+        return [
+            key.fileobj
+            for key, _ in found
+            if isinstance(key.fileobj, socket.socket) and key.fileobj.fileno() >= 0
+        ]
+
+    def read(self, connection: socket.socket) -> bytes | None:
+        """Read on, or take a new connection where it is the listener; return the head once it is whole.
+
+        Raises:
+            OSError: the listener is closed.
+        """
+        if connection is self._listener:
+            try:
+                new, _ = self._listener.accept()
+            except OSError as error:
+                if error.errno in _PASSING:
+                    time.sleep(0.05)
+                    return None
+                raise
+            new.setblocking(False)
+            self._selector.register(new, selectors.EVENT_READ)
+            self._heads[new], self._until[new] = b"", time.monotonic() + PATIENCE
+            if len(self._heads) > PENDING:
+                oldest = next(iter(self._heads))
+                self._leave(oldest)
+                oldest.close()
+            return None
+        if connection not in self._heads:  # ended meanwhile
+            return None
+        try:
+            more = connection.recv(4096)
+        except BlockingIOError:
+            return None
+        except OSError:
+            more = b""
+        self._heads[connection] += more
+        head = self._heads[connection]
+        if more and b"\r\n\r\n" not in head and len(head) < HEAD:
+            return None
+        self._leave(connection)
+        return head
+
+    def close(self) -> None:
+        """End every connection that waits."""
+        for connection in self._heads:
+            connection.close()
+        self._selector.close()
+
+    def _leave(self, connection: socket.socket) -> None:
+        self._selector.unregister(connection)
+        del self._heads[connection], self._until[connection]
 
 
 _REFUSED = b"HTTP/1.1 403 Forbidden\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\n"

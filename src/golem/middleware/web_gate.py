@@ -36,7 +36,7 @@ class OriginGate(Relay):
 
     def admits(self, head: bytes) -> bool:
         """Return whether every origin that the head of a request names is a trusted one."""
-        origins = re.findall(r"^origin:[ \t]*(.*?)[ \t]*\r?$", head.decode("latin-1"), re.I | re.M)
+        origins = re.findall(r"^origin[ \t]*:[ \t]*(.*?)[ \t]*\r?$", head.decode("latin-1"), re.I | re.M)
         return all(origin in self._also or LOCAL.fullmatch(origin) for origin in origins)
 
 
@@ -80,7 +80,9 @@ class TokenGate(Relay):
     def admits(self, head: bytes) -> bool:
         """Return whether the head of a request shows the token."""
         kept = re.search(
-            rf"^cookie:.*?\b{COOKIE}=([\w-]+)", head.decode("latin-1").partition("\r\n")[2], re.I | re.M
+            rf"^cookie:.*?\b{COOKIE}=([A-Za-z0-9_-]+)",
+            head.decode("latin-1").partition("\r\n")[2],
+            re.I | re.M,
         )
         return self._by_address(head) or (kept is not None and hmac.compare_digest(kept[1], self.token))
 
@@ -90,5 +92,7 @@ class TokenGate(Relay):
         return cookie.encode() if self._by_address(head) else b""
 
     def _by_address(self, head: bytes) -> bool:
-        asked = re.search(r"[?&]token=([\w-]+)", head.decode("latin-1").partition("\r\n")[0])
-        return asked is not None and hmac.compare_digest(asked[1], self.token)
+        return self._shown(re.search(rb"[?&]token=([^&\s]*)", head.partition(b"\r\n")[0]))
+
+    def _shown(self, found: re.Match[bytes] | None) -> bool:
+        return found is not None and hmac.compare_digest(found[1], self.token.encode())
