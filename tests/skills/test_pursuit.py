@@ -14,7 +14,7 @@ from golem.errors import MissingExtra, unknown_name
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.robots.model.kinematics import Kinematics
-from golem.skills.base import Skill, SkillCancelled, SkillResult
+from golem.skills.base import Skill, SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.pursuit import CLEANUP, pursue
 from golem.skills.runner import SkillRun
@@ -130,6 +130,28 @@ def test_a_skill_gets_the_result_and_the_value_of_the_one_it_calls() -> None:
     result = bench.run(run)
     assert result is not None and result.success and result.value == Found(2)
     assert bench.said == [("counter", "count", "0"), ("counter", "count", "1"), ("caller", "called", "done")]
+
+
+def test_what_a_caller_minds_ends_the_skill_that_it_called() -> None:
+    bench, looks = Bench(), list[float]()
+
+    def check() -> None:
+        looks.append(bench.context.t)
+        if bench.context.t > 3.5 * PERIOD:
+            raise StageFailed("carry", "grasp_method", "It fell.")
+
+    async def call(context: Context) -> SkillResult:
+        with context.minding(check):
+            return await context.run("counter", Count(50))
+
+    _, run = bench.begin(call)
+    result = bench.run(run)
+    assert result is not None and (result.stage, result.slot, result.reason) == (
+        "carry",
+        "grasp_method",
+        "It fell.",
+    )
+    assert bench.counter.log == ["end"] and set(looks) == {PERIOD * k for k in (2, 3, 4)}
 
 
 def test_a_goal_may_be_given_by_its_fields() -> None:

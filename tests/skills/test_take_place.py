@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from golem.capabilities.properties.property_table import PropertyTable
 from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.interfaces.payloads import ArmCommand, GripState, HandStatus
+from golem.skills.base import StageFailed
+from golem.skills.context import Context
 from golem.skills.fetch import STANDOFF, before, stance
 from golem.skills.place import PlaceGoal, SetDown
 from golem.skills.planned_motion import PlannedMotion
@@ -188,6 +191,38 @@ def test_what_is_held_stays_held_where_no_surface_is_seen(world: Any) -> None:
     assert run.result is not None
     assert run.result.reason == "The head camera shows no surface at that place."
     assert world.bus.latest(topics.hand_goal("right")) is None
+
+
+def test_what_does_not_stand_where_it_was_set_down_is_not_done() -> None:
+    table, can = table_with_can()
+    goal, spot = PlaceGoal(0.5, -0.2, below=0.08, above=0.04, radius=0.034), np.array([0.5, -0.2, TOP])
+
+    def looked(points: Array) -> str:
+        try:
+            SetDown()._stands(cast(Context, SimpleNamespace(scene=lambda camera: points)), goal, spot)
+        except StageFailed as failure:
+            return str(failure)
+        return ""
+
+    lying = can[:, [0, 2, 1]] - can[:, [0, 2, 1]].mean(axis=0) + (0.5, -0.2, TOP + 0.034)
+    assert looked(np.concatenate([table, can])) == ""
+    assert looked(table) == "Nothing stands where it was set down."
+    assert "12 cm high is 7 cm now: it fell over." in looked(np.concatenate([table, lying]))
+    assert looked(np.zeros((0, 3))) == ""  # not seen is not known
+    assert looked(np.concatenate([table, can + (0.0, 0.2, 0.0)])) != ""  # it stands elsewhere
+
+
+def test_a_place_at_the_edge_is_refused(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    at_home(world)
+    table, _ = table_with_can()
+    xy = np.random.default_rng(3).uniform((0.0, -0.5), (0.3, 0.2), (6000, 2))
+    scene = np.concatenate([table, np.column_stack([xy, np.full(6000, -1.0)])])
+    monkeypatch.setattr(SetDown, "_scene", lambda *_: scene)
+    motion, context = PlannedMotion(world.context), world.context
+    inside = SetDown()._spot(context, motion, PlaceGoal(0.45, -0.2, radius=0.08), "right")
+    assert inside[2] == pytest.approx(TOP, abs=0.002)
+    with pytest.raises(StageFailed, match="ends within the width"):
+        SetDown()._spot(context, motion, PlaceGoal(0.34, -0.2, radius=0.08), "right")
 
 
 def test_a_stance_is_before_the_place_and_straight_to_the_edge() -> None:

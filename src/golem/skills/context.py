@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
@@ -17,16 +18,17 @@ from golem.capabilities.perception.lift import scene_of
 from golem.capabilities.planning.base import ArmPlanner
 from golem.capabilities.properties.base import Properties, PropertySource
 from golem.interfaces import topics
-from golem.interfaces.payloads import Feedback, HandGoal, HandStatus
+from golem.interfaces.payloads import Feedback
 from golem.middleware.bus import Bus, Topic
 from golem.robots.model.kinematics import Kinematics
 from golem.skills.base import Skill, SkillResult, StageFailed, Tick, expect
 from golem.skills.detection_stream import DetectionStream
+from golem.skills.hand_interface import HandInterface
 from golem.skills.joint_motion import follow
 from golem.skills.legs_interface import LegsInterface
 from golem.skills.navigation import Navigation
 from golem.skills.pursuit import call
-from golem.types import UPPER, Array, LocalizedObject, PalmTargets, PlanarPose, Side
+from golem.types import SIDES, UPPER, Array, LocalizedObject, PalmTargets, PlanarPose, Side
 
 T = TypeVar("T")
 
@@ -50,35 +52,6 @@ class Modules:
     memory: Memory
     properties: PropertySource
     worker: Executor | None = None
-
-
-class Hand:
-    """One gripper, as a skill commands and reads it."""
-
-    def __init__(self, context: Context, side: Side) -> None:
-        """Speak for the hand on `side`."""
-        self._context = context
-        self._side: Side = side
-
-    @property
-    def status(self) -> HandStatus:
-        """What the hand's controller reports now.
-
-        Raises:
-            StageFailed: it has not reported yet.
-        """
-        status = self._context.bus.latest(topics.hand_status(self._side))
-        if status is None:
-            raise StageFailed("grasp", "hand", f"The {self._side} hand does not report.")
-        return status
-
-    def open(self, gap: float) -> None:
-        """Move the fingers to an opening of `gap` [m]."""
-        self._context.publish(topics.hand_goal(self._side), HandGoal(gap))
-
-    def close(self, force: float) -> None:
-        """Close until both fingers press with `force` [N]."""
-        self._context.publish(topics.hand_goal(self._side), HandGoal(None, force))
 
 
 class Arm:
@@ -197,9 +170,10 @@ class Context:
         self.period = period
         self.t = 0.0
         self.skill = ""
+        self._checks: list[Callable[[], None]] = []
         self.legs = LegsInterface(self)
         self.arms: dict[Side, Arm] = {"left": Arm(self, "left"), "right": Arm(self, "right")}
-        self.hands: dict[Side, Hand] = {"left": Hand(self, "left"), "right": Hand(self, "right")}
+        self.hands: dict[Side, HandInterface] = {side: HandInterface(self, side) for side in SIDES}
 
     def refresh(self, t: float) -> None:
         """Take over time and measured joints; the runner calls it before it resumes the skill."""
@@ -373,6 +347,17 @@ class Context:
     async def tick(self) -> None:
         """Give the tick back until the skill's next period."""
         await Tick()
+        for check in self._checks:
+            check()
+
+    @contextmanager
+    def minding(self, check: Callable[[], None]) -> Iterator[None]:
+        """Call `check()` at every tick meanwhile, also of skills that this one runs; what it raises ends them."""
+        self._checks.append(check)
+        try:
+            yield
+        finally:
+            self._checks.remove(check)
 
     async def sleep(self, seconds: float) -> None:
         """Let `seconds` of robot time pass."""

@@ -17,7 +17,7 @@ from golem.errors import ConfigError
 from golem.options import require
 from golem.skills.approach import APPROACH, approach
 from golem.skills.base import SkillResult, StageFailed
-from golem.skills.closing import close_hand
+from golem.skills.closing import PATIENCE, KeptGrip
 from golem.skills.context import Context
 from golem.skills.navigate import NavigateGoal
 from golem.skills.pack_view import see_edge
@@ -345,20 +345,20 @@ class Fetch:
         taken = report.taken
         side: Side = "left" if taken.side == "left" else "right"
         facing = PlanarPose.of(context.legs.pose).yaw
-        if walks:
-            await self._raise(context, side)
-            context.release_arms()
-            await step_back(context)
-        if to is None:
+        with context.minding(KeptGrip(context, side, taken.force, goal.text)):
             if walks:
-                await self._navigate(context, home)
-            await self._still_held(context, goal, side, taken.force)
+                await self._raise(context, side)
+                context.release_arms()
+                await step_back(context)
+                if to is None:
+                    await self._navigate(context, home)
+                else:
+                    report.approaches += await self._go(context, self._in_odom(context, to))
+            await context.sleep(context.period)
+            await context.until(lambda: context.hands[side].status.holding, 2.0 * PATIENCE)
+        if to is None:
             return f"The {goal.text} is in the {side} hand, where the robot began."
         spot = self._in_odom(context, to)
-        if walks:
-            report.approaches += await self._go(context, spot)
-            spot = self._in_odom(context, to)
-        await self._still_held(context, goal, side, taken.force)
         aside, turned = (taken.aside_x, taken.aside_y), PlanarPose.of(context.legs.pose).yaw - facing
         # What the head camera is off by turns with the robot.
         off = PlanarPose(0.0, 0.0, turned) @ PlanarPose(taken.off_x, taken.off_y, 0.0)
@@ -379,14 +379,6 @@ class Fetch:
         for tolerance, height in product(BENT, RAISES):
             with suppress(PlanRefused):
                 return await motion.line(side, lifted(T, height), RAISING, tolerance=tolerance)
-
-    async def _still_held(self, context: Context, goal: FetchGoal, side: Side, force: float) -> None:
-        """Grip again, with `force` [N], what has slid in the fingers, if it is still there."""
-        if context.hands[side].status.holding:
-            return
-        if not await close_hand(context, side, force):
-            raise StageFailed("carry", "grasp_method", f"The {goal.text} was lost on the way.")
-        context.say("carry", f"The {goal.text} had slid in the fingers.")
 
 
 def _elsewhere(result: SkillResult) -> bool:

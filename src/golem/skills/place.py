@@ -54,6 +54,12 @@ STRAIGHT = (0.02, 0.1)
 """How far a hand that carries may leave its line, and turn [m, rad]."""
 LEANS = 0.7
 """How far a hand that came from above may lean: over a bowl's rim by 0.5 [rad]."""
+NEARBY = 0.06
+"""How far beside its place what was set down may stand to be found there [m]."""
+EDGE = 0.05
+"""How far below a surface what is seen is beyond its edge [m]."""
+LYING = 0.6
+"""Share of its height below which a thing does not stand."""
 TILT = 0.4
 """How far what is held may lean on the way [rad]."""
 
@@ -104,7 +110,8 @@ class PlaceConfig:
 
     Attributes:
         hover: height above the surface from which it is lowered [m].
-        lower: how much further than expected it may be lowered [m]: the head camera is off by as much.
+        lower: how much further than expected it is lowered at first [m]: the head camera is off by as much.
+        deeper: how much further it is lowered then, where nothing was felt; what meets nothing is not let go [m].
         travel_speed: between places [m/s].
         lower_speed: down onto the surface [m/s].
         contact: force at which it stands [N].
@@ -117,6 +124,7 @@ class PlaceConfig:
 
     hover: float = 0.10
     lower: float = 0.05
+    deeper: float = 0.04
     travel_speed: float = 0.20
     lower_speed: float = 0.04
     contact: float = 8.0
@@ -174,6 +182,7 @@ class SetDown:
             await self._carry(context, motion, goal, side, spot)
             await self._lower(context, goal, side, float(spot[2]))
             await self._release(context, motion, side)
+            self._stands(context, goal, spot)
         except StageFailed as failure:
             context.say(failure.stage, str(failure), failed=True)
             timings = {"total": context.t - start}
@@ -182,8 +191,7 @@ class SetDown:
             # Stay where we are; what is held stays held.
             context.say("cancelled", "Stopped where it was.")
             raise
-        felt = "" if self._report.touched else ", though no contact was felt"
-        text = f"Set down at ({self._report.x:.2f}, {self._report.y:.2f}) in odom{felt}."
+        text = f"Set down at ({self._report.x:.2f}, {self._report.y:.2f}) in odom."
         context.say("done", text)
         return SkillResult(True, "done", None, text, {"total": context.t - start}, self._report)
 
@@ -212,6 +220,11 @@ class SetDown:
         if level is None:
             raise StageFailed("detect", "localizer", "The head camera shows no surface at that place.")
         spot[2] = level
+        away = np.linalg.norm(scene[:, :2] - spot[:2], axis=1)
+        if np.count_nonzero((scene[:, 2] < level - EDGE) & (away < goal.radius)) > MIN_POINTS:
+            raise StageFailed(
+                "detect", "skill", "The surface ends within the width of what would stand at that place."
+            )
         proud = scene[(scene[:, 2] > level + PROUD) & (scene[:, 2] < level + 0.4), :2]
         c = self._config
         # The head camera is off by centimetres: what looks too narrow for the thing may do, less than `room` does not.
@@ -307,7 +320,19 @@ class SetDown:
         guard = await ForceGuard.at_rest(context, side, np.array([0.0, 0.0, -1.0]), c.contact)
         T = arm.commanded.copy()
         T[2, 3] = level + (goal.below or c.unknown) - c.lower
-        await arm.move(T, c.lower_speed, stop=lambda: guard() or not hand.status.holding)
+        for further in (0.0, c.deeper):
+            T[2, 3] -= further
+            await arm.move(T, c.lower_speed, stop=lambda: guard() or not hand.status.holding)
+            if guard.stuck or not hand.status.holding:
+                break
+        else:
+            await arm.move(lifted(T, c.hover + c.lower + c.deeper), c.lower_speed)
+            away = 100 * (c.lower + c.deeper)
+            raise StageFailed(
+                "lower",
+                "localizer",
+                f"No surface was felt to {away:.0f} cm below where it was seen; it stays held.",
+            )
         self._report.touched = guard.stuck
         if guard.stuck:
             # What presses on the surface springs back: give way by what the arm is behind.
@@ -329,6 +354,25 @@ class SetDown:
             await motion.to_joints(posture("home"), [side], c.travel_speed)
         except PlanRefused as refusal:
             context.say("release", f"The arm stays where it is: {refusal}")
+
+    def _stands(self, context: Context, goal: PlaceGoal, spot: Array) -> None:
+        """Look whether it stands where it was set down, as far as the head camera shows the place.
+
+        Raises:
+            StageFailed: nothing stands there, or something much lower than what was held.
+        """
+        scene = context.scene("head") + ((*goal.off, 0.0) if goal.off else 0.0)
+        near = scene[np.linalg.norm(scene[:, :2] - spot[:2], axis=1) < goal.radius + NEARBY]
+        height = near[:, 2] - spot[2]
+        if np.count_nonzero(np.abs(height) < PROUD) <= MIN_POINTS:
+            return  # the place is not seen
+        proud = height[(height > PROUD) & (height < 0.4)]
+        if len(proud) <= MIN_POINTS:
+            raise StageFailed("release", "grasp_method", "Nothing stands where it was set down.")
+        tall, top = goal.below + goal.above, float(np.quantile(proud, 0.98))
+        if goal.below and top < LYING * tall:
+            why = f"What was {100 * tall:.0f} cm high is {100 * top:.0f} cm now: it fell over."
+            raise StageFailed("release", "grasp_method", why)
 
 
 def _column(T: Array, below: float, above: float) -> Array:
