@@ -9,7 +9,7 @@ Optical frames have z forward, x right, y down.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -140,6 +140,10 @@ class CameraInfo:
     near: float
     far: float
     rate: float
+
+    def with_lens(self, focal: float, right: float, down: float) -> CameraInfo:
+        """Return the camera with `focal` times its focal lengths, and its principal point moved [px]."""
+        return replace(self, fx=focal * self.fx, fy=focal * self.fy, cx=self.cx + right, cy=self.cy + down)
 
 
 @dataclass(frozen=True, slots=True)

@@ -220,6 +220,22 @@ def test_a_capture_has_the_cameras_shape(camera: str, robot: MujocoRobot) -> Non
         assert valid.min() >= info.near and valid.max() <= info.far
 
 
+def test_a_payload_weighs_and_hides_nothing() -> None:
+    plain, loaded = twin(), twin(config=MujocoConfig(payload=(1.0, 2.0)))
+    np.testing.assert_array_equal(plain.capture("right_hand")[0], loaded.capture("right_hand")[0])
+    weight = [float(r.scene.model.body_mass.sum()) for r in (plain, loaded)]
+    assert weight[1] - weight[0] == pytest.approx(3.0)
+    for robot in (plain, loaded):
+        robot.close()
+
+
+def test_pictures_of_one_moment_differ_by_the_noise_of_the_sensor_alone() -> None:
+    robot = twin("field")
+    (one, _), (other, _) = robot.capture("head"), robot.capture("head")
+    assert 0.5 < np.std(one.astype(float) - other.astype(float)) < 5.0
+    robot.close()
+
+
 def test_what_is_reported_is_not_changed_by_what_comes_after(robot: MujocoRobot) -> None:
     q, dq, tau = robot.joints()
     imu = robot.imu()

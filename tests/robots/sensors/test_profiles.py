@@ -4,6 +4,7 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.robots.model import pinocchio_model
+from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.profiles import PROFILES, EpisodeErrors, load_profile, sample_episode
 from golem.robots.sensors.streams import stream
 from golem.types import LEGS, UPPER
@@ -36,6 +37,20 @@ def test_ideal_has_no_errors() -> None:
     assert not episode.imu.gyro.any()
     assert not episode.imu.acc.any()
     assert not episode.hoist_sway.offset(1.0).any()
+
+
+def test_a_camera_is_not_quite_what_it_says_of_itself() -> None:
+    assert all(v.tolist() == [1.0, 0.0, 0.0] for v in episodes("ideal", 1)[0].intrinsics.values())
+    profile = load_profile("field")
+    drawn = np.array([v for e in episodes("field") for v in e.intrinsics.values()])
+    sigma = [profile.focal, profile.principal, profile.principal]
+    np.testing.assert_allclose((drawn - [1.0, 0.0, 0.0]).std(axis=0), sigma, rtol=0.1)
+    lens = CAMERAS["head"].with_lens(1.01, 2.0, -1.0)
+    assert (lens.fx, lens.cx, lens.cy) == (
+        1.01 * CAMERAS["head"].fx,
+        CAMERAS["head"].cx + 2.0,
+        CAMERAS["head"].cy - 1.0,
+    )
 
 
 def test_field_head_camera_is_off_by_what_the_paper_reports() -> None:

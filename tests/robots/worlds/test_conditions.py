@@ -11,7 +11,7 @@ import pytest
 from golem.errors import ConfigError
 from golem.robots.mujoco.config import MujocoConfig
 from golem.robots.mujoco.scene import build_scene
-from golem.robots.sensors.auto_exposure import GAIN, LONGER, AutoExposure
+from golem.robots.sensors.auto_exposure import GAIN, LONGER, READ_NOISE, SHOT_NOISE, AutoExposure
 from golem.robots.sensors.profiles import load_profile
 from golem.robots.worlds.conditions import (
     NAMES,
@@ -113,15 +113,17 @@ def test_every_screw_of_a_varied_place_stands_in_its_bore() -> None:
 
 def test_a_camera_exposes_longer_then_amplifies_then_sees_less() -> None:
     grey = np.full((60, 80, 3), 100, np.uint8)
-    assert AutoExposure(1.0, rng()).expose(grey) is grey
-    assert AutoExposure(3.0, rng()).expose(grey) is grey
+    assert AutoExposure(1.0, rng(), 0.0).expose(grey) is grey
+    assert AutoExposure(0.5 / (LONGER * GAIN), rng(), 0.0).expose(grey).std() == 0.0
     noise, mean = [], []
-    for light in (1 / LONGER, 0.25, 0.1, 0.5 / (LONGER * GAIN)):
+    for light in (3.0, 1.0, 1 / LONGER, 0.25, 0.1, 0.5 / (LONGER * GAIN)):
         image = AutoExposure(light, rng()).expose(grey).astype(float)
         noise.append(image.std())
         mean.append(image.mean())
-    assert noise[0] == 0.0 < noise[1] < noise[2]
-    np.testing.assert_allclose(mean, [100.0, 100.0, 100.0, 50.0], atol=0.5)
+    sigma = np.sqrt(READ_NOISE**2 + 100.0 * SHOT_NOISE**2)
+    np.testing.assert_allclose(noise[:3], sigma, rtol=0.05)
+    assert noise[2] < noise[3] < noise[4]
+    np.testing.assert_allclose(mean, [100.0] * 5 + [50.0], atol=0.5)
 
 
 def test_a_tray_on_the_other_side_is_the_mirror_image() -> None:

@@ -89,13 +89,10 @@ class MujocoRobot:
         }
         conditions = self.scene.conditions
         self._exposure = {
-            name: AutoExposure(conditions.light, stream(seed, f"exposure/{name}")) for name in CAMERAS
+            name: AutoExposure(conditions.light, stream(seed, f"exposure/{name}"), self.profile.colour_noise)
+            for name in CAMERAS
         }
-        self._mirrors = (
-            mirror_geoms(model, conditions)
-            if self.config.world == "pack" and self.config.layout == "varied"
-            else None
-        )
+        self._mirrors = mirror_geoms(model, conditions) if self.config.world == "pack" else None
         self._memory = memory = new_record(TWIN)
         noise = stream(seed, "imu")
         self._imu_model = ImuModel(self.profile.imu, self._errors.imu, noise, memory["imu"])
@@ -272,7 +269,10 @@ class MujocoRobot:
     def capture(self, camera: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Expose one camera now; see `Robot`."""
         if self._rig is None:
-            self._rig = CameraRig(self._model, self.cameras.values())
+            lenses = self._errors.intrinsics
+            self._rig = CameraRig(
+                self._model, [info.with_lens(*lenses[name].tolist()) for name, info in self.cameras.items()]
+            )
         # A physics step ends with the joints one step ahead of the frames; the exposure shall show where they are.
         mujoco.mj_kinematics(self._model, self.data)
         mujoco.mj_camlight(self._model, self.data)

@@ -16,7 +16,7 @@ from golem.robots.mujoco.config import KITCHENS, WITH_PACK, MujocoConfig
 from golem.robots.mujoco.tag_plates import add_tag_cuffs
 from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream
-from golem.robots.worlds import furnished, parts, terrain
+from golem.robots.worlds import furnished, terrain
 from golem.robots.worlds.clutter import add_clutter
 from golem.robots.worlds.conditions import (
     REACH_Y,
@@ -215,16 +215,15 @@ def foreign_robot(path: Path) -> mujoco.MjSpec:
 
 
 def _add_payload(hand: mujoco.MjsBody, mass: float) -> None:
-    """Fix a ball of `mass` [kg] where the fingers meet; it touches nothing."""
+    """Fix a ball of `mass` [kg] where the fingers meet; it touches nothing, and no camera sees it."""
     radius = 0.04
-    body = hand.add_body(
+    hand.add_body(
         name=f"{hand.name}_payload",
         pos=magpie_model.T_HAND_GRIPPER[:3, 3],
         mass=mass,
         inertia=[0.4 * mass * radius**2] * 3,
         explicitinertial=True,
     )
-    parts.visual(body, mujoco.mjtGeom.mjGEOM_SPHERE, (radius,), material="", rgba=(0.9, 0.5, 0.1, 1.0))
 
 
 def _add_terrain(spec: mujoco.MjSpec, config: MujocoConfig, seed: int) -> tuple[Person, ...]:
