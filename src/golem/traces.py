@@ -70,6 +70,11 @@ def _owner(path: str) -> str:
     return "library" if path.startswith(("<", *_LIBRARIES)) else "user"
 
 
+def is_users(path: str) -> bool:
+    """Return whether a file belongs to neither this package nor a library."""
+    return _owner(path) == "user"
+
+
 def caller(frame: FrameType) -> str | None:
     """Return the line of the module in which `frame` or the nearest frame outside the libraries is.
 

@@ -22,6 +22,7 @@ from golem.evaluation.conformance.base import (
     checks_of,
 )
 from golem.evaluation.conformance.suite import Suite
+from golem.evaluation.no_search import searching_forbidden
 from golem.options import check_values, read_yaml
 
 _HERE = "golem.evaluation.conformance"
@@ -132,7 +133,8 @@ def examine(subject: Candidate, on_check: Callable[[Check], None] = lambda check
         subject: the module.
         on_check: called before each check.
     """
-    return run_suite(suite_of(subject.slot), subject, on_check)
+    with searching_forbidden():
+        return run_suite(suite_of(subject.slot), subject, on_check)
 
 
 def run_suite(suite: object, subject: Candidate, on_check: Callable[[Check], None]) -> Report:

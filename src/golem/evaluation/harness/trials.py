@@ -19,6 +19,7 @@ from golem.evaluation.base import Rung, TrialOutcome, TrialSpec, make_rung
 from golem.evaluation.episodes.last_seconds import FILM, LastSeconds
 from golem.evaluation.harness.copies import CopyDied
 from golem.evaluation.harness.run_folder import Finished
+from golem.evaluation.no_search import searching_forbidden
 from golem.provenance import changes, code_files, commit, digest, versions
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.gate_tally import GateTally, tallied
@@ -238,7 +239,8 @@ def run_trial(
 ) -> TrialOutcome:
     """Run one trial; a module that breaks its contract, or raises one of `leaving`, loses it."""
     try:
-        return rung.run(spec, artefacts)
+        with searching_forbidden():
+            return rung.run(spec, artefacts)
     except ModuleFault as fault:
         return TrialOutcome(False, FAULT, f"{fault.slot}: {fault.use}", fault.reason, trace=fault.trace)
     except leaving as error:
