@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError
-from golem.evaluation.base import TrialSpec
+from golem.evaluation.base import Case, TrialSpec
 from golem.evaluation.episodes.episode import episode_seed
 from golem.evaluation.rungs.counter import CounterOptions, CounterTether, draw_errand
 from golem.evaluation.rungs.fetch_errand import FetchRung
@@ -35,6 +35,25 @@ def test_an_errand_leads_elsewhere_and_to_a_free_place(index: int) -> None:
         if other is not thing:
             room = np.hypot(*np.subtract(other.position[:2], place)) - KINDS[kind][0] - KINDS[other.kind][0]
             assert room > 0.03
+
+
+def test_only_places_with_room_are_asked_for() -> None:
+    back = 0
+    for index, (kind, hand) in enumerate([(kind, hand) for kind in KINDS for hand in ("left", "right")] * 12):
+        kitchen = draw_counter(np.random.default_rng(index))
+        case: Case = {"thing": kind, "hand": hand}
+        _, _, place = draw_errand(
+            TrialSpec("counter-tether", "centroid", "field", 1, index, case=case), kitchen
+        )
+        (thing,) = (one for one in kitchen.things if one.kind == kind)
+        back += place == pytest.approx(tuple(thing.position[:2]))
+        for other in kitchen.things:
+            if other is not thing:
+                room = (
+                    np.hypot(*np.subtract(other.position[:2], place)) - KINDS[kind][0] - KINDS[other.kind][0]
+                )
+                assert room > 0.01
+    assert 0 < back < 20
 
 
 def test_the_things_that_are_asked_for_are_tried_case_by_case() -> None:

@@ -35,6 +35,8 @@ AREA = ((0.43, 0.56), (-0.38, 0.38))
 """x and y bounds in base_link of the places that are asked for [m]: the hand on their side gets there."""
 FREE = 0.045
 """Room between what stands at such a place and other things that is enough [m]."""
+TIGHT = 0.015
+"""Room with which it still can be set down, and less than which is not asked for [m]."""
 EAR = 0.03
 """How far a mug's ear is beyond its radius [m]."""
 ELSEWHERE = 0.10
@@ -170,7 +172,9 @@ def draw_errand(
 ) -> tuple[str, Literal["left", "right"], tuple[float, float]]:
     """Return the kind of a thing, the hand, and x, y of a free place for it in the world [m].
 
-    The case names thing and hand where there is one. Else a thing and the hand on its side are drawn.
+    The case names thing and hand where there is one. Else a thing and the hand on its side are drawn. Of the things
+    that may be meant, the first is taken for which there is a place with room; where there is room for none, the last
+    one is to be set down again where it stood.
 
     Raises:
         ConfigError: nothing of the kind stands there.
@@ -179,22 +183,26 @@ def draw_errand(
     things = kitchen.things
     order = rng.permutation(len(things))
     wanted = str(spec.case.get("thing", ""))
-    chosen = next((things[k] for k in order if wanted in ("", things[k].kind)), None)
+    back: tuple[str, Side, tuple[float, float]] | None = None
     spots = rng.uniform((AREA[0][0], AREA[1][0]), (AREA[0][1], AREA[1][1]), (200, 2))
-    if chosen is None:
-        raise ConfigError(f"The counter of trial {spec.index} has no room for an errand.")
-    own: Side = "left" if chosen.position[1] > 0.0 else "right"
-    hand: Side = "left" if spec.case.get("hand", own) == "left" else "right"
-    mirror = 1.0 if hand == "left" else -1.0
-    others = [thing for thing in things if thing is not chosen]
-    wide = np.array([_radius(thing) + _radius(chosen) for thing in others])
-    there = np.array([thing.position[:2] for thing in others]).reshape(-1, 2)
-    spots = spots[mirror * spots[:, 1] > -ACROSS]
-    room = (np.linalg.norm(spots[:, None] - there, axis=2) - wide).min(axis=1, initial=np.inf)
-    room[np.linalg.norm(spots - chosen.position[:2], axis=1) < ELSEWHERE] = 0.0
-    # Any free place; of a counter without one the place with the most room.
-    spot = spots[int(np.argmax(np.minimum(room, FREE)))]
-    return chosen.kind, hand, (float(spot[0]), float(spot[1]))
+    for chosen in (things[k] for k in order if wanted in ("", things[k].kind)):
+        own: Side = "left" if chosen.position[1] > 0.0 else "right"
+        hand: Side = "left" if spec.case.get("hand", own) == "left" else "right"
+        mirror = 1.0 if hand == "left" else -1.0
+        others = [thing for thing in things if thing is not chosen]
+        wide = np.array([_radius(thing) + _radius(chosen) for thing in others])
+        there = np.array([thing.position[:2] for thing in others]).reshape(-1, 2)
+        free = spots[mirror * spots[:, 1] > -ACROSS]
+        room = (np.linalg.norm(free[:, None] - there, axis=2) - wide).min(axis=1, initial=np.inf)
+        room[np.linalg.norm(free - chosen.position[:2], axis=1) < ELSEWHERE] = 0.0
+        if room.max() >= TIGHT:
+            # Any free place; of a counter without one the place with the most room.
+            x, y = free[int(np.argmax(np.minimum(room, FREE)))]
+            return chosen.kind, hand, (float(x), float(y))
+        back = chosen.kind, hand, (float(chosen.position[0]), float(chosen.position[1]))
+    if back is None:
+        raise ConfigError(f"No {wanted} stands on the counter of trial {spec.index}.")
+    return back
 
 
 def _radius(thing: StandingThing) -> float:
