@@ -103,6 +103,18 @@ def test_a_part_that_a_class_of_a_users_file_plays_is_that_file(tmp_path: Path) 
     assert before.keys() == after.keys() == {"lower_body/walk/use"} and before != after
 
 
+def test_what_a_users_file_imports_from_beside_it_is_of_the_configuration(tmp_path: Path) -> None:
+    mine, helper = tmp_path / "mine.py", tmp_path / "helper.py"
+    mine.write_text("import helper\n")
+    helper.write_text("one = 1\n")
+    legs = Choice(f"{mine}:Mine")
+    before = provenance.user_files(Stack({"lower_body": legs}))
+    helper.write_text("one = 2\n")
+    after = provenance.user_files(Stack({"lower_body": legs}))
+    assert before.keys() == {"lower_body/use", "lower_body/use/helper.py"}
+    assert [key for key in after if before[key] != after[key]] == ["lower_body/use/helper.py"]
+
+
 def test_a_digest_does_not_depend_on_the_order_of_keys() -> None:
     assert provenance.digest({"a": 1, "b": [2]}) == provenance.digest({"b": [2], "a": 1})
     assert provenance.digest({"a": 1}) != provenance.digest({"a": 1.5})

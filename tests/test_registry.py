@@ -11,7 +11,9 @@ from golem import registry
 from golem.capabilities.grasping.centroid import Centroid
 from golem.capabilities.grasping.visual_servo import VisualServo
 from golem.errors import ConfigError, ModuleFault
+from golem.evaluation.conformance.examine import OPTIONS
 from golem.slots import KEYS, SLOTS
+from golem.user_file import neighbours
 
 USER_FILE = """
 from __future__ import annotations
@@ -163,6 +165,68 @@ def test_a_file_that_cannot_be_imported_is_the_modules_fault(tmp_path: Path, tex
         registry.create("hand", use, {})
     assert (caught.value.slot, caught.value.use) == ("hand", use)
     assert reason in caught.value.reason
+
+
+def test_a_file_imports_the_files_beside_it_and_not_those_beside_another(tmp_path: Path) -> None:
+    for folder, value in (("one", 1), ("two", 2)):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "my_helper_of_test.py").write_text(f"VALUE = {value}\n")
+        text = "from my_helper_of_test import VALUE\nclass Hand:\n    value = VALUE\n"
+        (tmp_path / folder / "hand.py").write_text(text)
+    assert registry.load("hand", f"{tmp_path}/one/hand.py:Hand").__dict__["value"] == 1
+    with pytest.raises(ConfigError, match=r"two/my_helper_of_test\.py, and .*one/my_helper.* rename one"):
+        registry.load("hand", f"{tmp_path}/two/hand.py:Hand")
+
+
+def test_neighbours_are_what_a_file_imports_whatever_the_depth(tmp_path: Path) -> None:
+    for name, text in {
+        "a.py": "import b, numpy, random\nfrom pack.inner import x\n",
+        "b.py": "import c\nimport a\n",
+        "c.py": "broken(:\n",
+        "unused.py": "",
+        "random.py": "",
+        "pack/__init__.py": "",
+        "pack/inner.py": "x = 1\n",
+    }.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    found = [str(path.relative_to(tmp_path)) for path in neighbours(tmp_path / "a.py")]
+    assert found == ["b.py", "c.py", "pack/__init__.py", "pack/inner.py"]
+
+
+@pytest.mark.parametrize(
+    ("slot", "use", "options", "words"),
+    [
+        ("grasp_method", "visual_servo", {"gian": 3}, "Unknown option of grasp_method: visual_servo 'gian'"),
+        ("grasp_method", "visual_servo", {"servo": {"tolerence": 1}}, "Did you mean 'tolerance'"),
+        ("hand", "MINE:WithKeywords", {"gian": 3}, "it lacks .* of the contract HandController"),
+        (
+            "grasp_method",
+            "golem.capabilities.memory.object_map:ObjectMap",
+            {},
+            "lacks propose, servo of the contract GraspMethod; it fits the slot memory; valid: antipodal",
+        ),
+    ],
+)
+def test_a_wrong_module_is_refused_without_being_built(
+    user: str, slot: str, use: str, options: dict[str, object], words: str
+) -> None:
+    with pytest.raises(ConfigError, match=words):
+        registry.check(slot, use.replace("MINE", user), options)
+
+
+@pytest.mark.parametrize("slot", SLOTS)
+def test_every_shipped_module_is_one_of_its_slot(slot: str) -> None:
+    for use in registry.names(slot):
+        if use == "pink_ik":
+            pytest.importorskip("pink")
+        registry.check(slot, use, OPTIONS.get((slot, use), {}) | NEEDED.get(use, {}))
+
+
+NEEDED: dict[str, dict[str, object]] = {
+    "replay": {"file": "bag"},
+    **dict.fromkeys(("grounding_dino", "owlv2", "yolo_world"), {"weights": "file"}),
+}
 
 
 def test_a_file_that_failed_is_tried_again_once_mended(tmp_path: Path) -> None:

@@ -285,3 +285,17 @@ def test_wrong_skills_are_answered_with_what_would_work(text: str, words: str) -
 def test_skills_are_added_to_those_of_a_stack() -> None:
     stack = Stack(skills={"gentle": Choice("pick")}).with_choice("skills", "{pick: {force: 8}}")
     assert stack.skills == {"gentle": Choice("pick"), "pick": Choice("pick", {"force": 8})}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("grasp_method: {use: visual_servo, gian: 3}", "grasp_method: visual_servo 'gian'"),
+        ("grasp_method: {use: reranked, proposer: {use: antipodal, options: {gian: 3}}}", "antipodal 'gian'"),
+        ("skills: {pick: {forse: 3}}", "Unknown option of skill: pick 'forse'.*Did you mean 'force'"),
+        ("planner: {use: 'golem.capabilities.memory.object_map:ObjectMap'}", "it lacks plan .*slot memory"),
+    ],
+)
+def test_a_wrong_option_or_class_is_refused_before_anything_is_built(text: str, words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        parse_stack(text, "mine").check()

@@ -23,6 +23,7 @@ from golem.errors import ConfigError, OutputError
 from golem.robots.sensors.profiles import load_profile
 from golem.slots import KEYS
 from golem.stack import Stack
+from golem.user_file import neighbours
 
 PACKAGES = ("golem-humanoid", "numpy", "scipy", "mujoco", "pin", "daqp", "onnxruntime", "torch")
 """Distributions whose version may change a trial's outcome."""
@@ -122,6 +123,9 @@ def _named(options: Mapping[str, Any]) -> dict[str, Path]:
         elif isinstance(value, str):
             file = _source(value.rpartition(":")[0]) if name == "use" else value
             found[name] = Path(file).expanduser()
+            if found[name].suffix == ".py":
+                path = found[name].resolve()
+                found |= {f"{name}/{p.relative_to(path.parent)}": p for p in neighbours(path)}
             if found[name].suffix in (".yaml", ".yml"):
                 with suppress(ConfigError):  # another kind of file, or absent: said elsewhere
                     found.setdefault("network", load_description(value)[1])

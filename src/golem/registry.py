@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import hashlib
 import importlib
-import importlib.util
 import inspect
 import sys
 import typing
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
@@ -24,6 +23,7 @@ from typing import Any
 from golem.errors import ConfigError, GolemError, ModuleFault, unknown_name
 from golem.options import convert_all, dataclass_in, fill
 from golem.slots import PARTS, SLOTS
+from golem.user_file import import_file
 
 PACKAGE = "golem-humanoid"
 """Distribution of the shipped implementations."""
@@ -84,16 +84,57 @@ def create(slot: str, use: str, options: Mapping[str, object], **context: object
         ModuleFault: the constructor raised.
     """
     cls = load(slot, use)
-    try:
+    with _blamed(slot, use):
         parameters = inspect.signature(cls).parameters
         supplied = {key: value for key, value in context.items() if key in parameters}
-        config = config_class(cls)
-        if config is not None:
-            return cls(config=configure(slot, use, options), **supplied)
-        return cls(**convert_all(_option(slot, use), cls, options, supplied), **supplied)
+        return cls(**_given(slot, use, cls, options, supplied), **supplied)
+
+
+def check(slot: str, use: str, options: Mapping[str, object]) -> None:
+    """Check that the implementation `use` is one of `slot` and has these `options`, without building it.
+
+    A class that lacks a method of the slot's contract is of another slot.
+
+    Raises:
+        ConfigError: it lacks methods, or see `create`.
+        ModuleFault: see `load`.
+    """
+    cls, asked = load(slot, use), contract(slot)
+    lacking = _lacking(cls, asked)
+    if lacking:
+        fits = [name for name in SLOTS if name != slot and not _lacking(cls, contract(name))]
+        hint = f"; it fits the slot {' or '.join(fits)}" if fits else ""
+        raise ConfigError(
+            f"'{use}' is no {slot}: it lacks {', '.join(lacking)} of the contract {asked.__name__}{hint}; "
+            f"valid: {', '.join(names(slot))}, or a class of yours."
+        )
+    with _blamed(slot, use):
+        _given(slot, use, cls, options, SLOTS[slot].supplied)
+
+
+def _lacking(cls: type[Any], asked: type[Any]) -> list[str]:
+    """Return the methods of the contract `asked` that the class `cls` has not; one with `__getattr__` has all."""
+    methods = [n for n, v in vars(asked).items() if inspect.isfunction(v) and not n.startswith("_")]
+    return [] if hasattr(cls, "__getattr__") else [name for name in methods if not hasattr(cls, name)]
+
+
+def _given(
+    slot: str, use: str, cls: type[Any], options: Mapping[str, object], supplied: Collection[str]
+) -> dict[str, Any]:
+    """Return the arguments of a constructor that `options` are, checked."""
+    if config_class(cls) is not None:
+        return {"config": configure(slot, use, options)}
+    return convert_all(_option(slot, use), cls, options, supplied)
+
+
+@contextmanager
+def _blamed(slot: str, use: str) -> Iterator[None]:
+    """Turn what a user's constructor raises, which may be anything, into its fault."""
+    try:
+        yield
     except GolemError:
         raise
-    except (Exception, SystemExit) as error:  # a user's constructor may raise anything
+    except (Exception, SystemExit) as error:
         raise ModuleFault.of(slot, use, error, "its constructor raised ") from error
 
 
@@ -173,19 +214,7 @@ def _import(slot: str, use: str, location: str) -> ModuleType:
         path = Path(location).expanduser().resolve()
         if not path.is_file():
             raise ConfigError(f"{slot}: '{use}' names the file {path}, which does not exist.")
-        name = f"golem_user_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
-        if name in sys.modules:
-            return sys.modules[name]
-        spec = importlib.util.spec_from_file_location(name, path)
-        assert spec is not None and spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[name] = module  # dataclasses look their own module up while it loads
-        try:
-            spec.loader.exec_module(module)
-        except BaseException:
-            del sys.modules[name]
-            raise
-        return module
+        return import_file(path)
     except GolemError:
         raise
     except ModuleNotFoundError as error:

@@ -128,10 +128,10 @@ class Stack:
         return self.choice("onboard") if self.onboard_client else None
 
     def check(self) -> None:
-        """Check that every module gets from the robot what its class `requires`: `ground` or `hoist`.
+        """Check every module: it is one of its slot, has its options, and gets from the robot what it `requires`.
 
         Raises:
-            ConfigError: one does not, or cannot be loaded.
+            ConfigError: one is not, does not, or cannot be loaded.
             ModuleFault: importing one raised.
         """
         missing, is_so = (HOIST, "stands on its feet") if self.on_ground else (GROUND, "hangs in the hoist")
@@ -143,6 +143,10 @@ class Stack:
                     f"The {key} '{use}' is for a robot with support '{missing}', and this one {is_so}: choose one of "
                     f"{others}, or yours."
                 )
+            for choice in self.choice(key).all:  # what a module's options choose is of its own slot
+                registry.check(row.slot, choice.use, choice.options)
+        for choice in self.skills.values():
+            registry.check(registry.SKILL, choice.use, choice.options)
 
     def with_choice(self, key: str, use: str | Choice) -> Stack:
         """Return a copy with another implementation under `key`.
