@@ -319,7 +319,7 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = FAILED
     except KeyboardInterrupt as interrupt:
-        print(f"golem: {interrupt or 'interrupted'}", file=sys.stderr)
+        print(f"golem: {str(interrupt) or 'interrupted'}", file=sys.stderr)
         code = INTERRUPTED
     sys.exit(code)
 

@@ -21,6 +21,10 @@ NUM_JOINTS = UPPER.stop - UPPER.start
 """Joints that are planned for: torso, left arm (7), right arm (7)."""
 
 
+STRONGEST = 8.0
+"""Acceleration that no joint of a plan exceeds [rad/s^2] [own: twice the limit that `rrt_connect` has by default]."""
+
+
 class Refusal(StrEnum):
     """Why there is no plan."""
 
@@ -130,7 +134,8 @@ class ArmPlanner(Protocol):
     """Finds a way for torso and arms that touches nothing, and times it.
 
     It is passive and deterministic: the same request gets the same answer. The trajectory keeps the range that the
-    safety gate allows, the planner's limits of speed and acceleration, and every rule of the request.
+    safety gate allows, the planner's limits of speed and acceleration, at most `STRONGEST`, and of the request the
+    share of speed, the speed of the hands, and every rule.
 
     Attributes:
         latency: time that a plan takes [s], as the lock-step runner shall account for it.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,12 +12,13 @@ from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
 from golem import registry
 from golem.errors import ConfigError, GolemError, OutputError
-from golem.evaluation.conformance.base import FAILED, PASSED, Finding, Report
+from golem.evaluation.conformance.base import FAILED, PASSED, Check, Finding, Report
 from golem.evaluation.conformance.engine_table import BEGIN as ENGINES_BEGIN
 from golem.evaluation.conformance.engine_table import END as ENGINES_END
 from golem.evaluation.conformance.engine_table import engine_table, read_reports
@@ -76,8 +77,9 @@ def run_check(config: CheckConfig) -> bool:
     console = Console(stderr=config.json)
     reports: list[Report] = []
     for slot, use in _wanted(config):
-        with console.status(f"{slot}: {use}"), _quiet():
-            report = examine(candidate(slot, use))
+        subject = candidate(slot, use)
+        with _shown(console, f"{slot}: {use}") as show_promise, _quiet():
+            report = examine(subject, show_promise)
         if report.lacks is not None and config.use:
             raise GolemError(report.lacks)
         reports.append(report)
@@ -110,6 +112,29 @@ def _keep(reports: list[Report], config: Output) -> None:
             config.save.write_text(text + "\n", encoding="utf-8")
         except OSError as error:
             raise OutputError(f"'{config.save}' cannot be written: {error.strerror}.") from error
+
+
+@contextmanager
+def _shown(console: Console, module: str) -> Iterator[Callable[[Check], None]]:
+    """Show in a terminal which promise of `module` is asked, and since when; yields what is told the promise.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C; says where it was.
+    """
+    columns = (SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+    asked = "is made ready"
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task(module)
+
+        def show_promise(check: Check) -> None:
+            nonlocal asked
+            asked = check.name.replace("_", " ")
+            progress.reset(task, description=f"{module}: {asked}")
+
+        try:
+            yield show_promise
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(f"interrupted while {module} was asked: {asked}") from None
 
 
 @contextmanager

@@ -21,6 +21,7 @@ from golem.evaluation.conformance.base import (
     Report,
     checks_of,
 )
+from golem.evaluation.conformance.cpu_limit import Endless, cpu_limit
 from golem.evaluation.conformance.suite import Suite
 from golem.evaluation.no_search import searching_forbidden
 from golem.options import check_values, read_yaml
@@ -146,9 +147,12 @@ def run_suite(suite: object, subject: Candidate, on_check: Callable[[Check], Non
             finding = Finding(check.name, check.promise, SKIPPED, f"not asked: {closed} failed")
         else:
             try:
-                finding = _ask(suite, check, subject)
+                with cpu_limit():
+                    finding = _ask(suite, check, subject)
             except (MissingExtra, MissingSystemLibrary) as lack:
                 return Report(subject.slot, subject.use, tuple(findings), str(lack))
+            except Endless as overdue:
+                finding, closed = Finding(check.name, check.promise, FAILED, str(overdue)), check.name
         findings.append(finding)
         if check.gate and finding.status == FAILED:
             closed = check.name

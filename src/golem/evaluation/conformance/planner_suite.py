@@ -11,8 +11,9 @@ import numpy as np
 from golem.capabilities.arms.postures import posture
 from golem.capabilities.arms.trajectory import check_trajectory
 from golem.capabilities.collision.obstacles import Obstacle, World
-from golem.capabilities.planning.base import ArmPlanner, Plan, PlanRefused, PlanRequest
-from golem.capabilities.planning.joint_space import PlanningRobot
+from golem.capabilities.planning.base import STRONGEST, ArmPlanner, Plan, PlanRefused, PlanRequest
+from golem.capabilities.planning.hermite import interpolate
+from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.capabilities.planning.path_planner import fine_points
 from golem.evaluation.conformance import samples
 from golem.evaluation.conformance.base import Candidate, check
@@ -22,6 +23,8 @@ from golem.runtime.contract_check import ContractCheck
 
 MEETS = 1e-6
 """How far a trajectory may begin and end from where it shall [rad]."""
+SLOW, INSTANT = 0.1, 0.005
+"""A speed of the hands that a request asks for [m/s], and the time over which it is measured [s]."""
 ALLOWED = 1.0
 """CPU time beyond its latency that a plan may take [s], as the bench of the shipped planner has it."""
 
@@ -103,6 +106,35 @@ class PlannerSuite(Suite):
         for given, plan in self._plans(candidate):
             trajectory = JointTrajectory(0.0, plan.times, plan.q, plan.dq)
             candidate.contract.call(check_trajectory, trajectory, given.q)
+
+    @check
+    def keeps_the_hands_speed(self, candidate: Candidate) -> None:
+        """The hands move no faster than the request's `hand_speed`."""
+        robot, module = PlanningRobot(), candidate.make()
+        for given in self.inputs()[:2]:
+            slow = replace(given, hand_speed=SLOW)
+            plan = candidate.contract.call(self.call, module, slow)
+            if not isinstance(plan, Plan):
+                raise candidate.fault(f"it finds no way at a hand_speed of {SLOW} m/s that it finds at 0.5")
+            s = np.arange(0.0, float(plan.times[-1]), INSTANT)
+            hands = JointSpace(robot, slow.q, None).hands(interpolate(plan.times, plan.q, plan.dq, s))
+            fastest = float(np.linalg.norm(np.diff(hands, axis=0), axis=2).max(initial=0.0)) / INSTANT
+            if fastest > 1.05 * SLOW:
+                raise candidate.fault(
+                    f"a hand moves at {fastest:.2f} m/s where hand_speed asks for {SLOW} m/s"
+                )
+
+    @check
+    def accelerates_gently(self, candidate: Candidate) -> None:
+        """No joint accelerates faster than 8 rad/s^2."""
+        for _, plan in self._plans(candidate):
+            gap, step = np.diff(plan.times)[:, None], np.diff(plan.q, axis=0)
+            a, b = plan.dq[:-1], plan.dq[1:]
+            # A cubic's acceleration is largest at its ends.
+            ends = 6.0 * step / gap - (4.0 * a + 2.0 * b), -6.0 * step / gap + (2.0 * a + 4.0 * b)
+            most = float(np.abs(np.array(ends) / gap).max())
+            if most > STRONGEST:
+                raise candidate.fault(f"a joint accelerates with {most:.3g} rad/s^2, more than {STRONGEST:g}")
 
     @check
     def touches_nothing(self, candidate: Candidate) -> None:
