@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import shutil
 import sys
 import warnings
 from collections.abc import Callable, Collection, Mapping
@@ -70,7 +71,7 @@ def _ladder(words: list[str]) -> int:
 
         return 0 if show_trial(config).success else FAILED
     result = run_ladder(config)
-    print(result.text())
+    print(result.text(min(max(shutil.get_terminal_size((100, 24)).columns, 80), 120)))
     print(f"Report: {result.report}" if result.report else result.note)
     if config.json:
         print(result.summary.json())

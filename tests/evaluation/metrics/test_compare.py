@@ -39,6 +39,7 @@ def test_trials_are_paired_across_rungs(runs: tuple[Path, Path], capsys: pytest.
     assert found.p == pytest.approx(mcnemar(table))
     assert (found.a, found.b) == ("good on fake", "good on harder")
     said = capsys.readouterr().out
+    assert "The runs are of two rungs, fake and harder: the same draws in two tasks" in said
     assert (
         "good on fake against good on harder" in said
         and f"{sum(won)}/12" in said
@@ -52,6 +53,8 @@ def test_runs_that_cannot_be_paired_are_refused(
     first, _ = runs
     with pytest.raises(ConfigError, match="holds no trials"):
         run_compare(CompareConfig(first, first.with_name("absent")))
+    with pytest.raises(ConfigError, match="name two run folders"):
+        run_compare(CompareConfig(first, first / ".." / first.name))
     reseeded = run_ladder(fake("good", n=1, seed=5, out="reseeded")).out
     with pytest.raises(ConfigError, match="different seeds"):
         run_compare(CompareConfig(first, reseeded))

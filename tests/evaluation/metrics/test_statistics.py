@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import binom, norm
+from scipy.stats import binom, binomtest, norm
 
 from golem.evaluation.metrics.statistics import (
     PairedTable,
+    clustered,
     distribution,
     holm,
     mcnemar,
@@ -111,7 +112,7 @@ def test_holm_steps_down_and_keeps_the_order() -> None:
 
 
 def test_what_is_quoted_of_values() -> None:
-    found = distribution([4.0, 1.0, -3.0, 2.0, 5.0], scale=10.0)
+    found = distribution([40.0, 10.0, -30.0, 20.0, 50.0])
     assert found is not None
     assert (found.n, found.q1, found.median, found.q3) == (5, 10.0, 20.0, 40.0)
     assert (found.minimum, found.maximum, found.mean) == (-30.0, 50.0, pytest.approx(18.0))
@@ -127,6 +128,37 @@ def test_the_interval_of_a_mean_is_students() -> None:
     assert found is not None
     assert (round(found.low, 2), round(found.high, 2)) == (-0.53, 2.03)
     assert mean_interval([1.0]) is None
+
+
+def test_the_interval_of_a_mean_is_cut_at_what_can_be() -> None:
+    forces = [0.0, 0.0, 70.0]
+    free, cut = mean_interval(forces), mean_interval(forces, 0.0)
+    assert free is not None and cut is not None
+    assert free.low < -70.0 and (cut.low, cut.high) == (0.0, free.high)
+    shares = mean_interval([0.5, 1.0, 1.0, 0.9], 0.0, 1.0)
+    assert shares is not None and shares.high == 1.0 and shares.low > 0.4
+
+
+def test_a_share_of_yes_and_no_has_wilsons_interval() -> None:
+    assert mean_interval([1.0, 1.0], 0.0, 1.0) == wilson(2, 2)
+    assert mean_interval([1.0, 0.0, 1.0], 0.0, 1.0) == wilson(2, 3)
+    assert mean_interval([0.5, 0.5], 0.0, 1.0) is None, "values that are alike do not say how they spread"
+
+
+@pytest.mark.parametrize("n, k", [(30, 27), (300, 300), (10, 0), (54, 42)])
+def test_wilsons_interval_is_that_of_scipy(n: int, k: int) -> None:
+    bounds = binomtest(k, n).proportion_ci(0.95, method="wilson")
+    assert (wilson(k, n).low, wilson(k, n).high) == pytest.approx((bounds.low, bounds.high), abs=1e-12)
+
+
+def test_trials_that_share_a_past_count_as_what_they_share() -> None:
+    alike = [[True] * 8] * 20
+    assert clustered(alike) == wilson(20, 20), "160 of 160 shoves of 20 robots"
+    halves = [[True, False]] * 10
+    assert clustered(halves) == wilson(10, 20), "what varies within a cluster as between counts in full"
+    whole = [[True, True]] * 6 + [[False, False]] * 4
+    # Each cluster is one trial, but for the m / (m - 1) of its variance: 10 units become 9 and are held at 10.
+    assert clustered(whole) == wilson(6, 10)
 
 
 @pytest.mark.parametrize("n", [6, 9, 10, 30, 101])

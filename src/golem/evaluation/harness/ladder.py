@@ -23,7 +23,7 @@ from golem.evaluation.harness.trial_executor import make_executor
 from golem.evaluation.harness.trial_runner import Request, Runner
 from golem.evaluation.harness.trials import facts
 from golem.evaluation.metrics.summary import Summary, summarise
-from golem.evaluation.metrics.tables import comparisons, metrics, rates
+from golem.evaluation.metrics.tables import all_cases, comparisons, losses, metrics, rates
 from golem.evaluation.metrics.text_table import TextTable
 from golem.provenance import code_files, command_line, commit, versions
 
@@ -110,11 +110,13 @@ class LadderResult:
     report: Path | None
     note: str = ""
 
-    def text(self) -> str:
-        """Return the tables for a terminal."""
+    def text(self, width: int = 100) -> str:
+        """Return the tables for a terminal of `width` characters; what counts comes last, above the prompt."""
         s, adaptive = self.summary, rung_class(self.config.rung).adaptive
-        standard = [] if adaptive else [rates(s), comparisons(s), metrics(s)]
-        return "\n\n".join(table.markdown() for table in (*self.own, *standard) if table is not None)
+        lost = losses(self.records)
+        standard = (metrics(s, brief=True), *self.own, lost, rates(s), all_cases(s), comparisons(s))
+        shown = (*self.own, lost) if adaptive else standard
+        return "\n\n".join(table.terminal(width) for table in shown if table is not None)
 
 
 class LadderInterrupted(KeyboardInterrupt):

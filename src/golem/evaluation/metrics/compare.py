@@ -36,21 +36,30 @@ def run_compare(config: CompareConfig) -> Summary:
         ConfigError: a folder holds no trials, or the two have nothing in common that can be compared.
         golem.errors.OutputError: a file is no trial record.
     """
+    if config.first.resolve() == config.second.resolve():
+        raise ConfigError(f"Both are {config.first}; name two run folders.")
     a, b = (_read(folder) for folder in (config.first, config.second))
+    rungs = (
+        f"The runs are of two rungs, {a[0].rung} and {b[0].rung}, and"
+        if a[0].rung != b[0].rung
+        else "The runs"
+    )
     for name in ("seed", "profile"):
         one, other = getattr(a[0], name), getattr(b[0], name)
         if one != other:
             raise ConfigError(
-                f"The runs have different {name}s ({one} and {other}); trials are paired by seed, index and profile."
+                f"{rungs} have different {name}s ({one} and {other}); trials are paired by seed, index and profile."
             )
+    if a[0].rung != b[0].rung:
+        print(f"{rungs.removesuffix(', and')}: the same draws in two tasks, trial by trial.")
     for difference in _differences(a[0], b[0]):
         print(difference)
     names = (a[0].rung, b[0].rung) if a[0].rung != b[0].rung else (config.first.name, config.second.name)
     one, other = ({r.key: r for r in side} for side in (a, b))
     if not {r.method for r in a} & {r.method for r in b}:
-        raise ConfigError("The runs have no method in common.")
+        raise ConfigError(f"{rungs} have no method in common.")
     groups: dict[tuple[str, str], list[Key]] = {}
-    for key in sorted(one.keys() & other.keys(), key=lambda key: key[2]):
+    for key in sorted((key for key in one if key in other), key=lambda key: key[2]):
         groups.setdefault(key[:2], []).append(key)
     if not groups:
         raise ConfigError("The runs have no trial in common.")

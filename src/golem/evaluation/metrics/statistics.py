@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 
@@ -23,7 +24,7 @@ class Distribution:
 
     Attributes:
         n: how many.
-        mean, mean_interval: with the 95 % interval of Student's t; None for one value.
+        mean, mean_interval: with its 95 % interval, see `mean_interval`.
         median, median_interval: with the 95 % interval between two of the values, which assumes no distribution;
             None for fewer than six.
         q1, q3: quartiles (linear interpolation).
@@ -75,7 +76,7 @@ class PairedTable:
         return self.both + self.only_a + self.only_b + self.neither
 
 
-def wilson(successes: int, n: int, confidence: float = 0.95) -> Interval:
+def wilson(successes: float, n: float, confidence: float = 0.95) -> Interval:
     """Return the Wilson score interval of a success rate, without continuity correction.
 
     Args:
@@ -83,10 +84,26 @@ def wilson(successes: int, n: int, confidence: float = 0.95) -> Interval:
         n: number of independent trials, > 0.
         confidence: coverage, 0 to 1.
     """
-    from scipy.stats import binomtest
+    z = NormalDist().inv_cdf(0.5 + confidence / 2)
+    centre, z2 = successes + z * z / 2, z * z
+    half = z * math.sqrt(successes * (n - successes) / n + z2 / 4)
+    low = 0.0 if successes == 0 else (centre - half) / (n + z2)
+    return Interval(low, 1.0 if successes == n else (centre + half) / (n + z2))
 
-    bounds = binomtest(successes, n).proportion_ci(confidence, method="wilson")
-    return Interval(float(bounds.low), float(bounds.high))
+
+def clustered(clusters: Sequence[Sequence[bool]]) -> Interval:
+    """Return the 95 % interval of a success rate whose trials come in `clusters` that share a past.
+
+    Wilson's with the number of trials divided by the design effect, of the ratio estimator (Kish, Survey Sampling,
+    1965). Where all trials end alike that is unknown, and a cluster counts as one trial.
+    """
+    m, n = len(clusters), sum(map(len, clusters))
+    rate = sum(map(sum, clusters)) / n
+    units = float(m)
+    if 0.0 < rate < 1.0 and m > 1:
+        spread = sum((sum(one) - rate * len(one)) ** 2 for one in clusters) * m / (m - 1)
+        units = min(max(rate * (1.0 - rate) * n * n / spread if spread else n, m), n)
+    return wilson(rate * units, units)
 
 
 def mcnemar(table: PairedTable) -> float:
@@ -136,16 +153,18 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return adjusted
 
 
-def distribution(values: Sequence[float], scale: float = 1.0) -> Distribution | None:
-    """Return what is quoted of `values`, each multiplied by `scale`; None for no values."""
+def distribution(
+    values: Sequence[float], low: float = -math.inf, high: float = math.inf
+) -> Distribution | None:
+    """Return what is quoted of `values`, which must lie between `low` and `high`; None for no values."""
     if not len(values):
         return None
-    x = scale * np.sort(np.array(values, dtype=np.float64))
+    x = np.sort(np.array(values, dtype=np.float64))
     q1, median, q3 = (float(q) for q in np.percentile(x, (25, 50, 75)))
     return Distribution(
         n=len(x),
         mean=float(x.mean()),
-        mean_interval=mean_interval(x.tolist()),
+        mean_interval=mean_interval(x.tolist(), low, high),
         median=median,
         median_interval=_median_interval(x.tolist()),
         q1=q1,
@@ -157,29 +176,25 @@ def distribution(values: Sequence[float], scale: float = 1.0) -> Distribution | 
     )
 
 
-def mean_interval(values: Sequence[float], confidence: float = 0.95) -> Interval | None:
-    """Return Student's t interval of the mean of `values`; None for fewer than two."""
+def mean_interval(
+    values: Sequence[float], low: float = -math.inf, high: float = math.inf, confidence: float = 0.95
+) -> Interval | None:
+    """Return the interval of the mean of `values`, which must lie between `low` and `high`.
+
+    Of values that are each 0 or 1, and can be nothing beyond, it is Wilson's. Else it is Student's t, cut at the
+    bounds: what cannot be is taken out of an interval without a loss of coverage. None for values that are all alike,
+    which say nothing about how they spread.
+    """
     n = len(values)
-    if n < 2:
+    if n and (low, high) == (0.0, 1.0) and set(values) <= {0.0, 1.0}:
+        return wilson(sum(values), n, confidence)
+    if len(set(values)) < 2:
         return None
     from scipy.stats import t as student
 
     half = float(student.ppf(0.5 + confidence / 2, n - 1) * np.std(values, ddof=1) / math.sqrt(n))
     mean = float(np.mean(values))
-    return Interval(mean - half, mean + half)
-
-
-def bootstrap_interval(values: Sequence[float], confidence: float = 0.95, draws: int = 2000) -> Interval:
-    """Return the percentile bootstrap interval of the mean of shares, one per cluster, such as an episode.
-
-    Where all of n shares are 0 or all are 1 no resample differs: that is Wilson's interval of 0 or n of n.
-    """
-    x = np.array(values, dtype=np.float64)
-    if len(set(values)) == 1 and x[0] in (0.0, 1.0):
-        return wilson(round(float(x.sum())), len(x), confidence)
-    means = x[np.random.default_rng(0).integers(len(x), size=(draws, len(x)))].mean(axis=1)
-    low, high = np.quantile(means, (0.5 - confidence / 2, 0.5 + confidence / 2)).tolist()
-    return Interval(low, high)
+    return Interval(max(mean - half, low), min(mean + half, high))
 
 
 def _median_interval(ordered: Sequence[float], confidence: float = 0.95) -> Interval | None:

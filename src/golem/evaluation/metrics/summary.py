@@ -11,10 +11,12 @@ from typing import Any
 
 from golem.evaluation.base import Case, case_name
 from golem.evaluation.harness.records import TrialRecord
+from golem.evaluation.metrics.metric_names import metric
 from golem.evaluation.metrics.statistics import (
     Distribution,
     Interval,
     PairedTable,
+    clustered,
     distribution,
     holm,
     mcnemar,
@@ -66,7 +68,7 @@ class PairedMean:
 
     n: int
     mean: float
-    interval: Interval
+    interval: Interval | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +82,7 @@ class Comparison:
         difference: 95 % interval of the success rate of `a` minus that of `b`.
         p: two-sided exact McNemar p-value.
         p_holm: the same, adjusted for the number of comparisons in the run.
-        metrics: name -> paired difference, a minus b, with Student's t interval.
+        metrics: name -> paired difference, a minus b, where there is any.
     """
 
     a: str
@@ -94,16 +96,29 @@ class Comparison:
 
 
 @dataclass(frozen=True, slots=True)
+class Pooled:
+    """One method under all cases of a rung: trials of one index share a scene, which is the unit of the interval."""
+
+    method: str
+    n: int
+    successes: int
+    scenes: int
+    interval: Interval
+
+
+@dataclass(frozen=True, slots=True)
 class Summary:
-    """All figures of one run, its rows case by case."""
+    """All figures of one run, its rows case by case; `pooled` where there are several cases."""
 
     rows: tuple[MethodSummary, ...]
     comparisons: tuple[Comparison, ...]
+    pooled: tuple[Pooled, ...] = ()
 
     def json(self) -> str:
         """Return the summary as one line of JSON; rates and intervals are 0 to 1, figures in SI units."""
         rows = [{**asdict(row), "rate": row.rate} for row in self.rows]
-        return json.dumps({"rows": rows, "comparisons": [asdict(c) for c in self.comparisons]})
+        others = {name: [asdict(one) for one in getattr(self, name)] for name in ("comparisons", "pooled")}
+        return json.dumps({"rows": rows, **others})
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -145,7 +160,22 @@ def summarise(
         for a, b in itertools.combinations(methods, 2)
         if compared and (name, a) in grouped and (name, b) in grouped
     ]
-    return Summary(tuple(row(grouped[key], spent.get(key, [])) for key in keys), comparisons_of(pairs))
+    rows = tuple(row(grouped[key], spent.get(key, [])) for key in keys)
+    together = [pooled(method, records) for method in methods] if compared and len(cases) > 1 else []
+    return Summary(rows, comparisons_of(pairs), tuple(one for one in together if one is not None))
+
+
+def pooled(method: str, records: Sequence[TrialRecord]) -> Pooled | None:
+    """Return how often `method` succeeded under all cases together; None where it has no trial."""
+    scenes: dict[int, list[bool]] = {}
+    for record in records:
+        if record.method == method:
+            scenes.setdefault(record.index, []).append(record.success)
+    if not scenes:
+        return None
+    won = [sum(scene) for scene in scenes.values()]
+    n = sum(map(len, scenes.values()))
+    return Pooled(method, n, sum(won), len(scenes), clustered(list(scenes.values())))
 
 
 def comparisons_of(
@@ -192,7 +222,9 @@ def row(records: Sequence[TrialRecord], costs: Sequence[Mapping[str, Any]] = ())
 
 def _distributions(rows: Sequence[Mapping[str, float]]) -> dict[str, Distribution]:
     names = sorted({name for row in rows for name in row})
-    found = {name: distribution([row[name] for row in rows if name in row]) for name in names}
+    found = {
+        name: distribution([row[name] for row in rows if name in row], *metric(name).bounds) for name in names
+    }
     return {name: d for name, d in found.items() if d is not None}
 
 
@@ -203,8 +235,17 @@ def _paired(a: Sequence[TrialRecord], b: Sequence[TrialRecord]) -> dict[str, Pai
         for one, other in zip(a, b, strict=True)
     ]
     for name in sorted({name for one, _ in sides for name in one}):
-        differences = [one[name] - other[name] for one, other in sides if name in one and name in other]
-        interval = mean_interval(differences)
-        if interval is not None:
-            found[name] = PairedMean(len(differences), sum(differences) / len(differences), interval)
+        pairs = [(one[name], other[name]) for one, other in sides if name in one and name in other]
+        differences = [first - second for first, second in pairs]
+        if not any(differences):  # as the draws of a scene: both met the same
+            continue
+        share = metric(name).share
+        if share and {value for pair in pairs for value in pair} <= {0.0, 1.0}:
+            first, second = zip(*pairs, strict=True)
+            interval = paired_difference(
+                PairedTable.count(*([x == 1.0 for x in side] for side in (first, second)))
+            )
+        else:
+            interval = mean_interval(differences, *((-1.0, 1.0) if share else ()))
+        found[name] = PairedMean(len(pairs), sum(differences) / len(pairs), interval)
     return found

@@ -2,160 +2,33 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from golem.evaluation.base import Case
+from golem.evaluation.harness.records import TrialRecord
+from golem.evaluation.metrics.metric_names import METRICS, Metric, metric
 from golem.evaluation.metrics.statistics import Distribution, Interval
-from golem.evaluation.metrics.summary import MethodSummary, PairedMean, Summary
+from golem.evaluation.metrics.summary import NO_MODULE, MethodSummary, PairedMean, Summary
 from golem.evaluation.metrics.text_table import TextTable, short_names
 
-
-@dataclass(frozen=True, slots=True)
-class Metric:
-    """How one scalar is shown.
-
-    Attributes:
-        label: its name in words.
-        unit: the unit it is shown in.
-        scale: that unit per SI unit.
-    """
-
-    label: str
-    unit: str = ""
-    scale: float = 1.0
-
-
-_DEG = math.degrees(1.0)
-
-METRICS: dict[str, Metric] = {
-    "detect_to_grasp": Metric("first look to closed grasp", "s"),
-    "recovery": Metric("first to last negative CoM margin", "s"),
-    "walk": Metric("walk to the goal", "s"),
-    "total": Metric("whole task", "s"),
-    "grasp_aim": Metric("horizontal distance, commanded hand to screw", "mm", 1e3),
-    "grasp_reach": Metric("horizontal distance, hand to where it was sent", "mm", 1e3),
-    "grasp_miss": Metric("horizontal distance, hand to screw", "mm", 1e3),
-    "grasp_depth": Metric("fingertips below the screw's head", "mm", 1e3),
-    "grasp_tilt": Metric("approach off vertical", "deg", _DEG),
-    "pull_beside": Metric("hand beside the straight line while pulling, at most", "mm", 1e3),
-    "pull_turn": Metric("hand turned while pulling, at most", "deg", _DEG),
-    "handle_miss": Metric("distance across the approach, hand to handle", "mm", 1e3),
-    "handle_reach": Metric("distance, hand to where it was sent", "mm", 1e3),
-    "door_angle": Metric("door open at the end", "deg", _DEG),
-    "door_angle_error": Metric("door angle as the skill has it, less the true one", "deg", _DEG),
-    "set_down_error": Metric("thing set down off its place", "mm", 1e3),
-    "others_moved": Metric("another thing moved, at most", "mm", 1e3),
-    "places_looked": Metric("remembered places that were gone to"),
-    "was_lifted": Metric("thing was lifted"),
-    "peak_force": Metric("peak force", "N"),
-    "peak_lean": Metric("peak lean (pitch)", "deg", _DEG),
-    "peak_tilt": Metric("peak tilt (any direction)", "deg", _DEG),
-    "margin_before": Metric("CoM margin before the push", "mm", 1e3),
-    "margin_min": Metric("minimum CoM margin", "mm", 1e3),
-    "margin_median": Metric("median CoM margin", "mm", 1e3),
-    "margin_final": Metric("final CoM margin", "mm", 1e3),
-    "below_zero": Metric("time with a negative margin", "s"),
-    "steps": Metric("steps taken"),
-    "displacement": Metric("base displaced", "mm", 1e3),
-    "sway": Metric("base sway, radial RMS", "mm", 1e3),
-    "goal_x": Metric("error at the goal along the line", "mm", 1e3),
-    "goal_y": Metric("error at the goal across the line", "mm", 1e3),
-    "goal_radial": Metric("error at the goal, radial", "mm", 1e3),
-    "odometry_error": Metric("odometry off the true pose", "mm", 1e3),
-    "place_error": Metric("off where it believes to be, by map and odometry", "mm", 1e3),
-    "place_yaw": Metric("off the heading that it believes to have", "deg", _DEG),
-    "follower_error": Metric("off the goal by the robot's own belief", "mm", 1e3),
-    "stop_shift": Metric("moved by the last stop", "mm", 1e3),
-    "contacts": Metric("links that touched something"),
-    "before_radial": Metric("beside the nominal stance before docking or picking, radial", "mm", 1e3),
-    "before_yaw": Metric("the same, heading", "deg", _DEG),
-    "after_radial": Metric("beside the nominal stance at the end, radial", "mm", 1e3),
-    "after_yaw": Metric("the same, heading", "deg", _DEG),
-    "before_x": Metric("the same, ahead", "mm", 1e3),
-    "before_y": Metric("the same, to the left", "mm", 1e3),
-    "after_x": Metric("at the end, ahead", "mm", 1e3),
-    "after_y": Metric("at the end, to the left", "mm", 1e3),
-    "dockings": Metric("dockings"),
-    "approaches": Metric("approaches of all dockings"),
-    "screws_served": Metric("loose screws within reach at the end"),
-    "recoveries": Metric("recoveries"),
-    "stood": Metric("stood on its way", "s"),
-    "nobody": Metric("walkers that are nobody, of all at all steps", "%", 100.0),
-    "goal_yaw": Metric("heading error at the goal", "deg", _DEG),
-    "base_range": Metric("largest distance between two places of the base", "mm", 1e3),
-    "share_not_negative": Metric("share of time with the CoM margin not negative", "%", 100.0),
-    "speed_before": Metric("forward speed before the push", "m/s"),
-    "error_vx": Metric("error of the mean forward speed", "m/s"),
-    "error_vy": Metric("error of the mean leftward speed", "m/s"),
-    "error_speed": Metric("error of the mean velocity", "m/s"),
-    "error_wz": Metric("error of the mean yaw rate", "rad/s"),
-    "seconds": Metric("time survived", "s"),
-    "pushes": Metric("pushes met"),
-    "distance": Metric("way gone", "m"),
-    "climbed": Metric("height gained", "m"),
-    "velocity_standing": Metric("velocity error standing, RMS", "m/s"),
-    "velocity_walking": Metric("velocity error walking, RMS", "m/s"),
-    "drift": Metric("position error at the end per way gone", "m/m"),
-    "yaw_drift": Metric("error of the heading's change", "deg", _DEG),
-    "gap": Metric("longest time without a believed foot", "ms", 1e3),
-    "tick": Metric("CPU time of a tick, median", "us", 1e6),
-    "tick_p99": Metric("CPU time of a tick, 99 % quantile", "us", 1e6),
-    "ate": Metric("trajectory off the true one, RMS after alignment", "cm", 1e2),
-    "end_error": Metric("place on the floor off at the end", "cm", 1e2),
-    "end_height": Metric("height off at the end", "cm", 1e2),
-    "end_range": Metric("end too far from the beginning", "cm", 1e2),
-    "end_bearing": Metric("direction from beginning to end off", "deg", _DEG),
-    "end_heading": Metric("heading off at the end", "deg", _DEG),
-    "frames_lost": Metric("scans after which it was silent"),
-    "nees_place": Metric("squared error of the place over its covariance"),
-    "nees_heading": Metric("the same of the heading"),
-    "frame": Metric("CPU time of a scan with all between two, median", "ms", 1e3),
-    "frame_p99": Metric("CPU time of a scan with all between two, 99 % quantile", "ms", 1e3),
-    "static_mrr": Metric("mean reciprocal rank before anything moved", "%", 100.0),
-    "current_top1": Metric("first answer is where it is now", "%", 100.0),
-    "outdated_top1": Metric("first answer is where it was", "%", 100.0),
-    "unmoved_top1": Metric("first answer is where what did not move is", "%", 100.0),
-    "history_at3": Metric("old place among the first three", "%", 100.0),
-    "absent": Metric("nothing answered of what is not there", "%", 100.0),
-    "query": Metric("CPU time of a question, median", "us", 1e6),
-    "update": Metric("CPU time of a look, median", "ms", 1e3),
-    "plans_per_second": Metric("plans per second"),
-    "in_time": Metric("share of plans in time", "%", 100.0),
-    "claim_picked": Metric("right when it says a screw is in the tray", "%", 100.0),
-    "claim_tight": Metric("right when it says a screw is tight", "%", 100.0),
-    "claim_jammed": Metric("right when it says a screw is jammed", "%", 100.0),
-    "claim_nothing_there": Metric("right when it says there is no screw", "%", 100.0),
-    "claim_out_of_reach": Metric("right when it says a screw is out of reach", "%", 100.0),
-    "claim_in_tray": Metric("right about the screw in the tray when it looks afterwards", "%", 100.0),
-    "claim_bore_empty": Metric("right about the bore when it looks afterwards", "%", 100.0),
-    "drop_inside": Metric("hand inside the tray's rim when it lets go", "mm", 1e3),
-    "doable": Metric("a hand reaches a loose screw and the tray", "%", 100.0),
-    "refusal_right": Metric("right when it says that it cannot be done", "%", 100.0),
-    "self_contacts": Metric("pairs of own links that touched"),
-    "touches": Metric("links that touched pack or tray away from the screws"),
-    "touch_force": Metric("largest force on pack or tray", "N"),
-    "claim_tray_full": Metric("right when it says the tray is full", "%", 100.0),
-    "claim_tray_out_of_reach": Metric("right when it says the tray is out of reach", "%", 100.0),
-    "claim_tray_missing": Metric("right when it says there is no tray", "%", 100.0),
-    "cpu_per_plan": Metric("CPU time of a plan", "ms", 1e3),
-}
-"""Name -> how it is shown."""
-
-
-def metric(name: str) -> Metric:
-    """Return how the scalar `name` is shown; one that is not declared, as it is."""
-    return METRICS.get(name, Metric(name.replace("_", " ")))
-
-
 SECONDS = Metric("", "s")
+OF_A_MEAN = "Student's t, cut at what the metric can be, and Wilson's where each trial is a yes or no"
+"""How the interval of a mean was found."""
+INTERVAL = "95 % interval"
+BRIEF = (0, 1, 3, 4, 7, 8)
+"""Columns of what was measured that a terminal shows."""
 MINUS = "\N{MINUS SIGN}"
 
 
 def run_tables(summary: Summary) -> list[TextTable]:
     """Return the tables that say all of a summary: rates, comparisons, metrics, and their paired differences."""
-    tables = [rates(summary), comparisons(summary), metrics(summary), metric_differences(summary)]
+    tables = [
+        rates(summary),
+        all_cases(summary),
+        comparisons(summary),
+        metrics(summary),
+        metric_differences(summary),
+    ]
     return [table for table in tables if table is not None]
 
 
@@ -185,6 +58,41 @@ def rates(summary: Summary) -> TextTable:
     return TextTable("", (*_names(summary), *columns), tuple(rows), note)
 
 
+def all_cases(summary: Summary) -> TextTable | None:
+    """Return success under all cases together; None where there is one case."""
+    if not summary.pooled:
+        return None
+    short = short_names(summary.methods)
+    rows = [
+        (
+            short[p.method],
+            f"{p.successes}/{p.n}",
+            f"{percent(p.successes / p.n)} %",
+            _interval(p.interval, 100.0),
+            f"{p.scenes}",
+        )
+        for p in summary.pooled
+    ]
+    note = "Trials of one index share a scene: Wilson interval with the design effect of these scenes."
+    columns = ("method", "success", "rate", "95 % interval", "scenes")
+    return TextTable("All cases together", columns, tuple(rows), note)
+
+
+def losses(records: Sequence[TrialRecord]) -> TextTable | None:
+    """Return where and by which module trials were lost, with one reason of each; None where none was."""
+    found: dict[tuple[str, str, str], list[str]] = {}
+    for r in records:
+        if not r.success:
+            found.setdefault((r.method, r.stage, r.module or NO_MODULE), []).append(r.detail)
+    short = short_names(record.method for record in records)
+    rows = [
+        (short[method], stage, module, str(len(reasons)), next(filter(None, reasons), "-"))
+        for (method, stage, module), reasons in sorted(found.items(), key=lambda item: -len(item[1]))
+    ]
+    heads = ("method", "lost in", "by", "trials", "the first of them")
+    return TextTable("Why trials were lost", heads, tuple(rows)) if rows else None
+
+
 def comparisons(summary: Summary) -> TextTable | None:
     """Return the paired tests of success; None where nothing is compared."""
     if not summary.comparisons:
@@ -210,43 +118,47 @@ def comparisons(summary: Summary) -> TextTable | None:
         )
         for c in summary.comparisons
     ]
-    return TextTable("Paired comparison of success", ("pair", *_names(summary)[1:], *columns), tuple(rows))
-
-
-def metrics(summary: Summary) -> TextTable | None:
-    """Return what was measured: median and mean with intervals, extremes; None where nothing was."""
-    columns = (
-        "n",
-        "median",
-        "95 % interval",
-        "mean",
-        "95 % interval",
-        "rms",
-        "95th percentile of size",
-        "min",
-        "max",
+    least = max(2.0 * 0.5**c.table.n * len(summary.comparisons) for c in summary.comparisons)
+    few = min(c.table.n for c in summary.comparisons)
+    note = (
+        f"With n = {few} no difference can be significant: p is {p_value(min(least, 1.0))} even where one method wins "
+        "every trial and the other none."
+        if least > 0.05
+        else ""
     )
+    return TextTable(
+        "Paired comparison of success", ("pair", *_names(summary)[1:], *columns), tuple(rows), note
+    )
+
+
+def metrics(summary: Summary, brief: bool = False) -> TextTable | None:
+    """Return what was measured: median and mean with intervals, extremes; None where nothing was.
+
+    `brief` leaves out what a terminal has no room for.
+    """
+    columns = ("n", "median", INTERVAL, "mean", INTERVAL, "rms", "95th percentile of size", "min", "max")
+    shown = [i for i, name in enumerate(columns) if not brief or i in BRIEF]
     short = short_names(summary.methods)
     rows = [
-        (_label(name), *_head(row, short), *_figures(d, metric(name)))
+        (_label(name), *_head(row, short), *(cells[i] for i in shown))
         for name in _measured([{**row.metrics, **row.costs} for row in summary.rows])
         for row in summary.rows
-        if (d := {**row.metrics, **row.costs}.get(name)) is not None
+        if (d := {**row.metrics, **row.costs}.get(name)) is not None and (cells := _figures(d, metric(name)))
     ]
     if not rows:
         return None
     return TextTable(
         "What was measured",
-        ("metric", *_names(summary), *columns),
+        ("metric", *_names(summary), *(columns[i] for i in shown)),
         tuple(rows),
-        "Over the trials that got that far. Intervals: median, between two values; mean, Student's t.",
+        "Over the trials that got that far. Intervals: "
+        f"{'' if brief else 'median, between two values; '}mean, {OF_A_MEAN}.",
     )
 
 
 def metric_differences(summary: Summary) -> TextTable | None:
     """Return the paired differences of what was measured; None where nothing is compared."""
     short = short_names(summary.methods)
-    # Where both met the same, as the draws of a scene, there is no difference to tell.
     rows = [
         (
             _label(name),
@@ -256,12 +168,12 @@ def metric_differences(summary: Summary) -> TextTable | None:
         )
         for name in _measured([c.metrics for c in summary.comparisons])
         for c in summary.comparisons
-        if name in c.metrics and c.metrics[name].interval != Interval(0.0, 0.0)
+        if name in c.metrics
     ]
     if not rows:
         return None
     columns = ("metric", "pair", *_names(summary)[1:], "n", "mean difference", "95 % interval")
-    return TextTable("Paired differences", columns, tuple(rows), "Student's t over the pairs.")
+    return TextTable("Paired differences", columns, tuple(rows), f"Over the pairs; {OF_A_MEAN}.")
 
 
 def percent(value: float) -> str:

@@ -14,7 +14,7 @@ from golem.evaluation.episodes.last_seconds import FILM
 from golem.evaluation.harness.records import TrialRecord, artefacts, trial_name
 from golem.evaluation.metrics.published import PAPER
 from golem.evaluation.metrics.summary import NO_MODULE, Summary
-from golem.evaluation.metrics.tables import comparisons, metric_differences, metrics, rates
+from golem.evaluation.metrics.tables import all_cases, comparisons, metric_differences, metrics, rates
 from golem.evaluation.metrics.text_table import short_names
 from golem.evaluation.report.html_page import render_page
 from golem.evaluation.report.ladder_plots import failure_plot, own_plot, rate_plot, time_plot
@@ -55,7 +55,7 @@ def render(result: LadderResult) -> str:
             rates=rates(summary),
             rate_plot="" if rung.adaptive else rate_plot(first.rung, summary),
             all_rates=[rates(summary)] if rung.adaptive else [],
-            comparisons=comparisons(summary),
+            comparisons=[table for table in (all_cases(summary), comparisons(summary)) if table],
             paper=any((first.rung, method) in PAPER for method in summary.methods),
             map={} if rung.adaptive else _map(records, summary),
             failure_plots=_failures(summary) if failed else [],

@@ -12,6 +12,7 @@ import numpy as np
 from golem.errors import unknown_name
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import Episode, episode_seed
+from golem.evaluation.metrics.statistics import Interval, clustered
 from golem.evaluation.metrics.text_table import TextTable, short_names
 from golem.evaluation.rungs.pushed_rung import PushedOptions, PushedRung, gait_name
 from golem.hardware.safety.base import SafetyLimits
@@ -115,24 +116,30 @@ class GateLimits(PushedRung[GateLimitsOptions]):
                 for level in self.options.level:
                     for lift in self.options.lift:
                         want = {"lift": lift, "phase": gait[0], "walk": gait[1], "level": level}
-                        mine = [o for s, o in trials if want.items() <= s.case.items()]
+                        mine, robots = list[TrialOutcome](), dict[int, list[bool]]()
+                        for spec, outcome in trials:
+                            if want.items() <= spec.case.items():
+                                mine.append(outcome)
+                                robots.setdefault(spec.index, []).append(outcome.success)
                         won = sum(outcome.success for outcome in mine)
+                        interval = clustered(list(robots.values())) if mine else Interval(0.0, 1.0)
                         rows.append(
                             (
                                 short[method],
                                 gait_name(gait),
                                 f"{level:g}",
                                 lift,
-                                f"{won} of {len(mine)}",
+                                f"{won} of {len(mine)} [{100 * interval.low:.3g}, {100 * interval.high:.3g}]",
                                 _ends(mine),
                             )
                         )
         return (
             TextTable(
                 "Pushes survived where a limit of the gate is lifted, all directions together",
-                ("lower body", "phase", "push", "lifted", "survived", "the others ended by"),
+                ("lower body", "phase", "push", "lifted", "survived [%]", "the others ended by"),
                 tuple(rows),
-                "A fall is judged on the simulator's truth; everything else is a stop of the gate.",
+                "A fall is judged on the simulator's truth; everything else is a stop of the gate. One robot is "
+                "pushed in all directions from one past: the interval counts robots, not pushes.",
             ),
         )
 

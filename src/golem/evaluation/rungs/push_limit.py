@@ -15,6 +15,7 @@ from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSp
 from golem.evaluation.episodes.episode import Episode, episode_seed
 from golem.evaluation.episodes.plain_episode import PlainEpisode, own_legs
 from golem.evaluation.harness.arguments import robot_options
+from golem.evaluation.metrics.statistics import wilson
 from golem.evaluation.metrics.text_table import TextTable, short_names
 from golem.evaluation.report.svg_figure import method_colour
 from golem.evaluation.rungs.gate_limits import NOTHING, lifted
@@ -47,7 +48,7 @@ class PushLimitOptions(PushedOptions):
 
 
 class PushLimit(PushedRung[PushLimitOptions]):
-    """Survive ever larger pushes: the largest that 95 of 100 robots survive, by direction and moment."""
+    """Survive ever larger pushes: the largest that 19 of 20 robots survive, by direction and moment."""
 
     name = "push-limit"
     Options = PushLimitOptions
@@ -153,10 +154,11 @@ class PushLimit(PushedRung[PushLimitOptions]):
                 costs.append((short[method], gait_name(gait), *shares(means)))
         directions = (d.replace("_", " ") for d in o.direction)
         found = TextTable(
-            f"Largest {what} survived in at least {100 * SURVIVED:.0f} % of {n} trials",
+            f"Largest {what} that {n - allowed(n)} of {n} robots survived",
             ("lower body", "terms", "phase", *directions, "min"),
             tuple(rows),
-            f"A level is lost with {allowed(n) + 1} of {n} trials; >=: the highest one tried was not lost.",
+            f"A level is lost with {allowed(n) + 1} of {n} robots, so one that is held may be survived by as few as "
+            f"{100 * wilson(n - allowed(n), n).low:.0f} % (Wilson); >=: the highest one tried was not lost.",
         )
         if len(o.terms) == 1:
             return (found,)

@@ -16,7 +16,7 @@ from golem.evaluation.base import DONE, Case, Outcomes, Results, Rung, TrialOutc
 from golem.evaluation.episodes.memory_timeline import ObjectTimeline, hits, timeline
 from golem.evaluation.episodes.relocation import Rates, Relocation, Setting, relocation
 from golem.evaluation.episodes.relocation_room import Thing
-from golem.evaluation.metrics.statistics import bootstrap_interval
+from golem.evaluation.metrics.statistics import mean_interval
 from golem.evaluation.metrics.text_table import TextTable
 from golem.evaluation.report.svg_figure import COLOUR
 from golem.provenance import stack_facts
@@ -165,8 +165,8 @@ class MemoryRung(Rung[Any]):
                     n = max(n, len(mine))
                     rows.append((condition, method, *(_share([one[m] for one in mine]) for m in METRICS)))
         note = (
-            f"{n} episodes each; in brackets the 95 % bootstrap interval over episodes, Wilson's where all are alike. "
-            "The paper's are of another room, other queries and other networks."
+            f"{n} episodes each; in brackets the 95 % interval over episodes: Wilson's where one says yes or no, else "
+            "Student's t. The paper's are of another room, other queries and other networks."
         )
         paper = tuple(("the paper", *row, "-") for row in PAPER)
         heads = ("condition", "memory", *METRICS.values())
@@ -192,8 +192,9 @@ class MemoryRung(Rung[Any]):
 
 
 def _share(values: Sequence[float]) -> str:
-    interval = bootstrap_interval(values)
-    return f"{100 * float(np.mean(values)):.1f} [{100 * interval.low:.3g}, {100 * interval.high:.3g}]"
+    interval = mean_interval(values, 0.0, 1.0)
+    bounds = "" if interval is None else f" [{100 * interval.low:.3g}, {100 * interval.high:.3g}]"
+    return f"{100 * float(np.mean(values)):.1f}{bounds}"
 
 
 def _make(method: str) -> Memory:
