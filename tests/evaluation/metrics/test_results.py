@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -55,3 +58,30 @@ def test_what_is_no_run_folder_is_named(tmp_path: Path) -> None:
     (tmp_path / "trials.jsonl").write_text("nonsense\n")
     with pytest.raises(OutputError, match="Line 1"):
         run_results(ResultsConfig((tmp_path,)))
+
+
+def test_a_paper_gets_rows_per_trial_tables_in_latex_and_figures(fake: Make, tmp_path: Path) -> None:
+    result = run_ladder(fake("good", "poor", n=4))
+    text = run_results(
+        ResultsConfig((result.out,), tmp_path / "new" / "trials.csv", "csv", tmp_path / "figures")
+    )
+    assert (tmp_path / "new" / "trials.csv").read_text() == text
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert [(row["method"], row["index"]) for row in rows[:3]] == [
+        ("good", "0"),
+        ("poor", "0"),
+        ("good", "1"),
+    ]
+    for row, record in zip(rows, result.records, strict=True):
+        assert row["success"] == str(record.success) and row["stage"] == record.stage
+        assert float(row["difficulty"]) == record.series["difficulty"]
+        assert row["time_total"] == str(record.timings.get("total", ""))
+    latex = run_results(ResultsConfig((result.out,), tmp_path / "t.tex", "latex"))
+    assert latex.startswith("% Rung `fake`") and r"\begin{tabular}{l" in latex and "```" not in latex
+    assert all(line.startswith(("%", "\\")) or "&" in line for line in latex.splitlines() if line)
+    names = sorted(path.name for path in (tmp_path / "figures").iterdir())
+    assert f"{result.out.name}-success.svg" in names and f"{result.out.name}-total.svg" in names
+    for name in names:
+        root = ElementTree.parse(tmp_path / "figures" / name).getroot()
+        assert root.tag == "{http://www.w3.org/2000/svg}svg"
+        assert "var(" not in (tmp_path / "figures" / name).read_text()

@@ -13,6 +13,7 @@ import fcntl
 import json
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -189,14 +190,25 @@ class RunFolder:
 
     def write_text(self, name: str, text: str) -> Path:
         """Write a file of the folder, whole or not at all, and return its path."""
-        path = self.path / name
-        part = path.with_name(name + ".part")
-        try:
-            part.write_text(text, encoding="utf-8")
-            os.replace(part, path)
-        except OSError as error:
-            raise OutputError(f"Cannot write {path}: {error.strerror}.") from error
-        return path
+        return write_file(self.path / name, text)
+
+
+def write_file(path: Path, text: str) -> Path:
+    """Write a file and the folder it is in, whole or not at all, and return its path.
+
+    Raises:
+        golem.errors.OutputError: it cannot be written.
+    """
+    part = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    except OSError as error:
+        with suppress(OSError):
+            part.unlink()
+        raise OutputError(f"Cannot write {path}: {error.strerror}.") from error
+    return path
 
 
 def read_facts(folder: Path) -> dict[str, Any]:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from scipy.stats import chi2
 from tyro.conf import Positional
 
-from golem.errors import ConfigError, OutputError
+from golem.errors import ConfigError
 from golem.evaluation.base import RUNGS, make_rung
 from golem.evaluation.harness.records import TrialRecord, read_records
-from golem.evaluation.harness.run_folder import read_costs, read_facts
+from golem.evaluation.harness.run_folder import read_costs, read_facts, write_file
 from golem.evaluation.metrics.summary import summarise
 from golem.evaluation.metrics.tables import run_tables
 
@@ -54,6 +55,8 @@ class GateHours:
         """Upper bound of the stops per robot hour, one-sided, 95 % (exact, of a Poisson process); inf without time."""
         if self.active <= 0.0:
             return float("inf")
+        from scipy.stats import chi2
+
         return float(chi2.ppf(CONFIDENCE, 2 * (self.stops.total() + 1))) / 2.0 / (self.active / HOUR)
 
     def sentence(self) -> str:
@@ -69,12 +72,16 @@ class GateHours:
 
 @dataclass(frozen=True)
 class ResultsConfig:
-    """Write what run folders hold as Markdown: per folder its command, commit, n, seed, profile and tables."""
+    """Write what run folders hold: per folder its command, commit, n, seed, profile and tables; or for a paper."""
 
     runs: Positional[tuple[Path, ...]]
     """Run folders of golem ladder."""
     out: Path | None = None
     """The file to write. Default: the terminal."""
+    format: Literal["markdown", "latex", "csv"] = "markdown"
+    """markdown: tables. latex: tables for the package booktabs. csv: a row per trial, with all it measured."""
+    figures: Path | None = None
+    """Folder for the figures of the report as SVG, too."""
 
 
 def run_results(config: ResultsConfig) -> str:
@@ -86,30 +93,59 @@ def run_results(config: ResultsConfig) -> str:
     """
     if not config.runs:
         raise ConfigError("Name at least one run folder.")
-    parts = [section(folder) for folder in config.runs]
-    if len(parts) > 1:
+    if config.format == "csv":
+        text = trials_csv([record for folder in config.runs for record in _records(folder)])
+    else:
+        parts = [section(folder, config.format == "latex") for folder in config.runs]
         total = sum((gate_hours(folder) for folder in config.runs), GateHours())
-        parts += [f"In all. {total.sentence()}"] if total.trials else []
-    text = "\n\n".join(parts) + "\n"
+        if len(parts) > 1 and total.trials:
+            parts.append(f"{'% ' if config.format == 'latex' else ''}In all. {total.sentence()}")
+        text = "\n\n".join(parts) + "\n"
     if config.out is None:
         print(text, end="")
-        return text
-    try:
-        config.out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"Cannot write {config.out}: {error.strerror}.") from error
+    else:
+        write_file(config.out, text)
+    if config.figures is not None:
+        from golem.evaluation.report.ladder_plots import standalone_figures
+
+        for folder in config.runs:
+            for name, picture in standalone_figures(_records(folder)).items():
+                write_file(config.figures / f"{folder.resolve().name}-{name}.svg", picture)
     return text
 
 
-def section(folder: Path) -> str:
-    """Return the Markdown of one run folder.
+def trials_csv(records: Sequence[TrialRecord]) -> str:
+    """Return a row per trial: what it is of, how it ended, and its scalars [SI units], empty where it has none."""
+    cases, times, series = (
+        dict.fromkeys(name for r in records for name in getattr(r, kind))
+        for kind in ("case", "timings", "series")
+    )
+    fixed = ("rung", "method", "profile", "seed", "index", "success", "stage", "module", "detail", "commit")
+    stream = io.StringIO()
+    rows = csv.writer(stream, lineterminator="\n")
+    rows.writerow([*fixed, *cases, *(f"time_{name}" for name in times), *series])
+    for r in records:
+        own = [(r.case, cases), (r.timings, times), (r.series, series)]
+        rows.writerow(
+            [*(getattr(r, name) for name in fixed), *(held.get(n, "") for held, names in own for n in names)]
+        )
+    return stream.getvalue()
+
+
+def _records(folder: Path) -> list[TrialRecord]:
+    records = read_records(folder / "trials.jsonl")
+    if not records:
+        raise ConfigError(f"{folder} holds no trials; give the --out folder of a finished golem ladder.")
+    return records
+
+
+def section(folder: Path, latex: bool = False) -> str:
+    """Return the Markdown of one run folder, or its LaTeX, in which all but the tables is a comment.
 
     Raises:
         ConfigError, OutputError: see `run_results`.
     """
-    records = read_records(folder / "trials.jsonl")
-    if not records:
-        raise ConfigError(f"{folder} holds no trials; give the --out folder of a finished golem ladder.")
+    records = _records(folder)
     commits = list(dict.fromkeys(record.commit for record in records))
     if len(commits) > 1:
         raise ConfigError(
@@ -129,8 +165,19 @@ def section(folder: Path) -> str:
     )
     command = read_facts(folder).get("command", "")
     hours = gate_hours(folder)
-    parts = [head, f"```sh\n{command}\n```" if command else "", *(table.markdown() for table in tables)]
-    parts += [hours.sentence()] if hours.trials else []
+    gates = hours.sentence() if hours.trials else ""
+    if latex:
+        parts = [
+            *(f"% {line}" for line in (head, command, gates) if line),
+            *(table.latex() for table in tables),
+        ]
+    else:
+        parts = [
+            head,
+            f"```sh\n{command}\n```" if command else "",
+            *(table.markdown() for table in tables),
+            gates,
+        ]
     return "\n\n".join(part for part in parts if part)
 
 

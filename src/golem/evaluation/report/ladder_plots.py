@@ -7,13 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from golem.evaluation.base import case_name
+from golem.evaluation.base import RUNGS, case_name, make_rung
 from golem.evaluation.harness.records import TrialRecord
 from golem.evaluation.metrics.published import PAPER
 from golem.evaluation.metrics.statistics import Interval, wilson
-from golem.evaluation.metrics.summary import MethodSummary, Summary
+from golem.evaluation.metrics.summary import MethodSummary, Summary, summarise
 from golem.evaluation.metrics.text_table import short_names
-from golem.evaluation.report.svg_figure import COLOUR, cause_colour, method_colour, page_figure, svg
+from golem.evaluation.report.svg_figure import (
+    COLOUR,
+    cause_colour,
+    method_colour,
+    page_figure,
+    standalone,
+    styled,
+    svg,
+)
 
 ROW = 34.0
 """Height of one row of a figure [px]."""
@@ -120,6 +128,28 @@ def time_plot(name: str, grouped: Mapping[str, Sequence[TrialRecord]]) -> str:
     axes.set_yticks(range(len(grouped)), list(short_names(grouped).values()))
     axes.grid(axis="y", visible=False)
     return svg(figure, f"{name} in seconds")
+
+
+def standalone_figures(records: Sequence[TrialRecord]) -> dict[str, str]:
+    """Return the figures of a run by name, each as the text of an SVG file.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    methods = tuple(dict.fromkeys(record.method for record in records))
+    rung = make_rung(RUNGS[records[0].rung], records[0].options)
+    grouped = {method: [r for r in records if r.method == method] for method in methods}
+    summary = summarise(records, methods, compared=False)
+    with styled():
+        own = own_plot(rung, {m: [(r.spec, r.outcome) for r in rows] for m, rows in grouped.items()})
+        found = {} if own is None else {"own": own[1]}
+        if not rung.adaptive:
+            found["success"] = rate_plot(rung.name, summary)
+            if any(not record.success for record in records):
+                found |= {kind: failure_plot(summary, kind) for kind in ("stages", "modules")}
+        times = dict.fromkeys(name for record in records for name in record.timings)
+        found |= {name: time_plot(name, grouped) for name in times}
+    return {name: standalone(picture) for name, picture in found.items()}
 
 
 def own_plot(rung: Any, outcomes: Mapping[str, Any]) -> tuple[str, str] | None:

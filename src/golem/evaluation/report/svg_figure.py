@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from importlib import resources
 from typing import Any
 
 from golem.errors import MissingExtra
@@ -91,3 +92,15 @@ def svg(figure: Any, label: str) -> str:
     size = re.search(r'viewBox="[^"]*"', text)
     assert size is not None
     return re.sub(r"<svg[^>]*>", f'<svg {size[0]} role="img" aria-label="{label}">', text, count=1)
+
+
+def standalone(picture: str) -> str:
+    """Return a figure of the page as the text of an SVG file, in the colours of the page by day."""
+    css = resources.files("golem.evaluation.report").joinpath("report.css").read_text(encoding="utf-8")
+    colours = dict(
+        reversed(re.findall(r"--(\w+):\s*(#[0-9a-fA-F]+)", css))
+    )  # the first of each name is by day
+    picture = re.sub(r"var\(--(\w+)\)", lambda match: colours[match[1]], picture)
+    names = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+    picture = picture.replace("font-family: inherit", "font-family: sans-serif")
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{picture.replace("<svg ", f"<svg {names} ", 1)}\n'
