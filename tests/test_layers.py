@@ -21,6 +21,7 @@ LAYERS = (
         "options",
         "traces",
         "registry",
+        "user_file",
         "slots",
         "true_runs",
     ),

@@ -43,6 +43,10 @@ def _demo(words: list[str]) -> int:
 
 def _run(words: list[str]) -> int:
     """Run a stack file once, in lock-step or with the live view; `--skill NAME` and its goal say what to do."""
+    if words and not words[0].startswith("-"):
+        from golem.stack import load_stack
+
+        load_stack(words[0])  # refuses before the twin is imported
     _prepare_graphics()
     from golem.run import read_run, run_stack
     from golem.skills.base import REFUSED
@@ -62,6 +66,9 @@ def _options(words: list[str]) -> int:
 
 def _ladder(words: list[str]) -> int:
     """Compare methods on one rung of the capability ladder, on the same seeds."""
+    from golem.evaluation.rung_table import refuse_early
+
+    refuse_early(words)
     _prepare_graphics()
     from golem.evaluation.harness.ladder import read_ladder, run_ladder
 

@@ -18,9 +18,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import golem
-from golem.capabilities.legs.description import load_description
 from golem.errors import ConfigError, OutputError
-from golem.robots.sensors.profiles import load_profile
 from golem.slots import KEYS
 from golem.stack import Stack
 from golem.user_file import neighbours
@@ -83,6 +81,8 @@ def stack_facts(stack: Stack) -> dict[str, Any]:
     Raises:
         ConfigError, ModuleFault: see `Stack.check`.
     """
+    from golem.robots.sensors.profiles import load_profile
+
     stack.check()
     return {
         "stack": asdict(stack),
@@ -127,6 +127,8 @@ def _named(options: Mapping[str, Any]) -> dict[str, Path]:
                 path = found[name].resolve()
                 found |= {f"{name}/{p.relative_to(path.parent)}": p for p in neighbours(path)}
             if found[name].suffix in (".yaml", ".yml"):
+                from golem.capabilities.legs.description import load_description
+
                 with suppress(ConfigError):  # another kind of file, or absent: said elsewhere
                     found.setdefault("network", load_description(value)[1])
     return {name: path for name, path in found.items() if path.is_file()}

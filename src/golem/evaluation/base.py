@@ -19,42 +19,11 @@ import numpy as np
 
 from golem.errors import unknown_name
 from golem.evaluation.metrics.text_table import TextTable
+from golem.evaluation.rung_table import PROFILES, RUNGS
 from golem.options import fill
-from golem.robots.sensors.profiles import PROFILES
 
 DONE = "done"
 """The stage of a trial that lost nothing."""
-
-RUNGS: dict[str, str] = {
-    "tether": "golem.evaluation.rungs.pick_screw:TetherRung",
-    "stand": "golem.evaluation.rungs.pick_screw:StandRung",
-    "tether-calibrated": "golem.evaluation.rungs.calibrated_robot:CalibratedTether",
-    "calibration": "golem.evaluation.rungs.calibrated_robot:CalibrationRung",
-    "fridge-tether": "golem.evaluation.rungs.open_fridge:FridgeTether",
-    "fridge-stand": "golem.evaluation.rungs.open_fridge:FridgeStand",
-    "counter-tether": "golem.evaluation.rungs.counter:CounterTether",
-    "counter-stand": "golem.evaluation.rungs.counter:CounterStand",
-    "fetch": "golem.evaluation.rungs.fetch_errand:FetchRung",
-    "push": "golem.evaluation.rungs.push:PushRung",
-    "push-ramp": "golem.evaluation.rungs.push_ramp:PushRampRung",
-    "push-limit": "golem.evaluation.rungs.push_limit:PushLimit",
-    "gate-limits": "golem.evaluation.rungs.gate_limits:GateLimits",
-    "faults": "golem.evaluation.rungs.faults:FaultsRung",
-    "stand-quiet": "golem.evaluation.rungs.stand_minute:StandQuiet",
-    "stand-arms": "golem.evaluation.rungs.stand_minute:StandArms",
-    "walk-twist": "golem.evaluation.rungs.walk_twist:WalkTwist",
-    "walk-stop": "golem.evaluation.rungs.walk_stop:WalkStop",
-    "walk-endurance": "golem.evaluation.rungs.walk_endurance:WalkEndurance",
-    "walk-rough": "golem.evaluation.rungs.walk_rough:WalkRough",
-    "navigate-line": "golem.evaluation.rungs.navigate_line:NavigateLine",
-    "navigate": "golem.evaluation.rungs.navigate_hall:NavigateRung",
-    "var-stand": "golem.evaluation.rungs.var_stand:VarStandRung",
-    "base-estimation": "golem.evaluation.rungs.base_estimation:BaseEstimation",
-    "odometry": "golem.evaluation.rungs.odometry:OdometryRung",
-    "memory": "golem.evaluation.rungs.spatial_memory:MemoryRung",
-    "mpc-rate": "golem.evaluation.rungs.mpc_rate:MpcRate",
-}
-"""Rung name -> `module:Class`; the module is imported when the rung is used."""
 
 Case = Mapping[str, float | str]
 """A condition under which a rung repeats its trials, e.g. `{"direction": "left", "level": 40.0}`; empty for most. All
@@ -164,7 +133,7 @@ class Rung(ABC, Generic[O]):
 
     A rung is made from its options, once per worker process, and may keep compiled models between trials; the
     outcome of a trial depends on its spec alone, never on the trials that ran before it. A new rung is one file and
-    one line in `RUNGS`; the first sentence of its docstring is what `golem ladder --help` says of it.
+    one line in `rung_table`; the first sentence of its docstring is what `golem ladder --help` says of it.
 
     Attributes:
         name: the name it is registered under.
@@ -181,7 +150,7 @@ class Rung(ABC, Generic[O]):
 
     name: str
     Options: ClassVar[type[Any]] = NoOptions
-    profiles: tuple[str, ...] = tuple(PROFILES)
+    profiles: tuple[str, ...] = PROFILES
     default_methods: tuple[str, ...] = ()
     default_n: int = 30
     default_profile: str = "field"

@@ -11,8 +11,9 @@ from golem.errors import ConfigError
 from golem.evaluation.base import TrialSpec
 from golem.evaluation.episodes.episode import Loss, episode_seed
 from golem.evaluation.episodes.oracle import GraspTruth, Oracle
+from golem.evaluation.episodes.pick_blame import PAD_REACH, STRAIGHT, blame
 from golem.evaluation.rungs import pick_screw as pick
-from golem.evaluation.rungs.pick_screw import PAD_REACH, STRAIGHT, StandRung, TetherRung, blame
+from golem.evaluation.rungs.pick_screw import StandRung, TetherRung
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.lockstep import build
 from golem.stack import load_stack
@@ -104,8 +105,15 @@ def test_an_unknown_slot_is_refused(rung: TetherRung) -> None:
         rung.config("centroid", "field", {"upperbody": "diff_ik"})
 
 
-def truth(aim: float = 0.0, reach: float = 0.0, miss: float = 0.0, tilt: float = 0.0) -> GraspTruth:
-    return GraspTruth(aim, reach, miss, 0.004, tilt)
+def truth(
+    aim: float = 0.0,
+    reach: float = 0.0,
+    miss: float = 0.0,
+    tilt: float = 0.0,
+    calibration: float = 0.0,
+    seen: float = 0.0,
+) -> GraspTruth:
+    return GraspTruth(aim, reach, miss, 0.004, tilt, calibration, seen)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +122,9 @@ def truth(aim: float = 0.0, reach: float = 0.0, miss: float = 0.0, tilt: float =
         ("detect", "localizer", None, "localizer"),
         ("servo", "upper_body", truth(aim=0.05), "upper_body"),
         ("grasp", "grasp_method", truth(aim=0.05, reach=0.01, miss=0.05), "localizer"),
-        ("grasp", "grasp_method", truth(aim=0.01, reach=0.05, miss=0.05), "upper_body"),
+        ("grasp", "grasp_method", truth(aim=0.05, miss=0.05, calibration=0.04, seen=0.01), "calibration"),
+        ("grasp", "grasp_method", truth(aim=0.05, miss=0.05, calibration=0.01, seen=0.04), "localizer"),
+        ("grasp", "grasp_method", truth(aim=0.01, reach=0.05, miss=0.05, calibration=0.05), "upper_body"),
         ("extract", "grasp_method", truth(tilt=2 * STRAIGHT), "upper_body"),
         ("extract", "grasp_method", truth(), "grasp_method"),
         ("place", "grasp_method", truth(), "localizer"),
@@ -124,6 +134,21 @@ def test_the_larger_error_takes_the_blame(
     stage: str, slot: str, seen: GraspTruth | None, culprit: str
 ) -> None:
     assert blame(stage, slot, seen) == culprit
+
+
+def test_the_calibration_of_the_head_camera_is_told_from_what_was_seen() -> None:
+    for profile, least, most in (("field", 0.03, 0.2), ("ideal", 0.0, 1e-9)):
+        _, robot = build(load_stack("tether", profile=profile), 3)
+        oracle = Oracle(robot)
+        screw = oracle.screw_heads()[0]
+        shift = oracle.camera_shift("head", screw)
+        assert least <= np.linalg.norm(shift) <= most
+        # An open loop sends the hand to where the calibration has the screw: nothing else is wrong.
+        T = oracle.gripper("right")
+        T[:3, 3] = screw + shift
+        found = oracle.grasp("right", T, "head")
+        assert found.seen < 1e-9 and found.calibration == pytest.approx(found.aim, abs=1e-9)
+        robot.close()
 
 
 def test_a_robot_without_a_truth_to_judge_on_is_refused(rung: TetherRung, tmp_path: Path) -> None:

@@ -44,6 +44,8 @@ class GraspTruth:
             hand as it was: one that is too high or too low misses nothing.
         depth: height of the screw's head above the fingertips [m], positive when the tips are below it.
         tilt: angle between approach axis and vertical [rad].
+        calibration: what `aim` owes to the calibration of the camera that the hand was sent by [m].
+        seen: what `aim` would be without that [m].
     """
 
     aim: float
@@ -51,6 +53,8 @@ class GraspTruth:
     miss: float
     depth: float
     tilt: float
+    calibration: float = 0.0
+    seen: float = 0.0
 
 
 class Oracle:
@@ -128,11 +132,27 @@ class Oracle:
         world = np.array([self._robot.data.body(name).xpos for name in self._robot.scene.names.screws])
         return world @ self._T_odom_world[:3, :3].T + self._T_odom_world[:3, 3]
 
-    def grasp(self, side: Side, T_commanded: Array) -> GraspTruth:
-        """Compare where the hand is, where it was sent (4, 4, in odom), and where the nearest screw is."""
+    def camera_shift(self, camera: str, point: Array) -> Array:
+        """Return how far from the true `point` (3,) in odom [m] the calibration of `camera` has what is there."""
+        seen_by = self._robot.data.camera(camera)
+        T = np.eye(4)
+        T[:3, :3] = seen_by.xmat.reshape(3, 3) * (
+            1.0,
+            -1.0,
+            -1.0,
+        )  # MuJoCo looks along -z, optical frames along z
+        T[:3, 3] = seen_by.xpos
+        T = self._T_odom_world @ T
+        believed = T @ self._robot.calibration[camera] @ np.linalg.inv(T) @ (*point, 1.0)
+        return believed[:3] - point
+
+    def grasp(self, side: Side, T_commanded: Array, camera: str) -> GraspTruth:
+        """Compare where the hand is, where it was sent (4, 4, in odom) by `camera`, and where the nearest screw is."""
         T = self.gripper(side)
-        screws = (self.screw_heads() - T[:3, 3]) @ T[:3, :3]
-        screw = screws[np.argmin(np.hypot(screws[:, 0], screws[:, 1]))]
+        heads = self.screw_heads()
+        screws = (heads - T[:3, 3]) @ T[:3, :3]
+        nearest = int(np.argmin(np.hypot(screws[:, 0], screws[:, 1])))
+        screw, shift = screws[nearest], self.camera_shift(camera, heads[nearest]) @ T[:3, :3]
         sent = (T_commanded[:3, 3] - T[:3, 3]) @ T[:3, :3]
         return GraspTruth(
             aim=float(np.hypot(*(screw - sent)[:2])),
@@ -140,6 +160,8 @@ class Oracle:
             miss=float(np.hypot(*screw[:2])),
             depth=-float(screw[2]),
             tilt=float(np.arccos(np.clip(-T[2, 2], -1.0, 1.0))),
+            calibration=float(np.hypot(*shift[:2])),
+            seen=float(np.hypot(*(screw + shift - sent)[:2])),
         )
 
     def picture(self) -> bytes:

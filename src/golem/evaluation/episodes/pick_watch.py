@@ -48,6 +48,7 @@ class PickWatch(ErrandWatch):
         self._side: Side = "right"
         self._attempt = 0
         self._stage = ""
+        self._servoed = False
 
     def due(self) -> float:
         """Return when it has to look again [s]; the way of a hand that pulls is kept by the tick."""
@@ -71,6 +72,8 @@ class PickWatch(ErrandWatch):
             self.pull = [] if self._stage == "extract" else self.pull
         if feedback.stage == "approach" and "side" in feedback.data:
             self._side, self._attempt = feedback.data["side"], feedback.data["attempt"] - 1
+            self._servoed = False
+        self._servoed = self._servoed or feedback.stage == "servo"
         if feedback.stage in LOOKING:
             # What it looks at is as far from the true hand as it believes it to be from the hand.
             looked = (
@@ -81,6 +84,8 @@ class PickWatch(ErrandWatch):
             if self._attempt not in self.looked_at or "hand" in feedback.data:
                 self.looked_at[self._attempt] = self._oracle.gripper(self._side)[:3, 3] + looked
         if feedback.stage == "grasp" and not feedback.data.get("failed"):
-            self.grasp = self._oracle.grasp(self._side, self._running.commanded(self._side))
+            # Where it servoed, the camera in the palm sent the hand, else that of the head.
+            camera = f"{self._side}_hand" if self._servoed else "head"
+            self.grasp = self._oracle.grasp(self._side, self._running.commanded(self._side), camera)
         if feedback.stage == DONE or feedback.data.get("failed"):
             self.picture = self._oracle.picture()

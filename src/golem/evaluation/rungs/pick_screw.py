@@ -23,7 +23,8 @@ from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Case, Outcomes, Results, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import HANGS, READY, Loss, episode_seed, lost
-from golem.evaluation.episodes.oracle import GraspTruth, Oracle
+from golem.evaluation.episodes.oracle import Oracle
+from golem.evaluation.episodes.pick_blame import blame
 from golem.evaluation.episodes.pick_claims import REFUSALS, Fastener, claims
 from golem.evaluation.episodes.pick_touches import PickTouches
 from golem.evaluation.episodes.pick_watch import PickWatch
@@ -187,10 +188,6 @@ SETTLE = 0.5
 """Robot time a dropped screw gets to come to rest [s]."""
 ABORTED = ("safety", FAULT, "timeout")
 """Stages at which a skill was ended from outside: not a success, wherever the screw is."""
-PAD_REACH = 0.008
-"""Half width of a finger pad [m]: a hand further off than this cannot hold the screw."""
-STRAIGHT = 0.087
-"""Tilt beyond which an extraction counts as off axis [rad]: 5 deg."""
 
 
 @dataclass(frozen=True)
@@ -344,7 +341,7 @@ def judge_pick(
 ) -> TrialOutcome:
     """Say whether a screw is in the tray and the robot still there, and if not, which module lost it."""
     truth = watch.grasp
-    series = {} if truth is None else {f"grasp_{name}": value for name, value in asdict(truth).items()}
+    series = {} if truth is None else {f"grasp_{name}": getattr(truth, name) for name in MEASURED}
     pulled = straightness(watch.pull)
     if pulled is not None:
         series |= {"pull_beside": pulled[0], "pull_turn": pulled[1]}
@@ -384,17 +381,5 @@ def balance(stood: BalanceTrace) -> dict[str, float]:
     }
 
 
-def blame(stage: str, slot: str | None, truth: GraspTruth | None) -> str | None:
-    """Return the slot that lost a failed trial.
-
-    Where the hand missed the screw, the larger of the two errors is to blame: where it was sent (perception and its
-    calibration) or where it went (the arm and its calibration). Where it did not miss, an off-axis pull is the arm's,
-    and the rest is the grip's.
-    """
-    if truth is None or stage in ("detect", "servo", "safety", FAULT):
-        return slot
-    if truth.miss > PAD_REACH:
-        return "localizer" if truth.aim >= truth.reach else "upper_body"
-    if stage == "extract" and truth.tilt > STRAIGHT:
-        return "upper_body"
-    return "localizer" if stage == "place" else SLOT
+MEASURED = ("aim", "reach", "miss", "depth", "tilt")
+"""What of a `GraspTruth` is recorded."""

@@ -14,9 +14,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from trimesh.exchange.gltf import export_glb
 
-from golem.robots.mujoco import body_meshes
 from golem.robots.mujoco.camera import CameraRig
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.types import Array, CameraInfo
@@ -105,6 +103,9 @@ class SpectatorView:
         self._infos += [halved(info) for info in robot.cameras.values()]
         self._fancy = fancy
         self._rig: CameraRig | None = None
+        from golem.robots.mujoco import body_meshes  # trimesh takes a second, which only a viewer needs
+
+        self._meshes = body_meshes.body_meshes
         self._moving = np.array([body for body in body_meshes.visual_geoms(self._model) if body], dtype=int)
         self._origin = robot.truth.T_world_odom[:3, 3]
 
@@ -115,7 +116,9 @@ class SpectatorView:
 
     def meshes(self) -> list[BodyMesh]:
         """Return one mesh per visible body."""
-        meshes = body_meshes.body_meshes(self._model, self._data)
+        from trimesh.exchange.gltf import export_glb
+
+        meshes = self._meshes(self._model, self._data)
         return [BodyMesh(self._model.body(body).name, export_glb(scene)) for body, scene in meshes.items()]
 
     def poses(self) -> tuple[Array, Array]:
