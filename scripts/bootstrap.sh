@@ -72,7 +72,10 @@ see_to_system() {
 }
 
 python=$(find_python)
-export UV_PYTHON_DOWNLOADS=never UV_NO_PROGRESS=1
+export UV_PYTHON_DOWNLOADS=never
+quiet=
+[ -t 2 ] || quiet=--quiet UV_NO_PROGRESS=1
+export UV_NO_PROGRESS
 locks=()
 for group in "$@"; do
     [ -f "requirements/$group.txt" ] || die "no lock requirements/$group.txt; groups: $(cd requirements && echo *.txt | sed 's/\.txt//g')"
@@ -88,11 +91,12 @@ find_uv "$python"
 if ! "$venv/bin/python" -c 'import sys' 2> /dev/null; then
     "$uv" venv --quiet --clear --python "$python" "$venv"
 fi
-echo "golem: installing the locked packages (${locks[*]}) into $venv" >&2
+echo "golem: installing the locked packages (${locks[*]}) into $venv; core alone takes 1 GB of disk and some minutes" >&2
 for group in "${locks[@]}"; do
-    "$uv" pip install --quiet --python "$venv/bin/python" --no-deps --require-hashes -r "requirements/$group.txt"
+    "$uv" pip install $quiet --python "$venv/bin/python" --no-deps --require-hashes -r "requirements/$group.txt"
 done
 "$uv" pip install --quiet --python "$venv/bin/python" --no-deps --editable .
+echo "golem: trying what it needs of this machine" >&2
 "$venv/bin/python" scripts/slim.py "$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')"
 see_to_system
 for group in "${locks[@]}"; do

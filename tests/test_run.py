@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from golem.run import RunConfig, read_run, run_stack
+from golem.interfaces.payloads import Feedback
+from golem.run import Narrator, RunConfig, read_run, run_stack
 
 BLIND = """
 class Blind:
@@ -43,3 +45,32 @@ def test_a_skill_is_run_in_lock_step(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert result.success and "Standing for 0.1 s." in capsys.readouterr().out
     result = run_stack(*read_run([str(tmp_path / "x.yaml"), "--skill", "walk", "1"]))
     assert result.stage == "refused" and "do not walk" in capsys.readouterr().out
+
+
+class Bus:
+    """Holds the feedback that a test says."""
+
+    def __init__(self) -> None:
+        self.said: Feedback | None = None
+
+    def read(self) -> Feedback | None:
+        return self.said
+
+
+def test_the_narrator_prints_each_new_sentence_once_whatever_its_figures(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus = Bus()
+    monkeypatch.setattr("golem.run.News", lambda *_: bus)
+    narrator = Narrator(SimpleNamespace(bus=None))  # type: ignore[arg-type]
+    for t, text in enumerate(
+        ("Looking.", "Few are seen. Looking around.", "Sure to 2.0 mm.", "Sure to 1.5 mm.")
+    ):
+        bus.said = Feedback(float(t), "pick", "detect", text, {})
+        narrator()
+    said = capsys.readouterr().out.splitlines()
+    assert [line.split("detect")[1].strip() for line in said] == [
+        "Looking.",
+        "Few are seen. Looking around.",
+        "Sure to 2.0 mm.",
+    ]

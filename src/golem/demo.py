@@ -298,7 +298,7 @@ def run_demo(config: DemoConfig) -> DemoResult:
         print(
             f"The robot {'stands on its own feet' if running.stack.on_ground else 'hangs from a hoist'} in front of "
             f"a battery pack with {loose} loosened screws in reach.\n"
-            f"It shall find {config.screws} of them in its cameras, pull them out and drop them in the tray "
+            f"It is to find {config.screws} of them by its cameras, pull them out and drop them in the tray "
             f"(profile {config.profile}, seed {config.seed}).",
             flush=True,
         )
@@ -343,7 +343,7 @@ def _filmed(config: DemoConfig, demo: Demo, running: LockstepRunner, robot: Mujo
         if running.stack.on_ground and not demo.lost():
             film.headline = f"A push of {SHOVE.impulse:.0f} N s"
             demo.push(watch)
-        print(f"Writing the film ({len(film)} pictures).", flush=True)
+        print(f"Writing the film ({len(film)} pictures): a minute or two.", flush=True)
         return demo.write(film.save(config.out / "demo.gif"), film.picture(len(film) // 3))
     finally:
         film.close()

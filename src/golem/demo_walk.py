@@ -49,7 +49,7 @@ def run_walk_demo(config: DemoConfig) -> bool:
         robot = shown(running, built)
         print(
             f"The robot stands in a hall, {math.hypot(GOAL.x, GOAL.y):.0f} m from the pack, and has no map.\n"
-            f"It shall find its way around walls and obstacles by its LiDAR, dock, and take a screw out "
+            f"It is to find its way around walls and obstacles by its LiDAR, dock, and take a screw out "
             f"(profile {config.profile}, seed {seed}).",
             flush=True,
         )

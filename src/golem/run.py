@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import webbrowser
 from collections.abc import Callable, Sequence
@@ -237,16 +238,17 @@ def shown(running: LockstepRunner, robot: object) -> MujocoRobot:
 
 
 class Narrator:
-    """Prints each new stage of the running skill once."""
+    """Prints what the running skill says: each new stage, and each sentence that differs in more than its figures."""
 
     def __init__(self, running: LockstepRunner) -> None:
         """Listen to the skill of `running`."""
         self._news = News(running.bus, topics.FEEDBACK)
-        self._stage = ""
+        self._said = ""
 
     def __call__(self) -> None:
         """Look for news."""
         feedback = self._news.read()
-        if feedback is not None and (feedback.stage != self._stage or feedback.data.get("failed")):
-            self._stage = feedback.stage
+        said = "" if feedback is None else feedback.stage + re.sub(r"[\d.]+", "", feedback.text)
+        if feedback is not None and (said != self._said or feedback.data.get("failed")):
+            self._said = said
             print(f"{feedback.t:7.2f} s  {feedback.stage:9s} {feedback.text}", flush=True)

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
+from tqdm import tqdm
 
 from golem.dashboard.balance_chart import SPAN, balance_chart
 from golem.dashboard.map_view import map_view
@@ -234,7 +235,7 @@ class Film:
         def indexed() -> Iterator[Image.Image]:
             shown = np.full((1, 1, 3), -1000, np.int16)
             index = np.zeros((1, 1), np.uint8)
-            for i in range(0, count, stride):
+            for i in tqdm(range(0, count, stride), path.name, leave=False, disable=None):
                 picture = self.picture(i, scale)
                 r, g, b = (picture[..., c] >> 2 for c in range(3))
                 changed = np.abs(picture - shown).max(axis=2) > STILL
@@ -262,7 +263,7 @@ class Film:
         writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"vp09"), self.fps, self._size)
         if not writer.isOpened():
             return False
-        for i in range(len(self._frames)):
+        for i in tqdm(range(len(self._frames)), path.name, leave=False, disable=None):
             writer.write(self.picture(i)[..., ::-1])
         writer.release()
         return path.is_file() and path.stat().st_size > 0

@@ -303,7 +303,7 @@ class Pick:
                 if not closing:
                     if fresh is not None:
                         room.look()
-                        text = f"Servoing, sigma {step.sigma * 1e3:.1f} mm."
+                        text = f"The palm camera guides the hand, sure to {step.sigma * 1e3:.1f} mm."
                         context.say("servo", text, target=step.target.tolist(), hand=arm.pose[:3, 3].tolist())
                     if step.status is ServoStatus.CONVERGED:
                         closing = True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import signal
+import sys
 import threading
 from collections.abc import Generator
 from contextlib import closing, contextmanager
@@ -185,6 +186,7 @@ def run_ladder(config: LadderConfig) -> LadderResult:
         wanted = {spec.key for spec in request.wanted({r.key: r.outcome for r in records})}
         records = tuple(r for r in records if r.key in wanted)
         folder.state(command, provenance)
+        print("Writing summary and report.", file=sys.stderr, flush=True)
         result = summed_up(config, folder.path, records, rung)
         folder.write_text("summary.json", result.summary.json() + "\n")
         try:

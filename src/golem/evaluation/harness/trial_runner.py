@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,7 +30,7 @@ class Progress:
 
     def __init__(self, kept: int) -> None:
         """Begin with `kept` trials of an earlier run."""
-        self._terminal = sys.stderr.isatty()
+        self._terminal = _has_width()
         self._bar: Any = tqdm(initial=kept, unit="trial", disable=not self._terminal)
         self._done, self._lost, self._began, self._here = kept, 0, time.monotonic(), 0
         self._next = self._began
@@ -60,6 +62,13 @@ class Progress:
     def __exit__(self, *_: object) -> None:
         """Leave the bar as it is."""
         self._bar.close()
+
+
+def _has_width() -> bool:
+    """Return whether stderr is a terminal with room for a bar; one of `script` or of a container may have none."""
+    with suppress(OSError):
+        return os.get_terminal_size(2).columns > 0
+    return False
 
 
 ATTEMPTS = 3
