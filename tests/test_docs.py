@@ -73,6 +73,10 @@ def test_the_example_of_a_slot_passes_its_own_test(
         ("how-to/write-a-skill.md", "skill", "wave.py:Wave"),
         ("how-to/write-a-skill.md", "skill", "elbow.py:Elbow"),
         ("how-to/write-arms.md", "upper_body", "my_arms.py:Damped"),
+        ("how-to/write-a-planner.md", "planner", "my_planner.py:Slow"),
+        ("how-to/write-a-memory.md", "memory", "my_memory.py:Mean"),
+        ("how-to/write-a-mapper.md", "mapper", "my_mapper.py:Counting"),
+        ("how-to/write-properties.md", "properties", "my_properties.py:Weighed"),
     ],
 )
 def test_an_example_keeps_the_contract_of_its_slot(
@@ -86,6 +90,23 @@ def test_an_example_keeps_the_contract_of_its_slot(
     findings = examine(candidate(slot, use)).findings
     broken = [f"{f.check}: {f.reason}" for f in findings if f.status == FAILED]
     assert [line for line in broken if not line.startswith("keeps_its_time")] == []
+
+
+def test_every_slot_has_its_contract_on_the_page() -> None:
+    page = (DOCS / "reference/contracts.md").read_text(encoding="utf-8")
+    for slot, row in SLOTS.items():
+        module = row.contract.partition(":")[0]
+        assert f"::: {module}\n" in page and f"`src/{module.replace('.', '/')}.py`" in page, slot
+
+
+def test_what_is_on_no_index_is_not_told_to_be_installed_from_one() -> None:
+    pages = [*DOCS.rglob("*.md"), DOCS.parent / "README.md"]
+    named = [
+        page.name
+        for page in pages
+        if re.search(r"pip install '?golem-humanoid(?!\[\w+\] @ file)", page.read_text())
+    ]
+    assert named == []
 
 
 def test_the_table_of_motors_is_the_robots() -> None:
