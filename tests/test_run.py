@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from golem.errors import ConfigError
 from golem.interfaces.payloads import Feedback
 from golem.run import Narrator, RunConfig, read_run, run_stack
 
@@ -74,3 +75,16 @@ def test_the_narrator_prints_each_new_sentence_once_whatever_its_figures(
         "Few are seen. Looking around.",
         "Sure to 2.0 mm.",
     ]
+
+
+def test_legs_that_do_not_balance_are_said_to_fall(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "held.yaml"
+    path.write_text("robot: {use: mujoco, support: ground}\nlower_body: {use: hold}\n")
+    with pytest.raises(ConfigError, match="not both"):
+        run_stack(RunConfig(str(path), skill="pick", operate=True))
+    assert "lower_body: hold does not balance, and the robot is on its feet" in capsys.readouterr().out
+    with pytest.raises(ConfigError, match="not both"):
+        run_stack(RunConfig("stand", skill="pick", operate=True))
+    assert capsys.readouterr().out == ""

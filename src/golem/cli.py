@@ -46,7 +46,10 @@ def _run(words: list[str]) -> int:
     if words and not words[0].startswith("-"):
         from golem.stack import load_stack
 
-        load_stack(words[0])  # refuses before the twin is imported
+        skills = load_stack(words[0]).all_skills  # refuses before the twin is imported
+        for option, name in zip(words, words[1:], strict=False):
+            if option == "--skill" and name not in skills and not name.startswith("-"):
+                raise unknown_name("skill", name, skills)
     _prepare_graphics()
     from golem.run import read_run, run_stack
     from golem.skills.base import REFUSED

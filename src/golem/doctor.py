@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from golem.errors import GolemError, MissingSystemLibrary
+from golem.errors import LOCKS, GolemError, MissingSystemLibrary
 from golem.robots.mujoco.gl import LIBRARIES
 
 DEBIAN_PACKAGES = ("libgomp1", *LIBRARIES["egl"][1].split())
@@ -48,9 +48,6 @@ EXTRAS = {
     "dev": ("pytest",),
 }
 """The importable modules of each optional extra."""
-LOCKS = {"foxglove": "record"}
-"""The lock in requirements/ that holds an extra, where it is not the one of its name."""
-
 _CHECKOUT = (Path(__file__).parents[2] / "scripts" / "bootstrap.sh").is_file()
 
 _INSTALLERS = {

@@ -20,14 +20,18 @@ class OutputError(GolemError):
     """A result cannot be written where the user asked."""
 
 
+LOCKS = {"foxglove": "record"}
+"""The lock in requirements/ that holds an extra, where it is not the one of its name."""
+
+
 class MissingExtra(GolemError):
     """An optional dependency is absent."""
 
     def __init__(self, package: str, extra: str) -> None:
         """Name the absent `package` and the `extra` whose installation brings it."""
         super().__init__(
-            f"The Python package '{package}' is not installed; install it with: "
-            f"pip install 'golem-humanoid[{extra}]'"
+            f"The Python package '{package}' is not installed; install it with: make venv-{LOCKS.get(extra, extra)} in "
+            f"a clone, or pip install 'golem-humanoid[{extra}]' where its wheel is installed"
         )
 
 

@@ -16,6 +16,7 @@ from typing import Annotated, get_type_hints
 import tyro
 from tyro.conf import Positional, arg
 
+from golem import registry
 from golem.dashboard.live import LiveView
 from golem.errors import ConfigError
 from golem.evaluation.base import TrialOutcome
@@ -107,6 +108,9 @@ def run_stack(config: RunConfig, goal_words: Sequence[str] = ()) -> SkillResult:
     stack = load_stack(config.stack, profile=config.profile)
     if config.world is not None:
         stack = stack.with_options("robot", world=config.world)
+    legs = stack.choice("lower_body").use
+    if stack.on_ground and not getattr(registry.load("lower_body", legs), "balances", True):
+        print(f"lower_body: {legs} does not balance, and the robot is on its feet: it will fall.", flush=True)
     if config.operate and config.skill is not None:
         raise ConfigError("--operate lets you start skills by hand; give it or --skill, not both.")
     if config.operate or (config.skill is None and stack.on_ground):

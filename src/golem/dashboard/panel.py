@@ -33,6 +33,17 @@ RECENT = 9
 """Stages listed in the timeline."""
 
 
+MEANING: dict[GateState, str] = {
+    GateState.INIT: "safety gate: something is missing",
+    GateState.ARMED: "safety gate: the motors damp, until it is activated",
+    GateState.ACTIVE: "safety gate: commands pass, limited",
+    GateState.STOP2: "stopped: the legs stand, the arms damp",
+    GateState.STOP1: "stopped: the motors damp",
+    GateState.STOP0: "stopped: the motors are limp",
+}
+"""What the states of the gate mean."""
+
+
 class Button(StrEnum):
     """What the operator asked for."""
 
@@ -85,7 +96,8 @@ class Panel:
         gui.set_panel_label("GOLEM")
         self._status = gui.add_html("")
         with gui.add_folder("Operator"):
-            self._stop = gui.add_button("Emergency stop", color="red", icon=Icon.HAND_STOP)
+            told = "The motors damp, and a robot on its feet sinks down. Start over sets it up again."
+            self._stop = gui.add_button("Emergency stop", color="red", icon=Icon.HAND_STOP, hint=told)
             self._release = gui.add_button("Release emergency stop", visible=False)
             self._revive = gui.add_button("Reset and activate", visible=False)
             self._pause = gui.add_button("Pause", color="gray")
@@ -183,10 +195,11 @@ def _status_html(
         f'<div style="{small};display:flex;justify-content:space-between"><span>robot time {status.t:.1f} s</span>'
         f"<span>{'paused' if paused else f'{factor:.2f} x real time'}</span></div>",
         f'<div style="margin:6px 0;padding:4px 10px;border-radius:6px;background:{colour};color:#fff">'
-        f"safety gate: <b>{escape(str(status.safety))}</b>"
-        + (f'<div style="font-size:12px">{escape(status.reason)}</div>' if status.reason else "")
-        + "</div>",
+        f"<b>{escape(MEANING[status.safety])}</b>"
+        f'<div style="font-size:12px">{escape(f"{status.safety} {status.reason}".rstrip())}</div></div>',
     ]
+    if status.safety.stopped and not note:
+        note = "Release the emergency stop, then reset and activate; a robot that fell needs Start over."
     if note:
         parts.append(f'<div style="margin:6px 0;color:#c25a10"><b>{escape(note)}</b></div>')
     if stages:

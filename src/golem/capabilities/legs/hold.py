@@ -50,7 +50,10 @@ class JointHold:
 
     Attributes:
         rate, latency, envelope, gait: see `LowerBody`.
+        balances: a robot on its feet falls with it.
     """
+
+    balances = False
 
     def __init__(self, config: HoldConfig | None = None) -> None:
         """Look up the stance of `config`.
