@@ -32,6 +32,12 @@ BROKEN = {
     "use": (["ladder", "--use", "upper_body"], "slot=implementation"),
     "stack": (["run", "nowhere"], "hall, stand, tether"),
     "run seed": (["run", "--seed", "-1"], "The seed is -1; it must be 0 or more"),
+    "bench": (["bench", "plan"], "Unknown bench 'plan'; valid: arms, dds, grasp,"),
+    "number": (["ladder", "-n", "ten"], "-n is a whole number, not 'ten'."),
+    "option of a method": (
+        ["ladder", "--method", "{use: visual_servo, gian: 3}"],
+        "Unknown option of grasp_method: visual_servo 'gian'; valid: centroid, servo.",
+    ),
     "bench seed": (["bench", "--seed", "-1"], "--seed is -1; it must be 0 or more"),
     "run profile": (["run", "--profile", "feild"], "Did you mean 'field'?"),
     "skill": (

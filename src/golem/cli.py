@@ -114,6 +114,8 @@ def _bench(words: list[str]) -> int:
     _prepare_graphics()
     if words and words[0] in BENCHES:
         return _one_of(words, "bench", "bench", BENCHES)
+    if words and not words[0].startswith("-"):
+        raise unknown_name("bench", words[0], BENCHES)
     from golem.evaluation.speed.bench import BenchConfig, run_bench
 
     run_bench(_parse(BenchConfig, "bench", words))

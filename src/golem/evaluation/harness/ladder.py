@@ -135,7 +135,8 @@ def read_ladder(words: list[str]) -> LadderConfig:
     kind = rung_class(names[-1] if names else LadderConfig.rung)
     own = (Annotated[kind.Options, arg(name="")], field(default_factory=kind.Options))
     parsed = make_dataclass("Ladder", [("options", *own)], bases=(LadderConfig,), frozen=True)
-    return cast(LadderConfig, tyro.cli(parsed, prog="golem ladder", args=words, description=_description()))
+    prog = " ".join(["golem ladder", *(f"--rung {name}" for name in names[-1:])])
+    return cast(LadderConfig, tyro.cli(parsed, prog=prog, args=words, description=_description()))
 
 
 def _description() -> str:

@@ -113,8 +113,6 @@ class KitchenRung(Rung[O]):
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
         stack = self.make_stack(method, profile, overrides)
-        for key, row in KEYS.items():
-            registry.load(row.slot, stack.choice(key).use)
         shared_context()
         return stack_facts(stack)
 

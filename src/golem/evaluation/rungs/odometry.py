@@ -140,7 +140,7 @@ class OdometryOptions:
 
     case: tuple[CaseName, ...] = ("hall-6m",)
     """Where and under what the robot walks: 6 m or 60 m through the hall, 20 m along a corridor without features; or
-    the 6 m with 3 people walking about, 30 %% of the points lost, the LiDAR turned by 1 deg, no scan for 1 s."""
+    the 6 m with 3 people walking about, 3 of 10 points lost, the LiDAR turned by 1 deg, no scan for 1 s."""
     legs: str = "almi"
     """The lower body that walks."""
     bags: str = ""

@@ -242,8 +242,7 @@ class PickRung(Rung[PickOptions]):
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
         stack = self._stack(method, profile, overrides)
-        classes = {key: registry.load(row.slot, stack.choice(key).use) for key, row in KEYS.items()}
-        if not issubclass(classes["robot"], MujocoRobot):
+        if not issubclass(registry.load("robot", stack.choice("robot").use), MujocoRobot):
             raise ConfigError(
                 f"Rung {self.name} judges on the simulator's truth; robot: {stack.choice('robot').use} is not the "
                 "twin, 'mujoco'."

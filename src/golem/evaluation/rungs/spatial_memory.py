@@ -134,8 +134,7 @@ class MemoryRung(Rung[Any]):
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
-        _make(method)
-        return stack_facts(Stack().with_choice(SLOT, method))
+        return stack_facts(Stack(profile=profile).with_choice(SLOT, method))
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return what the looks suffer."""
