@@ -13,7 +13,7 @@ import importlib
 import inspect
 import sys
 import typing
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Generator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
@@ -128,7 +128,7 @@ def _given(
 
 
 @contextmanager
-def _blamed(slot: str, use: str) -> Iterator[None]:
+def _blamed(slot: str, use: str) -> Generator[None, None, None]:
     """Turn what a user's constructor raises, which may be anything, into its fault."""
     try:
         yield

@@ -67,6 +67,6 @@ def test_the_table_counts_and_names_what_ended_the_others() -> None:
     ]
     (table,) = rung.tables({"almi": trials})
     assert table.rows == (
-        ("almi", "standing", "30", "nothing", "1 of 2", "joint_velocity ankle_pitch_joint 1"),
-        ("almi", "standing", "30", "stops", "1 of 2", "fall 1"),
+        ("almi", "standing", "30", "nothing", "1 of 2 [9.45, 90.5]", "joint_velocity ankle_pitch_joint 1"),
+        ("almi", "standing", "30", "stops", "1 of 2 [9.45, 90.5]", "fall 1"),
     )

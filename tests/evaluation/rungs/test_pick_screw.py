@@ -191,7 +191,7 @@ def test_aim_reach_and_miss_are_measured_alike() -> None:
         high[:3, 3] -= 0.05 * T[:3, 2]
         aside = T.copy()
         aside[:3, 3] += 0.05 * T[:3, 1]
-        exact, above, beside = (oracle.grasp("right", sent) for sent in (T, high, aside))
+        exact, above, beside = (oracle.grasp("right", sent, "head") for sent in (T, high, aside))
     finally:
         oracle.close()
         robot.close()

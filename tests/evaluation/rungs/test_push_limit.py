@@ -90,7 +90,8 @@ def test_the_table_says_what_was_survived_and_what_was_not_found() -> None:
         ("mine", "stack", "standing", "10", ">= 20", "10"),
         ("mine", "stack", "left swing at 0.3", "does not walk", "does not walk", "does not walk"),
     )
-    assert "20 trials" in table.title and "lost with 2 of 20" in table.note
+    assert "that 19 of 20 robots survived" in table.title and "lost with 2 of 20" in table.note
+    assert "as few as 76 %" in table.note
 
 
 def test_every_walk_has_rows_of_its_own_and_standing_has_one() -> None:
