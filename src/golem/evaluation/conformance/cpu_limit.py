@@ -18,26 +18,25 @@ PERIOD = 0.5
 
 
 class Endless(BaseException):
-    """A promise took more CPU time than it may; the text says where. Modules that catch everything let it pass."""
+    """A promise took more CPU time than it may; the text says where. It passes `except Exception` of a module."""
 
 
 @contextmanager
-def cpu_limit(limit: float | None = None) -> Generator[None, None, None]:
-    """Raise `Endless` in what runs within once this thread has spent `limit` [s], by default `LIMIT`, of CPU time.
+def cpu_limit() -> Generator[None, None, None]:
+    """Raise `Endless` in what runs within once this thread has spent `LIMIT` of CPU time.
 
     Only the main thread can be interrupted; elsewhere there is no limit. Native code ends before it is.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    most = LIMIT if limit is None else limit
     started = cpu_now()
 
     def look(number: int, frame: FrameType | None) -> None:
-        if cpu_now() - started > most:
+        if cpu_now() - started > LIMIT:
             place = caller(frame) if frame is not None else None
             where = f" and had not ended at {place}" if place else ""
-            raise Endless(f"it took more than {most:g} s of CPU time{where}")
+            raise Endless(f"it took more than {LIMIT:g} s of CPU time{where}")
 
     before = signal.signal(signal.SIGPROF, look)
     signal.setitimer(signal.ITIMER_PROF, PERIOD, PERIOD)
