@@ -13,6 +13,8 @@ import pytest
 pytest.importorskip("mcap")
 pytest.importorskip("rosbags")
 
+from mcap.writer import Writer
+
 from golem.errors import RobotGone
 from golem.interfaces import images, topics
 from golem.interfaces import ros_convert as convert
@@ -26,6 +28,7 @@ from golem.middleware.bus import News
 from golem.middleware.dds.base import LATCHED, SENSOR, Payload
 from golem.middleware.ros import codec
 from golem.middleware.ros.message import NANO
+from golem.middleware.wire import hg
 from golem.middleware.wire.convert import encode_low_state
 from golem.robots.replay.robot import ReplayRobot, ReplayRobotConfig
 from golem.robots.sensors.cameras import HEAD
@@ -153,6 +156,41 @@ def test_a_bag_without_a_robot_is_refused(tmp_path: Path) -> None:
         ReplayRobot(ReplayRobotConfig(tmp_path / "bag"))
     with pytest.raises(BagError, match="No bag at"):
         ReplayRobot(ReplayRobotConfig(tmp_path / "nothing"))
+
+
+def test_a_topic_without_a_state_is_no_robot(tmp_path: Path) -> None:
+    with (tmp_path / "none.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2", library="x")
+        schema = writer.register_schema(name="unitree_hg/msg/LowState", encoding="ros2msg", data=b"uint8 x")
+        writer.register_channel(topic="/lowstate", message_encoding="cdr", schema_id=schema)
+        writer.finish()
+    with pytest.raises(BagError, match="Nothing was published on /lowstate"):
+        ReplayRobot(ReplayRobotConfig(tmp_path / "none.mcap"))
+
+
+@pytest.mark.parametrize("what", ["checksum", "zero quaternion", "big endian", "short"])
+def test_a_damaged_state_is_named_with_its_place(what: str, tmp_path: Path) -> None:
+    scribe = Scribe(tmp_path / "bag", 0.0)
+    for k in range(600):
+        state = bytearray(encode_low_state(LowState(0.0, ZERO, ZERO, ZERO, STILL)))
+        if k == 300 and what == "checksum":
+            state[100] ^= 1
+        elif k == 300 and what == "zero quaternion":
+            at = state.find(np.array([1, 0, 0, 0], "<f4").tobytes())
+            state[at : at + 16] = bytes(16)
+            hg.STATE_CHECKSUM.seal(state)
+        elif k == 300 and what == "big endian":
+            state[1] = 0
+        elif k == 300:
+            del state[-4:]
+        scribe.write("/lowstate", "unitree_hg/msg/LowState", bytes(state), k * 0.002)
+    scribe.close()
+    robot = ReplayRobot(ReplayRobotConfig(tmp_path / "bag"))
+    with pytest.raises(BagError, match=r"bag, /lowstate 0\.600 s after its first state: ") as refusal:
+        for _ in range(600):
+            robot.advance(COMMAND, {}, 0.002)
+    assert "\n" not in str(refusal.value)
 
 
 @dataclass

@@ -1,7 +1,8 @@
 """Maps on disk: the image and YAML file of ROS's map_server, and the voxels of the same map beside them.
 
 The image has one byte per cell, its first row the last of the grid: 254 free, 0 occupied, 205 unknown. The file says
-`free_thresh: 0.196`: with Nav2's 0.25 an unknown cell would be read as free. Any thresholds are accepted on reading.
+`free_thresh: 0.196`: with Nav2's 0.25 an unknown cell would be read as free. Images are read by the rule of Nav2 from
+Jazzy on (ros-navigation/navigation2, nav2_map_server/src/map_io.cpp): what is transparent is unknown.
 """
 
 from __future__ import annotations
@@ -12,15 +13,19 @@ from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
-import cv2
 import numpy as np
 import yaml
 from numpy.typing import NDArray
+from PIL import Image
 
-from golem.errors import ConfigError, OutputError, shorten
+from golem.errors import ConfigError, OutputError
+from golem.options import read_yaml
 from golem.types import Array, PlanarPose
 
 OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
+_KINDS = ("PPM", "PNG", "BMP", "JPEG", "GIF", "TIFF", "WEBP")
+_LUMA = np.array([0.212656, 0.715158, 0.072186])
+"""Grey of red, green and blue (Rec. 709), as ImageMagick has it."""
 _WRITTEN = {0: 254, 100: 0, -1: 205}
 CLOUD = ".npz"
 """Ending of the file of the voxels, beside the YAML file of the same name."""
@@ -88,12 +93,11 @@ def load_map(path: Path) -> StoredMap:
     """
     file = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")
     try:
-        facts = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"The map '{file}' cannot be read: {error.strerror}.") from error
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        why = " ".join(str(error).split())
-        raise ConfigError(f"The map '{file}' cannot be read, it is no YAML: {shorten(why)}") from error
+        facts = read_yaml(file.read_text(encoding="utf-8"), f"The map '{file}'")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(
+            f"The map '{file}' cannot be read: {getattr(error, 'strerror', 'it is no text')}."
+        ) from error
     if not isinstance(facts, dict) or not isinstance(facts.get("image"), str):
         raise ConfigError(
             f"'{file}' is no map: a YAML file of map_server names an image, resolution and origin."
@@ -107,11 +111,21 @@ def load_map(path: Path) -> StoredMap:
     if not (isinstance(origin, list) and len(origin) == 3 and all(_finite(v) for v in origin)):
         raise ConfigError(f"The map '{file}' has the origin {origin}; it is [x, y, yaw].")
     occupied, free = _number(file, facts, "occupied_thresh", 0.65), _number(file, facts, "free_thresh", 0.25)
+    if not 0.0 <= free <= occupied <= 1.0:
+        raise ConfigError(
+            f"The map '{file}' has free_thresh {free:g} and occupied_thresh {occupied:g}; they are shares from 0 to 1, "
+            "the first no larger than the second."
+        )
+    negate = facts.get("negate", 0)
+    if not isinstance(negate, int):
+        raise ConfigError(f"The map '{file}' has the negate {negate}; it is 0 or 1.")
     mode = facts.get("mode", "trinary")
     if mode not in ("trinary", "scale", "raw"):
         raise ConfigError(f"The map '{file}' has the mode '{mode}'; choose from trinary, scale, raw.")
-    image = _image(file.parent / facts["image"])
-    cells = _cells(image, bool(facts.get("negate", 0)), occupied, free, str(mode))
+    image, opaque = _image(file.parent / facts["image"])
+    cells = _cells(image, bool(negate), occupied, free, str(mode))
+    if mode != "raw":
+        cells[~opaque[::-1]] = -1
     cloud, walls = _beside(file.with_suffix(CLOUD))
     return StoredMap(PlanarPose(*(float(v) for v in origin)), resolution, cells, cloud, walls)
 
@@ -131,26 +145,36 @@ def _beside(file: Path) -> tuple[Array, Array]:
     return cloud, walls
 
 
-def _image(file: Path) -> NDArray[np.uint8]:
-    image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE) if file.is_file() else None
-    if image is None or image.size == 0:
-        raise ConfigError(f"The image of the map, '{file}', cannot be read; it is a PGM, PNG or BMP file.")
-    return np.asarray(image, np.uint8)
+def _image(file: Path) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """Return the grey of an image, whose brightest is 255, and which pixels are opaque."""
+    try:
+        with Image.open(file, formats=_KINDS) as image:
+            if image.mode.startswith("I"):
+                grey = np.round(np.asarray(image, float) / 257.0)
+                return grey.astype(np.uint8), np.ones(grey.shape, bool)
+            pixels = np.asarray(image.convert("RGBA"))
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise ConfigError(
+            f"The image of the map, '{file}', cannot be read; it is a PGM, PNG or BMP file."
+        ) from error
+    return np.round(pixels[..., :3] @ _LUMA).astype(np.uint8), pixels[..., 3] == 255
 
 
 def _cells(
     image: NDArray[np.uint8], negate: bool, occupied: float, free: float, mode: str
 ) -> NDArray[np.int8]:
-    """Return the cells of an image, as map_server reads them; an unknown one of mode `scale` needs an alpha channel."""
-    value = image[::-1].astype(np.float64)
+    """Return the cells of an opaque image, in single precision as Nav2 has it."""
+    value = image[::-1].astype(np.float32)
     if mode == "raw":
         return np.where(value <= 100.0, value, -1.0).astype(np.int8)
-    share = value / 255.0 if negate else (255.0 - value) / 255.0
-    between = np.full(value.shape, -1.0)
+    value /= np.float32(255.0)
+    share = value if negate else np.float32(1.0) - value
+    low, high = np.float32(free), np.float32(occupied)
+    between = np.full(value.shape, -1.0, np.float32)
     if mode == "scale":
-        between = np.round(100.0 * (share - free) / max(occupied - free, 1e-9))
+        between = np.floor((share - low) / np.maximum(high - low, np.float32(1e-9)) * np.float32(100.0) + 0.5)
     # 205 is the byte of unknown, though its share is 0.19608, just above 0.196.
-    return np.where(share > occupied, 100.0, np.where(share < free, 0.0, between)).astype(np.int8)
+    return np.where(share <= low, 0.0, np.where(share >= high, 100.0, between)).astype(np.int8)
 
 
 def _finite(value: Any) -> bool:

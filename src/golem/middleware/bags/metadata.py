@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import yaml
 
+from golem.errors import ConfigError
 from golem.middleware.bags.base import BagTopic
 from golem.middleware.dds.base import DEFAULT, Qos
+from golem.options import read_yaml
 
 VERSION = 8
 FOREVER = {"sec": 9223372036, "nsec": 854775807}
@@ -81,7 +83,7 @@ def offered_qos(qos: Qos) -> str:
 def parse_qos(text: str) -> Qos:
     """Return the QoS of a topic's first writer from what rosbag2 stored; the default where it says nothing usable."""
     try:
-        profile = (yaml.safe_load(text) or [{}])[0]
+        profile = cast("Any", read_yaml(text, "QoS") or [{}])[0]
         history, reliability, durability = (profile[k] for k in ("history", "reliability", "durability"))
         depth = int(profile.get("depth") or 0)
         return Qos(
@@ -89,7 +91,7 @@ def parse_qos(text: str) -> Qos:
             durability in (TRANSIENT_LOCAL, "transient_local"),
             None if history in (KEEP_ALL, "keep_all") else max(depth, 1),
         )
-    except (yaml.YAMLError, LookupError, TypeError, ValueError, AttributeError):
+    except (ConfigError, LookupError, TypeError, ValueError, AttributeError):
         return DEFAULT
 
 

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from golem.errors import ConfigError, unknown_name
-from golem.middleware.bags.base import BagMessage, BagTopic
+from golem.middleware.bags.base import BagError, BagMessage, BagTopic
 from golem.middleware.bags.catalog import topic as describe
 from golem.middleware.bags.reader import Bag
 from golem.middleware.bags.recorder import CLOCK, CLOCK_KIND
-from golem.middleware.dds.base import ENCAPSULATION, Participant, Payload, Qos, Writer
+from golem.middleware.dds.base import ENCAPSULATION, DdsError, Participant, Payload, Qos, Writer
 from golem.middleware.ros import codec, names
 from golem.middleware.ros.message import NANO
 
@@ -62,6 +62,8 @@ class Player:
         """
         self._bag, self._participant, self._config = bag, participant, config or PlayConfig()
         for name in self._config.topics:
+            if name in bag.foreign:
+                raise ConfigError(f"{name} in {bag.path} cannot be played: {bag.foreign[name]}.")
             if name not in bag.topics:
                 raise unknown_name(f"topic in {bag.path}", name, bag.topics)
         chosen = self._config.topics or tuple(bag.topics)
@@ -74,7 +76,7 @@ class Player:
         """Play until the end, or until `stop` is set; return how many messages were written.
 
         Raises:
-            BagError: the bag is damaged.
+            BagError: the bag, or a message in it, is damaged.
             DdsError: a reader that takes nothing holds the writers up.
         """
         stop.wait(self._config.wait)
@@ -100,7 +102,11 @@ class Player:
                 stop.wait(lag)
             if stop.is_set():
                 break
-            writer.write(payload)
+            try:
+                writer.write(payload)
+            except DdsError as error:
+                where = f"{self._bag.path}, {elapsed / NANO:.3f} s after its beginning"
+                raise BagError(f"{where}: {error}") from error
             written += writer is not self._clock
         return written
 

@@ -27,6 +27,15 @@ except ModuleNotFoundError as error:
     raise missing(error) from error
 
 MAGIC = b"\x89MCAP0\r\n"
+CDR = "cdr"
+KIND = re.compile(r"\w+/(msg|srv|action)/\w+")
+CONVERT = "`rosbags-convert --src {path} --dst FOLDER --dst-storage mcap` turns it into one"
+OTHERS = {
+    b"#ROSBAG V": f"is a bag of ROS 1, not an MCAP file; {CONVERT}",
+    b"SQLite format 3": f"is a bag in SQLite, not an MCAP file; {CONVERT}",
+    b"version https://git-lfs": "is a pointer of Git LFS, not the bag itself; `git lfs pull` fetches that",
+}
+"""What a file that begins so is."""
 FRAME = struct.Struct("<BQ")
 """What precedes a record's content: opcode and length."""
 DAMAGE = (
@@ -47,7 +56,8 @@ class Bag:
 
     Attributes:
         path: its folder, or its only file.
-        topics: every topic, by name.
+        topics: every topic of ROS 2, by name.
+        foreign: what cannot be played, by the name of its topic, and why.
         custom: what else its writer said about it.
     """
 
@@ -60,6 +70,7 @@ class Bag:
         self.path = path
         self.files = [BagFile(file) for file in _files(path)]
         self.topics = {topic.name: topic for file in self.files for topic in file.topics}
+        self.foreign = {name: why for file in self.files for name, why in file.foreign.items()}
         self.custom = {key: value for file in self.files for key, value in file.custom.items()}
 
     @property
@@ -88,6 +99,7 @@ class BagFile:
     Attributes:
         path: where it is.
         finished: whether its writer completed it.
+        foreign: see `Bag`.
         custom: what its writer said about the bag.
     """
 
@@ -95,9 +107,10 @@ class BagFile:
         """Look through it; errors as for `Bag`."""
         self.path = path
         self.custom: dict[str, str] = {}
+        self.foreign: dict[str, str] = {}
         self._channels: dict[int, BagTopic] = {}
         with self._open() as file:
-            self.finished, self._end = _extent(file)
+            self.finished, self._end = _extent(path, file)
             self._indexed = self.finished and self._read_summary(file)
             if not self._indexed:
                 for _ in self._scan(file):
@@ -115,7 +128,8 @@ class BagFile:
                 yield from (m for m in self._scan(file) if topics is None or m.topic.name in topics)
                 return
             for _, channel, record in SeekingReader(file, validate_crcs=True).iter_messages(topics):
-                yield _message(self._channels[channel.id], record)
+                if channel.id in self._channels:
+                    yield _message(self._channels[channel.id], record)
 
     @contextmanager
     def _open(self) -> Iterator[IO[bytes]]:
@@ -136,7 +150,7 @@ class BagFile:
         if summary is None or not summary.chunk_indexes:
             return False
         for channel in summary.channels.values():
-            self._channels[channel.id] = _topic(channel, summary.schemas.get(channel.schema_id))
+            self._add(channel, summary.schemas.get(channel.schema_id))
         for metadata in reader.iter_metadata():
             self._take_metadata(metadata)
         return True
@@ -148,11 +162,23 @@ class BagFile:
             if isinstance(record, Schema):
                 schemas[record.id] = record
             elif isinstance(record, Channel):
-                self._channels[record.id] = _topic(record, schemas.get(record.schema_id))
+                self._add(record, schemas.get(record.schema_id))
             elif isinstance(record, Metadata):
                 self._take_metadata(record)
-            elif isinstance(record, Record):
+            elif isinstance(record, Record) and record.channel_id in self._channels:
                 yield _message(self._channels[record.channel_id], record)
+
+    def _add(self, channel: Channel, schema: Schema | None) -> None:
+        why = ""
+        if channel.message_encoding != CDR:
+            why = f"its messages are '{channel.message_encoding}', not '{CDR}'"
+        elif schema is None or not KIND.fullmatch(schema.name):
+            why = f"its type is '{'' if schema is None else schema.name}', not of the form package/msg/Name"
+        if why:
+            self.foreign[channel.topic] = why
+        else:
+            assert schema is not None
+            self._channels[channel.id] = _topic(channel, schema)
 
     def _take_metadata(self, metadata: Metadata) -> None:
         if metadata.name == CUSTOM:
@@ -174,6 +200,8 @@ def repair(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise BagError(f"{folder} is no folder; the parts of a bag are in one.")
     bag = Bag(folder)
+    if bag.foreign:
+        raise BagError(f"{folder} holds more than messages of ROS 2, which a repair would lose: {told(bag)}.")
     files: dict[str, Contents] = {}
     repaired: list[Path] = []
     try:
@@ -197,23 +225,33 @@ def repair(folder: Path) -> list[Path]:
     return repaired
 
 
+def told(bag: Bag) -> str:
+    """Return which topics cannot be played, and why."""
+    return "; ".join(f"{name}: {why}" for name, why in sorted(bag.foreign.items()))
+
+
 def _files(path: Path) -> list[Path]:
     """Return the files of a bag in the order in which they were written."""
     if path.is_file():
         return [path]
     found = sorted(path.glob("*.mcap"), key=lambda p: [int(n) for n in re.findall(r"\d+", p.stem)[-1:]])
     if not found:
+        other = next(iter([*path.glob("*.db3"), *path.glob("*.bag")]), None)
+        if other is not None:
+            return [other]
         raise BagError(f"No bag at {path}; give an MCAP file, or the folder that holds its *.mcap files.")
     return found
 
 
-def _extent(file: IO[bytes]) -> tuple[bool, int]:
+def _extent(path: Path, file: IO[bytes]) -> tuple[bool, int]:
     """Return whether a file is finished, and where its last whole record ends."""
     file.seek(0, os.SEEK_END)
     size = file.tell()
     file.seek(0)
-    if file.read(len(MAGIC)) != MAGIC:
-        raise McapError("it is no MCAP file")
+    head = file.read(32)
+    if not head.startswith(MAGIC):
+        is_ = next((what for start, what in OTHERS.items() if head.startswith(start)), "is no MCAP file")
+        raise BagError(f"{path} {is_.format(path=path)}.")
     file.seek(max(0, size - len(MAGIC)))
     if size > 2 * len(MAGIC) and file.read(len(MAGIC)) == MAGIC:
         return True, size
@@ -242,11 +280,11 @@ def _records(file: IO[bytes], end: int) -> Iterator[McapRecord]:
             return
 
 
-def _topic(channel: Channel, schema: Schema | None) -> BagTopic:
+def _topic(channel: Channel, schema: Schema) -> BagTopic:
     return BagTopic(
         channel.topic,
-        "" if schema is None else schema.name,
-        "" if schema is None else schema.data.decode(),
+        schema.name,
+        schema.data.decode(),
         parse_qos(channel.metadata.get("offered_qos_profiles", "")),
         channel.metadata.get("topic_type_hash", ""),
     )

@@ -19,10 +19,11 @@ from golem.middleware.bags.base import BagError, BagMessage
 from golem.middleware.bags.reader import Bag
 from golem.middleware.ros import codec
 from golem.middleware.ros.goals import from_time
-from golem.middleware.ros.message import NANO
+from golem.middleware.ros.message import NANO, CodecError
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo as InfoMessage
 from golem.middleware.ros.msgs.sensor_msgs import Image
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
+from golem.middleware.wire.struct_layout import WireError
 from golem.robots.base import STAMP_TOLERANCE
 from golem.robots.sensors.calibration import calibrations
 from golem.robots.sensors.cameras import CAMERAS
@@ -78,8 +79,7 @@ class Log:
         """Open the bag at `path`.
 
         Raises:
-            BagError: there is none, it is damaged, or it holds no state of a robot.
-            CodecError, WireError: a message is not what its topic says.
+            BagError: there is none, it or a message in it is damaged, or it holds no state of a robot.
         """
         self._bag = bag = Bag(path)
         if STATE not in bag.topics:
@@ -99,7 +99,12 @@ class Log:
             pairing = Pairing(partial(self._picture, name))
             self._take[public.image(name, public.COLOR)] = partial(_image, pairing.color)
             self._take[public.image(name, public.DEPTH)] = partial(_image, pairing.depth)
-        self._origin = next(bag.messages([STATE])).log_time
+        first = next(bag.messages([STATE]), None)
+        if first is None:
+            raise BagError(
+                f"Nothing was published on {STATE} in the bag {path}: it cannot stand in for a robot."
+            )
+        self._origin = first.log_time
         self._messages = bag.messages(self._take)
         self._read = self._newest = -math.inf
         self.read(0.0)
@@ -113,7 +118,11 @@ class Log:
                 self.end = self._newest
             else:
                 self._read = at
-                self._take[message.topic.name](message)
+                try:
+                    self._take[message.topic.name](message)
+                except (CodecError, WireError) as error:
+                    where = f"{self._bag.path}, {message.topic.name} {at:.3f} s after its first state"
+                    raise BagError(f"{where}: {error}") from error
         for track in (self.states, *self.hands.values(), *self.pictures.values()):
             track.at(t)
 

@@ -16,7 +16,7 @@ from golem.errors import ConfigError
 from golem.interfaces.recorded import public_topics
 from golem.middleware.bags.catalog import offered
 from golem.middleware.bags.player import PlayConfig, Player
-from golem.middleware.bags.reader import Bag, repair
+from golem.middleware.bags.reader import Bag, repair, told
 from golem.middleware.bags.recorder import Recorder
 from golem.middleware.bags.writer import BagConfig, BagWriter, Compression
 from golem.middleware.dds import discovery
@@ -150,6 +150,8 @@ def run_replay(config: ReplayBagConfig) -> int:
             "The recorder of this bag was killed; it is played up to the last chunk that is whole.",
             flush=True,
         )
+    if bag.foreign:
+        print(f"Left out: {told(bag)}.", flush=True)
     with closing(connect(config.dds, identity("replay"))) as participant, interrupted() as stop:
         # Whatever is played, it is played with a clock.
         played = play.topics or tuple(bag.topics)
