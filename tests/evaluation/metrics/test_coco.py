@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError
-from golem.evaluation.metrics.coco import LabelledImage, read_coco, score_label
+from golem.evaluation.metrics.coco import LabelledImage, score_label
+from golem.evaluation.metrics.coco_folder import read_coco
 from golem.evaluation.speed.localizer_bench import LocalizerBenchConfig, run_localizer_bench
 from golem.types import Array, Detection
 
@@ -47,7 +48,7 @@ def test_what_is_no_such_folder_is_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="it has none"):
         read_coco(tmp_path)
     (tmp_path / "a.json").write_text("[]")
-    with pytest.raises(ConfigError, match="not in COCO format"):
+    with pytest.raises(ConfigError, match="in COCO format .*; it has a.json"):
         read_coco(tmp_path)
     (tmp_path / "b.json").write_text("{}")
     with pytest.raises(ConfigError, match="a.json, b.json"):

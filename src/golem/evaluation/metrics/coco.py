@@ -1,12 +1,10 @@
-"""Folders in COCO format: images with labelled boxes, and the average precision of detections against them."""
+"""Images with labelled boxes, and the average precision of detections against them."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -26,6 +24,7 @@ class LabelledImage:
         boxes: (n, 4) x_min, y_min, x_max, y_max [px].
         ignored: numbers of the boxes that are neither asked for nor make what is found there wrong.
         crowds: those of them that hold any number of things.
+        split: what the file that lists it is named after; empty where none does.
     """
 
     path: Path
@@ -33,6 +32,7 @@ class LabelledImage:
     boxes: Array
     ignored: tuple[int, ...] = ()
     crowds: tuple[int, ...] = ()
+    split: str = ""
 
     @property
     def counted(self) -> NDArray[np.bool_]:
@@ -53,68 +53,9 @@ class LabelledImage:
         return np.ascontiguousarray(image[:, :, ::-1], np.uint8)
 
 
-class _Row(NamedTuple):
-    """One annotation."""
-
-    label: str
-    box: tuple[float, float, float, float]
-    ignored: bool
-    crowd: bool
-
-
-def read_coco(folder: Path) -> list[LabelledImage]:
-    """Return the images of a folder: its one `*.json` in COCO format, with `images`, `annotations`, `categories`.
-
-    Images are looked for beside the JSON file and in `images`. Boxes with `iscrowd` or `ignore` are ignored. Class
-    names are in small letters, with `_` for a space.
-
-    Raises:
-        ConfigError: there is no such file or more than one, or it is no such file, or an image is absent.
-    """
-    files = sorted(folder.expanduser().glob("*.json"))
-    if len(files) != 1:
-        found = ", ".join(file.name for file in files) or "none"
-        raise ConfigError(f"{folder} needs one JSON file of annotations in COCO format; it has {found}.")
-    try:
-        data = json.loads(files[0].read_text(encoding="utf-8"))
-        names = {int(c["id"]): label_of(str(c["name"])) for c in data["categories"]}
-        images = {int(image["id"]): str(image["file_name"]) for image in data["images"]}
-        rows: dict[int, list[_Row]] = {key: [] for key in images}
-        for one in data["annotations"]:
-            x, y, w, h = (float(v) for v in one["bbox"])
-            kind, image = int(one["category_id"]), int(one["image_id"])
-            if kind not in names:
-                raise ConfigError(
-                    f"{files[0]}: an annotation is of class {kind}; the categories are "
-                    f"{', '.join(f'{key} ({name})' for key, name in sorted(names.items()))}."
-                )
-            crowd = bool(one.get("iscrowd"))
-            box = (x, y, x + w, y + h)
-            rows[image].append(_Row(names[kind], box, crowd or bool(one.get("ignore")), crowd))
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ConfigError(f"{files[0]} is not in COCO format: {type(error).__name__} {error}.") from error
-    return [
-        LabelledImage(
-            _image(files[0].parent, images[key]),
-            tuple(row.label for row in rows[key]),
-            np.array([row.box for row in rows[key]]).reshape(-1, 4),
-            tuple(k for k, row in enumerate(rows[key]) if row.ignored),
-            tuple(k for k, row in enumerate(rows[key]) if row.crowd),
-        )
-        for key in sorted(images)
-    ]
-
-
 def label_of(name: str) -> str:
     """Return the label of a class as others name it: in small letters, with `_` for a space."""
     return name.lower().replace(" ", "_")
-
-
-def _image(folder: Path, name: str) -> Path:
-    for path in (folder / name, folder / "images" / name):
-        if path.is_file():
-            return path
-    raise ConfigError(f"The image {name} is neither in {folder} nor in {folder / 'images'}.")
 
 
 @dataclass(frozen=True, slots=True)
