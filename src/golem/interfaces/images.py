@@ -100,18 +100,34 @@ def camera_info(t: float, camera: Camera, frame: str) -> CameraInfo:
 
 
 def to_camera(message: CameraInfo, name: str, near: float, far: float, rate: float) -> Camera:
-    """Return the camera that a CameraInfo describes; ROS says nothing of its name, depth range [m] and rate [Hz].
+    """Return the pinhole camera that a CameraInfo describes, by its K, region and binning; see `lens` for distortion.
+
+    ROS says nothing of its name, depth range [m] and rate [Hz]. Region and binning are counted as by image_geometry
+    (ros-perception/vision_opencv, pinhole_camera_model): K is that of the whole image, both of 0 are no region, 0 is 1.
 
     Raises:
-        CodecError: a focal length is not positive, or a number is not finite.
+        CodecError: a focal length is not positive, a number is not finite, K is skewed, or the region is outside.
     """
-    fx, _, cx, _, fy, cy = message.k[:6].tolist()
+    fx, skew, cx, low, fy, cy = message.k[:6].tolist()
     finite = bool(np.isfinite([fx, fy, cx, cy]).all())
     if not (finite and fx > 0.0 and fy > 0.0 and message.width and message.height):
         raise CodecError(
             f"A camera of {message.width} x {message.height} pixels with fx {fx:g}, fy {fy:g}, cx {cx:g}, cy {cy:g}."
         )
-    return Camera(name, message.width, message.height, fx, fy, cx, cy, near, far, rate)
+    if not (abs(skew) < 1e-3 and abs(low) < 1e-3):
+        raise CodecError(
+            f"A camera with a skew of {skew or low:g} pixels; a pinhole camera's axes are square."
+        )
+    roi, bin_x, bin_y = message.roi, max(message.binning_x, 1), max(message.binning_y, 1)
+    width, height = roi.width or message.width, roi.height or message.height
+    inside = roi.x_offset + width <= message.width and roi.y_offset + height <= message.height
+    if not inside or width < bin_x or height < bin_y:
+        raise CodecError(
+            f"A region of {width} x {height} pixels at ({roi.x_offset}, {roi.y_offset}), binned {bin_x} x {bin_y}, of "
+            f"a camera of {message.width} x {message.height} pixels."
+        )
+    cx, cy = (cx - roi.x_offset) / bin_x, (cy - roi.y_offset) / bin_y
+    return Camera(name, width // bin_x, height // bin_y, fx / bin_x, fy / bin_y, cx, cy, near, far, rate)
 
 
 def to_rgb(message: Image) -> NDArray[np.uint8]:

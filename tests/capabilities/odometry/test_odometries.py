@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -72,8 +73,8 @@ def test_what_is_said_outside_of_the_lidars_imu_becomes_a_level_pose_of_the_base
     odometry = ExternalTopic()
     assert "/Odometry" in odometry.why
     for k in range(3):
-        odometry.add_legs(legs_at(0.1 * k, 0.0, waist=0.0))
-        odometry.add_external(outside(0.1 * k, 0.5 * k, np.eye(4)))
+        odometry.add_legs(legs_at(1.0 * k, 0.0, waist=0.0))
+        odometry.add_external(outside(1.0 * k, 0.5 * k, np.eye(4)))
     estimate = odometry.estimate()
     assert estimate is not None
     np.testing.assert_allclose(estimate.T_odom_base, transform((1.0, 0.0, 0.0)), atol=1e-9)
@@ -97,6 +98,81 @@ def test_who_falls_silent_outside_is_silent_inside() -> None:
     assert odometry.estimate() is not None
     odometry.add_legs(legs_at(1.0, 0.0))
     assert odometry.estimate() is None and "for 1.0 s" in odometry.why
+
+
+def drive(pose: Callable[[float], np.ndarray], rate: float = 10.0, velocity: float = 0.0) -> ExternalTopic:
+    """Tell `pose` (t -> (4, 4)) for 4 s, and return the odometry."""
+    odometry = ExternalTopic(ExternalTopicConfig(child="base_link", level=True))
+    v, zero = np.array([velocity, 0.0, 0.0]), np.zeros(3)
+    for t in np.arange(0.0, 4.0, 1.0 / rate):
+        odometry.add_legs(legs_at(t, 0.0))
+        odometry.add_external(ExternalOdometry(t, pose(t), v, zero, np.zeros((6, 6))))
+    return odometry
+
+
+def flipped(t: float) -> np.ndarray:
+    return transform((0.3 * t, 0.0, 0.0), np.diag([1.0, -1.0, -1.0]))
+
+
+IMPOSSIBLE = {
+    "a jump of 3 m": (lambda t: transform((0.3 * t + 3.0 * (t > 2.0), 0.0, 0.0)), 10.0, 0.0, "3.03 m"),
+    "a jump of 1 m": (
+        lambda t: transform((0.3 * t, 1.0 * (t > 2.0), 0.0)),
+        10.0,
+        0.0,
+        "has moved the robot 1.0",
+    ),
+    "a jump up": (lambda t: transform((0.0, 0.0, 0.9 * (t > 2.0))), 10.0, 0.0, "has moved the robot 0.90 m"),
+    "a restart at zero": (
+        lambda t: transform((1.0 * t * (t < 2.0), 0.0, 0.0)),
+        10.0,
+        0.0,
+        "has moved the robot",
+    ),
+    "100 m/s": (lambda t: transform((100.0 * t, 0.0, 0.0)), 10.0, 0.0, "has moved the robot 10.00 m"),
+    "100 m/s, 500 Hz": (lambda t: transform((100.0 * t, 0.0, 0.0)), 500.0, 0.0, "has moved the robot 0"),
+    "10 m/s": (lambda t: transform((10.0 * t, 0.0, 0.0)), 100.0, 0.0, "has moved the robot"),
+    "a turn by 180 degrees": (
+        lambda t: transform((0.0, 0.0, 0.0), rotation_rpy(0.0, 0.0, np.pi * (t > 2.0))),
+        10.0,
+        0.0,
+        "3.1 rad in 0.1",
+    ),
+    "upside down": (flipped, 10.0, 0.0, "tilted by 180 degrees"),
+    "on its side": (
+        lambda t: transform((0.0, 0.0, 0.0), rotation_rpy(1.57, 0.0, 0.0)),
+        10.0,
+        0.0,
+        "by 90 deg",
+    ),
+    "a velocity of 100 m/s": (lambda t: transform((0.3 * t, 0.0, 0.0)), 10.0, 100.0, "move at 100.0 m/s"),
+}
+
+
+@pytest.mark.parametrize("what", IMPOSSIBLE)
+def test_what_no_robot_can_do_is_not_believed(what: str) -> None:
+    pose, rate, velocity, said = IMPOSSIBLE[what]
+    odometry = drive(pose, rate, velocity)
+    assert odometry.estimate() is None
+    assert odometry.why.startswith("What comes on /Odometry has") and said in odometry.why
+    odometry.reset()
+    odometry.add_external(ExternalOdometry(9.0, np.eye(4), np.zeros(3), np.zeros(3), np.zeros((6, 6))))
+    assert odometry.estimate() is not None
+
+
+@pytest.mark.parametrize("rate", [5.0, 10.0, 50.0, 500.0])
+def test_what_a_robot_can_do_is_believed(rate: float) -> None:
+    turn = 1.5
+    odometry = drive(lambda t: transform((1.5 * t, 0.0, 0.0), rotation_rpy(0.1, 0.0, turn * t)), rate, 1.5)
+    estimate = odometry.estimate()
+    assert odometry.why == "" and estimate is not None
+    assert estimate.T_odom_base[0, 3] == pytest.approx(1.5 * estimate.t)
+
+
+def test_one_wrong_pose_passes() -> None:
+    odometry = drive(lambda t: transform((0.3 * t + 5.0 * (1.95 < t < 2.05), 0.0, 0.0)))
+    estimate = odometry.estimate()
+    assert estimate is not None and estimate.T_odom_base[0, 3] == pytest.approx(0.3 * 3.9)
 
 
 def test_a_wrong_child_is_answered_with_the_valid_ones() -> None:

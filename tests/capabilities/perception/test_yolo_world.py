@@ -86,9 +86,36 @@ def test_classes_can_be_renamed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
 
 
 def test_another_answer_is_a_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    module = network(monkeypatch, tmp_path, Session(np.zeros((1, 84, 8400))))
     with pytest.raises(ConfigError, match=r"shape \(1, 84, 8400\), not \(1, 6, n\) or \(1, n, 6\)"):
-        module.boxes(FRAME.rgb)
+        network(monkeypatch, tmp_path, Session(np.zeros((1, 84, 8400))))
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        (31.5, 31.5, 16.0, 8.0, 0.9, 1.0),  # middle, size, objectness, class score, as YOLOv5 with one class
+        (10.0, 5.0, 30.0, 30.0, 0.9, 0.97),  # one that could be corners
+        (10.0, 5.0, 30.0, 30.0, 0.9, 1.0),
+        (40.0, 20.0, 30.0, 30.0, 0.9, 0.0),
+    ],
+)
+def test_one_class_of_yolov5_is_no_corners(
+    row: tuple[float, ...], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with pytest.raises(ConfigError, match=r"\(1, 1, 6\), but not with corners, score and class"):
+        network(monkeypatch, tmp_path, Session(np.array([[row]]), "{0: 'screw'}"))
+
+
+def test_a_network_that_cannot_run_is_found_at_the_start(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def run(outputs: list[str], inputs: dict[str, Array]) -> list[Array]:
+        raise RuntimeError("INVALID_ARGUMENT")
+
+    session = Session(np.zeros((1, 300, 6)))
+    monkeypatch.setattr(session, "run", run)
+    with pytest.raises(ConfigError, match="cannot be run on an image of 640 x 640 pixels"):
+        network(monkeypatch, tmp_path, session)
 
 
 def test_a_label_it_does_not_know_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

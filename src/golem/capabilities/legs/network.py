@@ -11,6 +11,8 @@ import onnxruntime
 from numpy.typing import NDArray
 
 from golem.errors import ConfigError, MissingExtra
+from golem.robots.model.table import JOINT_NAMES
+from golem.types import LEGS
 
 Float32 = NDArray[np.float32]
 ACTIONS = 12
@@ -63,6 +65,7 @@ class OnnxNetwork:
         width = inputs[0].shape[-1] if inputs[0].shape else None
         if isinstance(width, int) and width != size:
             raise _wrong_input(path, size, str(width))
+        _check_joints(path, session.get_modelmeta().custom_metadata_map.get("joint_names", ""))
         kinds = inputs[0].type, outputs[0].type
         if kinds != ("tensor(float)", "tensor(float)"):
             raise ConfigError(
@@ -141,6 +144,17 @@ class TorchScriptNetwork:
 
 LOADERS: dict[str, Callable[[Path, int], Network]] = {".onnx": OnnxNetwork, ".pt": TorchScriptNetwork}
 """Which class reads a file, by its ending."""
+
+
+def _check_joints(path: Path, said: str) -> None:
+    """Raise where the joints that an export names, e.g. of mjlab, do not have this robot's order."""
+    names = [name.strip(" '\"").removesuffix("_joint") for name in said.strip("[]()").split(",")]
+    own = [name.removesuffix("_joint") for name in JOINT_NAMES[LEGS]]
+    if said and [name for name in names if name in own] != own:
+        raise ConfigError(
+            f"The network {path} names its joints in another order ({', '.join(names[:3])}, ...); a leg policy's are "
+            f"{', '.join(own)}."
+        )
 
 
 def _wrong_input(path: Path, size: int, found: str) -> ConfigError:

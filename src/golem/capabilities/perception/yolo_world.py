@@ -69,7 +69,7 @@ class YoloWorld:
         """Load the network.
 
         Raises:
-            ConfigError: the file is absent, no network, or no such export.
+            ConfigError: the file is absent, no network, no such export, or cannot be run.
         """
         self.config = config
         self.latency = config.latency
@@ -97,6 +97,9 @@ class YoloWorld:
         self.classes = tuple(config.rename.get(name, name.lower().replace(" ", "_")) for name in names)
         self._name, self._outputs = inputs[0].name, [outputs[0].name]
         self._size = (_side(shape[2]), _side(shape[3]))
+        self.boxes(
+            np.full((*self._size, 3), GREY, np.uint8)
+        )  # what cannot run, or answers otherwise, is found now
 
     def boxes(self, image: NDArray[np.uint8]) -> list[Box]:
         """Return all boxes in an image, (height, width, 3) RGB, best first.
@@ -105,7 +108,12 @@ class YoloWorld:
             ConfigError: the network's answer has another shape than such an export's.
         """
         x, scale, shift = letterbox(image, self._size)
-        answer = np.asarray(self._session.run(self._outputs, {self._name: x})[0], np.float64)
+        try:
+            answer = np.asarray(self._session.run(self._outputs, {self._name: x})[0], np.float64)
+        except Exception as error:  # onnxruntime's errors have no common base
+            raise ConfigError(
+                f"{self.config.weights} cannot be run on an image of {x.shape[3]} x {x.shape[2]} pixels."
+            ) from error
         corners, scores, classes = self._read(answer)
         corners = (corners - np.tile(shift, 2)) / scale - 0.5
         found: list[Box] = []
@@ -141,7 +149,16 @@ class YoloWorld:
             half = rows[:, 2:4] / 2.0
             corners = np.column_stack([rows[:, :2] - half, rows[:, :2] + half])
         elif answer.ndim == 3 and answer.shape[2] == 6:
-            corners, scores, classes = answer[0, :, :4], answer[0, :, 4], answer[0, :, 5].astype(np.int64)
+            corners, scores, numbers = answer[0, :, :4], answer[0, :, 4], answer[0, :, 5]
+            told = scores > 0.0
+            odd = (numbers[told] % 1.0 > 0.0) | (numbers[told] >= count)
+            if odd.any() or (corners[told, 2:] < corners[told, :2]).any():
+                raise ConfigError(
+                    f"{self.config.weights} answers with shape {answer.shape}, but not with corners, score and class: "
+                    f"a box ends before it begins, or a class is none of its {count} (YOLOv5 answers so). Export it "
+                    "with nms=True."
+                )
+            classes = np.where(np.isfinite(numbers), numbers, -1.0).astype(np.int64)
         else:
             raise ConfigError(
                 f"{self.config.weights} answers with shape {answer.shape}, not (1, {4 + count}, n) or (1, n, 6)."

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from golem.errors import RobotGone
 from golem.interfaces import images, public
+from golem.interfaces.lens import Lens, to_lens
 from golem.middleware.bags.base import BagError, BagMessage
 from golem.middleware.bags.reader import Bag
 from golem.middleware.ros import codec
@@ -28,7 +29,7 @@ from golem.robots.base import STAMP_TOLERANCE
 from golem.robots.sensors.calibration import calibrations
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.pairing import Pairing
-from golem.types import SIDES, Array, CameraInfo, HandCommand, HandState, Imu, LowCommand, LowState, Side
+from golem.types import SIDES, Array, HandCommand, HandState, Imu, LowCommand, LowState, Side
 
 T = TypeVar("T")
 STATE, STATIC = "/lowstate", "/tf_static"
@@ -90,7 +91,8 @@ class Log:
         self.states: Track[LowState] = Track()
         self.hands: dict[Side, Track[HandState]] = {side: Track() for side in SIDES}
         self.end: float | None = None
-        self.cameras, self.calibration = _cameras(bag)
+        self._lenses, self.calibration = _cameras(bag)
+        self.cameras = {name: lens.camera for name, lens in self._lenses.items()}
         self.pictures: dict[str, Track[Picture]] = {name: Track() for name in self.cameras}
         self._take: dict[str, Callable[[BagMessage], None]] = {STATE: self._state}
         for side in SIDES:
@@ -139,25 +141,26 @@ class Log:
 
     def _picture(self, camera: str, color: Image, depth: Image) -> None:
         t = self._time(from_time(color.header.stamp))
-        self.pictures[camera].add(t, (images.to_rgb(color), images.to_depth(depth)))
+        picture = self._lenses[camera].straighten(images.to_rgb(color), images.to_depth(depth))
+        self.pictures[camera].add(t, picture)
 
 
 def _image(take: Callable[[Image], None], message: BagMessage) -> None:
     take(codec.deserialize(message.payload, Image))
 
 
-def _cameras(bag: Bag) -> tuple[dict[str, CameraInfo], dict[str, Array]]:
+def _cameras(bag: Bag) -> tuple[dict[str, Lens], dict[str, Array]]:
     """Return the recorded cameras and their calibration; what ROS does not say of a camera, its table does."""
     infos = {public.image(name, public.CAMERA_INFO): name for name in CAMERAS}
     recorded = [topic for topic in infos if topic in bag.topics]
-    found: dict[str, CameraInfo] = {}
+    found: dict[str, Lens] = {}
     claimed: dict[str, Array] = {}
     for message in bag.messages((STATIC,)):
         claimed |= calibrations(codec.deserialize(message.payload, TFMessage))
     for message in bag.messages(recorded):
         nominal = CAMERAS[infos[message.topic.name]]
         info = codec.deserialize(message.payload, InfoMessage)
-        found[nominal.name] = images.to_camera(info, nominal.name, nominal.near, nominal.far, nominal.rate)
+        found[nominal.name] = to_lens(info, nominal.name, nominal.near, nominal.far, nominal.rate)
         if len(found) == len(recorded):
             break
     return found, {name: claimed.get(name, np.eye(4)) for name in found}

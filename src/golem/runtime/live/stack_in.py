@@ -10,6 +10,7 @@ from typing import Generic, TypeVar
 
 from golem.interfaces import images, public, topics
 from golem.interfaces import ros_convert as convert
+from golem.interfaces.lens import Lens, to_lens
 from golem.interfaces.payloads import Exposure, GateState, GateStatus
 from golem.middleware.bus import Bus, Topic
 from golem.middleware.ros.future import Future
@@ -24,7 +25,7 @@ from golem.runtime.live.node_setup import log_line
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.live.sim_sync import SILENCE
 from golem.runtime.perception_nodes import detection_requested
-from golem.types import TICK, CameraInfo
+from golem.types import TICK
 
 T = TypeVar("T")
 
@@ -43,7 +44,7 @@ class CameraIn:
         self._bus, self._endpoints, self._camera = bus, endpoints, camera
         self._wanted = detection_requested(bus, camera)
         self._open: list[Subscription] = []
-        self._info: CameraInfo | None = None
+        self._lens: Lens | None = None
         self._pairing = Pairing(self._take)
 
     def step(self, t: float) -> None:
@@ -71,16 +72,18 @@ class CameraIn:
 
     def _take_info(self, message: sensor_msgs.CameraInfo) -> None:
         known = CAMERAS[self._camera]
-        self._info = images.to_camera(message, self._camera, known.near, known.far, known.rate)
+        self._lens = to_lens(message, self._camera, known.near, known.far, known.rate)
 
     def _take(self, color: sensor_msgs.Image, depth: sensor_msgs.Image) -> None:
-        info, rgb, metres = self._info, images.to_rgb(color), images.to_depth(depth)
-        if info is not None and rgb.shape[:2] == metres.shape == (info.height, info.width):
+        lens, rgb, metres = self._lens, images.to_rgb(color), images.to_depth(depth)
+        if lens is not None and rgb.shape[:2] == metres.shape == (lens.camera.height, lens.camera.width):
             t = convert.seconds(color.header.stamp)
             if t > self._t + AHEAD:
                 self._warn(t)
                 return
-            self._bus.publish(topics.exposures(self._camera), Exposure(t, info, rgb, metres), t)
+            self._bus.publish(
+                topics.exposures(self._camera), Exposure(t, lens.camera, *lens.straighten(rgb, metres)), t
+            )
 
     def _warn(self, t: float) -> None:
         if not self._warned:
