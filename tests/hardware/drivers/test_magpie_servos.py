@@ -243,6 +243,60 @@ def test_what_a_servo_says_is_wrong_with_it_is_raised(hand: Hand, bit: int, text
     assert not hand.faults
 
 
+def shut_down(hand: Hand, servo: SimulatedAx12, bit: int) -> None:
+    """Let a servo that holds a part do what an AX-12A does by itself: no torque."""
+    hand.grip()
+    servo.error = bit
+    servo.table[34:36] = b"\0\0"
+    hand.run(0.1)
+    assert text_of(hand, bit)
+
+
+def text_of(hand: Hand, bit: int) -> bool:
+    return ("overload" if bit == 0x20 else "overheated") in hand.faults[-1][1]
+
+
+@pytest.mark.parametrize("bit", [0x20, 0x04])
+@pytest.mark.parametrize("clears", [False, True], ids=["its error stays", "its error goes"])
+def test_a_servo_that_shut_itself_down_is_left_alone(hand: Hand, bit: int, clears: bool) -> None:
+    shut_down(hand, hand.b, bit)
+    if clears:
+        hand.b.error = 0
+    hand.run(1.0)
+    assert hand.b.word(34) == 0 and hand.a.word(34) > 0
+    assert hand.faults[-1][0] == pytest.approx(hand.t) and text_of(hand, bit)
+    assert hand.reports[-1].t < hand.t - 0.9
+
+
+def test_another_gap_ends_a_shutdown(hand: Hand) -> None:
+    shut_down(hand, hand.b, 0x20)
+    hand.b.error = 0
+    hand.driver.command(HandCommand(0.0, 0.0, 9.0))  # the same gap with another force is no new command
+    for _ in range(50):
+        hand.t += DT
+        with pytest.raises(HandFault, match="overload"):
+            hand.driver.step(hand.t)
+        hand.bus.step(hand.t, DT)
+    assert hand.b.word(34) == 0
+    hand.controller.open(0.08)
+    hand.run(0.05)
+    hand.faults.clear()
+    hand.run(0.05)
+    assert hand.b.word(34) > 0 and not hand.faults and hand.reports[-1].t > hand.t - 0.02
+
+
+def test_power_that_was_off_ends_a_shutdown(hand: Hand) -> None:
+    shut_down(hand, hand.b, 0x20)
+    hand.b.dead = True
+    hand.run(0.2)
+    hand.b.dead, hand.b.error = False, 0
+    hand.b.power_up()
+    hand.run(0.05)
+    hand.faults.clear()
+    hand.run(0.1)
+    assert hand.b.word(34) > 0 and not hand.faults
+
+
 def test_nothing_moves_before_the_first_command() -> None:
     bus = SimulatedBus({i: SimulatedAx12(i, 400.0) for i in (1, 2)})
     driver = MagpieServos(MagpieServoConfig(bus.line.name), bus.connect)

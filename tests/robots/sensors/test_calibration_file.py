@@ -59,7 +59,7 @@ def test_a_zero_that_cannot_be_one_is_refused(tmp_path: Path) -> None:
     rows = json.loads(path.read_text())
     rows["cameras"] = {"nose": rows["cameras"]["head"]}
     path.write_text(json.dumps(rows))
-    with pytest.raises(ConfigError, match="a camera is unknown"):
+    with pytest.raises(ConfigError, match="it has the camera nose; valid: head"):
         read_calibration(path)
 
 
@@ -71,8 +71,46 @@ def test_a_lidar_comes_back_and_a_wild_one_is_refused(tmp_path: Path) -> None:
         back is not None and (back.pose == mount.pose).all() and (back.covariance == mount.covariance).all()
     )
     replace(example(), lidar=replace(mount, pose=pose(np.full(6, 0.5)))).save(path)
-    with pytest.raises(ConfigError, match=r"or is 0\.3 m off"):
+    with pytest.raises(ConfigError, match="the LiDAR is 0.866025 m off its place"):
         read_calibration(path)
+
+
+def turned(angle: float) -> np.ndarray:
+    return pose(np.array([0.0, 0.0, angle, 0.0, 0.0, 0.0]))
+
+
+def shifted(x: float) -> np.ndarray:
+    T = np.eye(4)
+    T[0, 3] = x
+    return T
+
+
+@pytest.mark.parametrize("what", ["camera", "LiDAR"])
+@pytest.mark.parametrize(
+    ("T", "said"),
+    [
+        (shifted(12.0), "12 m off its place; .* may be millimetres"),
+        (shifted(-0.4), "0.4 m off its place"),
+        (np.diag([1.0, -1.0, 1.0, 1.0]), "is mirrored"),
+        (np.diag([-1.0, -1.0, -1.0, 1.0]), "is mirrored"),
+        (np.diag([1.0, 1.0, 2.0, 1.0]), "has no rotation"),
+        (np.diag([1000.0, 1000.0, 1000.0, 1.0]), "has no rotation"),
+        (np.zeros((4, 4)), "has no .4, 4. pose"),
+        (np.eye(3), "has no .4, 4. pose"),
+        (shifted(np.nan), "has no .4, 4. pose"),
+        (turned(1.0), "moves what is 1 m away by more than 0.3 m"),
+        (np.diag([1.0, -1.0, -1.0, 1.0]), "moves what is 1 m away"),
+    ],
+)
+def test_a_mount_that_cannot_be_one_is_refused(what: str, T: np.ndarray, said: str, tmp_path: Path) -> None:
+    one = example()
+    if what == "camera":
+        one = replace(one, cameras={"head": T})
+    else:
+        one = replace(one, lidar=LidarMount(T, 1e-6 * np.eye(6)))
+    one.save(tmp_path / "c.json")
+    with pytest.raises(ConfigError, match=f"the {what}.* {said}"):
+        read_calibration(tmp_path / "c.json")
 
 
 def test_how_far_a_lidar_moves_what_it_sees_is_that_of_random_directions() -> None:

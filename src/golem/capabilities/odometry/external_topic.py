@@ -133,7 +133,7 @@ class ExternalTopic(Ignores):
         speed = float(np.linalg.norm(odometry.velocity))
         if speed > SPEED or np.linalg.norm(odometry.rate) > TURNING:
             return f"has the robot move at {speed:.1f} m/s and {np.linalg.norm(odometry.rate):.1f} rad/s"
-        for t, before in (self._recent[0], self._recent[-1]) if self._recent else ():
+        for t, before in (self._recent[-1], self._recent[0]) if self._recent else ():
             dt = odometry.t - t
             way = float(np.linalg.norm(T[:3, 3] - before[:3, 3]))
             turned = float(np.arccos(np.clip(0.5 * (np.sum(before[:3, :3] * T[:3, :3]) - 1.0), -1.0, 1.0)))

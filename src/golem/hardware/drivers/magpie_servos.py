@@ -3,8 +3,10 @@
 The servos hold the force by themselves: their torque limit is its ceiling, as in the twin. A closing finger is sent
 beyond its stop by as much as the servo is soft, so that both press with their full force wherever the part stands.
 
-Everything a servo forgets without power is written again and again: one that has been off would else come back with its
-full torque and speed. What was not read is no report: a hand that does not answer raises.
+Each answer also holds goal, speed and torque limit. What a servo forgot without power is so written again: it would
+else come back with its full torque and speed. One that shut itself down, after an overload or too hot, has set its
+torque limit to 0, and writing would revive it: it is left alone until it is told another gap, or its power was off.
+What was not read is no report: a hand that does not answer raises.
 
 Registers and units are those of the ROBOTIS e-manual, AX-12A. The force law, load of an AX-12A <-> force of one finger,
 was measured by the lab (its driver magpie_control), F in N, L the load or torque limit, 0 to 1023:
@@ -70,12 +72,13 @@ RANGE = 300.0
 
 SETTINGS = 24
 """Address of what `settings` writes: torque enable to torque limit."""
-STATE = 36
-"""Address of what `decode` reads: present position to present temperature."""
+TOLD = 30
+"""Address of what is read: goal position, speed and torque limit, then what `decode` takes, from address 36."""
+TOLD_SIZE = 6
 STATE_SIZE = 8
-"""Bytes of it."""
-MAX_READ = 14
-"""Bytes from `STATE` to the end of the table."""
+"""Bytes of either: present position to present temperature."""
+MAX_READ = 20
+"""Bytes from `TOLD` to the end of the table."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +102,7 @@ class Ax12State:
 
 
 def decode(data: bytes) -> Ax12State:
-    """Return what the `STATE_SIZE` bytes from `STATE` say; more bytes may follow.
+    """Return what the `STATE_SIZE` bytes from present position on say; more bytes may follow.
 
     Raises:
         ValueError: they say something that no AX-12A reports.
@@ -142,6 +145,8 @@ ANSWER = 0.005
 """Time in which a servo answers [s]: on the wire 0.7 ms, the rest is for the adapter and the operating system."""
 LOST = 0.050
 """Time without an answer from which a servo is lost [s]: eight questions."""
+SHUTDOWN = 0x24
+"""Error bits after which an AX-12A takes its torque away, as it comes (Alarm Shutdown 36): overheated, overload."""
 REOPEN = 1.0
 """Time between two attempts to open a port that is gone [s]."""
 EDGE = 4.0
@@ -202,6 +207,29 @@ class _Finger:
         self.state: Ax12State | None = None
         self.heard = -math.inf
         self.trouble = ""
+        self.settings = b""
+        self.due = self.shut = self._taken = False
+
+    def tell(self, settings: bytes) -> None:
+        """Take what it is told; another goal than before ends a shutdown."""
+        if settings[6:8] != self.settings[6:8]:
+            self.shut, self._taken = False, False
+        self.due |= settings != self.settings
+        self.settings = settings
+
+    def heed(self, packet: StatusPacket) -> None:
+        """Take the errors of an answer, and what the servo says that it was told."""
+        told, own = packet.parameters[:TOLD_SIZE], self.settings[6:]
+        limp = not any(told[4:6])
+        down = bool(packet.error & SHUTDOWN) or (limp and self._taken)
+        if down or not limp:  # one that has torque, and says nothing of an error, was without power
+            self.shut = down
+        self._taken |= told == own
+        self.due |= told != own != b"" and (not limp or (any(told) and not self._taken))
+        if not self.shut:
+            self.trouble = packet.trouble
+        elif packet.trouble or not self.trouble:
+            self.trouble = packet.trouble or "it has taken its torque away"
 
     def goal(self, gap: float) -> int:
         """Return the position for a `gap` [m] that is not 0, at a distance from the finger's stops."""
@@ -253,7 +281,6 @@ class MagpieServos:
         self._port: SerialPort | None = connect(config.port, BAUD)
         self._parser = StatusParser()
         self._fingers = (_Finger(config.a), _Finger(config.b))
-        self._settings: bytes = b""
         self._asked: tuple[_Finger, int, float] | None = None
         self._turn = self._size = 0
         self._reported = self._retry = -math.inf
@@ -275,11 +302,9 @@ class MagpieServos:
             raise ValueError(f"A hand is told finite numbers, not {command}.")
         force = min(max(command.force, magpie_model.MIN_FORCE), magpie_model.MAX_FORCE)
         c, limit = self.config, load_from_force(force)
-        settings: dict[int, bytes] = {}
         for finger in self._fingers:
             goal = finger.goal(command.gap) if command.gap > 0.0 else finger.closed(c.slope)
-            settings[finger.config.id] = servo_settings(goal, c.speed, limit, c.margin, c.slope)
-        self._settings = sync_write_packet(SETTINGS, settings)
+            finger.tell(servo_settings(goal, c.speed, limit, c.margin, c.slope))
 
     def step(self, t: float) -> HandState | None:
         """Exchange what there is to exchange at `t` [s]; return a report when one is complete, every 10 ms.
@@ -335,10 +360,13 @@ class MagpieServos:
     def _ask(self, port: SerialPort, t: float) -> None:
         finger = self._fingers[self._turn]
         # Each question asks for another number of bytes, so that the answer to an earlier one is known as such.
-        self._size = (self._size + 1) % (MAX_READ - STATE_SIZE + 1)
-        size = STATE_SIZE + self._size
-        settings = self._settings if self._turn == 0 else b""
-        port.write(settings + read_packet(finger.config.id, STATE, size))
+        self._size = (self._size + 1) % (MAX_READ - TOLD_SIZE - STATE_SIZE + 1)
+        size = TOLD_SIZE + STATE_SIZE + self._size
+        due = [f for f in self._fingers if f.due and not f.shut] if self._turn == 0 else []
+        settings = sync_write_packet(SETTINGS, {f.config.id: f.settings for f in due}) if due else b""
+        for f in due:
+            f.due = False
+        port.write(settings + read_packet(finger.config.id, TOLD, size))
         self._asked, self._turn = (finger, size, t), 1 - self._turn
 
     def _answer(self, packet: StatusPacket, t: float) -> None:
@@ -351,11 +379,12 @@ class MagpieServos:
             self.lost += 1
             return
         try:
-            finger.state = decode(packet.parameters)
+            finger.state = decode(packet.parameters[TOLD_SIZE:])
         except ValueError as error:
             finger.trouble = f"reports nonsense ({error})"
             return
-        finger.trouble, finger.heard = packet.trouble, t
+        finger.heed(packet)
+        finger.heard = t
 
 
 def _ticks(angle: float) -> int:

@@ -34,7 +34,7 @@ def calibrations(message: TFMessage) -> dict[str, Array]:
 
 
 FARTHEST = 0.3
-"""By how much the mount of a LiDAR can move what is 1 m away [m]: more is no mount's error."""
+"""By how much the mount of a sensor can move what is 1 m away [m]: more is no mount's error."""
 
 
 def _none() -> Array:
@@ -163,17 +163,36 @@ def read_calibration(path: Path) -> Calibration:
             f"'{path}' is no calibration: {error!r}; golem calibrate head writes one."
         ) from error
     unknown = [name for name in cameras if name not in OPTICAL_FRAMES]
-    if unknown or any(T.shape != (4, 4) or not np.isfinite(T).all() for T in cameras.values()):
-        raise ConfigError(f"'{path}' is no calibration: a camera is unknown, or its pose no (4, 4) matrix.")
-    if lidar is not None and not (
-        lidar.pose.shape == (4, 4) and lidar.covariance.shape == (6, 6) and lidar.moved(1.0) < FARTHEST
-    ):
+    if unknown:
         raise ConfigError(
-            f"'{path}' is no calibration: the LiDAR has no (4, 4) pose, no (6, 6) covariance, or is {FARTHEST:g} m off."
+            f"'{path}' is no calibration: it has the camera {unknown[0]}; valid: {', '.join(OPTICAL_FRAMES)}."
         )
+    mounts = [(f"the camera {name}", T, covariances[name]) for name, T in cameras.items()]
+    mounts += [] if lidar is None else [("the LiDAR", lidar.pose, lidar.covariance)]
+    for what, T, covariance in mounts:
+        if wrong := _wrong(T, covariance):
+            raise ConfigError(f"'{path}' is no calibration: {what} {wrong}.")
     if not np.isfinite(offset).all() or np.abs(offset).max() > 0.3:
         raise ConfigError(f"'{path}' shifts a joint by more than 0.3 rad: that is no encoder's zero.")
     return found
+
+
+def _wrong(T: Array, covariance: Array) -> str:
+    """Return what is wrong with the pose of a mount (4, 4) and its covariance (6, 6); empty where nothing is."""
+    if T.shape != (4, 4) or not np.isfinite(T).all() or not np.array_equal(T[3], [0.0, 0.0, 0.0, 1.0]):
+        return "has no (4, 4) pose of finite numbers"
+    R, away = T[:3, :3], float(np.linalg.norm(T[:3, 3]))
+    if not np.allclose(R @ R.T, np.eye(3), atol=1e-4):
+        return "has no rotation: its axes are not square and of length 1"
+    if np.linalg.det(R) < 0.0:
+        return "is mirrored: its axes are left-handed"
+    if away > FARTHEST:
+        return f"is {away:g} m off its place; no mount is more than {FARTHEST:g} m off, so these may be millimetres"
+    if math.sqrt((3.0 - np.trace(R)) * 2.0 / 3.0 + away**2) > FARTHEST:
+        return f"moves what is 1 m away by more than {FARTHEST:g} m"
+    if covariance.shape != (6, 6) or not np.isfinite(covariance).all():
+        return "has no (6, 6) covariance of finite numbers"
+    return ""
 
 
 @dataclass(frozen=True)
