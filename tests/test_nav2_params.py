@@ -6,9 +6,11 @@ from typing import Any
 
 import pytest
 import yaml
-from tests.sources import ROOT
+from tests.sources import SOURCE
 
-PARAMS: dict[str, Any] = yaml.safe_load((ROOT / "docs/how-to/nav2_params.yaml").read_text(encoding="utf-8"))
+PARAMS: dict[str, Any] = yaml.safe_load(
+    (SOURCE.parents[1] / "docs/how-to/nav2_params.yaml").read_text(encoding="utf-8")
+)
 TWIST = ("controller_server", "behavior_server", "velocity_smoother", "collision_monitor", "docking_server")
 """Servers that write or read velocities (nav2_bringup navigation_launch.py of Jazzy and Kilted)."""
 ASKED = {
