@@ -48,7 +48,7 @@ def test_wrong_options_are_answered_in_one_sentence(
 
 def test_a_world_without_screws_is_named(tmp_path: Path) -> None:
     mine = tmp_path / "mine.yaml"
-    mine.write_text("robot: {use: mujoco, support: ground, world: open}\nestimator: random_walk_kf\n")
+    mine.write_text("robot: {use: mujoco, support: ground, world: open}\nlower_body: almi\n")
     with pytest.raises(ConfigError, match="no screws; give one with 'world: pack'"):
         run_demo(DemoConfig(stack=str(mine), headless=True, out=tmp_path / "demo"))
 

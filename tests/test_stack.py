@@ -155,12 +155,30 @@ def test_a_robot_on_its_feet_falls_back_on_legs_that_balance() -> None:
     assert chosen.choice("fallback") == Choice("hold", {"stance": "crouch"})
 
 
+@pytest.mark.parametrize(
+    "legs",
+    [
+        "",
+        "lower_body: {use: hold, stance: crouch}",
+        "lower_body: {use: golem.capabilities.legs.hold:JointHold}",
+        "lower_body: {use: handover, walk: {use: almi}, stand: {use: hold}}",
+        "lower_body: almi\nfallback: hold",
+    ],
+)
+def test_a_robot_on_its_feet_has_legs_that_carry_it(legs: str) -> None:
+    with pytest.raises(ConfigError, match=r"stands on its feet: choose almi, .*standing: true"):
+        parse_stack(f"{GROUND}\n{legs}", "x").check()
+    parse_stack(legs, "x").check() if "handover" not in legs and "almi" not in legs else None
+    for sound in ("lower_body: almi", "lower_body: {use: hold, standing: true}"):
+        parse_stack(f"{GROUND}\n{sound}", "x").check()
+
+
 def test_a_robot_on_its_feet_is_not_taken_to_hang() -> None:
     assert Stack().choice("estimator") == Choice("tether")
     assert parse_stack(GROUND, "x").choice("estimator") == Choice("random_walk_kf")
     with pytest.raises(ConfigError, match="estimator 'tether' .*'hoist', .* stands .*random_walk_kf, invar"):
         parse_stack(f"{GROUND}\nestimator: tether", "x").check()
-    parse_stack(GROUND, "x").check()
+    parse_stack(f"{GROUND}\nlower_body: almi", "x").check()
     Stack().check()
 
 

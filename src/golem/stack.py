@@ -130,6 +130,8 @@ class Stack:
     def check(self) -> None:
         """Check every module: it is one of its slot, has its options, and gets from the robot what it `requires`.
 
+        Legs must carry a robot that stands on its feet.
+
         Raises:
             ConfigError: one is not, does not, or cannot be loaded.
             ModuleFault: importing one raised.
@@ -147,6 +149,19 @@ class Stack:
                 registry.check(row.slot, choice.use, choice.options)
         for choice in self.skills.values():
             registry.check(registry.SKILL, choice.use, choice.options)
+
+        if self.on_ground:
+            for key in ("lower_body", "fallback", *(("onboard",) if self.onboard_client else ())):
+                for choice in self.choice(key).all:
+                    self._check_legs(key, choice)
+
+    def _check_legs(self, key: str, choice: Choice) -> None:
+        carries = getattr(registry.load("lower_body", choice.use), "carries", None)
+        if carries is not None and not carries(choice.options):
+            raise ConfigError(
+                f"The {key} '{choice.use}' lets the legs hang, and this robot stands on its feet: choose almi, another "
+                f"that walks, or {{use: {choice.use}, standing: true}} for legs that only stand."
+            )
 
     def with_choice(self, key: str, use: str | Choice) -> Stack:
         """Return a copy with another implementation under `key`.

@@ -222,14 +222,19 @@ def test_legs_on_the_ground_say_what_torque_they_want() -> None:
     assert CheckedLowerBody(JointHold(), contract).check(untold) is untold
 
 
-def test_legs_on_the_ground_without_a_torque_go_to_the_fallback() -> None:
+def test_legs_on_the_ground_without_a_torque_go_to_the_fallback(tmp_path: Path) -> None:
     robot = {"support": "ground", "world": "open"}
-    choices = {"robot": Choice("mujoco", robot), "lower_body": Choice("hold"), "fallback": Choice("wbc")}
+    use = tmp_path / "untold.py"
+    use.write_text(
+        "from golem.capabilities.legs.hold import JointHold\nclass Untold(JointHold):\n    carries = None\n"
+    )
+    legs = {"lower_body": Choice(f"{use}:Untold"), "fallback": Choice("wbc")}
+    choices = {"robot": Choice("mujoco", robot), **legs}
     running, twin = build(Stack(choices, profile="ideal"), seed=0)
     try:
         running.executor.run(0.01)
         fault = status(running).fault
-        assert fault is not None and "lower_body: hold failed: tau is None" in fault
+        assert fault is not None and "Untold failed: tau is None" in fault
         assert status(running).controller == "wbc"
     finally:
         twin.close()

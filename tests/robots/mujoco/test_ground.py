@@ -210,6 +210,41 @@ def test_the_robot_of_another_file_stands_on_the_same_floor(tmp_path: Path) -> N
     other.close()
 
 
+@pytest.mark.parametrize("world", ["open", "slope"])
+def test_what_stands_around_the_robot_in_its_file_is_left_out(world: str, tmp_path: Path) -> None:
+    spec = mujoco.MjSpec.from_string(export_mjcf(hands=False))
+    spec.add_texture(name="floor", type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=1, width=8, height=8)
+    textures = [""] * 10
+    textures[1] = "floor"
+    spec.add_material(name="floor", textures=textures)
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    spec.worldbody.add_geom(name="floor", type=plane, size=[0, 0, 0.05], material="floor")
+    spec.worldbody.add_geom(type=plane, size=[5, 5, 0.05], pos=[0, 0, 0.3])  # one that would carry it higher
+    spec.worldbody.add_light(name="sun", pos=[0, 0, 3])
+    spec.worldbody.add_body(name="table", pos=[0.3, 0, 0.5]).add_geom(size=[0.2, 0.2, 0.2])
+    (tmp_path / "robot.xml").write_text(spec.to_xml())
+    other, ours = twin(mjcf=str(tmp_path / "robot.xml"), world=world), twin(world=world)
+    assert weight(other) == pytest.approx(weight(ours), rel=1e-6)
+    model, own = other.scene.model, ours.scene.model
+    fixed = [sum(m.geom_bodyid == 0) for m in (model, own)]
+    assert fixed[0] == fixed[1] and not any(model.body(b).name == "table" for b in range(model.nbody))
+    other.release()
+    run(other, 1.0)
+    assert load(other) == pytest.approx(weight(other), rel=0.02)
+    other.close()
+
+
+def test_a_robot_whose_names_are_the_worlds_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    spec = mujoco.MjSpec.from_string(export_mjcf(hands=False))
+    spec.body("pelvis").add_geom(name="floor", size=[0.01, 0.01, 0.01])
+    (tmp_path / "robot.xml").write_text(spec.to_xml())
+    with pytest.raises(
+        ConfigError, match="does not fit into the world 'open': .*repeated name 'floor'"
+    ) as error:
+        twin(mjcf=str(tmp_path / "robot.xml"))
+    assert "\n" not in str(error.value)
+
+
 def test_a_file_that_is_no_such_robot_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "robot.xml"
     with pytest.raises(ConfigError, match="cannot be read"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,6 +80,11 @@ class JointHold:
         self._kd: Array = np.tile(np.asarray(self.config.kd), 2)
         self._tau = np.zeros(LEGS.stop) if self.config.standing else None
         self._q: Array = self._goal.copy()
+
+    @staticmethod
+    def carries(options: Mapping[str, object]) -> bool:
+        """Return whether legs with these options of the stack file carry the robot."""
+        return bool(options.get("standing"))
 
     def reset(self, state: LowState) -> None:
         """Start from the measured leg joints of `state`."""

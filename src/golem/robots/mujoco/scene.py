@@ -94,7 +94,20 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
     Raises:
         ConfigError: an option of `config` has no meaning, or its MJCF is no robot of this kind.
     """
-    spec = _robot(config)
+    try:
+        return _build(_robot(config), config, layout, profile, seed)
+    except ValueError as error:
+        if config.mjcf is None:
+            raise
+        why = " ".join(str(error).split())
+        raise ConfigError(
+            f"The robot '{config.mjcf}' does not fit into the world '{config.world}': {why}."
+        ) from error
+
+
+def _build(
+    spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profile: RealismProfile, seed: int
+) -> Scene:
     draws: list[ScrewDraw] = []
     people: tuple[Person, ...] = ()
     kitchen: KitchenLayout | None = None
@@ -197,6 +210,7 @@ def foreign_robot(path: Path) -> mujoco.MjSpec:
         ConfigError: see `read_robot`.
     """
     spec = read_robot(path)
+    _strip_world(spec)
     for element in (*spec.sensors, *spec.cameras):
         spec.delete(element)
     for geom in spec.geoms:
@@ -212,6 +226,20 @@ def foreign_robot(path: Path) -> mujoco.MjSpec:
     for side in SIDES:
         mjcf.add_hand(spec, side)
     return spec
+
+
+def _strip_world(spec: mujoco.MjSpec) -> None:
+    """Leave out all of a robot's file that stands around the robot, its ground for one: the world is ours."""
+    world, base = spec.worldbody, spec.body(BASE_LINK)
+    others = [body for body in world.bodies if body.name != base.name]
+    for element in (*world.geoms, *world.lights, *world.sites, *others):
+        spec.delete(element)
+    used = {geom.material for geom in spec.geoms}
+    for material in [m for m in spec.materials if m.name not in used]:
+        spec.delete(material)
+    used = {name for material in spec.materials for name in material.textures}
+    for texture in [t for t in spec.textures if t.name not in used]:
+        spec.delete(texture)
 
 
 def _add_payload(hand: mujoco.MjsBody, mass: float) -> None:
