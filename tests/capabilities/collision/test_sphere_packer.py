@@ -8,7 +8,7 @@ import trimesh
 
 from golem.capabilities.collision.packing_report import coverage
 from golem.capabilities.collision.sphere_packer import SphereKind, pack
-from golem.capabilities.collision.surface import LinkSurface, link_surface
+from golem.capabilities.collision.surface import LinkSurface, link_surface, open_edges
 from golem.errors import ConfigError
 from golem.robots.model.link_geometry import SurfacePart
 
@@ -56,12 +56,36 @@ def test_a_packing_is_the_same_each_time() -> None:
     assert np.array_equal(one.centres, other.centres) and np.array_equal(one.radii, other.radii)
 
 
-def test_meshes_that_bound_no_volume_are_refused() -> None:
+@pytest.mark.parametrize("missing", [1, 2, 4])
+def test_holes_are_closed_and_named(missing: int) -> None:
     box = trimesh.creation.box(extents=(0.1, 0.1, 0.1))
-    with pytest.raises(ConfigError, match="'lid' has an open mesh: 3 of its 18 edges"):
-        link_surface(
-            "lid", [SurfacePart(np.asarray(box.vertices, float), np.asarray(box.faces[1:], np.int64))]
-        )
+    vertices, faces = np.asarray(box.vertices, float), np.asarray(box.faces, np.int64)
+    whole = link_surface("box", [SurfacePart(vertices, faces)])
+    holed = link_surface("box", [SurfacePart(vertices, faces[missing:])])
+    assert open_edges(vertices, faces) == 0 and open_edges(vertices, faces[missing:]) >= 3
+    assert holed.volume == pytest.approx(whole.volume, rel=0.01 if missing < 4 else 0.6)
+    assert (holed.height(np.zeros((1, 3))) < 0.0).all()
+
+
+def test_edges_that_join_four_faces_are_no_hole() -> None:
+    one = trimesh.creation.box(extents=(0.1, 0.1, 0.1))
+    other = one.copy()
+    other.apply_translation((0.1, 0.1, 0.0))
+    both = trimesh.util.concatenate([one, other])
+    vertices, faces = np.asarray(both.vertices, float), np.asarray(both.faces, np.int64)
+    assert not trimesh.Trimesh(vertices, faces).is_watertight and open_edges(vertices, faces) == 0
+    assert link_surface("pair", [SurfacePart(vertices, faces)]).volume == pytest.approx(0.002, rel=0.05)
+
+
+def test_a_plate_is_covered_though_it_has_no_inside() -> None:
+    plate = np.array([[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0], [0, 0.1, 0]], float)
+    surface = link_surface("plate", [SurfacePart(plate, np.array([[0, 1, 2], [0, 2, 3]], np.int64))])
+    packing = pack(surface, "conservative", 0.006, 30)
+    assert packing.gap(surface.points).max() <= 0.0 and packing.radii.max() < 0.05
+
+
+def test_meshes_that_are_not_finite_are_refused() -> None:
+    box = trimesh.creation.box(extents=(0.1, 0.1, 0.1))
     vertices = np.asarray(box.vertices, float).copy()
     vertices[0, 0] = np.nan
     with pytest.raises(ConfigError, match="'lid' has a mesh with vertices that are not finite"):

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 
 from golem.capabilities.collision import sphere_kernel, world_kernel
-from golem.capabilities.collision.link_poses import joint_names, joint_pose
+from golem.capabilities.collision.link_poses import joint_names, joint_value
 from golem.capabilities.collision.obstacles import World
 from golem.capabilities.collision.sphere_robot import SphereRobot, sphere_columns
 from golem.errors import ConfigError, unknown_name
+from golem.robots.model.link_geometry import joint_pose
 from golem.types import Array
 
 CLUSTER = 6
@@ -67,6 +68,11 @@ class CollisionModel:
         for name in (*self.joints, *(held or {})):
             if name not in every:
                 raise unknown_name("joint", name, every)
+        led = [link for link in robot.links if link.leader in self.joints]
+        if led:
+            raise ConfigError(
+                f"Joint '{led[0].joint}' follows '{led[0].leader}', which can only be held here, not moved."
+            )
         if len(set(self.joints)) != len(self.joints):
             raise ConfigError(f"A joint occurs twice among {', '.join(self.joints)}.")
         self.robot = robot
@@ -140,7 +146,7 @@ class CollisionModel:
             T_above = np.eye(4) if link.parent < 0 else T_body_link[link.parent]
             if link.kind == "fixed" or link.joint not in column:
                 body[i] = above
-                T_body_link[i] = T_above @ joint_pose(link, held.get(link.joint, 0.0))
+                T_body_link[i] = T_above @ joint_pose(link, joint_value(link, held))
                 continue
             j = column[link.joint]
             T_link_axis = np.eye(4)

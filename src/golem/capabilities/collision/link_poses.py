@@ -8,26 +8,25 @@ from dataclasses import replace
 import numpy as np
 
 from golem.errors import unknown_name
-from golem.robots.model.link_geometry import LinkGeometry
+from golem.robots.model.link_geometry import LinkGeometry, joint_pose
 from golem.types import Array
 
 
+def free_links(links: Sequence[LinkGeometry]) -> list[LinkGeometry]:
+    """Return the links whose joints move and follow no other, in order."""
+    return [link for link in links if link.kind != "fixed" and not link.leader]
+
+
 def joint_names(links: Sequence[LinkGeometry]) -> list[str]:
-    """Return the names of the joints that move, in the order of the links."""
-    return [link.joint for link in links if link.kind != "fixed"]
+    """Return the names of the joints that move by themselves, in the order of the links."""
+    return [link.joint for link in free_links(links)]
 
 
-def joint_pose(link: LinkGeometry, q: float) -> Array:
-    """Return the (4, 4) pose of a link in its parent with its joint at `q` [rad or m]."""
-    T = np.eye(4)
-    if link.kind == "slide":
-        T[:3, 3] = q * link.axis
-    elif link.kind == "hinge":
-        x, y, z = link.axis
-        K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        T[:3, :3] = np.eye(3) + np.sin(q) * K + (1.0 - np.cos(q)) * (K @ K)
-        T[:3, 3] = link.anchor - T[:3, :3] @ link.anchor
-    return link.T_parent_link @ T
+def joint_value(link: LinkGeometry, q: Mapping[str, float]) -> float:
+    """Return the position of a link's joint [rad or m] where the free joints are at `q`; those not named are at 0."""
+    if link.leader:
+        return link.ratio * q.get(link.leader, 0.0) + link.offset
+    return q.get(link.joint, 0.0)
 
 
 def link_poses(links: Sequence[LinkGeometry], q: Array) -> Array:
@@ -38,19 +37,15 @@ def link_poses(links: Sequence[LinkGeometry], q: Array) -> Array:
         q: one position per joint of `joint_names` [rad or m].
     """
     poses = np.empty((len(links), 4, 4))
-    column = 0
+    values = dict(zip(joint_names(links), (float(v) for v in q), strict=True))
     for i, link in enumerate(links):
-        value = 0.0
-        if link.kind != "fixed":
-            value = float(q[column])
-            column += 1
-        local = joint_pose(link, value)
+        local = joint_pose(link, joint_value(link, values))
         poses[i] = local if link.parent < 0 else poses[link.parent] @ local
     return poses
 
 
 def hold_joints(links: Sequence[LinkGeometry], held: Mapping[str, float]) -> tuple[LinkGeometry, ...]:
-    """Return the links with some joints fixed at a position [rad or m].
+    """Return the links with some joints, and those that follow them, fixed at a position [rad or m].
 
     Raises:
         ConfigError: no link hangs on a joint of that name.
@@ -60,8 +55,10 @@ def hold_joints(links: Sequence[LinkGeometry], held: Mapping[str, float]) -> tup
         if name not in names:
             raise unknown_name("joint", name, names)
     return tuple(
-        replace(link, kind="fixed", joint="", T_parent_link=joint_pose(link, held[link.joint]))
-        if link.joint in held and link.kind != "fixed"
+        replace(
+            link, kind="fixed", joint="", leader="", T_parent_link=joint_pose(link, joint_value(link, held))
+        )
+        if (link.leader or link.joint) in held and link.kind != "fixed"
         else link
         for link in links
     )

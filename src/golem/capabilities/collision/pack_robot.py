@@ -9,19 +9,26 @@ alarms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 import tyro
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
+from tqdm import tqdm
 
-from golem.capabilities.collision.link_poses import hold_joints, joint_names, link_poses, neighbours
+from golem.capabilities.collision.link_poses import (
+    free_links,
+    hold_joints,
+    joint_names,
+    link_poses,
+    neighbours,
+)
 from golem.capabilities.collision.mesh_oracle import MeshOracle
 from golem.capabilities.collision.packing_report import (
     CollisionScore,
@@ -35,13 +42,15 @@ from golem.capabilities.collision.sphere_robot import (
     save_spheres,
     without_surfaces,
 )
-from golem.capabilities.collision.surface import link_surface
+from golem.capabilities.collision.surface import link_surface, open_edges
 from golem.errors import ConfigError
 from golem.robots.model.link_geometry import LinkGeometry, h12_geometry, read_geometry
 from golem.robots.model.magpie_model import FINGERS, finger_names
+from golem.robots.model.mesh_file import package_folders
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, SIDES, Array
 
+T = TypeVar("T")
 ALWAYS = 0.9
 """Share of the postures in which links touch that count as always touching."""
 NEAR = 0.15
@@ -68,7 +77,7 @@ def sample_postures(links: Sequence[LinkGeometry], n: int, seed: int, still: Seq
         still: joints that stay at zero.
     """
     rng = np.random.default_rng(seed)
-    moving = [link for link in links if link.kind != "fixed"]
+    moving = free_links(links)
     lower, upper = np.array([link.lower for link in moving]), np.array([link.upper for link in moving])
     around = np.clip(ZERO_SPREAD * rng.standard_normal((n // 2, len(moving))), lower, upper)
     postures = np.concatenate([around, rng.uniform(lower, upper, (n - n // 2, len(moving)))])
@@ -101,7 +110,7 @@ def find_pairs(links: Sequence[LinkGeometry], packings: Sequence[Packing], postu
     assert postures.shape[1] == len(joint_names(links))
     poses = np.array([link_poses(links, q) for q in postures])
     oracle = MeshOracle(links, every)
-    touching = np.array([oracle.touching(q) for q in postures])
+    touching = np.array([oracle.touching(q) for q in _bar("postures", postures)])
     first = np.cumsum([0, *(len(p.radii) for p in packings)])
     centres = [
         np.einsum("nij,kj->nki", poses[:, i, :3, :3], p.centres) + poses[:, i, None, :3, 3]
@@ -179,6 +188,8 @@ class SpheresConfig:
     """A sphere need not stand out less [m]."""
     geometry: Literal["visual", "collision"] = "visual"
     """Which surfaces of a link count."""
+    package: tuple[str, ...] = ()
+    """Folders of ROS packages as NAME=FOLDER; others are looked for above the file and in the paths of ROS."""
     postures: int = 3000
     """Postures that find the pairs, and as many others that judge them."""
     still: tuple[str, ...] = JOINT_NAMES[LEGS]
@@ -201,13 +212,14 @@ def run_spheres(config: SpheresConfig) -> PackedRobot:
     """Pack, print the report and write the file.
 
     Raises:
-        ConfigError: a number is out of range, or the file cannot be read, has no geometry or an open mesh.
+        ConfigError: a number is out of range, or the file cannot be read or has no geometry.
     """
     if config.file is None:
         name, links = our_robot()
     else:
-        geometry = read_geometry(config.file, config.geometry)
+        geometry = read_geometry(config.file, config.geometry, package_folders(config.package))
         name, links = geometry.name, geometry.links
+        _tell(links)
     packed = pack_robot(name, links, config)
     _print(packed)
     if config.out is not None:
@@ -225,7 +237,7 @@ def pack_robot(name: str, links: tuple[LinkGeometry, ...], config: SpheresConfig
         config: how; `file` and `out` are not looked at.
 
     Raises:
-        ConfigError: a number is out of range, or a mesh is open.
+        ConfigError: a number is out of range, or a mesh is not finite.
     """
     solid = [i for i, link in enumerate(links) if link.parts]
     if config.spheres < LEAST * len(solid):
@@ -235,7 +247,7 @@ def pack_robot(name: str, links: tuple[LinkGeometry, ...], config: SpheresConfig
         )
     if not config.tolerance > 0.0 or config.postures < 2:
         raise ConfigError("--tolerance must be positive, and --postures 2 or more.")
-    surfaces = {i: link_surface(links[i].name, links[i].parts, config.seed) for i in solid}
+    surfaces = {i: link_surface(links[i].name, links[i].parts, config.seed) for i in _bar("surfaces", solid)}
     weight = {i: float(len(s.points) * s.step**2) ** SHARE for i, s in surfaces.items()}
     spare = config.spheres - LEAST * len(solid)
     share = {i: LEAST + int(spare * w / sum(weight.values())) for i, w in weight.items()}
@@ -245,7 +257,7 @@ def pack_robot(name: str, links: tuple[LinkGeometry, ...], config: SpheresConfig
             pack(surfaces[i], kind, config.tolerance, share[i], config.seed)
             if i in surfaces
             else Packing(np.zeros((0, 3)), np.zeros(0))
-            for i in range(len(links))
+            for i in _bar("spheres", range(len(links)))
         )
 
     packings = packed_as("conservative")
@@ -263,6 +275,28 @@ def pack_robot(name: str, links: tuple[LinkGeometry, ...], config: SpheresConfig
     return PackedRobot(
         robot, tuple(report), score_collisions(robot, links, table.pairs, judged), table.always
     )
+
+
+def _bar(what: str, things: Collection[T]) -> Iterable[T]:
+    """Return things that show on a terminal how many are done."""
+    return tqdm(things, desc=what, disable=None, leave=False)
+
+
+def _tell(links: Sequence[LinkGeometry]) -> None:
+    """Print what of a file is not as its author may think."""
+    rows = {
+        "No surface": [link.name for link in links if not link.parts],
+        "Held, its limits are equal": [x.joint for x in links if x.kind != "fixed" and x.lower == x.upper],
+        "Follows": [f"{link.joint} ({link.leader})" for link in links if link.leader],
+        "Holes closed": [
+            f"{link.name} ({count} edges)"
+            for link in _bar("holes", links)
+            if (count := sum(open_edges(part.vertices, part.faces) for part in link.parts))
+        ],
+    }
+    for what, names in rows.items():
+        if names:
+            print(f"{what}: {', '.join(names)}.")
 
 
 def our_robot() -> tuple[str, tuple[LinkGeometry, ...]]:

@@ -69,6 +69,7 @@ def save_spheres(robot: SphereRobot, file: Path) -> None:
                 "T_parent_link": link.T_parent_link[:3].round(12).tolist(),
                 "spheres": spheres.round(5).tolist(),
             }
+            | ({"follows": [link.leader, link.ratio, link.offset]} if link.leader else {})
         )
     head = {"format": FORMAT, "robot": robot.name, "kind": robot.kind}
     lines = [json.dumps(head)[:-1], ' "links": [\n  ' + ",\n  ".join(json.dumps(row) for row in rows) + "]"]
@@ -99,8 +100,18 @@ def load_spheres(file: Path = H12_SPHERES) -> SphereRobot:
             lower, upper = row["range"]
             links.append(
                 LinkGeometry(
-                    row["name"], row["parent"], T, row["joint"], row["kind"], axis, anchor, lower, upper, ()
-                )
+                    row["name"],
+                    row["parent"],
+                    T,
+                    row["joint"],
+                    row["kind"],
+                    axis,
+                    anchor,
+                    lower,
+                    upper,
+                    (),
+                    *row.get("follows", ()),
+                )  # fmt: skip
             )
             spheres = np.array(row["spheres"], float).reshape(-1, 4)
             packings.append(Packing(spheres[:, :3].copy(), spheres[:, 3].copy()))

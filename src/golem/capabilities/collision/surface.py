@@ -1,6 +1,7 @@
 """The outer surface of a link: samples of what can be touched, and the signed distance from it.
 
 Parts of a link overlap. So inside and outside come from voxels: what a flood from the border does not reach is inside.
+Holes are capped before: spheres of an open link are those of the closed one, and a plate is one without an inside.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from golem.errors import ConfigError
@@ -69,15 +72,13 @@ def link_surface(name: str, parts: Sequence[SurfacePart], seed: int = 0) -> Link
         seed: of the samples.
 
     Raises:
-        ConfigError: a mesh is not finite, or is open.
+        ConfigError: a mesh is not finite.
     """
     import trimesh  # 27 MB, for packing only
 
     if not all(np.isfinite(p.vertices).all() for p in parts):
         raise ConfigError(f"Link '{name}' has a mesh with vertices that are not finite.")
-    meshes = [trimesh.Trimesh(p.vertices, p.faces, process=True) for p in parts]
-    for mesh in meshes:
-        _refuse_open(name, mesh)
+    meshes = [_capped(trimesh.Trimesh(p.vertices, p.faces, process=True)) for p in parts]
     low = np.min([m.bounds[0] for m in meshes], axis=0)
     high = np.max([m.bounds[1] for m in meshes], axis=0)
     step = float(np.clip((high - low).max() / VOXELS, *VOXEL_SIZE))
@@ -124,10 +125,31 @@ def _count(mesh: trimesh.Trimesh, step: float) -> int:
     return int(max(DENSITY * mesh.area / step**2, 200))
 
 
-def _refuse_open(name: str, mesh: trimesh.Trimesh) -> None:
-    if not mesh.is_watertight:
-        edges, count = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
-        raise ConfigError(
-            f"Link '{name}' has an open mesh: {int((count != 2).sum())} of its {len(edges)} edges do not join two "
-            "faces. Close its holes, or choose the other surfaces with --geometry."
-        )
+def open_edges(vertices: Array, faces: NDArray[np.int64]) -> int:
+    """Return how many edges of a mesh belong to one face only: those of its holes."""
+    import trimesh
+
+    return len(_rim(trimesh.Trimesh(vertices, faces, process=True)))
+
+
+def _rim(mesh: trimesh.Trimesh) -> NDArray[np.int64]:
+    """Return the edges (n, 2) of a mesh that belong to one face only."""
+    edges, count = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
+    return edges[count == 1]
+
+
+def _capped(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return a mesh whose holes are closed, each by triangles from its rim to the middle of that."""
+    import trimesh
+
+    rim = _rim(mesh)
+    if not len(rim):
+        return mesh
+    graph = coo_matrix((np.ones(len(rim)), (rim[:, 0], rim[:, 1])), shape=(len(mesh.vertices),) * 2)
+    hole = connected_components(graph, directed=False)[1][rim[:, 0]]
+    number, hole = np.unique(hole, return_inverse=True)
+    middles = np.array([mesh.vertices[np.unique(rim[hole == k])].mean(axis=0) for k in range(len(number))])
+    caps = np.column_stack([rim, len(mesh.vertices) + hole])
+    return trimesh.Trimesh(
+        np.concatenate([mesh.vertices, middles]), np.concatenate([mesh.faces, caps]), process=False
+    )

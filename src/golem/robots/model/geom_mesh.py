@@ -13,6 +13,15 @@ if TYPE_CHECKING:
     import trimesh
 
 
+_NAMES = {
+    mujoco.mjtGeom.mjGEOM_BOX: "box",
+    mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
+    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
+    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
+}
+
+
 def geom_mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
     """Return the surface of one geom in the geom's own frame [m].
 
@@ -32,18 +41,32 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
     if kind == mujoco.mjtGeom.mjGEOM_PLANE:
         corners = np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
         return trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]])
-    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+    if kind not in _NAMES:
+        raise NotImplementedError(f"geom {geom} is a {kind.name}")
+    return primitive(_NAMES[kind], x, y, z)
+
+
+def primitive(name: str, x: float, y: float, z: float) -> trimesh.Trimesh:
+    """Return the surface of a shape about its middle [m].
+
+    Args:
+        name: box, sphere, ellipsoid, cylinder or capsule.
+        x: half side, or radius.
+        y: half side, or half length along z.
+        z: half side.
+    """
+    import trimesh
+
+    if name == "box":
         return trimesh.creation.box(extents=(2 * x, 2 * y, 2 * z))
-    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+    if name == "sphere":
         return trimesh.creation.icosphere(subdivisions=3, radius=x)
-    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+    if name == "ellipsoid":
         sphere = trimesh.creation.icosphere(subdivisions=3)
         return trimesh.Trimesh(sphere.vertices * (x, y, z), sphere.faces)
-    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+    if name == "cylinder":
         return trimesh.creation.cylinder(radius=x, height=2 * y, sections=24)
-    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        return trimesh.creation.capsule(radius=x, height=2 * y, count=(24, 12))
-    raise NotImplementedError(f"geom {geom} is a {kind.name}")
+    return trimesh.creation.capsule(radius=x, height=2 * y, count=(24, 12))
 
 
 def pose_matrix(position: Array, quaternion: Array) -> Array:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -49,6 +51,8 @@ class LinkGeometry:
         anchor: (3,) point on a hinge's axis in the link [m].
         lower, upper: range [rad or m]; +-pi or +-1 m where the file gives none.
         parts: its surface.
+        leader: name of the joint that this one follows, by a <mimic> or the like; empty where it is free.
+        ratio, offset: of such a joint: its position is ratio times that of the leader, plus the offset [rad or m].
     """
 
     name: str
@@ -61,6 +65,9 @@ class LinkGeometry:
     lower: float
     upper: float
     parts: tuple[SurfacePart, ...]
+    leader: str = ""
+    ratio: float = 1.0
+    offset: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,20 +81,42 @@ class RobotGeometry:
     links: tuple[LinkGeometry, ...]
 
 
-def read_geometry(file: Path, choice: GeometryChoice = "visual") -> RobotGeometry:
+def read_geometry(
+    file: Path, choice: GeometryChoice = "visual", packages: Mapping[str, Path] | None = None
+) -> RobotGeometry:
     """Read a URDF or MJCF file.
 
     Args:
-        file: the file; meshes are STL or OBJ, beside it or where it says.
+        file: the file.
         choice: which surfaces.
+        packages: folders of ROS packages by name; others are looked for, see `mesh_file.find_mesh`.
 
     Raises:
-        ConfigError: the file cannot be read, has a joint that is no hinge or slide, or no surface at all.
+        ConfigError: the file cannot be read, has a joint that is no hinge or slide, or no surface at all; of a URDF all
+            that is wrong is named.
     """
+    from golem.robots.model.urdf_geometry import read_urdf
+
+    if choice not in GEOMETRY_CHOICES:
+        raise unknown_name("choice of surfaces", choice, GEOMETRY_CHOICES)
+    try:
+        root = ET.fromstring(file.read_bytes())
+    except (OSError, ET.ParseError, ValueError, LookupError) as error:
+        why = getattr(error, "strerror", None) or f"it is no XML ({error})"
+        raise ConfigError(f"Cannot read '{file}' as URDF or MJCF: {why}.") from error
+    if root.tag == "robot":
+        return read_urdf(root, file, choice, packages or {})
+    if root.tag != "mujoco":
+        raise ConfigError(f"Cannot read '{file}' as URDF or MJCF: its root is <{root.tag}>.")
     try:
         spec = mujoco.MjSpec.from_file(str(file))
         spec.compiler.discardvisual = False
         spec.compiler.fusestatic = False
+        # Spheres need no inertia: what the dynamics would refuse, plates for one, is let through.
+        spec.compiler.balanceinertia = True
+        spec.compiler.boundmass = spec.compiler.boundinertia = 1e-6
+        for mesh in spec.meshes:
+            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
         model = spec.compile()
     except (ValueError, OSError, mujoco.FatalError) as error:
         raise ConfigError(f"Cannot read '{file}' as URDF or MJCF: {' '.join(str(error).split())}") from error
@@ -105,8 +134,6 @@ def geometry_of(model: mujoco.MjModel, name: str, choice: GeometryChoice) -> Rob
     Raises:
         ConfigError: see `read_geometry`.
     """
-    if choice not in GEOMETRY_CHOICES:
-        raise unknown_name("choice of surfaces", choice, GEOMETRY_CHOICES)
     roots = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0]
     lone = roots[0] if len(roots) == 1 else None
     links: list[LinkGeometry] = []
@@ -132,11 +159,46 @@ def geometry_of(model: mujoco.MjModel, name: str, choice: GeometryChoice) -> Rob
             )
             parent, T = len(links) - 1, np.eye(4)
         last[body] = len(links) - 1
-    if not any(link.parts for link in links):
+    links, wrong = led(links)
+    if wrong:
+        raise ConfigError(f"'{name}' cannot be read as a robot: {'; '.join(wrong)}.")
+    return with_surface(RobotGeometry(name, tuple(links)))
+
+
+def led(links: Sequence[LinkGeometry]) -> tuple[list[LinkGeometry], list[str]]:
+    """Return the links, each joint that follows another led by a free one, and what is wrong with the leaders."""
+    by_joint = {link.joint: link for link in links if link.joint}
+    found: list[LinkGeometry] = []
+    wrong: list[str] = []
+    for link in links:
+        own, seen = link, {link.joint}
+        while own.leader:
+            above = by_joint.get(own.leader)
+            if above is None or above.joint in seen:
+                wrong.append(
+                    f"joint '{link.joint}' follows '{own.leader}', which is no joint that moves by itself"
+                )
+                break
+            if not above.leader:
+                break
+            seen.add(above.joint)
+            ratio, offset = own.ratio * above.ratio, own.ratio * above.offset + own.offset
+            own = replace(own, leader=above.leader, ratio=ratio, offset=offset)
+        found.append(own)
+    return found, wrong
+
+
+def with_surface(robot: RobotGeometry) -> RobotGeometry:
+    """Return the robot.
+
+    Raises:
+        ConfigError: none of its links has a surface.
+    """
+    if not any(link.parts for link in robot.links):
         raise ConfigError(
-            f"'{name}' has no geometry: none of its links has a mesh or a shape to cover with spheres."
+            f"'{robot.name}' has no geometry: none of its links has a mesh or a shape to cover with spheres."
         )
-    return RobotGeometry(name, tuple(links))
+    return robot
 
 
 def _link(name: str, parent: int, T: Array, parts: tuple[SurfacePart, ...]) -> LinkGeometry:
@@ -155,7 +217,50 @@ def _moved(
         upper = float(np.pi) if kind == "hinge" else 1.0
         lower = -upper
     axis, anchor = model.jnt_axis[joint].copy(), model.jnt_pos[joint].copy()
-    return LinkGeometry(name, parent, T, title, kind, axis, anchor, lower, upper, parts)
+    link = LinkGeometry(
+        name, parent, T, title, kind, axis, anchor, lower, upper, parts, *_leader(model, joint)
+    )
+    # The file's pose is that at the joint's `ref`.
+    return replace(link, T_parent_link=joint_pose(link, -float(model.qpos0[model.jnt_qposadr[joint]])))
+
+
+def _leader(model: mujoco.MjModel, joint: int) -> tuple[str, float, float]:
+    """Return the joint that an active equality lets `joint` follow, with ratio and offset; see `LinkGeometry`.
+
+    Raises:
+        ConfigError: it follows by a polynomial that is no line.
+    """
+    for k in range(model.neq):
+        if (
+            model.eq_type[k] != mujoco.mjtEq.mjEQ_JOINT
+            or not model.eq_active0[k]
+            or model.eq_obj1id[k] != joint
+        ):
+            continue
+        other, line = int(model.eq_obj2id[k]), model.eq_data[k, :5]
+        if other < 0 or line[2:].any():
+            raise ConfigError(f"Joint '{model.joint(joint).name}' follows no other by a straight line.")
+        own, lead = (float(model.qpos0[model.jnt_qposadr[j]]) for j in (joint, other))
+        # MuJoCo's line is between the ways from `ref`.
+        return (
+            model.joint(other).name or f"joint_{other}",
+            float(line[1]),
+            float(own + line[0] - line[1] * lead),
+        )
+    return "", 1.0, 0.0
+
+
+def joint_pose(link: LinkGeometry, q: float) -> Array:
+    """Return the (4, 4) pose of a link in its parent with its joint at `q` [rad or m]."""
+    T = np.eye(4)
+    if link.kind == "slide":
+        T[:3, 3] = q * link.axis
+    elif link.kind == "hinge":
+        x, y, z = link.axis
+        K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        T[:3, :3] = np.eye(3) + np.sin(q) * K + (1.0 - np.cos(q)) * (K @ K)
+        T[:3, 3] = link.anchor - T[:3, :3] @ link.anchor
+    return link.T_parent_link @ T
 
 
 def _parts(model: mujoco.MjModel, body: int, choice: GeometryChoice) -> tuple[SurfacePart, ...]:
