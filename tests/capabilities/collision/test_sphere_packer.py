@@ -63,7 +63,7 @@ def test_holes_are_closed_and_named(missing: int) -> None:
     whole = link_surface("box", [SurfacePart(vertices, faces)])
     holed = link_surface("box", [SurfacePart(vertices, faces[missing:])])
     assert open_edges(vertices, faces) == 0 and open_edges(vertices, faces[missing:]) >= 3
-    assert holed.volume == pytest.approx(whole.volume, rel=0.01 if missing < 4 else 0.6)
+    assert holed.volume == pytest.approx(whole.volume, rel=0.1 if missing < 4 else 0.6)
     assert (holed.height(np.zeros((1, 3))) < 0.0).all()
 
 
