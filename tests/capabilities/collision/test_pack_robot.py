@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from golem.capabilities.collision.collision_model import CollisionModel
 from golem.capabilities.collision.link_poses import hold_joints, joint_names, link_poses
 from golem.capabilities.collision.pack_robot import SpheresConfig, run_spheres
 from golem.capabilities.collision.packing_report import spheres_collide
-from golem.capabilities.collision.sphere_robot import load_spheres
+from golem.capabilities.collision.sphere_robot import load_spheres, sphere_columns
 from golem.errors import ConfigError
 from golem.robots.model.link_geometry import read_geometry
 
@@ -62,6 +63,43 @@ def test_a_joint_that_is_held_stays_where_it_is(model: Path) -> None:
     assert link_poses(held, np.array([0.2])) == pytest.approx(link_poses(links, np.array([0.4, 0.2])))
     with pytest.raises(ConfigError, match="Unknown joint 'middle'; valid: left, right"):
         hold_joints(links, {"middle": 0.0})
+
+
+MIMIC = """
+<robot name="gripper">
+  <link name="palm"><visual><geometry><box size="0.1 0.3 0.02"/></geometry></visual></link>
+  <link name="left"><visual><origin xyz="0 0 0.1"/><geometry><box size="0.02 0.02 0.2"/></geometry></visual></link>
+  <link name="right"><visual><origin xyz="0 0 0.1"/><geometry><box size="0.02 0.02 0.2"/></geometry></visual></link>
+  <joint name="left" type="revolute"><parent link="palm"/><child link="left"/><origin xyz="0 0.08 0.03"/>
+    <axis xyz="1 0 0"/><limit lower="0" upper="1"/></joint>
+  <joint name="right" type="revolute"><parent link="palm"/><child link="right"/><origin xyz="0 -0.08 0.03"/>
+    <axis xyz="1 0 0"/><limit lower="-1" upper="0"/><mimic joint="left" multiplier="-1"/></joint>
+</robot>
+"""
+
+
+@pytest.mark.slow
+def test_a_gripper_whose_fingers_follow_each_other_is_packed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = tmp_path / "gripper.urdf", tmp_path / "spheres.json"
+    file.write_text(MIMIC)
+    packed = run_spheres(SpheresConfig(file, out, spheres=40, postures=300))
+    assert "Follows: right (left)." in capsys.readouterr().out
+    assert packed.score.missed == 0 and 20 < packed.score.colliding < 280
+    read = load_spheres(out)
+    assert joint_names(read.links) == ["left"]
+    for q in (0.0, 0.3, 0.7, 1.0):  # the tips meet at 0.4 rad
+        assert (
+            spheres_collide(read, np.array([q])) == spheres_collide(packed.robot, np.array([q])) == (q > 0.35)
+        )
+    with pytest.raises(ConfigError, match="Joint 'right' follows 'left', which can only be held here"):
+        CollisionModel(read)
+    link, centres, _ = sphere_columns(read)
+    poses = link_poses(read.links, np.array([0.7]))[link]
+    placed = np.einsum("nij,nj->ni", poses[:, :3, :3], centres) + poses[:, :3, 3]
+    held = CollisionModel(read, (), {"left": 0.7}).placed(np.zeros(0))[:, :3]
+    np.testing.assert_allclose(np.sort(held, axis=0), np.sort(placed, axis=0), atol=1e-9)
 
 
 def test_a_urdf_without_meshes_is_refused(tmp_path: Path) -> None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
+from golem.capabilities.collision.link_poses import joint_names, link_poses
 from golem.errors import ConfigError
 from golem.robots.model.link_geometry import h12_geometry, read_geometry
 from golem.robots.model.table import JOINT_NAMES
@@ -57,3 +59,68 @@ def test_what_cannot_be_a_tree_of_surfaces_is_refused(tmp_path: Path) -> None:
         read_geometry(path)
     with pytest.raises(ConfigError, match=r"Cannot read '.*none.xml'"):
         read_geometry(tmp_path / "none.xml")
+
+
+LINE = """
+<mujoco>
+  <compiler angle="radian"/>
+  <asset><mesh name="plate" vertex="0 0 0 1 0 0 0 1 0 1 1 0" face="0 1 2 1 3 2" {inertia}/></asset>
+  <worldbody>
+    <body name="base">
+      <geom type="box" size="0.1 0.1 0.1"/>
+      <body name="a" pos="0 0 0.2" euler="0.1 0.2 0.3">
+        <joint name="a" axis="0 1 0" pos="0.1 0 0" range="-1 2" limited="true" ref="0.4"/>
+        <joint name="slide" type="slide" axis="1 1 0" ref="-0.2"/>
+        <geom type="mesh" mesh="plate" contype="0" conaffinity="0"/>
+        <body name="b" pos="0.3 0 0">
+          <joint name="b" axis="0 0 1" pos="0 0.1 0" ref="0.7"/>
+          <inertial pos="0 0 0" mass="1" diaginertia="{diagonal}"/>
+          <geom type="sphere" size="0.1"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <equality>{equality}</equality>
+</mujoco>
+"""
+FOLLOWS = '<joint joint1="b" joint2="a" polycoef="0.1 -2 0 0 0"/>'
+
+
+def mjcf(folder: Path, equality: str = "", diagonal: str = "1 1 1", inertia: str = 'inertia="shell"') -> Path:
+    path = folder / "line.xml"
+    path.write_text(LINE.format(equality=equality, diagonal=diagonal, inertia=inertia))
+    return path
+
+
+def test_joints_with_a_ref_stand_where_mujoco_has_them(tmp_path: Path) -> None:
+    path = mjcf(tmp_path)
+    links, model = read_geometry(path).links, mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    assert joint_names(links) == ["a", "slide", "b"]
+    for q in (np.zeros(3), model.qpos0, np.array([1.0, -0.3, 2.0])):
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        for link, T in zip(links, link_poses(links, q), strict=True):
+            if link.name in ("a", "b"):
+                np.testing.assert_allclose(T[:3, 3], data.body(link.name).xpos, atol=1e-12)
+                np.testing.assert_allclose(T[:3, :3].ravel(), data.body(link.name).xmat, atol=1e-12)
+
+
+def test_joints_that_an_equality_couples_follow(tmp_path: Path) -> None:
+    links = read_geometry(mjcf(tmp_path, FOLLOWS)).links
+    assert joint_names(links) == ["a", "slide"]
+    # b - 0.7 = 0.1 - 2 (a - 0.4)
+    assert (links[-1].leader, links[-1].ratio, links[-1].offset) == ("a", -2.0, pytest.approx(1.6))
+    assert (
+        joint_names(read_geometry(mjcf(tmp_path, FOLLOWS.replace("/>", ' active="false"/>'))).links)[-1]
+        == "b"
+    )
+    with pytest.raises(ConfigError, match="'b' follows no other by a straight line"):
+        read_geometry(mjcf(tmp_path, FOLLOWS.replace("-2 0", "-2 1")))
+
+
+@pytest.mark.parametrize("diagonal", ["1 1 1", "5 1 1"])
+@pytest.mark.parametrize("inertia", ["", 'inertia="shell"'])
+def test_what_only_dynamics_need_is_not_asked_for(diagonal: str, inertia: str, tmp_path: Path) -> None:
+    links = read_geometry(mjcf(tmp_path, "", diagonal, inertia)).links
+    assert [len(link.parts) for link in links] == [1, 0, 1, 1]
