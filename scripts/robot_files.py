@@ -19,6 +19,7 @@ import pinocchio as pin
 
 from golem.capabilities.collision.link_poses import free_links, joint_value, link_poses
 from golem.errors import GolemError
+from golem.robots.model.geom_mesh import pose_matrix
 from golem.robots.model.link_geometry import RobotGeometry, read_geometry
 from golem.robots.model.mesh_file import package_folders
 from golem.types import Array
@@ -66,6 +67,18 @@ def by_pinocchio(robot: RobotGeometry, file: Path) -> list[dict[str, Array]]:
     return found
 
 
+def root_pose(model: mujoco.MjModel, data: mujoco.MjData, robot: RobotGeometry) -> Array:
+    """Return the (4, 4) pose of the base that `robot` has: its only root, before any hinge of that, or the world."""
+    roots = [body for body in range(1, model.nbody) if model.body_parentid[body] == 0]
+    if len(roots) != 1 or robot.links[0].name == "world":
+        return np.eye(4)
+    first = model.body_jntadr[roots[0]]
+    free = first >= 0 and model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE
+    if not free:
+        return pose_matrix(model.body_pos[roots[0]], model.body_quat[roots[0]])
+    return pose_matrix(data.xpos[roots[0]], data.xquat[roots[0]])
+
+
 def by_mujoco(robot: RobotGeometry, file: Path) -> list[dict[str, Array]]:
     """Return what `by_pinocchio` returns, of an MJCF file."""
     model = mujoco.MjModel.from_xml_path(str(file))
@@ -81,8 +94,7 @@ def by_mujoco(robot: RobotGeometry, file: Path) -> list[dict[str, Array]]:
             T = np.eye(4)
             T[:3, :3], T[:3, 3] = data.xmat[body].reshape(3, 3), data.xpos[body]
             poses[model.body(body).name] = T
-        first = robot.links[0].name
-        base = np.linalg.inv(poses.get(first, np.eye(4)))
+        base = np.linalg.inv(root_pose(model, data, robot))
         found.append({name: base @ T for name, T in poses.items()})
     return found
 
