@@ -326,6 +326,14 @@ def test_a_file_that_is_no_robot_is_called_what_it_is(text: str, match: str, tmp
         read_geometry(tmp_path / "robot.urdf")
 
 
+def test_what_xacro_left_behind_and_shapes_of_no_size_do_not_matter(tmp_path: Path) -> None:
+    nothing = '<visual><geometry><box size="0 0 0"/></geometry></visual>'
+    body = f'<link name="tip">{nothing}</link>{joint("tip", "fixed")}<xacro:property name="a" value="1"/>'
+    path = robot(tmp_path, body)
+    path.write_text(path.read_text().replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" '))
+    assert [len(link.parts) for link in read_geometry(path).links] == [1, 0]
+
+
 def test_folders_of_packages_are_named_with_them(tmp_path: Path) -> None:
     assert package_folders((f"arm={tmp_path}",)) == {"arm": tmp_path}
     for wrong in ("arm", f"={tmp_path}", f"arm={tmp_path / 'none'}"):

@@ -112,7 +112,11 @@ def read_geometry(
         spec = mujoco.MjSpec.from_file(str(file))
         spec.compiler.discardvisual = False
         spec.compiler.fusestatic = False
-        # Spheres need no inertia: what the dynamics would refuse, plates for one, is let through.
+        # Spheres need no inertia and no looks: what those would have refused, plates or a lost picture, is let through.
+        for element in (*spec.geoms, *spec.sites, *spec.tendons):
+            element.material = ""
+        for element in (*spec.skins, *spec.materials, *spec.textures):
+            spec.delete(element)
         spec.compiler.balanceinertia = True
         spec.compiler.boundmass = spec.compiler.boundinertia = 1e-6
         for mesh in spec.meshes:

@@ -112,9 +112,9 @@ class _Reader:
                 size[0] = self.numbers(shape, "radius", "1", where)[0]
             if shape.tag in ("cylinder", "capsule"):
                 size[1] = 0.5 * self.numbers(shape, "length", "1", where)[0]
-            if size.min() < 0.0 or not size.any():
-                self.findings.append(f"{where}: its {shape.tag} has no size")
-            if len(self.findings) > count:
+            if size.min() < 0.0:
+                self.findings.append(f"{where}: its {shape.tag} has a negative size")
+            if len(self.findings) > count or not size.any():  # one of size 0 stands for none
                 return None
             mesh = primitive(shape.tag, *(float(v) for v in size))
             vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
@@ -182,7 +182,8 @@ def read_urdf(
     Raises:
         ConfigError: something is wrong with it; names all that is.
     """
-    if any("xacro" in element.tag for element in root.iter()):
+    unfilled = any("${" in value for element in root.iter() for value in element.attrib.values())
+    if any("xacro" in element.tag for element in root.iter()) and (unfilled or root.find("link") is None):
         raise ConfigError(f"'{file}' is a xacro file; `xacro {file.name} > robot.urdf` makes a URDF of it.")
     compiler = root.find("mujoco/compiler")
     reader = _Reader(file, packages, "" if compiler is None else compiler.get("meshdir", ""), [])
