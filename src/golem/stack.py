@@ -156,8 +156,8 @@ class Stack:
                     self._check_legs(key, choice)
 
     def _check_legs(self, key: str, choice: Choice) -> None:
-        carries = getattr(registry.load("lower_body", choice.use), "carries", None)
-        if carries is not None and not carries(choice.options):
+        cls = registry.load("lower_body", choice.use)
+        if "carries" in vars(cls) and not cls.carries(choice.options):  # a heir has options of its own
             raise ConfigError(
                 f"The {key} '{choice.use}' lets the legs hang, and this robot stands on its feet: choose almi, another "
                 f"that walks, or {{use: {choice.use}, standing: true}} for legs that only stand."

@@ -225,9 +225,7 @@ def test_legs_on_the_ground_say_what_torque_they_want() -> None:
 def test_legs_on_the_ground_without_a_torque_go_to_the_fallback(tmp_path: Path) -> None:
     robot = {"support": "ground", "world": "open"}
     use = tmp_path / "untold.py"
-    use.write_text(
-        "from golem.capabilities.legs.hold import JointHold\nclass Untold(JointHold):\n    carries = None\n"
-    )
+    use.write_text("from golem.capabilities.legs.hold import JointHold\nclass Untold(JointHold):\n    pass\n")
     legs = {"lower_body": Choice(f"{use}:Untold"), "fallback": Choice("wbc")}
     choices = {"robot": Choice("mujoco", robot), **legs}
     running, twin = build(Stack(choices, profile="ideal"), seed=0)

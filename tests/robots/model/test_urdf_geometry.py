@@ -332,6 +332,11 @@ def test_what_xacro_left_behind_and_shapes_of_no_size_do_not_matter(tmp_path: Pa
     path = robot(tmp_path, body)
     path.write_text(path.read_text().replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" '))
     assert [len(link.parts) for link in read_geometry(path).links] == [1, 0]
+    path.write_text(path.read_text().replace(' xmlns:xacro="http://ros.org/wiki/xacro"', ""))
+    assert [len(link.parts) for link in read_geometry(path).links] == [
+        1,
+        0,
+    ]  # of a space that is not declared
 
 
 def test_folders_of_packages_are_named_with_them(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +28,7 @@ _KINDS: dict[int, JointKind] = {
 }
 _UNBOUNDED = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD, mujoco.mjtGeom.mjGEOM_SDF)
 _WORLD = "world"
+_PREFIX = re.compile(rb"(</?|\s)([A-Za-z_][\w.-]*):(?=[A-Za-z_][\w.-]*[\s=/>])")
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +102,13 @@ def read_geometry(
     if choice not in GEOMETRY_CHOICES:
         raise unknown_name("choice of surfaces", choice, GEOMETRY_CHOICES)
     try:
-        root = ET.fromstring(file.read_bytes())
+        text = file.read_bytes()
+        try:
+            root = ET.fromstring(text)
+        except (
+            ET.ParseError
+        ):  # names of a space that the file does not declare, which readers of URDF let pass
+            root = ET.fromstring(_PREFIX.sub(rb"\1\2_", text))
     except (OSError, ET.ParseError, ValueError, LookupError) as error:
         why = getattr(error, "strerror", None) or f"it is no XML ({error})"
         raise ConfigError(f"Cannot read '{file}' as URDF or MJCF: {why}.") from error

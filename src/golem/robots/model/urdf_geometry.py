@@ -211,9 +211,8 @@ def read_urdf(
             below[ends[0]].append((ends[1], joint))
     roots = [name for name in elements if name not in above]
     if len(roots) != 1:
-        findings.append(
-            f"it has {len(roots)} roots ({', '.join(roots[:3]) or 'its links hang in a circle'}), not one"
-        )
+        which = ", ".join(roots[:3]) or ("its links hang in a circle" if elements else "and no links")
+        findings.append(f"it has {len(roots)} roots ({which}), not one")
     base = LinkGeometry("", -1, np.eye(4), "", "fixed", np.array([0.0, 0.0, 1.0]), np.zeros(3), 0.0, 0.0, ())
     links: list[LinkGeometry] = []
     waiting = [(name, -1, [base]) for name in roots]
