@@ -66,7 +66,7 @@ def test_without_distortion_images_are_left_alone() -> None:
     rgb, depth = np.ones((480, 640, 3), np.uint8), np.ones((480, 640), np.float32)
     for model in ("plumb_bob", "", "none", "mine"):
         one = lens(distortion_model=model, d=np.zeros(0 if model else 5))
-        assert one.maps is None and one.straighten(rgb, depth)[0] is rgb
+        assert one.distortion == () and one.straighten(rgb, depth)[0] is rgb
 
 
 @pytest.mark.parametrize(
@@ -82,6 +82,11 @@ def test_without_distortion_images_are_left_alone() -> None:
 def test_regions_and_binning_count(fields: dict[str, object], expected: tuple[float, ...]) -> None:
     camera = to_camera(info(**fields), "head", 0.1, 3.0, 15.0)
     assert (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy) == expected
+
+
+def test_a_size_that_nobody_has_takes_no_memory() -> None:
+    one = lens(width=0xFFFFFFFF, height=0xFFFFFFFF, d=np.array([0.1, 0, 0, 0, 0]))
+    assert one.camera.width == 0xFFFFFFFF and one.distortion
 
 
 @pytest.mark.parametrize(

@@ -31,23 +31,30 @@ class Lens:
 
     Attributes:
         camera: the pinhole camera of its straightened images.
-        maps: where those find their pixels; None where it bends nothing.
+        distortion: coefficients; empty where it bends nothing.
+        fisheye: whether they are those of such a lens.
     """
 
     camera: Camera
-    maps: Maps | None
+    distortion: tuple[float, ...] = ()
+    fisheye: bool = False
 
     def straighten(
         self, rgb: NDArray[np.uint8], depth: NDArray[np.float32]
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Return colour (height, width, 3) and depth (height, width) [m] without distortion; 0 beyond the image."""
-        if self.maps is None:
+        """Return colour (height, width, 3) and depth (height, width) [m] of the camera's size without distortion.
+
+        They are 0 beyond the image.
+        """
+        if not self.distortion:
             return rgb, depth
+        # Made when there are images: whatever size a message claims takes no memory before.
+        maps = _maps(self.camera, self.fisheye, self.distortion)
         import cv2
 
         straight = (
-            cv2.remap(rgb, *self.maps, cv2.INTER_LINEAR),
-            cv2.remap(depth, *self.maps, cv2.INTER_NEAREST),
+            cv2.remap(rgb, *maps, cv2.INTER_LINEAR),
+            cv2.remap(depth, *maps, cv2.INTER_NEAREST),
         )
         return np.asarray(straight[0], np.uint8), np.asarray(straight[1], np.float32)
 
@@ -60,14 +67,14 @@ def to_lens(message: CameraInfo, name: str, near: float, far: float, rate: float
     """
     camera = to_camera(message, name, near, far, rate)
     if not message.d.any():
-        return Lens(camera, None)
+        return Lens(camera)
     model, d = message.distortion_model, message.d
     if len(d) not in MODELS.get(model, ()) or not np.isfinite(d).all():
         raise CodecError(
             f"A camera with the distortion '{model[:30]}' and {len(d)} coefficients: valid are finite ones of "
             f"{', '.join(f'{m} ({len_[0]})' for m, len_ in MODELS.items())}."
         )
-    return Lens(camera, _maps(camera, model in _FISHEYE, tuple(d.tolist())))
+    return Lens(camera, tuple(d.tolist()), model in _FISHEYE)
 
 
 @lru_cache(maxsize=8)

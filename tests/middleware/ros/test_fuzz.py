@@ -17,6 +17,7 @@ pytest.importorskip("rosbags")
 from tests.middleware.ros.samples import mutated, random_message, travelling
 
 from golem.interfaces import images, public
+from golem.interfaces.lens import to_lens
 from golem.interfaces.ros_convert import (
     to_base_estimate,
     to_gate_status,
@@ -28,6 +29,7 @@ from golem.interfaces.ros_convert import (
 from golem.middleware.ros import codec
 from golem.middleware.ros.message import CodecError
 from golem.robots.sensors.calibration import OPTICAL_FRAMES, calibrations
+from golem.robots.sensors.cameras import HEAD
 
 READ: dict[str, tuple[Callable[[Any], object], ...]] = {
     "geometry_msgs/msg/Twist": (to_twist,),
@@ -35,7 +37,7 @@ READ: dict[str, tuple[Callable[[Any], object], ...]] = {
     "golem_interfaces/msg/HandState": (to_hand_state,),
     "golem_interfaces/msg/HandCommand": (to_hand_command,),
     "golem_interfaces/msg/SafetyStatus": (to_gate_status,),
-    "sensor_msgs/msg/CameraInfo": (lambda message: images.to_camera(message, "head", 0.1, 3.0, 15.0),),
+    "sensor_msgs/msg/CameraInfo": (lambda message: to_lens(message, "head", 0.1, 3.0, 15.0),),
     "sensor_msgs/msg/Image": (images.to_rgb, images.to_depth),
     "sensor_msgs/msg/PointCloud2": (images.to_points,),
     "tf2_msgs/msg/TFMessage": (calibrations,),
@@ -46,6 +48,7 @@ SOUND = {
         images.color_image(0.0, np.zeros((4, 6, 3), np.uint8), "camera"),
         images.depth_image(0.0, np.ones((4, 6), np.float32), "camera"),
     ],
+    "sensor_msgs/msg/CameraInfo": [images.camera_info(0.0, HEAD, "camera")],
     "sensor_msgs/msg/PointCloud2": [images.point_cloud(0.0, np.zeros(8, images.LIVOX_POINT), "lidar_link")],
     "tf2_msgs/msg/TFMessage": [
         transforms(0.0, [(OPTICAL_FRAMES["head"], public.optical_frame("head"))], np.eye(4)[np.newaxis])
