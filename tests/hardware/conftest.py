@@ -9,13 +9,15 @@ import mujoco
 import numpy as np
 import pytest
 
+from golem.capabilities.legs.hold import STANCES
 from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
 from golem.hardware.safety.memory import GateResult
 from golem.interfaces.payloads import EstopMessage, GateState
+from golem.robots.model.leg_dynamics import LegDynamics
 from golem.robots.model.mjcf import robot_spec
 from golem.robots.model.table import JOINT_NAMES
-from golem.types import NUM_JOINTS, Array, Imu, LowCommand, LowState
+from golem.types import GRAVITY, LEGS, NUM_JOINTS, Array, Imu, LowCommand, LowState
 
 DT = 0.002
 
@@ -40,6 +42,17 @@ def make_command(t: float, q: Array | None = None, **changes: Array) -> LowComma
     return LowCommand(t=t, q=np.zeros(NUM_JOINTS) if q is None else q, **arrays)
 
 
+def carrying() -> tuple[Array, Array]:
+    """Return positions and torques, (27,) each, of a robot of 66 kg that stands level on crouching legs."""
+    q, tau, legs = np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS), LegDynamics()
+    q[LEGS] = np.tile(STANCES["crouch"], 2)
+    legs.update(q, np.zeros(NUM_JOINTS))
+    weight = legs.gravity(q, np.array([0.0, 0.0, -GRAVITY])).reshape(2, 6)
+    ground = np.array([0.0, 0.0, 33.0 * GRAVITY, 0.0, 0.0, 0.0])
+    tau[LEGS] = np.concatenate([weight[k] - legs.jacobians[k].T @ ground for k in range(2)])
+    return q, tau
+
+
 @dataclass
 class Bench:
     """A gate on a bench: every tick it is fed sound frames, unless the test says otherwise."""
@@ -48,13 +61,28 @@ class Bench:
     t: float = 0.0
     sequence: int = 0
     results: list[GateResult] = field(default_factory=list)
+    q: Array = field(default_factory=lambda: np.zeros(NUM_JOINTS))
+    tau: Array = field(default_factory=lambda: np.zeros(NUM_JOINTS))
+
+    def carry(self) -> None:
+        """Put the robot on its feet: legs that crouch, with the torques of its weight."""
+        self.q, self.tau = carrying()
+
+    def wait(self, seconds: float, **changes: object) -> GateResult:
+        """Let time pass, with `changes` at every tick."""
+        for _ in range(round(seconds / DT)):
+            self.tick(**changes)
+        return self.results[-1]
 
     def tick(self, **changes: object) -> GateResult:
         """Advance by 2 ms and feed sound frames; `changes` replace fields of the inputs."""
         self.t += DT
         self.sequence += 1
         sound = GateInputs(
-            self.t, make_state(self.t), make_command(self.t), EstopMessage(self.t, self.sequence, False)
+            self.t,
+            make_state(self.t, self.q, tau=self.tau),
+            make_command(self.t, self.q),
+            EstopMessage(self.t, self.sequence, False),
         )
         self.results.append(self.gate.step(replace(sound, **changes)))  # pyright: ignore[reportArgumentType]
         return self.results[-1]

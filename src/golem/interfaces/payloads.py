@@ -299,6 +299,8 @@ class Reason(StrEnum):
     BRAKING = "joint_braking_distance"
     TILT = "tilt"
     BASE_STALE = "base_estimate_stale"
+    BALANCE = "balance_lost"
+    STANDING = "standing_failed"
     WRITERS = "two_writers"
     HELD = "motors_held"
     UNHEARD = "motors_unheard"
@@ -318,6 +320,8 @@ class Reason(StrEnum):
     COMMAND_GAINS = "command_gains"
     COMMAND_JOLTS = "command_torque_jumps"
     COMMAND_BEYOND = "command_beyond_robot"
+    COMMAND_HUNG = "command_hung"
+    COMMAND_AWAY = "command_away"
 
 
 class Fault(NamedTuple):

@@ -84,6 +84,7 @@ class SafetyNode:
         if waiting and estop is not None and estop.pressed:
             # Released later, the button must not set free what was asked for before it was pressed.
             self.request = OperatorRequest.NONE
+        fault = self._faults.read()
         inputs = GateInputs(
             t,
             self._bus.latest(topics.LOW_STATE),
@@ -91,7 +92,7 @@ class SafetyNode:
             estop,
             OperatorRequest.NONE if waiting else self.request,
             self._bus.latest(topics.BASE),
-            self._faults.read(),
+            () if fault is None else (fault,),
         )
         before = self._gate.memory.mode
         result = self._gate.step(inputs)

@@ -10,7 +10,7 @@ import numpy as np
 from golem.hardware.safety.base import EARLY, EASE, SPACE, Outgoing, SafetyLimits
 from golem.types import NUM_JOINTS, Array, Imu, LowCommand, LowState
 
-BRAKE, DELAYS, FORGET, GRAVITY_TIME = 0.5, 6, 1.0, 0.5
+BRAKE, DELAYS, FORGET, GRAVITY_TIME = 0.5, 6, 4.0, 0.5
 
 
 def slow_limit(
@@ -48,6 +48,7 @@ class SlowLook:
     """What looks at a robot's samples have found so far; `same` is of the newest one, by limb and of the IMU."""
 
     state: LowState
+    newest: LowState
     drift: Array
     dead: Array
     asked: tuple[LowCommand, ...]
@@ -59,12 +60,17 @@ class SlowLook:
     def at(cls, state: LowState) -> SlowLook:
         """Begin with `state`."""
         zeros = np.zeros(NUM_JOINTS)
-        return cls(state, zeros, zeros, (), np.zeros(3))
+        return cls(state, state, zeros, zeros, (), np.zeros(3))
+
+    def follow(self, new: LowState) -> SlowLook:
+        """Take the sample `new`, whether it is looked at or not."""
+        old, dt = self.newest, new.t - self.newest.t
+        drift = (1.0 - dt / FORGET) * self.drift + (new.q - old.q) - 0.5 * dt * (new.dq + old.dq)
+        return replace(self, newest=new, drift=drift)
 
     def add(self, new: LowState, dt: float, sent: LowCommand | None, limits: SafetyLimits) -> SlowLook:
         """Look at `new`, `dt` after the one before."""
         keep, old = 1.0 - dt / FORGET, self.state
-        drift = keep * self.drift + (new.q - old.q) - 0.5 * dt * (new.dq + old.dq)
         turn = keep * self.turn + _turn(old.imu, new.imu) - 0.5 * dt * (old.imu.gyro + new.imu.gyro)
         mean = new.imu.acc if self.force is None else self.force
         force = mean + dt / GRAVITY_TIME * (new.imu.acc - mean)
@@ -79,9 +85,7 @@ class SlowLook:
         same = [_equal(new, old, part) for part in parts]
         imus = [(new.imu.quat, old.imu.quat), (new.imu.gyro, old.imu.gyro), (new.imu.acc, old.imu.acc)]
         same.append(all(np.array_equal(a, b) for a, b in imus))
-        return replace(
-            self, state=new, drift=drift, dead=dead, asked=asked, turn=turn, force=force, same=tuple(same)
-        )
+        return replace(self, state=new, dead=dead, asked=asked, turn=turn, force=force, same=tuple(same))
 
 
 def _equal(a: LowState, b: LowState, part: slice) -> bool:

@@ -179,6 +179,7 @@ def test_reset_needs_the_button_out_and_a_request_and_does_not_restart(bench: An
     bench.tick(estop=EstopMessage(bench.t, 999, True))
     pressed = bench.tick(estop=EstopMessage(bench.t + 0.002, 1000, True), request=OperatorRequest.RESET)
     assert pressed.state is GateState.STOP1
+    assert bench.wait(1.0, request=OperatorRequest.RESET).state is GateState.STOP1
     # Released, and the request still held: it must be made anew.
     assert bench.tick(request=OperatorRequest.RESET).state is GateState.STOP1
     assert bench.tick(request=OperatorRequest.ACTIVATE).state is GateState.STOP1

@@ -81,7 +81,7 @@ def put(record: Any, inputs: GateInputs) -> None:
 def numbers(value: Any) -> Any:
     """Return a memory with arrays as lists, so that it can be compared."""
     if isinstance(value, np.ndarray):
-        return value.tolist()
+        return value.tobytes() if value.dtype.names else value.tolist()
     if hasattr(value, "__dataclass_fields__"):
         return {name: numbers(getattr(value, name)) for name in value.__dataclass_fields__}
     return value

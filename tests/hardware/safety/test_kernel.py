@@ -79,7 +79,10 @@ def test_a_look_is_that_of_numpy() -> None:
         sent = any_command(rng, 0.0, 0.3) if k // 400 % 2 else None
         before = memory.looked_at
         memory, believed, _ = sense(state, state.t, memory, LIMITS, sent)
-        if not believed or memory.looked is not state:
+        if not believed:
+            continue
+        slow = slow and slow.follow(state)
+        if memory.looked is not state:
             continue
         if slow is None:
             slow = SlowLook.at(state)
@@ -92,7 +95,7 @@ def test_a_look_is_that_of_numpy() -> None:
         np.testing.assert_allclose(memory.force, slow.force, rtol=0, atol=1e-14)
         assert tuple(since < state.t for since in memory.since) == slow.same
         seen |= set(slow.same)
-    assert looks > 500 and seen == {False, True} and (memory.count // EVERY) == looks + 1
+    assert looks > 500 and seen == {False, True} and 3000 // EVERY in (looks, looks + 1)
 
 
 def test_what_is_quickly_known_of_a_state_is_what_the_judges_find() -> None:

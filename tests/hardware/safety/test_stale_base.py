@@ -66,6 +66,7 @@ def test_a_robot_in_a_band_is_not_stopped_before_its_feet_have_carried_it(bench:
 def test_after_a_reset_it_may_hang_again(standing: Any) -> None:
     run(standing, 0.5, stale=True)
     assert standing.results[-1].state is GateState.STOP1
+    run(standing, 1.0, stale=True)
     standing.tick(request=OperatorRequest.RESET, base=base(standing.t + 0.002, stale=True))
     standing.tick(request=OperatorRequest.ACTIVATE, base=base(standing.t + 0.002, stale=True))
     run(standing, 1.0, stale=True)

@@ -21,17 +21,21 @@ Make = Callable[..., Any]
 class Stands:
     """Stands where the robot is; fails on demand."""
 
-    failing = False
+    failing: Exception | None = None
+    stiffness = 200.0
+    knee = 0.0
 
     def start(self, state: LowState) -> None:
         self.started = state
 
     def step(self, state: LowState, damping: Array) -> LowCommand:
         if self.failing:
-            raise GolemError("the network is gone")
+            raise self.failing
         kp = np.zeros(27)
-        kp[LEGS] = 200.0
-        return LowCommand(state.t, state.q, np.zeros(27), np.zeros(27), kp, damping)
+        kp[LEGS] = self.stiffness
+        tau = np.zeros(27)
+        tau[3] = self.knee
+        return LowCommand(state.t, state.q, np.zeros(27), tau, kp, damping)
 
 
 @pytest.fixture
@@ -43,6 +47,7 @@ def legs() -> Stands:
 def standing(bench: Any, limits: SafetyLimits, legs: Stands) -> Any:
     """A bench whose active gate can stand, with feet on the ground."""
     bench.gate = StandingGate(Gate(limits), lambda: legs)
+    bench.carry()
     bench.activate()
     for _ in range(100):
         bench.tick(base=BaseEstimate(bench.t + 0.002, np.eye(4)))
@@ -77,7 +82,7 @@ def test_legs_keep_their_stiffness_at_the_take_over(standing: Any, command_at: M
         lambda b, s: {"estop": EstopMessage(b.t, 999, True)},
         lambda b, s: {"state": s(b.t + 0.002, np.full(27, np.nan))},
         lambda b, s: {"request": OperatorRequest.STOP},
-        lambda b, s: {"transport": Fault(Reason.WRITERS, "two robots")},
+        lambda b, s: {"transport": (Fault(Reason.WRITERS, "two robots"),)},
     ],
 )
 @pytest.mark.parametrize("first", [True, False])
@@ -100,7 +105,8 @@ def test_a_fault_of_the_arms_leaves_it_standing_and_one_of_the_legs_does_not(
         dq = np.zeros(27)
         dq[joint] = 500.0
         result = standing.tick(
-            state=state_at(standing.t + 0.002, dq=dq), base=BaseEstimate(standing.t, np.eye(4))
+            state=state_at(standing.t + 0.002, standing.q, dq=dq, tau=standing.tau),
+            base=BaseEstimate(standing.t, np.eye(4)),
         )
         assert (result.state, result.reason) == (state, Reason.VELOCITY)
         standing.results.pop()
@@ -114,11 +120,41 @@ def test_without_a_foot_on_the_ground_nobody_stands(
     assert bench.tick(command=nan(command_at, bench.t + 0.002)).state is GateState.STOP1
 
 
-def test_a_standing_controller_that_fails_damps(standing: Any, legs: Stands, command_at: Make) -> None:
+@pytest.mark.parametrize(
+    "fails",
+    [
+        {"failing": GolemError("no network")},
+        {"failing": ZeroDivisionError()},
+        {"stiffness": np.nan},
+        {"stiffness": 1.0},
+    ],
+)
+def test_a_standing_controller_that_fails_damps_and_is_named(
+    fails: dict[str, Any], standing: Any, legs: Stands, command_at: Make
+) -> None:
     standing.tick(command=nan(command_at, standing.t + 0.002))
-    legs.failing = True
-    states = [standing.tick(command=None).state for _ in range(10)]
-    assert states[-1] is GateState.STOP1
+    vars(legs).update(fails)
+    result = standing.wait(0.02, command=None)
+    assert (result.state, result.reason) == (GateState.STOP1, Reason.STANDING)
+
+
+def test_in_stop2_a_motor_without_torque_is_named_and_an_outlier_is_borne(
+    standing: Any, legs: Stands, state_at: Make, command_at: Make
+) -> None:
+    def knee(q: float, tau: float) -> LowState:
+        state = state_at(standing.t + 0.002, standing.q.copy(), tau=standing.tau.copy())
+        state.q[3] += q
+        state.tau[3] *= tau
+        return state
+
+    standing.tick(command=nan(command_at, standing.t + 0.002))
+    for k in range(300):
+        result = standing.tick(command=None, state=knee(0.5 if k % 60 == 0 else 0.0, 1.0))
+    assert result.state is GateState.STOP2
+    legs.knee = 60.0
+    for _ in range(120):
+        result = standing.tick(command=None, state=knee(0.0, 0.0))
+    assert (result.state, result.reason) == (GateState.STOP1, Reason.MOTOR_DEAD)
 
 
 def test_a_robot_that_stands_goes_on_after_reset_and_activation_and_not_before(
@@ -127,7 +163,8 @@ def test_a_robot_that_stands_goes_on_after_reset_and_activation_and_not_before(
     standing.tick(command=nan(command_at, standing.t + 0.002))
     standing.tick()
     assert standing.tick(request=OperatorRequest.ACTIVATE).state is GateState.STOP2, "the reason still stands"
-    standing.tick()
+    assert standing.tick(request=OperatorRequest.RESET).reason is not None, "so soon nothing is reset"
+    standing.wait(1.0)
     result = standing.tick(request=OperatorRequest.RESET)
     assert (result.state, result.reason) == (GateState.STOP2, None)
     standing.tick()

@@ -60,7 +60,7 @@ def gate_ticks(n: int) -> Array:
     activate = node.client("/safety/activate", public.TRIGGER)
     q, zeros = start_posture(), np.zeros(NUM_JOINTS)
     up, noise = np.array([1.0, 0.0, 0.0, 0.0]), np.random.default_rng(0)
-    command = LowCommand(0.0, q, zeros, zeros, np.full(NUM_JOINTS, 50.0), np.full(NUM_JOINTS, 2.0))
+    command = LowCommand(0.0, q, zeros, zeros, np.full(NUM_JOINTS, 100.0), np.full(NUM_JOINTS, 3.0))
     times: list[float] = []
     for i in count(1):
         clock = i * TICK
@@ -90,7 +90,7 @@ def check_ticks(n: int) -> Array:
     """
     gate, noise = Gate(), np.random.default_rng(0)
     q, zeros, up = start_posture(), np.zeros(NUM_JOINTS), np.array([1.0, 0.0, 0.0, 0.0])
-    kp, kd = np.full(NUM_JOINTS, 50.0), np.full(NUM_JOINTS, 2.0)
+    kp, kd = np.full(NUM_JOINTS, 100.0), np.full(NUM_JOINTS, 3.0)
     times: list[float] = []
     for i in range(1, WARM_UP + n + 1):
         t, shake = i * TICK, 1e-3 * noise.standard_normal((4, NUM_JOINTS))

@@ -12,6 +12,7 @@ from enum import StrEnum
 import numpy as np
 
 from golem.hardware.safety.limit_table import limit_table
+from golem.hardware.servo.gains import default_gains
 from golem.interfaces.payloads import EstopMessage, Fault
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
@@ -77,6 +78,9 @@ class SafetyLimits:
             rotor: 0.4, 0.4 and 0.11 kg m^2].
         damping: kd of the damping stop [N m s/rad]: at most 5, and at most `torque_command / velocity`, so that
             damping breaks no torque limit at any legal speed [own].
+        least_kp, least_kd: what holds a motor at least: a third of the servo's stiffness, for legs that carry [own: in
+            a ramp to nothing they stand until a quarter]; damping of 30 % for legs, 10 % for torso and arms [own: the
+            authors' published arms have a quarter].
         kp_max, kd_max: bounds of the gains [authors].
         kp_rate, kd_rate: how fast gains may rise, per second; they may fall at once [own: full arm stiffness in 0.2 s].
         tilt: angle between the torso's and the world's up that stops the robot [rad] [own: legs that
@@ -127,6 +131,16 @@ class SafetyLimits:
             the shipped legs reach 0.5, 0.9 and 4.3].
         throws: consecutive commands beyond the last of these that stop the robot [own: legs that decide at 50 Hz and
             once saw nonsense give their answer ten times; meanwhile the last sound command holds].
+        grace: time from the activation in which legs may become stiff [s] [own: the servo's ramp takes 1.5 s].
+        reset_after: time from a stop to its reset [s] [own].
+        at_rest: rate of the torso, and of joints, below which a reset is accepted [rad/s] [own].
+        opening: at the activation, how far targets of stiff motors may be away [rad], and by how much predicted torques
+            may differ from those measured, in shares of `torque` [own].
+        hung: time for which the targets of legs that answer the state may be the same, bit for bit [s]; see `sender`
+            [own: five and a half decisions at 50 Hz].
+        capture: how far the capture point may be outside what both soles span [m] [own: see decisions/control.md].
+        sinking: speed with which the centre of mass of a robot on its feet may sink [m/s] [own].
+        lean: angle between the IMU's up and that of two flat feet [rad] [own: a ramp of 8 degrees is 0.14].
         table: the limits by motor for compiled code, see `limit_table`.
     """
 
@@ -145,6 +159,8 @@ class SafetyLimits:
     slew: Array
     deceleration: Array
     damping: Array
+    least_kp: Array
+    least_kd: Array
     kp_max: float = KP_MAX
     kd_max: float = KD_MAX
     kp_rate: float = 1000.0
@@ -182,6 +198,14 @@ class SafetyLimits:
     jolt_leak: float = 0.002
     throw: tuple[float, float, float] = (1.05, 3.0, 5.0)
     throws: int = 15
+    grace: float = 3.0
+    reset_after: float = 1.0
+    at_rest: tuple[float, float] = (0.5, 1.5)
+    opening: tuple[float, float] = (1.6, 1.0)
+    hung: float = 0.110
+    capture: float = 0.18
+    sinking: float = 0.5
+    lean: float = 0.25
     table: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -206,7 +230,7 @@ class SafetyLimits:
         Raises:
             ConfigError: there is no such profile.
         """
-        limits = load_limits(profile)
+        limits, gains = load_limits(profile), default_gains()
         middle = 0.5 * (limits.lower + limits.upper)
         half = 0.5 * (limits.upper - limits.lower)
         reach = half + 0.05
@@ -245,6 +269,8 @@ class SafetyLimits:
             slew=slew,
             deceleration=deceleration,
             damping=np.minimum(5.0, torque_command / velocity),
+            least_kp=gains.kp / 3.0,
+            least_kd=np.where(np.arange(NUM_JOINTS) < LEGS.stop, 0.3, 0.1) * gains.kd,
         )
         for name in cls.__slots__:
             value = getattr(new, name)
@@ -264,11 +290,11 @@ class GateInputs:
         estop: newest frame of the emergency stop that arrived, or None.
         request: what the operator asks for.
         base: newest estimate of the base that arrived, or None.
-        transport: what is wrong with the way the frames came: a checksum, or a second writer of the motors' command;
-            None when nothing is, or when there is no transport.
+        transport: all that is wrong with the way the frames came, such as a checksum or a second writer.
         tick: the robot's own time of `state` [s]; None where its stamp is that.
         stands: whether a standing controller can take the legs.
         standing: what it tells the motors; None before it has them, or when it fails.
+        earlier: states that arrived since the last tick, before `state`, each with its tick.
     """
 
     t: float
@@ -277,10 +303,11 @@ class GateInputs:
     estop: EstopMessage | None = None
     request: OperatorRequest = OperatorRequest.NONE
     base: BaseEstimate | None = None
-    transport: Fault | None = None
+    transport: tuple[Fault, ...] = ()
     tick: float | None = None
     stands: bool = False
     standing: LowCommand | None = None
+    earlier: tuple[tuple[float, LowState], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,11 @@
     STOP1  damps                                -> STOP0  after 3 s, ARMED on reset
     STOP0  limp                                 -> ARMED  on reset
 
-A stop is latched with its reason. Reset needs everything sound, the button released, and an explicit request; it leads
-to ARMED, never back to motion. A robot that stands in STOP2 would fall in ARMED: there a reset only takes the reason
-away, and a robot without a reason can be activated again. A command that is not finite stops the robot; one beyond a
-limit is limited.
+A stop is latched with its reason. Reset needs everything sound, the button released, a robot that is upright and at
+rest, a second since the stop, and an explicit request; it leads to ARMED, never back to motion. What activates is a
+command that holds every motor near where it is. ACTIVE and STOP2 pass the same checks, by the same memory. A robot that
+stands in STOP2 would fall in ARMED: there a reset only takes the reason away, and a robot without a reason can be
+activated again. A command that is not finite stops the robot; one beyond a limit is limited.
 """
 
 from __future__ import annotations
@@ -21,14 +22,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from golem.hardware.safety.balance import carried, unbalanced
 from golem.hardware.safety.base import Counters, GateInputs, OperatorRequest, Outgoing, SafetyLimits
 from golem.hardware.safety.limiter import limit_command
 from golem.hardware.safety.memory import GateMemory, GateResult
-from golem.hardware.safety.monitor import examine, quickly, whole
-from golem.hardware.safety.sender import SenderMemory, examine_command
+from golem.hardware.safety.monitor import examine, quickly, whole, whole_command
+from golem.hardware.safety.sender import SenderMemory, examine_command, ungrasped
 from golem.hardware.safety.senses import EVERY, SensesMemory, sense
 from golem.interfaces.payloads import EstopMessage, Fault, GateState, Reason
-from golem.types import NUM_JOINTS, TICK, Array, BaseEstimate, Imu, LowCommand, LowState
+from golem.robots.model.table import JOINT_NAMES
+from golem.types import LEGS, NUM_JOINTS, TICK, Array, BaseEstimate, Imu, LowCommand, LowState
 
 STANDING_AGE = 0.010
 """Time in which a standing controller has to have the legs once a stop has given them to it [s]."""
@@ -43,6 +46,9 @@ STAND = frozenset(
         Reason.COMMAND_GAINS,
         Reason.COMMAND_JOLTS,
         Reason.COMMAND_BEYOND,
+        Reason.COMMAND_HUNG,
+        Reason.BALANCE,
+        Reason.BASE_STALE,
     }
 )
 """Reasons that say nothing against state and legs."""
@@ -64,37 +70,41 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     t = inputs.t if running else memory.t if math.isfinite(memory.t) else 0.0
     estop, estop_fault = _estop(inputs.estop, memory.estop, t, limits)
     state, counters, senses, state_fault = _state(inputs, memory, t, limits)
-    command, sender, prompt, command_fault = _command(inputs.command, memory, t, limits)
+    stands_up = carried(senses.balance)
+    command, sender, prompt, command_fault = _command(inputs.command, memory, t, limits, stands_up)
     grounded, base_fault = _base(inputs.base, memory, t, limits)
     clock_fault = None if running else Fault(Reason.CLOCK)
-    faults = [clock_fault, _pause(memory, t, limits), inputs.transport, estop_fault, state_fault]
-    fault = _first(faults)
+    faults = [clock_fault, _pause(memory, t, limits), *inputs.transport, estop_fault, state_fault]
+    fault = _strictest(faults)
     edge = inputs.request if inputs.request is not memory.request else OperatorRequest.NONE
 
     mode, reason, detail, since = memory.mode, memory.reason, memory.detail, memory.since
-    outgoing = memory.outgoing
+    outgoing, stopped = memory.outgoing, memory.stopped
     if mode is GateState.ACTIVE:
         requested = Fault(Reason.REQUESTED) if inputs.request is OperatorRequest.STOP else None
-        faults += [command_fault, base_fault, requested]
-        fault = _first(faults)
+        faults += [command_fault, base_fault, unbalanced(memory.senses.balance), requested]
+        fault = _strictest(faults)
         if fault is not None:
-            carried = grounded is not None and t - grounded <= limits.base_age
-            stands = inputs.stands and carried and all(map(_stands, faults))
+            stands = inputs.stands and stands_up and all(map(_stands, faults))
             mode = GateState.STOP2 if stands else GateState.STOP1
             reason, detail, since = fault.reason, fault.detail, t
     elif mode is GateState.STOP2:
         asked = Fault(Reason.REQUESTED) if inputs.request is OperatorRequest.STOP else None
-        hard = next((f for f in (asked, *faults) if not _stands(f)), None)
-        failed = inputs.standing is None and t > since + STANDING_AGE
-        if hard is not None or failed:
-            mode, since = GateState.STOP1, t
-            reason, detail = (hard.reason, hard.detail) if hard is not None else (reason, detail)
-        elif edge is OperatorRequest.RESET and fault is None and command_fault is None:
+        faults = [asked, *faults, _standing(inputs, since, limits), unbalanced(memory.senses.balance)]
+        hard = next((f for f in faults if not _stands(f)), None)
+        fault = fault or command_fault
+        if hard is not None:
+            mode, since, reason, detail = GateState.STOP1, t, hard.reason, hard.detail
+        elif edge is OperatorRequest.RESET and fault is None and _rests(state, t - since, limits):
             reason, detail = None, ""
-        elif edge is OperatorRequest.ACTIVATE and reason is None and fault is None and command_fault is None:
-            mode, since = GateState.ACTIVE, t
+        elif edge is OperatorRequest.ACTIVATE and reason is None and state is not None:
+            fault = fault or _opens(command, state, limits)
+            if fault is None:
+                mode, since = GateState.ACTIVE, t
+            else:
+                detail = f"not activated: {fault.detail or fault.reason}"
     elif mode.stopped:
-        if edge is OperatorRequest.RESET and fault is None:
+        if edge is OperatorRequest.RESET and fault is None and _rests(state, t - stopped, limits):
             mode, reason, detail, since = GateState.ARMED, None, "", t
         elif mode is GateState.STOP1 and t - since >= limits.damping_time:
             mode, since = GateState.STOP0, t
@@ -102,13 +112,16 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
         reason, detail = (None, "") if fault is None else (fault.reason, fault.detail)
         new = GateState.ARMED if fault is None else GateState.INIT
         if new is GateState.ARMED and edge is OperatorRequest.ACTIVATE:
-            if command_fault is not None:
-                reason, detail = command_fault.reason, command_fault.detail
+            refused = command_fault or (None if state is None else _opens(command, state, limits))
+            if refused is not None:
+                reason, detail = refused.reason, refused.detail
             elif state is not None:
                 new = GateState.ACTIVE
                 outgoing = Outgoing(state.q.astype(np.float64), np.zeros(NUM_JOINTS), limits.damping)
         if new is not mode:
             mode, since = new, t
+    if mode.stopped and mode is not memory.mode and mode is not GateState.STOP0:
+        stopped = t
 
     wanted = {GateState.ACTIVE: command, GateState.STOP2: inputs.standing}.get(mode)
     if state is not None and wanted is not None and outgoing is not None:
@@ -141,6 +154,7 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
             sender=sender,
             prompt=prompt,
             sent=sent,
+            stopped=stopped,
         ),
     )
 
@@ -183,8 +197,52 @@ class Gate:
         return result
 
 
-def _first(faults: list[Fault | None]) -> Fault | None:
-    return next((fault for fault in faults if fault is not None), None)
+def _strictest(faults: list[Fault | None]) -> Fault | None:
+    """Return the first fault in spite of which nobody stands, or else the first."""
+    known = [fault for fault in faults if fault is not None]
+    return next((fault for fault in known if not _stands(fault)), known[0] if known else None)
+
+
+def _standing(inputs: GateInputs, since: float, limits: SafetyLimits) -> Fault | None:
+    """Say what is wrong with the standing controller, which has had the time to take the legs."""
+    told = inputs.standing
+    if told is None:
+        late = inputs.t > since + STANDING_AGE
+        return Fault(Reason.STANDING, "it gives no command") if late else None
+    if not whole_command(told, limits.sane):
+        return Fault(Reason.STANDING, "its command is not finite, or beyond the robot")
+    free, soft = ungrasped(told, limits)
+    return Fault(Reason.STANDING, "it lets go of the legs") if (free | soft)[LEGS].any() else None
+
+
+def _rests(state: LowState | None, since: float, limits: SafetyLimits) -> bool:
+    """Return whether a robot that stopped `since` ago is at rest."""
+    if state is None or since < limits.reset_after:
+        return False
+    turning, moving = limits.at_rest
+    return bool(np.abs(state.imu.gyro).max() <= turning and np.abs(state.dq).max() <= moving)
+
+
+def _opens(command: LowCommand | None, state: LowState, limits: SafetyLimits) -> Fault | None:
+    """Say what speaks against letting `command` drive a robot in `state` that damps, or stands by the gate."""
+    if command is None:
+        return Fault(Reason.COMMAND_MISSING)
+    free, away = ungrasped(command, limits)[0], np.abs(command.q - state.q)
+    away[command.kp < limits.least_kp] = 0.0
+    asked = (
+        command.kp * (command.q - state.q) + command.kd * (command.dq - state.dq) + command.tau - state.tau
+    )
+    asked[LEGS] = 0.0  # their targets are torques: what they need depends on who carries the robot until now
+    thrown = np.abs(asked) / limits.torque
+    far, much = limits.opening
+    for bad, text in (
+        (free, "is not held"),
+        (away > far, f"would go {away.max():.2f} rad"),
+        (thrown > much, f"would get {thrown.max():.1f} times its torque at once"),
+    ):
+        if bad.any():
+            return Fault(Reason.COMMAND_AWAY, f"{JOINT_NAMES[int(np.argmax(bad))]} {text}")
+    return None
 
 
 def _stands(fault: Fault | None) -> bool:
@@ -225,19 +283,38 @@ def _estop(
 def _state(
     inputs: GateInputs, memory: GateMemory, t: float, limits: SafetyLimits
 ) -> tuple[LowState | None, Counters, SensesMemory, Fault | None]:
-    new, old, counters, senses = inputs.state, memory.state, memory.counters, memory.senses
+    known, senses, faults = memory.state, memory.senses, list[Fault | None]()
+    counters, driven = memory.counters, memory.mode in (GateState.ACTIVE, GateState.STOP2)
+    newest = (inputs.tick, inputs.state)
+    sent = memory.sent if driven else None
+    for tick, state in (*inputs.earlier, newest):
+        known, counters, senses, fault = _sample(state, tick, (known, counters, senses), sent, t, limits)
+        faults.append(fault)
+    return known, counters, senses, _strictest(faults)
+
+
+def _sample(
+    new: LowState | None,
+    tick: float | None,
+    before: tuple[LowState | None, Counters, SensesMemory],
+    sent: LowCommand | None,
+    t: float,
+    limits: SafetyLimits,
+) -> tuple[LowState | None, Counters, SensesMemory, Fault | None]:
+    """Judge one sample that arrived; `sent` is what drives the motors."""
+    old, counters, senses = before
     if new is not None:
         if not _stamped(new.t, t, limits):
             return old, counters, senses, Fault(Reason.STATE_TIME, f"stamp {new.t} at {t}")
-        fresh = old is None or new.t > old.t
-        before = senses.q
-        known = quickly(new, before, limits, limits.jump) if fresh and before is not None else None
+        # Of states that were taken from the network at once the robot's own time tells which is newer.
+        fresh = old is None or new.t > old.t or (new.t == old.t and tick is not None and tick > senses.tick)
+        was = senses.q
+        known = quickly(new, was, limits, limits.jump) if fresh and was is not None else None
         if known is None and new is not old and not whole(new):
             return old, counters, senses, Fault(Reason.STATE_INVALID)
         if fresh:
-            tick = new.t if inputs.tick is None else inputs.tick
-            sent = memory.sent if memory.mode is GateState.ACTIVE else None
-            senses, believed, odd = sense(new, tick, senses, limits, sent, smooth=known is not None)
+            at = new.t if tick is None else tick
+            senses, believed, odd = sense(new, at, senses, limits, sent, smooth=known is not None)
             if believed:
                 counters, fault = (known, None) if known is not None else examine(new, limits, counters)
                 if fault is not None:
@@ -266,7 +343,7 @@ def _base(
 
 
 def _command(
-    new: LowCommand | None, memory: GateMemory, t: float, limits: SafetyLimits
+    new: LowCommand | None, memory: GateMemory, t: float, limits: SafetyLimits, carries: bool
 ) -> tuple[LowCommand | None, SenderMemory, float, Fault | None]:
     old, active = memory.command, memory.mode is GateState.ACTIVE
     sender, prompt = (memory.sender, memory.prompt) if active else (SenderMemory(), t)
@@ -274,7 +351,8 @@ def _command(
         if not _stamped(new.t, t, limits):
             return old, sender, prompt, Fault(Reason.COMMAND_TIME, f"stamp {new.t} at {t}")
         if old is None or new.t > old.t:
-            sender, followed, fault = examine_command(new, sender, limits)
+            late = active and t - memory.since > limits.grace
+            sender, followed, fault = examine_command(new, sender, limits, carries, late)
             if fault is not None:
                 return (old if fault.reason is Reason.COMMAND_INVALID else new), sender, prompt, fault
             old = new if followed or old is None else replace(old, t=new.t)

@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from golem.hardware.safety.balance import BALANCE, balances, sense_balance
 from golem.hardware.safety.base import Counters, Outgoing, SafetyLimits
 from golem.hardware.safety.kernel import ORDINARY as SOUND
 from golem.hardware.safety.kernel import UNKNOWN, limited, ordinary_command, rate_state
 from golem.hardware.safety.memory import GateMemory
-from golem.hardware.safety.sender import SenderMemory
-from golem.hardware.safety.senses import CALM, EVERY, FORGET, GRAVITY_TIME, LOST, SensesMemory
+from golem.hardware.safety.sender import LIVELY, SenderMemory
+from golem.hardware.safety.senses import CALM, EVERY, FORGET, GRAVITY_TIME, LOOK, LOST, STEADY, SensesMemory
 from golem.hardware.safety.senses_kernel import ASKED, GROUPS, SCALARS, looked
 from golem.interfaces.payloads import EstopMessage, GateState
 from golem.kernels import cfunc, njit
@@ -35,9 +36,9 @@ from golem.native import (
     view,
 )
 from golem.native_messages import command_of, put_command, state_of
-from golem.types import NUM_JOINTS, TICK
+from golem.types import LEGS, NUM_JOINTS, TICK
 
-_N = NUM_JOINTS
+_N, _LEGS = NUM_JOINTS, LEGS.stop
 _LIMITS = (
     "tilt",
     "jump",
@@ -57,6 +58,7 @@ _LIMITS = (
     "dead_time",
     "frame_leak",
     "jolt_leak",
+    "hung",
 )
 """Limits that the stage compares with and that are one number."""
 
@@ -66,7 +68,7 @@ GATE = np.dtype(
         ("gravity", "f8", (2,)),
         ("gravity_moving", "f8", (2,)),
         ("throw", "f8", (3,)),
-        ("table", "f8", (25, _N)),
+        ("table", "f8", (27, _N)),
         # What of `GateMemory` changes from one ordinary tick to the next.
         ("t", "f8"),
         ("state_t", "f8"),
@@ -81,10 +83,12 @@ GATE = np.dtype(
         ("grounded", "f8"),
         ("prompt", "f8"),
         ("jolts", "f8"),
+        ("moved", "f8"),
+        ("moves", "i8"),
         # Of `SensesMemory`.
         ("tick", "f8"),
         ("q", "f8", (_N,)),
-        ("count", "i8"),
+        ("dq", "f8", (_N,)),
         ("bad", "f8"),
         ("looked", "f8", (STATE,)),
         ("looked_t", "f8"),
@@ -96,6 +100,7 @@ GATE = np.dtype(
         ("restless", "f8"),
         ("asked", "f8", (ASKED,)),
         ("dead", "f8", (_N,)),
+        ("balance", BALANCE),
     ]
 )
 """Limits and memory of the stage."""
@@ -138,14 +143,32 @@ def pass_command(r: Record, m: Record) -> bool:
     known = rate_state(numbers, m.table, m.jump, math.cos(m.tilt))
     if known == UNKNOWN:
         return False
-    looks = (m.count + 1) % EVERY == 0
+    if not balances(m.balance):
+        return False
+    apart, drift = r.state_t - m.tick, np.empty(_N)
+    for i in range(_N):
+        drift[i] = m.drift_now[i]
+        if 0.0 < apart <= STEADY:
+            drift[i] = (
+                (1.0 - apart / FORGET) * drift[i] + (r.q[i] - m.q[i]) - (0.5 * apart) * (r.dq[i] + m.dq[i])
+            )
+    looks = not 0.0 <= r.state_t - m.looked_at < LOOK
     if looks:
-        out = look(r, m)
+        out = look(r, m, drift)
         if not plausible(r, m, out):
             return False
     for i in range(COMMAND):
         numbers[i], numbers[COMMAND + i] = r.request[i], m.command[i]
     if not ordinary_command(numbers, m.table, m.throw[0], m.throw[1], m.throw[2]):
+        return False
+    moved, moves = m.moved, m.moves
+    same = True
+    for i in range(_LEGS):
+        same = same and r.request[i] == m.command[i]
+    if not same:
+        moves = min(moves + 1, LIVELY) if r.request_t - moved <= 0.5 * m.hung else 0
+        moved = r.request_t
+    elif m.frozen > 0.0 and moves == LIVELY and r.request_t - moved > m.hung:
         return False
 
     # From here on the tick is ordinary, and is remembered.
@@ -155,7 +178,7 @@ def pass_command(r: Record, m: Record) -> bool:
         numbers[5 * _N + i], numbers[6 * _N + i] = r.q[i], r.dq[i]
         for k in range(4):
             numbers[(7 + k) * _N + i] = m.outgoing[k, i]
-        m.q[i] = r.q[i]
+        m.q[i], m.dq[i], m.drift_now[i] = r.q[i], r.dq[i], drift[i]
     rows = limited(numbers, m.table, min(t - m.t, m.longest_tick), True, known != SOUND)
     for i in range(_N):
         for k in range(5):
@@ -171,13 +194,13 @@ def pass_command(r: Record, m: Record) -> bool:
     m.t, m.state_t, m.command_t, m.tick = t, r.state_t, r.request_t, r.state_t
     m.grounded, m.prompt, m.strained = grounded, t, known != SOUND
     m.jolts = max(0.0, m.jolts - m.jolt_leak)
-    m.bad, m.count = max(0.0, m.bad - m.frame_leak), m.count + 1
+    m.bad, m.moved, m.moves = max(0.0, m.bad - m.frame_leak), moved, moves
     r.command_t = t
     return True
 
 
 @njit(cache=True)
-def look(r: Record, m: Record) -> np.ndarray[Any, Any]:
+def look(r: Record, m: Record, drift_now: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """Return what a look at life and plausibility finds; see `senses_kernel.looked`."""
     dt = r.state_t - m.looked_at
     numbers = np.empty(2 * STATE + 2 * _N + ASKED + COMMAND + 6)
@@ -185,7 +208,7 @@ def look(r: Record, m: Record) -> np.ndarray[Any, Any]:
     for i in range(STATE):
         numbers[i], numbers[STATE + i] = r.state[i], m.looked[i]
     for i in range(_N):
-        numbers[drift + i], numbers[drift + _N + i] = m.drift_now[i], m.dead[i]
+        numbers[drift + i], numbers[drift + _N + i] = drift_now[i], m.dead[i]
     for i in range(ASKED):
         numbers[asked + i] = m.asked[i]
     for i in range(COMMAND):
@@ -243,8 +266,9 @@ def plausible(r: Record, m: Record, out: np.ndarray[Any, Any]) -> bool:
 def remember_look(r: Record, m: Record, out: np.ndarray[Any, Any]) -> None:
     """Take over what a look found."""
     t = r.state_t
+    sense_balance(m.balance, r.q, r.dq, r.tau, r.quat, r.gyro, t - m.looked_at)
     for i in range(_N):
-        m.drift_now[i], m.dead[i] = out[i], out[_N + i]
+        m.dead[i] = out[_N + i]
     for i in range(ASKED):
         m.asked[i] = out[2 * _N + i]
     for i in range(3):
@@ -289,19 +313,24 @@ class GateStage:
         before, counters = senses.looked, gate.counters
         if gate.mode is not GateState.ACTIVE or gate.reason is not None or sender.refused:
             return False
-        if counters not in (Counters(), Counters(strained=True)) or sender.held is not True:
+        if (
+            counters not in (Counters(), Counters(strained=True))
+            or sender.held is not True
+            or not sender.firm
+        ):
             return False
         if outgoing is None or outgoing.tau is None or state is None or command is None or estop is None:
             return False
-        if sent is None or senses.q is None or before is None or senses.force is None:
+        if sent is None or senses.q is None or senses.dq is None or before is None or senses.force is None:
             return False
         if senses.asked is None or sender.last is not command:
             return False
         memory, row = self.stage.memory, self.stage.memory[0]
         for name in ("t", "prompt"):
             memory[name] = getattr(gate, name)
-        for name in ("tick", "q", "count", "bad", "looked_at", "since", "turn", "force", "restless", "asked"):
+        for name in ("tick", "q", "dq", "bad", "looked_at", "since", "turn", "force", "restless", "asked"):
             memory[name] = getattr(senses, name)
+        memory["balance"], memory["moved"], memory["moves"] = senses.balance, sender.moved, sender.moves
         memory["dead"], memory["drift_now"], memory["jolts"] = senses.dead, senses.drift, sender.jolts
         memory["strained"] = counters.strained
         memory["grounded"] = -math.inf if gate.grounded is None else gate.grounded
@@ -324,7 +353,7 @@ class GateStage:
         senses = SensesMemory(
             tick=float(row["tick"]),
             q=row["q"].copy(),
-            count=int(row["count"]),
+            dq=row["dq"].copy(),
             bad=float(row["bad"]),
             looked=state_of(row["looked"], float(row["looked_t"])),
             looked_at=float(row["looked_at"]),
@@ -335,6 +364,7 @@ class GateStage:
             restless=float(row["restless"]),
             asked=row["asked"].copy(),
             dead=row["dead"].copy(),
+            balance=self.stage.memory["balance"].copy(),
         )
         return GateMemory(
             t=t,
@@ -348,7 +378,10 @@ class GateStage:
             request=gate.request,
             grounded=None if grounded == -math.inf else grounded,
             senses=senses,
-            sender=SenderMemory(command, True, 0, float(row["jolts"])),
+            sender=SenderMemory(
+                command, True, 0, float(row["jolts"]), True, float(row["moved"]), int(row["moves"])
+            ),
             prompt=float(row["prompt"]),
             sent=command_of(row["sent"], t),
+            stopped=gate.stopped,
         )

@@ -23,6 +23,8 @@ UNKNOWN, STRAINED, ORDINARY = 0, 1, 2
 """What is known of a sample: nothing; it is whole, has not jumped and breaks no limit; nor is any joint strained."""
 MOST = 1e5
 """Sum of the rates [rad/s] and specific forces [m/s^2] that an ordinary sample stays below."""
+SLACK = 0.01
+"""Share of a motor's torque below which a feed-forward carries nothing [own]."""
 _N = NUM_JOINTS
 _UPPER = LEGS.stop
 
@@ -158,7 +160,12 @@ def ordinary_command(
     thrown, constant = 0.0, 0.0
     for i in range(_N):
         kp, kd = numbers[3 * _N + i], numbers[4 * _N + i]
-        if not (kd > 0.0 and kp >= 0.0):
+        if not (kd >= table[rows.LEAST_KD, i] and kp >= 0.0):
+            return False
+        soft = (
+            kp < table[rows.LEAST_KP, i] and abs(numbers[2 * _N + i]) <= SLACK * table[rows.TORQUE_LIMIT, i]
+        )
+        if soft and i < _UPPER:
             return False
         jump = numbers[2 * _N + i] - numbers[COMMAND + 2 * _N + i]
         spring = kp * (numbers[i] - numbers[COMMAND + i])

@@ -32,6 +32,7 @@ class GateMemory:
         sender: what is known of whoever sends the commands.
         prompt: when the newest command was no older than `command_late` last, while active [s].
         sent: what the motors were told last.
+        stopped: when the last stop began, or became stricter [s].
     """
 
     t: float = -np.inf
@@ -50,6 +51,7 @@ class GateMemory:
     sender: SenderMemory = field(default_factory=SenderMemory)
     prompt: float = -np.inf
     sent: LowCommand | None = None
+    stopped: float = -np.inf
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,9 @@ from golem.types import NUM_JOINTS, Array
 EVERY = 5
 """States from one look at the reports to the next: none of them moves faster."""
 PERSISTENT = 5
-"""Looks in a row that show the same kind of trouble before it is a fault [own: 50 ms, as long as legs may be wrong]."""
+"""Level of bad looks that is a fault: each counts one, each good one takes `LEAK` off [own: 50 ms, as long as legs may
+be wrong; more than one in ten for long]."""
+LEAK = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,15 +49,26 @@ class MotorWatch:
         self._limits = limits
         self._was_on = np.zeros(NUM_JOINTS, dtype=bool)
         self._powered = np.zeros(NUM_JOINTS, dtype=bool)
-        self._bad = 0
+        self._bad = 0.0
+        self._forget()
+
+    def _forget(self) -> None:
+        self._on, self._error = np.ones(NUM_JOINTS, dtype=bool), np.zeros(NUM_JOINTS, dtype=np.int64)
+
+    def gather(self, reports: MotorReports) -> None:
+        """Keep errors and modes of a frame between two looks for the next one."""
+        self._on &= reports.on
+        self._error |= reports.error.astype(np.int64)
 
     def add(self, reports: MotorReports) -> Fault | None:
-        """Judge new reports; return what is wrong once it has persisted."""
-        fault = self._wrong(reports)
+        """Judge new reports, with those gathered; return what is wrong once it has persisted."""
+        self.gather(reports)
+        fault = self._wrong(MotorReports(self._on, self._error, reports.temperature, reports.voltage))
         self._was_on |= reports.on
         self._powered |= reports.voltage != 0.0
-        self._bad = 0 if fault is None else self._bad + 1
-        return fault if self._bad >= PERSISTENT else None
+        self._forget()
+        self._bad = max(0.0, self._bad - LEAK) if fault is None else min(self._bad + 1.0, PERSISTENT)
+        return fault if self._bad >= PERSISTENT and fault is not None else None
 
     def _wrong(self, reports: MotorReports) -> Fault | None:
         if reports.error.any():

@@ -1,9 +1,11 @@
 """Judges whoever sends the commands: what no motor can be held with, what nobody could mean, torques that jump.
 
-A motor without damping is limp or rings, so a sender that takes it away from one that had it is at fault, whatever else
-its command says. What is merely too large is limited, not judged (see `limiter`). What is far beyond the robot, or
-jumps to and fro again and again, is judged: a limiter keeps the motors within their limits, and not what the ground
-does to a robot that is thrown about.
+A motor without the least damping is limp or rings, and so is a leg that carries without the least stiffness and without
+a feed-forward. A sender that takes it away from one that had it is at fault, whatever else its command says. So is one
+whose legs answered the state, and then say the same for ever: on a live state no policy repeats twelve targets. What is
+merely too large is limited, not judged (see `limiter`). What is far beyond the robot, or jumps to and fro again and
+again, is judged: a limiter keeps the motors within their limits, and not what the ground does to a robot that is thrown
+about.
 """
 
 from __future__ import annotations
@@ -14,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.hardware.safety.base import SafetyLimits
-from golem.hardware.safety.kernel import ordinary_command
+from golem.hardware.safety.kernel import SLACK, ordinary_command
 from golem.hardware.safety.monitor import whole_command
 from golem.interfaces.payloads import Fault, Reason
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, LowCommand
 
-_ZERO = np.zeros(NUM_JOINTS)
+LIVELY = 25
+"""Changes of the legs' targets after which they are taken to answer the state [own: half a second at 50 Hz]."""
 _SHAPES = [(NUM_JOINTS,)] * 5
 
 
@@ -31,18 +34,24 @@ class SenderMemory:
     Attributes:
         last: the newest command that was followed.
         held: which motors have been held since the activation, all of them or (27,) flags.
+        firm: whether legs have been stiff, or fed forward, since the activation.
         refused: commands in a row that were not followed.
         jolts: level of the jumps of torque.
+        moved: stamp of the newest command whose legs have other targets than the one before [s].
+        moves: how many such there were with no longer a pause than `hung / 2`, at most `LIVELY`.
     """
 
     last: LowCommand | None = None
     held: NDArray[np.bool_] | bool = False
     refused: int = 0
     jolts: float = 0.0
+    firm: bool = False
+    moved: float = -np.inf
+    moves: int = 0
 
 
 def examine_command(
-    new: LowCommand, memory: SenderMemory, limits: SafetyLimits
+    new: LowCommand, memory: SenderMemory, limits: SafetyLimits, carries: bool = False, late: bool = False
 ) -> tuple[SenderMemory, bool, Fault | None]:
     """Judge one new command.
 
@@ -50,14 +59,20 @@ def examine_command(
         new: the command, arrays (27,).
         memory: of the commands before it.
         limits: what to compare with.
+        carries: whether feet carry the robot.
+        late: whether legs have had their time to become stiff.
 
     Returns:
         The new memory, whether the command is to be followed, and the fault if it is not finite or one has persisted.
     """
+    moved, moves, hung = _answers(new, memory, limits)
+    if hung and carries:
+        said = f"12 targets of the legs are the same for {(new.t - moved) * 1e3:.0f} ms"
+        return memory, False, Fault(Reason.COMMAND_HUNG, said)
     if memory.last is not None and _ordinary(new, memory.last, limits):
         jolts = max(0.0, memory.jolts - limits.jolt_leak) if memory.jolts else 0.0
-        return SenderMemory(new, True, 0, jolts), True, None
-    held, needed = memory.held, limits.samples
+        return SenderMemory(new, True, 0, jolts, True, moved, moves), True, None
+    held, firm, needed = memory.held, memory.firm, limits.samples
     wrong: Fault | None = None
     # Counting is the quickest question numpy answers.
     count = np.count_nonzero
@@ -65,21 +80,20 @@ def examine_command(
         if not whole_command(new):
             return memory, False, Fault(Reason.COMMAND_INVALID)
         wrong = Fault(Reason.COMMAND_BEYOND, _beyond(new, limits))
-    elif count(new.kd > _ZERO) < NUM_JOINTS or count(new.kp < _ZERO):
-        let_go = (new.kd <= 0.0) & held | (new.kp < 0.0) | (new.kd < 0.0)
+    else:
+        free, soft = ungrasped(new, limits)
+        let_go = free & held | (new.kp < 0.0) | (new.kd < 0.0)
+        let_go |= soft & (carries and (memory.firm or late))
         if let_go.any():
             i = int(np.argmax(let_go))
-            wrong = Fault(
-                Reason.COMMAND_GAINS, f"{JOINT_NAMES[i]} with kp {new.kp[i]:g} and kd {new.kd[i]:g}"
-            )
-        held = held | (new.kd > 0.0)
-    else:
-        held = True
+            said = f"{JOINT_NAMES[i]} with kp {new.kp[i]:g}, kd {new.kd[i]:g} and tau {new.tau[i]:g}"
+            wrong = Fault(Reason.COMMAND_GAINS, said)
+        held, firm = held | ~free if count(free) else True, firm or not count(soft)
     if wrong is None and memory.last is not None:
         wrong, needed = _thrown(new, memory.last, limits)
     if wrong is not None:
         refused = memory.refused + 1
-        after = SenderMemory(memory.last, held, refused, memory.jolts)
+        after = SenderMemory(memory.last, held, refused, memory.jolts, firm, moved, moves)
         return after, False, wrong if refused >= needed else None
     last, jolts = memory.last, memory.jolts
     if last is not None:
@@ -98,7 +112,22 @@ def examine_command(
                 wrong = Fault(Reason.COMMAND_JOLTS, f"{JOINT_NAMES[i]} by {jump[i]:.0f} N m")
         elif jolts:
             jolts = max(0.0, jolts - limits.jolt_leak)
-    return SenderMemory(new, held, 0, jolts), wrong is None, wrong
+    return SenderMemory(new, held, 0, jolts, firm, moved, moves), wrong is None, wrong
+
+
+def ungrasped(new: LowCommand, limits: SafetyLimits) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which motors have too little damping, and which of the legs' no stiffness and no feed-forward, (27,)."""
+    soft = (new.kp < limits.least_kp) & (np.abs(new.tau) <= SLACK * limits.torque)
+    soft[LEGS.stop :] = False
+    return ~(new.kd >= limits.least_kd), soft
+
+
+def _answers(new: LowCommand, m: SenderMemory, limits: SafetyLimits) -> tuple[float, int, bool]:
+    """Return the next `moved` and `moves`, and whether the legs' targets hang; sensors that stand still excuse it."""
+    if m.last is None or np.count_nonzero(new.q[LEGS] != m.last.q[LEGS]):
+        lively = new.t - m.moved <= 0.5 * limits.hung
+        return new.t, min(m.moves + 1, LIVELY) if lively else 0, False
+    return m.moved, m.moves, limits.frozen > 0.0 and m.moves == LIVELY and new.t - m.moved > limits.hung
 
 
 def _ordinary(new: LowCommand, last: LowCommand, limits: SafetyLimits) -> bool:

@@ -5,7 +5,8 @@ tick does. What lives is held against what else is known: a joint's position aga
 against its rate and against gravity, a motor's torque against the one it was asked for. One sample that cannot be true
 is dropped; a run of them is a fault.
 
-Everything but the jump of a position is judged at every fifth sample, which is soon enough and keeps a tick short.
+Jump and integral of a position take every sample; all else is judged every 10 ms of the robot's time, which is soon
+enough and keeps a tick short.
 """
 
 from __future__ import annotations
@@ -16,14 +17,20 @@ from itertools import pairwise
 
 import numpy as np
 
+from golem.hardware.safety.balance import no_balance, sensed
 from golem.hardware.safety.base import STANDING, SafetyLimits
 from golem.hardware.safety.senses_kernel import ASKED, DELAYS, FIRST, SCALARS, looked
 from golem.interfaces.payloads import Fault, Reason
+from golem.native import Records
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import NUM_JOINTS, TICK, Array, LowCommand, LowState
 
 EVERY = 5
 """Samples from one look at life and plausibility to the next."""
+LOOK = (EVERY - 0.5) * TICK
+"""Robot time from which on the next one is due [s]."""
+STEADY = 0.012
+"""Time between two samples beyond which their speeds do not tell how far a joint has gone [s] [own]."""
 LIMBS = {
     name: slice(*ends)
     for name, ends in zip(
@@ -34,7 +41,7 @@ LIMBS = {
 GROUPS = (*LIMBS, "IMU")
 LOST = 0.05
 """Time between two looks beyond which nothing is held against the last one [s]."""
-FORGET = 1.0
+FORGET = 4.0
 """Time constant with which a difference between two sensors is forgotten [s] [own]."""
 GRAVITY_TIME = 0.5
 """Time constant of the mean specific force, and how long a robot has to be calm for it to be judged [s]."""
@@ -49,8 +56,7 @@ class SensesMemory:
 
     Attributes:
         tick: the robot's time of the newest accepted sample [s].
-        q: (27,) its positions [rad]; None before the first.
-        count: samples accepted.
+        q, dq: (27,) its positions [rad] and speeds [rad/s]; None before the first.
         bad: level of the samples that were dropped.
         looked: the sample looked at last, with its time.
         since: since when each group of `GROUPS` has had its numbers [s].
@@ -61,11 +67,12 @@ class SensesMemory:
         asked: (486,) what the motors were asked for at the looks of late, see `senses_kernel`; None while no command
             passes.
         dead: (27,) for how long each motor has not followed [s].
+        balance: see `balance`.
     """
 
     tick: float = -math.inf
     q: Array | None = None
-    count: int = 0
+    dq: Array | None = None
     bad: float = 0.0
     looked: LowState | None = None
     looked_at: float = -math.inf
@@ -76,6 +83,7 @@ class SensesMemory:
     restless: float = -math.inf
     asked: Array | None = None
     dead: Array = field(default_factory=lambda: np.zeros(NUM_JOINTS))
+    balance: Records = field(default_factory=no_balance)
 
 
 def sense(
@@ -93,43 +101,44 @@ def sense(
         tick: the robot's own time of it [s].
         memory: of the samples before it.
         limits: what to compare with.
-        sent: what the motors were told last while commands pass; None else, and a jump is then believed.
+        sent: what the motors were told last while something drives them; None else, and a jump is then believed.
         smooth: whether it is known that no joint has jumped.
 
     Returns:
         The new memory, whether the sample is to be believed, and the fault if one has persisted.
     """
-    apart, q = tick - memory.tick, memory.q
+    apart, q, dq = tick - memory.tick, memory.q, memory.dq
     if not smooth and q is not None and 0.0 < apart < LOST:
         moved = np.abs(state.q - q)
         if np.count_nonzero(moved > limits.jump * max(1.0, apart / TICK)):
             return _jumped(state, tick, memory, limits, moved, sent is not None)
-    count = memory.count + 1
-    bad = max(0.0, memory.bad - limits.frame_leak)
-    if count % EVERY:
-        return _kept(memory, tick, state.q, count, bad), True, None
-    memory, fault = _look(
-        state, tick, replace(memory, tick=tick, q=state.q, count=count, bad=bad), limits, sent
-    )
+    bad, drift = max(0.0, memory.bad - limits.frame_leak), memory.drift
+    if q is not None and dq is not None and 0.0 < apart <= STEADY:
+        drift = (1.0 - apart / FORGET) * drift + (state.q - q) - (0.5 * apart) * (state.dq + dq)
+    memory = _kept(memory, tick, state, bad, drift)
+    if 0.0 <= tick - memory.looked_at < LOOK:
+        return memory, True, None
+    memory, fault = _look(state, tick, memory, limits, sent)
     return memory, True, fault
 
 
-def _kept(m: SensesMemory, tick: float, q: Array, count: int, bad: float) -> SensesMemory:
+def _kept(m: SensesMemory, tick: float, state: LowState, bad: float, drift: Array) -> SensesMemory:
     """Return `m` with a newer sample; `replace` would take ten times the time."""
     return SensesMemory(
         tick,
-        q,
-        count,
+        state.q,
+        state.dq,
         bad,
         m.looked,
         m.looked_at,
         m.since,
-        m.drift,
+        drift,
         m.turn,
         m.force,
         m.restless,
         m.asked,
         m.dead,
+        m.balance,
     )
 
 
@@ -140,7 +149,7 @@ def _jumped(
     if active:
         memory = replace(memory, bad=bad)
     else:
-        memory = replace(memory, bad=min(bad, limits.bad_frames), q=state.q, tick=tick)
+        memory = replace(memory, bad=min(bad, limits.bad_frames), q=state.q, dq=state.dq, tick=tick)
     if bad < limits.bad_frames:
         return memory, False, None
     i = int(np.argmax(moved))
@@ -158,7 +167,8 @@ def _look(
     """Judge life and plausibility of `state` against the sample looked at before."""
     before, dt = m.looked, tick - m.looked_at
     if before is None or not 0.0 < dt < LOST:
-        return replace(m, looked=state, looked_at=tick, since=(tick,) * len(GROUPS)), None
+        balance = sensed(m.balance, state, None, limits)
+        return replace(m, looked=state, looked_at=tick, since=(tick,) * len(GROUPS), balance=balance), None
     now, was = state.imu, before.imu
     force = now.acc if m.force is None else m.force
     # Which of the commands of late the motors have by now depends on their delay: a motor follows if it does one.
@@ -182,7 +192,7 @@ def _look(
     after = SensesMemory(
         m.tick,
         m.q,
-        m.count,
+        m.dq,
         m.bad,
         state,
         tick,
@@ -193,6 +203,7 @@ def _look(
         tick if rate > CALM else m.restless,
         None if sent is None else out[2 * NUM_JOINTS : SCALARS],
         out[NUM_JOINTS : 2 * NUM_JOINTS],
+        sensed(m.balance, state, dt, limits),
     )
     return after, (
         _frozen(after, limits)

@@ -21,6 +21,8 @@ ASKED = 3 * DELAYS * NUM_JOINTS
 """Numbers of the commands of late: constant torque, stiffness, damping (`DELAYS`, 27) each, the oldest first."""
 SCALARS = 2 * NUM_JOINTS + ASKED
 """Where the numbers that have no joint begin in what `looked` returns."""
+_STILL = (1e-6, 1e-5, 1e-4)
+"""Changes of orientation, rate [rad/s] and force [m/s^2] that no IMU's noise stays below [own: a hundredth of it]."""
 _N, _D = NUM_JOINTS, DELAYS
 
 
@@ -63,9 +65,8 @@ def looked(
     for i in range(_N):
         q, dq, tau = numbers[i], numbers[_N + i], numbers[2 * _N + i]
         speed = dq + numbers[STATE + _N + i]
-        drift = keep * numbers[drift_at + i] + (q - numbers[STATE + i]) - (0.5 * dt) * speed
-        out[i] = drift
-        worst_drift = max(worst_drift, abs(drift) - lag * abs(speed))
+        out[i] = numbers[drift_at + i]
+        worst_drift = max(worst_drift, abs(out[i]) - lag * abs(speed))
         dead = numbers[dead_at + i]
         if commanded:
             s = sent_at + i
@@ -112,6 +113,7 @@ def looked(
                     same = same and numbers[k] == numbers[STATE + k]
         else:
             for k in range(imu, STATE):
-                same = same and numbers[k] == numbers[STATE + k]
+                floor = _STILL[0] if k < imu + 4 else _STILL[1] if k < imu + 7 else _STILL[2]
+                same = same and abs(numbers[k] - numbers[STATE + k]) <= floor
         out[SCALARS + 9 + g] = 1.0 if same else 0.0
     return out

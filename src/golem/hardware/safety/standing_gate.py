@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from typing import Protocol
 
-from golem.errors import GolemError
 from golem.hardware.safety.base import STANDING, GateInputs
 from golem.hardware.safety.gate import Gate
 from golem.hardware.safety.memory import GateMemory, GateResult
@@ -23,8 +23,7 @@ class StandingController(Protocol):
     def step(self, state: LowState, damping: Array) -> LowCommand:
         """Return what the motors are told in `state`: legs that stand, and `damping` (27,) for all others.
 
-        Raises:
-            GolemError: it failed.
+        Whatever it raises is a stop by the name `STANDING`.
         """
         ...
 
@@ -59,21 +58,23 @@ class StandingGate:
         """Run the gate, and the legs if they are the controller's."""
         before = self.gate.memory
         standing = None
-        if before.mode is GateState.STOP2 and self._legs is not None and inputs.state is not None:
-            try:
-                standing = self._legs.step(_believed(inputs.state), self.gate.limits.damping)
-            except GolemError:
-                standing = None  # the gate then damps
+        if before.mode is GateState.STOP2 and self._legs is not None and before.state is not None:
+            # By the state that was believed last: the newest may be an outlier.
+            with contextlib.suppress(
+                Exception
+            ):  # what a process that guards must outlive; the gate then damps
+                standing = self._legs.step(_believed(before.state), self.gate.limits.damping)
         if self._make is not None:
             # `replace` would take a fifth of the tick.
             i = inputs
             frames = i.t, i.state, i.command, i.estop, i.request, i.base, i.transport, i.tick
-            inputs = GateInputs(*frames, True, standing)
+            inputs = GateInputs(*frames, True, standing, i.earlier)
         result = self.gate.step(inputs)
         if result.state is GateState.STOP2 and before.mode is not GateState.STOP2:
             self._make_legs()
             assert self._legs is not None and result.memory.state is not None
-            self._legs.start(_believed(result.memory.state))
+            with contextlib.suppress(Exception):
+                self._legs.start(_believed(result.memory.state))
         return result
 
 

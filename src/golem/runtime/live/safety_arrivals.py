@@ -79,7 +79,8 @@ class Arrivals:
         self._motors, self._count = MotorWatch(limits), 0
         self.state: LowState | None = None
         self.command: LowCommand | None = None
-        self._fault: Fault | None = None
+        self._faults = list[Fault]()
+        self._earlier = list[tuple[float, LowState]]()
         self._arrived: OrderedDict[float, float] = OrderedDict()
         self.commands, self._states = WaitSet(), WaitSet()
         self.mode_machine: int | None = None
@@ -98,10 +99,15 @@ class Arrivals:
         self._states.poll()
         self.commands.poll()
 
-    def take_fault(self) -> Fault | None:
-        """Return what was wrong with the newest frame that was not sound, once."""
-        fault, self._fault = self._fault, None
-        return fault
+    def take_faults(self) -> list[Fault]:
+        """Return all that was wrong with the frames since the last call."""
+        faults, self._faults = self._faults, []
+        return faults
+
+    def take_earlier(self) -> tuple[tuple[float, LowState], ...]:
+        """Return the sound states since the last call but the newest one, each with its tick."""
+        earlier, self._earlier = self._earlier[:-1], []
+        return tuple(earlier)
 
     def _state(self, sample: Sample) -> None:
         now = self._clock()
@@ -111,7 +117,7 @@ class Arrivals:
             state = convert.decode_low_state(sample.payload)
         except WireError as error:
             if self.damaged["/lowstate"].bad():
-                self._fault = Fault(Reason.STATE_DAMAGED, str(error))
+                self._faults.append(Fault(Reason.STATE_DAMAGED, str(error)))
             return
         self.damaged["/lowstate"].good()
         known, before, heard = self._robot.known, self._robot.t, self._robot.heard
@@ -119,14 +125,14 @@ class Arrivals:
             return
         ahead = (state.t - before) - (now - heard)
         if known and (self._robot.restarted or ahead > BACK):
-            self._fault = Fault(Reason.STATE_JUMPED, f"by {state.t - before:+.3f} s in {now - heard:.3f} s")
+            said = f"by {state.t - before:+.3f} s in {now - heard:.3f} s"
+            self._faults.append(Fault(Reason.STATE_JUMPED, said))
         if self._robot.restarted:
             self._arrived.clear()
         machine = convert.mode_machine(sample.payload)
         if self.mode_machine not in (None, machine):
-            self._fault = Fault(
-                Reason.MOTOR_MODE, f"mode_machine changed from {self.mode_machine} to {machine}"
-            )
+            said = f"mode_machine changed from {self.mode_machine} to {machine}"
+            self._faults.append(Fault(Reason.MOTOR_MODE, said))
         self.mode_machine = machine
         self._arrived[state.t] = now
         self.rate.add(state.t, now)
@@ -134,9 +140,12 @@ class Arrivals:
             self._arrived.popitem(last=False)
         # Not by `replace`, which takes ten times as long; so below.
         self.state, self.tick = LowState(now, state.q, state.dq, state.tau, state.imu), state.t
+        self._earlier.append((self.tick, self.state))
         self._count += 1
-        if self._count % EVERY == 0:
-            self._fault = self._motors.add(_reports(sample.payload)) or self._fault
+        reports = _reports(sample.payload)
+        fault = self._motors.add(reports) if self._count % EVERY == 0 else self._motors.gather(reports)
+        if fault is not None:
+            self._faults.append(fault)
 
     def _command(self, sample: Sample) -> None:
         now = self._clock()
@@ -149,13 +158,12 @@ class Arrivals:
             answered = convert.answered(sample.payload)
         except WireError as error:
             if self.damaged["/safety/lowcmd_in"].bad():
-                self._fault = Fault(Reason.COMMAND_DAMAGED, str(error))
+                self._faults.append(Fault(Reason.COMMAND_DAMAGED, str(error)))
             return
         self.damaged["/safety/lowcmd_in"].good()
         if not answered:
-            self._fault = Fault(
-                Reason.COMMAND_UNSTAMPED, "reserve[0] is 0: copy the tick of the state it answers"
-            )
+            said = "reserve[0] is 0: copy the tick of the state it answers"
+            self._faults.append(Fault(Reason.COMMAND_UNSTAMPED, said))
             return
         # As old as the state it answers; one that answers a state nobody remembers is too old for anything.
         self.answered = answered

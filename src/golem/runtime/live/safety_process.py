@@ -143,6 +143,7 @@ class SafetyProcess:
             limits = sim_sync.relaxed_limits(limits)
         self._patient, self._damping, self._stall = patient, limits.damping, limits.stall
         self._estop_age, self._frozen = limits.estop_age, limits.frozen > 0.0
+        self._reset_after = limits.reset_after
         self._node, self._clock, self._who = node, clock, who
         self._endpoints = endpoints = RoleEndpoints("safety", participant, node)
         self._arrivals = Arrivals(endpoints, clock, limits, None if black_box is None else black_box.add)
@@ -226,8 +227,9 @@ class SafetyProcess:
                 self._frame,
                 OperatorRequest.NONE if early else request,
                 self._base,
-                self._fault(moving),
+                tuple(self._transport(moving)),
                 self._arrivals.tick,
+                earlier=self._arrivals.take_earlier(),
             )
         )
         if result.state is GateState.ACTIVE and not moving:
@@ -250,22 +252,19 @@ class SafetyProcess:
             self._endpoints.send("/estop", frame)
         self._reports.add(status)
 
-    def _fault(self, moving: bool) -> Fault | None:
-        """Return what is wrong with the transport: what holds now, or else what came since the gate last ran."""
-        fault = self._arrivals.take_fault()
+    def _transport(self, moving: bool) -> list[Fault]:
+        """Return all that is wrong with the transport: what holds now, and what came since the gate last ran."""
+        faults = self._arrivals.take_faults()
         if self._crowded:
             # Of two stacks, or two writers of commands, neither touches what the robot measures.
-            fault = Fault(Reason.WRITERS, self._crowded, not self._crowded.startswith("/lowstate"))
+            faults.append(Fault(Reason.WRITERS, self._crowded, not self._crowded.startswith("/lowstate")))
         doubts = [(self._estop_reason(), self._estop_fault())]
         if self._real:
             # A robot that moves is not dropped for its clock: the unit was right, and what arrives may be late.
             clock = "" if moving or self._arrivals.mode_machine is None else self._arrivals.rate.doubt()
             held = self._switcher.doubt(moving)
             doubts += [(Reason.STATE_CLOCK, clock), (Reason.UNHEARD, self._unheard), (Reason.HELD, held)]
-        for reason, detail in doubts:
-            if detail:
-                fault = Fault(reason, detail)
-        return fault
+        return faults + [Fault(reason, detail) for reason, detail in doubts if detail]
 
     def _estop_reason(self) -> Reason:
         return Reason.ESTOP_MISSING if self._frame is None else Reason.ESTOP_STALE
@@ -329,7 +328,10 @@ class SafetyProcess:
         if paused and request is not OperatorRequest.STOP:
             return Trigger_Response(False, f"The gate was held up; ask again in {WARY:g} s.")
         self._judge(request)
-        return Trigger_Response(self.status.state in wanted, describe_status(self.status))
+        said, done = describe_status(self.status), self.status.state in wanted
+        if request is OperatorRequest.RESET and self.status.stopped and self.status.reason:
+            said += f"; a reset waits until {self._reset_after:g} s after the stop, and for a robot at rest"
+        return Trigger_Response(done, said)
 
     def _hand_over(self) -> Trigger_Response:
         """Let the other of two stacks have the lease for commands; a robot that moves has to be stopped first."""
