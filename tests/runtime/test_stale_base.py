@@ -18,13 +18,13 @@ def test_an_estimate_that_stays_stale_stops_the_motors() -> None:
     bus = Bus()
     node = SafetyNode(bus, SafetyLimits.from_profile().still())
     node.request = OperatorRequest.ACTIVATE
-    zero = np.zeros(NUM_JOINTS)
+    zero, held = np.zeros(NUM_JOINTS), np.full(NUM_JOINTS, 3.0)
     imu = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
     results = []
     for i in range(500):
         t = i * DT
         bus.publish(topics.LOW_STATE, LowState(t, zero, zero, zero, imu), t)
-        bus.publish(topics.LOW_CMD_REQUEST, LowCommand(t, zero, zero, zero, zero, zero), t)
+        bus.publish(topics.LOW_CMD_REQUEST, LowCommand(t, zero, zero, zero, zero, held), t)
         bus.publish(topics.ESTOP, EstopMessage(t, i % 256, False), t)
         bus.publish(topics.BASE, BaseEstimate(t, np.eye(4), stale=i >= 100), t)
         bus.deliver(t)

@@ -19,6 +19,8 @@ class Expect(StrEnum):
 
     STOP = "stop"
     """Stop for one of the reasons, in time."""
+    STOP1 = "stop1"
+    """The same, and damp: nobody stands with it."""
     BEAR = "bear"
     """Go on, and the robot with it as if there were no fault."""
     SAFE = "safe"

@@ -25,6 +25,8 @@ BEYOND = 0.05
 """How far a joint may be beyond its range [rad]: what a joint that leans on its stop gives."""
 ASTRAY = 0.1
 """How far a robot that hangs may be moved by a fault the gate bears [rad]."""
+LEAST = 0.05
+"""Least sum of the gains of a motor that is driven."""
 SEEN = 0.3
 """Time after a stop that does not stand from which on nothing more can be learnt [s]."""
 KP_MAX, KD_MAX = 500.0, 30.0
@@ -44,6 +46,7 @@ class FaultFinding:
         effort: greatest predicted torque of a command, by the limit.
         moved: greatest distance of a joint from where it was [rad].
         fell: whether the robot lies or hangs in its fall.
+        unstopped: whether it fell while commands passed, or passed again.
         unsafe: what was wrong with a command that reached the motors; empty where nothing was.
     """
 
@@ -56,6 +59,7 @@ class FaultFinding:
     effort: float = 0.0
     moved: float = 0.0
     fell: bool = False
+    unstopped: bool = False
     unsafe: str = ""
 
 
@@ -95,8 +99,11 @@ class Judge:
         """Look at one tick."""
         rig, found = self._rig, self.finding
         status, data = rig.status, rig.robot.data
+        fault = rig.fault
+        harder = status.state is GateState.STOP1 and found.ended is GateState.STOP2
+        first = found.stopped_at is None or (harder and fault is not None and fault.expect is Expect.STOP1)
         found.ended = status.state
-        if status.stopped and found.stopped_at is None:
+        if status.stopped and first:
             found.stopped_at = rig.moment.t - TICK
             found.reason, found.detail = status.reason, status.detail
         if rig.told is not None and not found.unsafe:
@@ -108,7 +115,9 @@ class Judge:
             found.moved = max(found.moved, float(np.abs(q - self._start).max()))
         w, x, y, z = data.qpos[3:7]
         tilt = math.acos(max(-1.0, min(1.0, 1.0 - 2.0 * (x * x + y * y))))
-        found.fell = found.fell or tilt > 1.0 or float(data.qpos[2]) < 0.7 * self._height
+        fallen = tilt > 1.0 or float(data.qpos[2]) < 0.7 * self._height
+        found.unstopped = found.unstopped or (fallen and status.state is GateState.ACTIVE)
+        found.fell = found.fell or fallen
 
     def _unsafe(self, command: LowCommand, state: GateState) -> str:
         """Return what no command to the motors may be; empty if this one is none of it."""
@@ -119,8 +128,8 @@ class Judge:
             return "negative gains"
         if command.kp.max() > KP_MAX + 1e-3 or command.kd.max() > KD_MAX + 1e-3:
             return "gains beyond the firmware's"
-        if state is GateState.ACTIVE and command.kd.max() <= 0.0:
-            return "limp while active"
+        if state is GateState.ACTIVE and np.min(command.kp + command.kd) < LEAST:
+            return "a motor is limp while active"
         if state is GateState.STOP1 and (command.kp.any() or command.tau.any() or not command.kd.all()):
             return "a stop that does not damp"
         measured = self._rig.bus.latest(topics.LOW_STATE)
@@ -141,14 +150,20 @@ def verdict(fault: Injection, found: FaultFinding, posture: str) -> tuple[str, s
     what = f"{found.ended}" + (f", {found.reason}: {found.detail}" if found.reason else "")
     if found.unsafe:
         return "unsafe", f"A command reached the motors: {found.unsafe} ({what})."
-    if found.stopped_at is None and fault.expect is Expect.STOP:
+    if found.unstopped and posture != "hanging":
+        return "unsafe", f"The robot fell while commands passed ({what})."
+    if fault.expect is Expect.STOP1 and found.ended in (GateState.ACTIVE, GateState.STOP2):
+        return "unsafe", f"Motors are driven with it ({what})."
+    stops = fault.expect in (Expect.STOP, Expect.STOP1)
+    if found.stopped_at is None and stops:
         return "missed", f"It was not noticed; joints moved {found.moved:.2f} rad ({what})."
     if found.stopped_at is not None:
         if fault.expect is Expect.BEAR:
             return "false stop", f"It stopped ({what})."
-        if found.reason not in fault.reasons:
+        # Of two reasons a robot that hangs is stopped for the one that comes first.
+        if found.reason not in fault.reasons and not (fault.expect is Expect.STOP1 and posture == "hanging"):
             return "reason", f"It stopped for another reason ({what})."
-        if fault.expect is Expect.STOP and found.stopped_at > fault.within + 1e-9:
+        if stops and found.stopped_at > fault.within + 1e-9:
             return "late", f"It stopped after {1e3 * found.stopped_at:.0f} ms ({what})."
     if fault.source is FaultSource.COMMAND and found.speed > MARGIN:
         return "speed", f"A joint reached {100 * found.speed:.0f} % of its speed ({what})."

@@ -110,6 +110,7 @@ class FaultRig:
         node, base = RosNode(self._member, "others"), public.topic("/base_estimate")
         self._base = node.publisher(base.name, base.type, base.qos)
         self._activate = node.client("/safety/activate", public.TRIGGER)
+        self._reset = node.client("/safety/reset", public.TRIGGER)
         nodes = RobotNodes(self.bus, stack, robot, None, None)
         gantry: Any = robot
         modules = StackNodes(self.bus, stack, robot.calibration, None, gantry, 0.0)
@@ -124,6 +125,10 @@ class FaultRig:
     def activate(self) -> None:
         """Ask the gate to let commands pass."""
         self._activate.call(Trigger_Request())
+
+    def reset(self) -> None:
+        """Ask the gate to forget its stop."""
+        self._reset.call(Trigger_Request())
 
     def begin(self, fault: Injection) -> None:
         """Let `fault` begin at the next tick."""
