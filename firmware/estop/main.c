@@ -1,15 +1,20 @@
 /* Emergency-stop board: an Arduino Uno (ATmega328P, 16 MHz) that tells the host every 10 ms whether its button is
-   pressed. The normally closed contact connects pin 2 (PD2) to ground; an open contact or a cut wire leaves the pin to
-   its pull-up, which reads as pressed. There are no interrupts: one loop polls the timer and the serial port. */
+   pressed. Pin 5 (PD5) feeds both contacts of the button: the normally closed one leads to pin 2 (PD2), the normally
+   open one to pin 3 (PD3). There are no interrupts: one loop polls the timer and the serial port. */
 
 #include <avr/io.h>
 #include <avr/wdt.h>
+#include <util/delay.h>
 
 #include "button.h"
 #include "frame.h"
 
 #define BAUD 115200UL
 #define SAMPLES_PER_FRAME 10 /* of 1 ms */
+#define CLOSED _BV(PIND2)    /* input of the normally closed contact, low while released */
+#define OPEN _BV(PIND3)      /* of the normally open one, low while pressed */
+#define FEED _BV(PIND5)
+#define SETTLE_US 10 /* a metre of cable and the pull-up: 100 pF, 50 kOhm */
 
 /* After a reset by the watchdog it stays on, with its shortest time, and would end the start of the C program. */
 void watchdog_off(void) __attribute__((naked, used, section(".init3")));
@@ -19,12 +24,25 @@ void watchdog_off(void)
     wdt_disable();
 }
 
+/* Both contacts at this level of the feed. Directions and pull-ups are written anew: none has to survive for long. */
+static uint8_t contacts(uint8_t feed)
+{
+    DDRD = FEED;
+    PORTD = (uint8_t)(CLOSED | OPEN | feed);
+    _delay_us(SETTLE_US);
+    return PIND & (CLOSED | OPEN);
+}
+
+/* Whether the button is out: fed low, the closed contact alone is low; fed high, as a test, both inputs follow. A wire
+   that touches ground or the supply, a welded contact of a pressed button and a dead input all fail one of the two. */
+static uint8_t is_out(void)
+{
+    uint8_t tested = contacts(FEED) == (CLOSED | OPEN);
+    return contacts(0) == OPEN && tested;
+}
+
 static void set_up(void)
 {
-    DDRD &= (uint8_t)~_BV(DDD2);
-    PORTD |= _BV(PORTD2); /* pull-up */
-    DDRB |= _BV(DDB5);    /* the board's lamp: lit while released */
-
     TCCR0A = _BV(WGM01); /* counts to OCR0A: 16 MHz / 64 / 250 = 1 kHz */
     OCR0A = F_CPU / 64 / 1000 - 1;
     TCCR0B = _BV(CS01) | _BV(CS00);
@@ -57,7 +75,8 @@ int main(void)
         TIFR0 = _BV(OCF0A);
         wdt_reset(); /* here alone: a timer that stands still resets the board */
 
-        pressed = button_sample(&button, !(PIND & _BV(PIND2)));
+        pressed = button_sample(&button, is_out());
+        DDRB = _BV(DDB5); /* the board's lamp: lit while released */
         if (pressed)
             PORTB &= (uint8_t)~_BV(PORTB5);
         else

@@ -41,7 +41,7 @@ class Uno:
         self.time = 0.0
 
     def say(self, words: str) -> None:
-        """Do something to the board: press, release, hang."""
+        """Do something to the board: press, release, hang, weld, cut PIN, ground PIN, flip ADDRESS BIT."""
         assert self._process.stdin is not None
         self._process.stdin.write(f"{words}\n")
         self._process.stdin.flush()

@@ -2,7 +2,11 @@
 
    usage: simavr_uno FIRMWARE.elf
    It prints `terminal NAME`, the pseudo terminal that is the board's serial port. Then it takes words, each on a line:
-   press, release     opens or closes the contact between pin 2 and ground
+   press, release     opens or closes the contact between pins 2 and 5, and closes or opens that between 3 and 5
+   weld               keeps the first of them closed
+   cut PIN            takes the wire from pin 2 or 3
+   ground PIN         connects it to ground
+   flip ADDRESS BIT   flips a bit of a register of the board, e.g. 2b 2 of PORTD
    hang               lets the board's timer stand still
    run MS RECEIVED    waits until RECEIVED bytes in all have come over the serial port, lets MS milliseconds pass on the
                       board, and answers `ran SENT` with the number of bytes in all that the board has sent
@@ -26,14 +30,37 @@
 
 static int terminal;
 static long bytes_sent, bytes_received;
+static int pressed, welded;
+static uint8_t lost, grounded;
 
-/* Connect pin 2 to ground, or to nothing: then it is at the level that the firmware's pull-up gives it. */
-static void connect(avr_t *avr, int to_ground)
+/* Connect pins 2 and 3 to pin 5, to ground, or to nothing: then each is at the level of the firmware's pull-up. */
+static void connect(avr_t *avr, uint8_t port)
 {
-    avr_ioport_external_t outside = {.name = 'D', .mask = to_ground ? 4 : 0, .value = 0};
+    uint8_t fed = (port & 32) ? 0xFF : 0, joined = (uint8_t)(((!pressed || welded) ? 4 : 0) | (pressed ? 8 : 0));
+    joined &= (uint8_t)~lost;
+    avr_ioport_external_t outside = {.name = 'D', .mask = joined | grounded, .value = fed & joined & ~grounded};
     avr_ioctl(avr, AVR_IOCTL_IOPORT_SET_EXTERNAL('D'), &outside);
-    avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), 2),
-                  to_ground ? 0 : (avr->data[PORTD] >> 2) & 1);
+    for (int pin = 2; pin < 4; pin++) {
+        avr_irq_t *level = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), pin);
+        uint32_t high = ((outside.mask & (1 << pin) ? outside.value : port) >> pin) & 1;
+        avr_raise_irq(level, !high); /* what does not change is not told, not even after a reset */
+        avr_raise_irq(level, high);
+    }
+}
+
+static void written(struct avr_irq_t *irq, uint32_t value, void *avr)
+{
+    (void)irq;
+    connect(avr, (uint8_t)value);
+}
+
+static void flip(avr_t *avr, unsigned address, unsigned bit)
+{
+    uint8_t value = avr->data[address] ^ (uint8_t)(1 << bit);
+    if (avr->io[AVR_DATA_TO_IO(address)].w.c)
+        avr->io[AVR_DATA_TO_IO(address)].w.c(avr, address, value, avr->io[AVR_DATA_TO_IO(address)].w.param);
+    else
+        avr->data[address] = value;
 }
 
 static void stop_timer(avr_t *avr)
@@ -91,6 +118,7 @@ int main(int argc, char **argv)
     uint32_t flags = 0;
     char line[64];
     long milliseconds, received;
+    unsigned pin, bit;
 
     memset(&firmware, 0, sizeof firmware);
     if (argc != 2 || elf_read_firmware(argv[1], &firmware) || open_terminal())
@@ -102,15 +130,24 @@ int main(int argc, char **argv)
     avr_load_firmware(avr, &firmware);
     avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags); /* neither a copy on stdout nor a nap at each poll */
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), sent, NULL);
-    connect(avr, 1);
+    avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('D'), IOPORT_IRQ_REG_PORT), written, avr);
+    connect(avr, 0);
 
     printf("terminal %s\n", ptsname(terminal));
     fflush(stdout);
     while (fgets(line, sizeof line, stdin)) {
         if (!strcmp(line, "press\n"))
-            connect(avr, 0);
+            pressed = 1;
         else if (!strcmp(line, "release\n"))
-            connect(avr, 1);
+            pressed = 0;
+        else if (!strcmp(line, "weld\n"))
+            welded = 1;
+        else if (sscanf(line, "cut %u", &pin) == 1)
+            lost |= (uint8_t)(1 << pin);
+        else if (sscanf(line, "ground %u", &pin) == 1)
+            grounded |= (uint8_t)(1 << pin);
+        else if (sscanf(line, "flip %x %u", &pin, &bit) == 2)
+            flip(avr, pin, bit);
         else if (!strcmp(line, "hang\n"))
             stop_timer(avr);
         else if (sscanf(line, "run %ld %ld", &milliseconds, &received) == 2) {

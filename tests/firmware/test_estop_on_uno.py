@@ -46,6 +46,34 @@ def test_a_contact_that_was_open_for_two_milliseconds_is_in_five_frames(uno: Uno
     assert sum(frame.pressed for frame in said) == 5
 
 
+@pytest.mark.parametrize(
+    "fault",
+    ["weld", "cut 2", "cut 3", "ground 2", "ground 3", "flip 2b 2", "flip 2b 3", "flip 2a 2", "flip 2a 5"],
+)
+@pytest.mark.parametrize("before", [True, False])
+def test_no_single_fault_hides_a_press(fault: str, before: bool, uno: Uno) -> None:
+    frames(uno, 0.105)
+    for word in (fault, "press") if before else ("press", fault):
+        uno.say(word)
+        said = frames(uno, 0.1)
+    assert all(frame.pressed for frame in said)
+
+
+@pytest.mark.parametrize("fault", ["cut 2", "ground 2", "ground 3"])
+def test_a_bad_wire_is_a_press_at_once(fault: str, uno: Uno) -> None:
+    assert not frames(uno, 0.105)[-1].pressed
+    uno.say(fault)
+    assert all(frame.pressed for frame in frames(uno, 0.1))
+
+
+@pytest.mark.parametrize("register", ["2b 2", "2b 3", "2b 5", "2a 2", "2a 3", "2a 5"])
+def test_a_bit_that_flips_is_set_right_again(register: str, uno: Uno) -> None:
+    """PORTD is at 2b, DDRD at 2a."""
+    frames(uno, 0.105)
+    uno.say(f"flip {register}")
+    assert not frames(uno, 0.2)[-1].pressed
+
+
 def test_it_echoes_the_newest_byte(uno: Uno) -> None:
     frames(uno, 0.1)
     for sent in (b"\x00", b"\x5a", b"\xa5\x00", b"\x13", b"\x01\x02\xff"):
