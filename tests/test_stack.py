@@ -317,3 +317,17 @@ def test_skills_are_added_to_those_of_a_stack() -> None:
 def test_a_wrong_option_or_class_is_refused_before_anything_is_built(text: str, words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         parse_stack(text, "mine").check()
+
+
+def test_half_a_stack_file_is_refused_for_a_real_robot(tmp_path: Path) -> None:
+    text = "upper_body: {use: diff_ik}\nestop: {use: serial, port: /dev/ttyACM0}\nlimits: urdf\n"
+    path = tmp_path / "mine.yaml"
+    for part in (text, "upper_body: {use: diff_ik}\n...\n"):
+        path.write_text(part)
+        load_stack(path, whole=True)
+    for part in ("", text.splitlines()[0], text[: text.index("limits")]):
+        path.write_text(part)
+        load_stack(path)
+        with pytest.raises(ConfigError, match="half a copy"):
+            load_stack(path, whole=True)
+    assert load_stack("tether", whole=True)

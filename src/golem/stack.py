@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
@@ -213,12 +214,17 @@ def shipped() -> tuple[str, ...]:
     return tuple(sorted(p.name.removesuffix(".yaml") for p in folder.iterdir() if p.name.endswith(".yaml")))
 
 
-def load_stack(source: str | Path, profile: str | None = None) -> Stack:
+END = "..."
+"""YAML's end of a document: the last line of a stack file that is known to be whole."""
+
+
+def load_stack(source: str | Path, profile: str | None = None, whole: bool = False) -> Stack:
     """Read a stack file.
 
     Args:
         source: path of a YAML file, or the name of a shipped stack.
         profile: replaces the file's realism profile.
+        whole: whether a file has to show that nothing of it is missing, as for a real robot.
 
     Raises:
         ConfigError: no such file, not YAML, or a key or value that means nothing; names what would be valid.
@@ -238,6 +244,12 @@ def load_stack(source: str | Path, profile: str | None = None) -> Stack:
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"The stack file '{source}' cannot be read as text: {error}.") from error
     stack = parse_stack(text, str(source))
+    both = "estop" in stack.parts and re.search("^limits:", text, re.MULTILINE)
+    if whole and str(source) not in shipped() and not both and text.rstrip().splitlines()[-1:] != [END]:
+        raise ConfigError(
+            f"{source}: a real robot's stack file ends with a line '{END}', or names both 'estop' and 'limits'; "
+            "this one may be half a copy."
+        )
     return stack if profile is None else replace(stack, profile=profile)
 
 

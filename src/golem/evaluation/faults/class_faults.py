@@ -98,8 +98,9 @@ def _limp() -> Iterator[Injection]:
 def _senders() -> Iterator[Injection]:
     def exchanged(a: slice, b: slice) -> Edit:
         def edit(m: FaultMoment, image: Any) -> None:
-            motors = image["motor"]
-            motors[a], motors[b] = motors[b].copy(), motors[a].copy()
+            for name in ("q", "dq", "tau", "kp", "kd"):
+                column = image["motor"][name]
+                column[a], column[b] = column[b].copy(), column[a].copy()
 
         return edit
 
@@ -113,7 +114,7 @@ def _senders() -> Iterator[Injection]:
         def edit(m: FaultMoment, image: Any) -> None:
             queue = m.kept.setdefault("queue", [])
             queue.append(image["motor"].copy())
-            image["motor"][:] = queue.pop(0) if len(queue) > ticks else queue[0]
+            image["motor"][:] = queue[m.k - min(ticks, m.k // 2)]
 
         return edit
 

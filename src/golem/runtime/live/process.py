@@ -127,7 +127,7 @@ def run_up(config: UpConfig) -> None:
         ModuleFault: a module broke its contract; the safety gate, which hears no more commands, damps the robot.
     """
     map_large_blocks()
-    stack = load_stack(config.stack, profile=config.profile)
+    stack = load_stack(config.stack, profile=config.profile, whole=config.dds.robot)
     with (
         interrupted() as stop,
         closing(AsyncLogger()) as tell,
