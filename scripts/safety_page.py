@@ -111,7 +111,20 @@ REASONS: dict[Reason, ReasonText] = {
         405, f"The torso leans {_L.tilt:g} rad for 3 samples.", "Lift the robot, then reset."
     ),
     Reason.BASE_STALE: ReasonText(
-        406, f"No foot found on the ground for {_ms(_L.base_age)}.", "Is the stack's estimator alive?"
+        406,
+        f"The stack's estimator has found no foot for {_ms(_L.base_age)}.",
+        "Is the stack's estimator alive?",
+    ),
+    Reason.BALANCE: ReasonText(
+        407,
+        f"By the gate's own estimate the capture point is {_L.capture:g} m outside what both soles span, or a robot on "
+        f"its feet sinks at {_L.sinking:g} m/s, for 30 ms.",
+        "The legs' controller does not balance: look at its log, and at what pushed.",
+    ),
+    Reason.STANDING: ReasonText(
+        408,
+        "In stop2 the gate's own controller fails, or lets go of the legs.",
+        "See the log of `golem safety`.",
     ),
     Reason.WRITERS: ReasonText(501, "Two write what one alone may.", "End the one that the detail names."),
     Reason.HELD: ReasonText(
@@ -161,7 +174,8 @@ REASONS: dict[Reason, ReasonText] = {
     ),
     Reason.COMMAND_GAINS: ReasonText(
         707,
-        "Three commands let a held motor go (kd 0, or mode 0), or a gain is negative.",
+        "Three commands let a held motor go (kd below 30 % of the servo's for legs, 10 % for the others; legs that "
+        "carry with kp below a third and no feed-forward), or a gain is negative.",
         "A bug in the stack.",
     ),
     Reason.COMMAND_JOLTS: ReasonText(
@@ -176,6 +190,17 @@ REASONS: dict[Reason, ReasonText] = {
         710,
         "Three commands ask for 5 rad beyond a range, or ten times a speed, torque or gain.",
         "A bug in the stack, or other units than rad and N m.",
+    ),
+    Reason.COMMAND_HUNG: ReasonText(
+        711,
+        f"Legs that answered the state ask for the very same 12 targets for {_ms(_L.hung)}, on their feet.",
+        "The legs' module hangs, or its answers are sent again.",
+    ),
+    Reason.COMMAND_AWAY: ReasonText(
+        712,
+        f"At the activation a motor is not held, a stiff one's target is {_L.opening[0]:g} rad away, or one of torso "
+        f"and arms would get {_L.opening[1]:.0%} of its torque at once.",
+        "The stack does not see where the robot is: start it again.",
     ),
 }
 
@@ -195,8 +220,12 @@ def page() -> str:
         "| stop1 | damping, for 3 s |",
         "| stop0 | limp |\n",
         "A stop whose reason leaves state and legs sound leads to stop2, if the robot stands (`golem safety --stand`,",
-        "which `golem launch` gives where it does) and a foot was on the ground within the last 0.3 s. Every other",
-        "leads to stop1. Of reasons marked *arms* that holds where the legs have no part in it.\n",
+        "which `golem launch` gives where it does) and by the gate's own estimate a foot carried it within the last",
+        "0.3 s. Every other leads to stop1; of several at once the strictest counts. Of reasons marked *arms* that",
+        "holds where the legs have no part in it.\n",
+        f"A reset waits until {_L.reset_after:g} s after the stop, for a torso that turns at less than "
+        f"{_L.at_rest[0]:g} rad/s and",
+        f"joints that move at less than {_L.at_rest[1]:g} rad/s. In stop2 the checks of active go on.\n",
         "| number | reason | stop | threshold | what to do |",
         "| --- | --- | --- | --- | --- |",
     ]
