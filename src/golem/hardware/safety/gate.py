@@ -182,7 +182,7 @@ class Gate:
     def prepare(self) -> None:
         """Load what is compiled now, or compile it: where the wall clock counts, no tick must wait for it."""
         memory, still = GateMemory(), np.zeros(NUM_JOINTS)
-        hold = np.ones(NUM_JOINTS)
+        hold = np.full(NUM_JOINTS, 100.0)
         imu = Imu(np.eye(4)[0], np.zeros(3), np.array([0.0, 0.0, 9.81]))
         for i in range(2 * EVERY + 1):
             t = i * TICK
