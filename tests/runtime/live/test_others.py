@@ -85,7 +85,7 @@ def test_an_operator_hands_over_to_a_second_stack_and_the_first_is_heard_no_more
     live.run(0.1)
     assert live.reason == "two_writers" and not live.ask("reset")[0]
     assert live.ask("hand_over")[0]
-    live.run(0.1)
+    live.run(1.0)
     assert live.ask("reset")[0]
     # The second says nothing, and what the first says does not count.
     assert live.gate is not None and live.gate._arrivals.ignored

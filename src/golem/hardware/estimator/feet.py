@@ -67,9 +67,9 @@ FEET = np.dtype(
 """Options, memory and answers of `sense_feet`; of the answers see `Feet`."""
 
 
-def put_feet(memory: Records, config: FeetConfig) -> None:
-    """Write the robot's legs and the options `config` into `memory`, a `FEET`."""
-    memory["tree"] = leg_tree()
+def put_feet(memory: Records, config: FeetConfig, tree: Records | None = None) -> None:
+    """Write the robot's legs and the options `config` into `memory`, a `FEET`; `tree` replaces Pinocchio's legs."""
+    memory["tree"] = leg_tree() if tree is None else tree
     memory["wrench"]["lag"], memory["wrench"]["floor"] = config.force.lag, config.force.floor()
     memory["half"] = _HALF
     memory["contacts"] = astuple(config.contact)

@@ -16,13 +16,12 @@ from numba import njit
 from golem.hardware.estimator.attitude import base_rotation
 from golem.hardware.estimator.feet import FEET, FeetConfig, forget_feet, put_feet, sense_feet
 from golem.hardware.safety.base import SafetyLimits
-from golem.hardware.servo.gravity import body_tree
 from golem.interfaces.payloads import Fault, Reason
 from golem.native import Record, Records, new_record
 from golem.robots.model.imu_mount import TORSO, turn_to_base
-from golem.robots.model.leg_kernel import tree_dtype, tree_frames
+from golem.robots.model.leg_kernel import table_tree, tree_dtype, tree_frames
 from golem.robots.model.table import BASE_LINK, LINKS
-from golem.types import GRAVITY, NUM_JOINTS, Array, LowState
+from golem.types import GRAVITY, LEGS, NUM_JOINTS, Array, LowState
 
 BALANCE = np.dtype(
     [
@@ -57,8 +56,8 @@ _DIRECTIONS = np.array([(math.cos(a), math.sin(a)) for a in np.arange(_RAYS) * 2
 @cache
 def _blank() -> Records:
     m = new_record(BALANCE)
-    put_feet(m["feet"], FeetConfig())
-    m["tree"], pelvis = body_tree(), LINKS[BASE_LINK]
+    put_feet(m["feet"], FeetConfig(), table_tree(LEGS.stop))
+    m["tree"], pelvis = table_tree(NUM_JOINTS), LINKS[BASE_LINK]
     m["pelvis"] = pelvis.mass, *pelvis.com
     m["new"], m["airborne"] = 1, math.inf
     return m

@@ -8,10 +8,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-import pinocchio as pin
 
 from golem.native import Records, new_record
-from golem.robots.model import pinocchio_model
 from golem.robots.model.leg_kernel import LEG, LEG_MOTION, leg_motion, tree_of
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, Array
@@ -23,6 +21,11 @@ _NOTHING = np.zeros(3)
 @cache
 def leg_tree() -> Records:
     """Return the tree of the twelve leg joints, see `leg_kernel`; shared, not to be changed."""
+    # Imported here: the safety gate, which has no use for it, is there sooner without.
+    import pinocchio as pin
+
+    from golem.robots.model import pinocchio_model
+
     whole = pinocchio_model.build(hands=False)
     locked = [whole.getJointId(name) for name in JOINT_NAMES[LEGS.stop :]]
     return tree_of(pin.buildReducedModel(whole, locked, np.zeros(NUM_JOINTS)))

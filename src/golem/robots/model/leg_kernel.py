@@ -7,16 +7,18 @@ Algorithms, 2008, chapters 5 and 6). Written for one robot at 500 Hz; axes of ba
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 
 from golem.kernels import njit
 from golem.native import Record, Records, new_record
 from golem.robots.model.leg_kinematics import SOLE_CENTER
-from golem.robots.model.table import DOF
+from golem.robots.model.table import DOF, JOINTS, LINKS
 from golem.types import LEGS, Array
+
+if TYPE_CHECKING:
+    import pinocchio as pin
 
 LEG = 6
 """Joints of one leg."""
@@ -65,6 +67,21 @@ LEG_MOTION = np.dtype(
     ]
 )
 """What `leg_motion` fills in; see `LegDynamics`, and `gravity`: torque that carries the legs' weight [N m]."""
+
+
+def table_tree(joints: int) -> Records:
+    """Return the tree of the first `joints` of the table, no hands; Pinocchio takes long to load."""
+    tree = new_record(tree_dtype(joints))
+    children = [joint.child for joint in JOINTS]
+    for i, joint in enumerate(JOINTS[:joints]):
+        link, T = LINKS[joint.child], joint.T_parent_joint
+        tree["parent"][0, i] = children.index(joint.parent) if joint.parent in children else -1
+        tree["axis"][0, i] = int(np.argmax(joint.axis))
+        tree["R"][0, i], tree["p"][0, i] = T[:3, :3], T[:3, 3]
+        tree["mass"][0, i], tree["com"][0, i], tree["inertia"][0, i] = link.mass, link.com, link.inertia
+    return tree
+
+
 SOLE = tuple(SOLE_CENTER.tolist())
 ARMATURE = DOF.armature
 

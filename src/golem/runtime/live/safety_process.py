@@ -264,7 +264,8 @@ class SafetyProcess:
             clock = "" if moving or self._arrivals.mode_machine is None else self._arrivals.rate.doubt()
             held = self._switcher.doubt(moving)
             doubts += [(Reason.STATE_CLOCK, clock), (Reason.UNHEARD, self._unheard), (Reason.HELD, held)]
-        return faults + [Fault(reason, detail) for reason, detail in doubts if detail]
+        faults += [Fault(reason, detail) for reason, detail in doubts if detail]
+        return faults[::-1]  # of two that are alike the later tells an operator more
 
     def _estop_reason(self) -> Reason:
         return Reason.ESTOP_MISSING if self._frame is None else Reason.ESTOP_STALE
