@@ -78,8 +78,8 @@ def _while_stopped() -> Iterator[Injection]:
         return lambda m, *what: (spoil if m.t > 1.0 else sound)(m, *what)
 
     for hard, (reasons, one) in HARD.items():
-        sound = {"state": lambda m, p: [p], "senses": lambda m, s: s}
-        late = {key: later(spoil, sound[key]) for key, spoil in one.items()}
+        sound: dict[str, Any] = {"state": lambda m, p: [p], "senses": lambda m, s: s}
+        late: dict[str, Any] = {key: later(spoil, sound[key]) for key, spoil in one.items()}
         yield Injection(
             f"{hard} while stopped",
             FaultSource.DEVICE,

@@ -17,7 +17,7 @@ from golem.hardware.estimator.attitude import base_rotation
 from golem.hardware.estimator.feet import FEET, FeetConfig, forget_feet, put_feet, sense_feet
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import Fault, Reason
-from golem.native import Record, Records, new_record
+from golem.native import Record, Records, address, new_record, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base
 from golem.robots.model.leg_kernel import table_tree, tree_dtype, tree_frames
 from golem.robots.model.table import BASE_LINK, LINKS
@@ -41,6 +41,7 @@ BALANCE = np.dtype(
 )
 """Models, limits and memory; then how far the capture point is outside [m], how fast the robot sinks [m/s], by how much
 IMU and feet differ [rad], for how long each has been too much, and for how long no foot has carried the robot [s]."""
+_balance_at = view(BALANCE)
 LASTS = (0.03, 0.03, 0.3)
 """Time for which each of the three may be too much [s] [own]."""
 SMOOTH = 0.03
@@ -79,8 +80,8 @@ def sensed(m: Records, state: LowState, dt: float | None, limits: SafetyLimits) 
         forget_feet(m["feet"])
         m["new"], m["lasted"] = 1, 0.0
     imu = state.imu
-    arrays = (np.ascontiguousarray(a, np.float64) for a in (state.q, state.dq, state.tau, imu.quat, imu.gyro))
-    sense_balance(m[0], *arrays, 0.01 if dt is None else dt)
+    numbers = np.concatenate((state.q, state.dq, state.tau, imu.quat, imu.gyro), dtype=np.float64)
+    _sense_at(address(m), numbers, 0.01 if dt is None else dt)
     return m
 
 
@@ -99,6 +100,14 @@ def unbalanced(m: Records) -> Fault | None:
     if sinks >= LASTS[1]:
         return Fault(Reason.BALANCE, f"it sinks at {m['sinks'][0]:.2f} m/s")
     return None
+
+
+@njit(cache=True)
+def _sense_at(place: int, numbers: Array, dt: float) -> None:  # pragma: no cover - compiled
+    """Do `sense_balance` at the address of the memory: to find the type of a record costs more than the sample."""
+    n = NUM_JOINTS
+    q, dq, tau = numbers[:n], numbers[n : 2 * n], numbers[2 * n : 3 * n]
+    sense_balance(_balance_at(place), q, dq, tau, numbers[3 * n : 3 * n + 4], numbers[3 * n + 4 :], dt)
 
 
 @njit(cache=True)

@@ -22,7 +22,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from golem.hardware.safety.balance import carried, unbalanced
 from golem.hardware.safety.base import Counters, GateInputs, OperatorRequest, Outgoing, SafetyLimits
 from golem.hardware.safety.limiter import limit_command
 from golem.hardware.safety.memory import GateMemory, GateResult
@@ -70,7 +69,7 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     t = inputs.t if running else memory.t if math.isfinite(memory.t) else 0.0
     estop, estop_fault = _estop(inputs.estop, memory.estop, t, limits)
     state, counters, senses, state_fault = _state(inputs, memory, t, limits)
-    stands_up = carried(senses.balance)
+    stands_up = senses.carries
     command, sender, prompt, command_fault = _command(inputs.command, memory, t, limits, stands_up)
     grounded, base_fault = _base(inputs.base, memory, t, limits)
     clock_fault = None if running else Fault(Reason.CLOCK)
@@ -82,7 +81,7 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
     outgoing, stopped = memory.outgoing, memory.stopped
     if mode is GateState.ACTIVE:
         requested = Fault(Reason.REQUESTED) if inputs.request is OperatorRequest.STOP else None
-        faults += [command_fault, base_fault, unbalanced(memory.senses.balance), requested]
+        faults += [command_fault, base_fault, memory.senses.unsteady, requested]
         fault = _strictest(faults)
         if fault is not None:
             stands = inputs.stands and stands_up and all(map(_stands, faults))
@@ -90,7 +89,7 @@ def check(inputs: GateInputs, limits: SafetyLimits, memory: GateMemory) -> GateR
             reason, detail, since = fault.reason, fault.detail, t
     elif mode is GateState.STOP2:
         asked = Fault(Reason.REQUESTED) if inputs.request is OperatorRequest.STOP else None
-        faults = [asked, *faults, _standing(inputs, since, limits), unbalanced(memory.senses.balance)]
+        faults = [asked, *faults, _standing(inputs, since, limits), memory.senses.unsteady]
         hard = next((f for f in faults if not _stands(f)), None)
         fault = fault or command_fault
         if hard is not None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from golem.hardware.safety.balance import BALANCE, balances, sense_balance
+from golem.hardware.safety.balance import BALANCE, balances, carried, sense_balance, unbalanced
 from golem.hardware.safety.base import Counters, Outgoing, SafetyLimits
 from golem.hardware.safety.kernel import ORDINARY as SOUND
 from golem.hardware.safety.kernel import UNKNOWN, limited, ordinary_command, rate_state
@@ -350,6 +350,7 @@ class GateStage:
         row = self.stage.memory[0]
         command = command_of(row["command"], float(row["command_t"]))
         grounded, t = float(row["grounded"]), float(row["t"])
+        balance = self.stage.memory["balance"].copy()
         senses = SensesMemory(
             tick=float(row["tick"]),
             q=row["q"].copy(),
@@ -364,7 +365,9 @@ class GateStage:
             restless=float(row["restless"]),
             asked=row["asked"].copy(),
             dead=row["dead"].copy(),
-            balance=self.stage.memory["balance"].copy(),
+            balance=balance,
+            carries=carried(balance),
+            unsteady=unbalanced(balance),
         )
         return GateMemory(
             t=t,

@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from golem.hardware.safety.balance import no_balance, sensed
+from golem.hardware.safety.balance import carried, no_balance, sensed, unbalanced
 from golem.hardware.safety.base import STANDING, SafetyLimits
 from golem.hardware.safety.senses_kernel import ASKED, DELAYS, FIRST, SCALARS, looked
 from golem.interfaces.payloads import Fault, Reason
@@ -67,7 +67,7 @@ class SensesMemory:
         asked: (486,) what the motors were asked for at the looks of late, see `senses_kernel`; None while no command
             passes.
         dead: (27,) for how long each motor has not followed [s].
-        balance: see `balance`.
+        balance: see `balance`; `carries` and `unsteady` are what it says.
     """
 
     tick: float = -math.inf
@@ -84,6 +84,8 @@ class SensesMemory:
     asked: Array | None = None
     dead: Array = field(default_factory=lambda: np.zeros(NUM_JOINTS))
     balance: Records = field(default_factory=no_balance)
+    carries: bool = False
+    unsteady: Fault | None = None
 
 
 def sense(
@@ -139,6 +141,8 @@ def _kept(m: SensesMemory, tick: float, state: LowState, bad: float, drift: Arra
         m.asked,
         m.dead,
         m.balance,
+        m.carries,
+        m.unsteady,
     )
 
 
@@ -168,6 +172,7 @@ def _look(
     before, dt = m.looked, tick - m.looked_at
     if before is None or not 0.0 < dt < LOST:
         balance = sensed(m.balance, state, None, limits)
+        m = replace(m, carries=carried(balance), unsteady=None)
         return replace(m, looked=state, looked_at=tick, since=(tick,) * len(GROUPS), balance=balance), None
     now, was = state.imu, before.imu
     force = now.acc if m.force is None else m.force
@@ -189,6 +194,7 @@ def _look(
         sent is not None,
     )
     tx, ty, tz, fx, fy, fz, rate, drifts, dead, *same = out[SCALARS:].tolist()
+    balance = sensed(m.balance, state, dt, limits)
     after = SensesMemory(
         m.tick,
         m.q,
@@ -203,7 +209,9 @@ def _look(
         tick if rate > CALM else m.restless,
         None if sent is None else out[2 * NUM_JOINTS : SCALARS],
         out[NUM_JOINTS : 2 * NUM_JOINTS],
-        sensed(m.balance, state, dt, limits),
+        balance,
+        carried(balance),
+        unbalanced(balance),
     )
     return after, (
         _frozen(after, limits)
