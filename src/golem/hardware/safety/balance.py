@@ -139,7 +139,7 @@ def sense_balance(
             for c in range(3):
                 at += R[i, a, c] * m.tree.com[i, c]
             com[a] += m.tree.mass[i] * at
-    total = height = 0.0
+    total = height = 0.0  # of the centre of mass above the lower sole
     v = np.zeros(3)
     for a in range(3):
         com[a] /= mass
@@ -150,7 +150,10 @@ def sense_balance(
         v[0] -= w * (omega[1] * z - omega[2] * y + feet.rates[k, 0])
         v[1] -= w * (omega[2] * x - omega[0] * z + feet.rates[k, 1])
         v[2] -= w * (omega[0] * y - omega[1] * x + feet.rates[k, 2])
-        height -= w * (x * up[0] + y * up[1] + z * up[2])
+        below = 0.0
+        for a in range(3):
+            below += (com[a] - feet.motion.soles[k, a]) * up[a]
+        height = max(height, below)
     carries = feet.contact[0] > 0.5 or feet.contact[1] > 0.5
     m.airborne = 0.0 if carries else m.airborne + dt
     sinks, share = 0.0, dt / (SMOOTH + dt)
@@ -163,11 +166,13 @@ def sense_balance(
         m.com[a] = com[a]
         sinks -= m.velocity[a] * up[a]
     m.new, m.sinks, m.outside, m.leans = 0, sinks, 0.0, 0.0
-    if total > 0.05 and carries:
-        m.outside = _outside(m, up, max(height / total, 0.2))
+    # Feet that slip or turn measure no velocity, and who falls over them goes on as before.
+    falls = m.airborne <= AIRBORNE
+    if falls:
+        m.outside = _outside(m, up, max(height, 0.2))
     if feet.weight[0] > 0.7 and feet.weight[1] > 0.7:
         m.leans = _leans(feet.motion.rotations, up)
-    for k, much in enumerate((m.outside, m.sinks if carries else 0.0, m.leans)):
+    for k, much in enumerate((m.outside, m.sinks if falls else 0.0, m.leans)):
         m.lasted[k] = m.lasted[k] + dt if much > m.most[k] else max(0.0, m.lasted[k] - dt)
 
 
