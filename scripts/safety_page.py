@@ -175,7 +175,7 @@ REASONS: dict[Reason, ReasonText] = {
     Reason.COMMAND_GAINS: ReasonText(
         707,
         "Three commands let a held motor go (kd below 30 % of the servo's for legs, 10 % for the others; legs that "
-        "carry with kp below a third and no feed-forward), or a gain is negative.",
+        "carry with kp below a third and no feed-forward). Or a gain is negative.",
         "A bug in the stack.",
     ),
     Reason.COMMAND_JOLTS: ReasonText(
@@ -198,8 +198,8 @@ REASONS: dict[Reason, ReasonText] = {
     ),
     Reason.COMMAND_AWAY: ReasonText(
         712,
-        f"At the activation a motor is not held, a stiff one's target is {_L.opening[0]:g} rad away, or one of torso "
-        f"and arms would get {_L.opening[1]:.0%} of its torque at once.",
+        f"At the activation a motor is not held, or a stiff one's target is {_L.opening[0]:g} rad away. Or one of "
+        f"torso and arms would get {_L.opening[1]:.0%} of its torque at once.",
         "The stack does not see where the robot is: start it again.",
     ),
 }
@@ -219,10 +219,10 @@ def page() -> str:
         "| stop2 | legs stand by a controller of the gate, arms damp; `stop` damps all, `reset`, `activate` go on |",
         "| stop1 | damping, for 3 s |",
         "| stop0 | limp |\n",
-        "A stop whose reason leaves state and legs sound leads to stop2, if the robot stands (`golem safety --stand`,",
-        "which `golem launch` gives where it does) and by the gate's own estimate a foot carried it within the last",
-        "0.3 s. Every other leads to stop1; of several at once the strictest counts. Of reasons marked *arms* that",
-        "holds where the legs have no part in it.\n",
+        "A stop whose reason leaves state and legs sound leads to stop2 (`golem safety --stand`,",
+        "which `golem launch` gives where a robot stands), if a foot carried it within the last",
+        "0.3 s, by the gate's own estimate. Every other leads to stop1. Of several at once the strictest counts.",
+        "Of reasons marked *arms* that holds where the legs have no part in it.\n",
         f"A reset waits until {_L.reset_after:g} s after the stop, for a torso that turns at less than "
         f"{_L.at_rest[0]:g} rad/s and",
         f"joints that move at less than {_L.at_rest[1]:g} rad/s. In stop2 the checks of active go on.\n",

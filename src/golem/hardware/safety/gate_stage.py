@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from golem.hardware.safety.balance import BALANCE, balances, carried, sense_balance, unbalanced
 from golem.hardware.safety.base import Counters, Outgoing, SafetyLimits
+from golem.hardware.safety.gate_balance import BALANCE, balances, carried, sense_balance, unbalanced
 from golem.hardware.safety.kernel import ORDINARY as SOUND
 from golem.hardware.safety.kernel import UNKNOWN, limited, ordinary_command, rate_state
 from golem.hardware.safety.memory import GateMemory

@@ -17,8 +17,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from golem.hardware.safety.balance import carried, no_balance, sensed, unbalanced
 from golem.hardware.safety.base import STANDING, SafetyLimits
+from golem.hardware.safety.gate_balance import carried, no_balance, sensed, unbalanced
 from golem.hardware.safety.senses_kernel import ASKED, DELAYS, FIRST, SCALARS, looked
 from golem.interfaces.payloads import Fault, Reason
 from golem.native import Records
@@ -67,7 +67,7 @@ class SensesMemory:
         asked: (486,) what the motors were asked for at the looks of late, see `senses_kernel`; None while no command
             passes.
         dead: (27,) for how long each motor has not followed [s].
-        balance: see `balance`; `carries` and `unsteady` are what it says.
+        balance: see `gate_balance`; `carries` and `unsteady` are what it says.
     """
 
     tick: float = -math.inf

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from tests.hardware.conftest import carrying, make_state
 
-from golem.hardware.safety.balance import carried, no_balance, sensed, unbalanced
 from golem.hardware.safety.base import SafetyLimits
+from golem.hardware.safety.gate_balance import carried, no_balance, sensed, unbalanced
 from golem.interfaces.payloads import Reason
 from golem.native import Records
 from golem.robots.model.kinematics import Kinematics
