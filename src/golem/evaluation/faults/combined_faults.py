@@ -51,7 +51,8 @@ def _unstamped(m: FaultMoment, image: Any) -> None:
 
 
 def _second(m: FaultMoment, rig: Any) -> None:
-    m.kept.setdefault("writer", rig.writer("/safety/lowcmd_in"))
+    if "writer" not in m.kept:
+        m.kept["writer"] = rig.writer("/safety/lowcmd_in")
 
 
 SOFT: dict[str, dict[str, Any]] = {
