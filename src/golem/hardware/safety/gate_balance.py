@@ -11,12 +11,12 @@ import math
 from functools import cache
 
 import numpy as np
-from numba import njit
 
 from golem.hardware.estimator.attitude import base_rotation
 from golem.hardware.estimator.feet import FEET, FeetConfig, forget_feet, put_feet, sense_feet
 from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces.payloads import Fault, Reason
+from golem.kernels import njit
 from golem.native import Record, Records, address, new_record, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base
 from golem.robots.model.leg_kernel import table_tree, tree_dtype, tree_frames
