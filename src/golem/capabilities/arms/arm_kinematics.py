@@ -59,6 +59,13 @@ class UpperKinematics:
         """
         return pin.getFrameJacobian(self.model, self.data, self.frame[side], pin.ReferenceFrame.LOCAL)
 
+    def exponentials(self, side: Side) -> tuple[Array, Array, Array]:
+        """Return torso and arm as `ik_kernel` takes them: axes (8, 3), points (8, 3) and the hand (4, 4), at zero."""
+        self.update(np.zeros(len(self.lower)))
+        J = pin.getFrameJacobian(self.model, self.data, self.frame[side], pin.ReferenceFrame.WORLD)
+        J = np.column_stack([J[:, 0], J[:, ARM_COLUMNS[side]]])
+        return J[3:].T.copy(), np.cross(J[3:].T, J[:3].T), self.placement(side).homogeneous.copy()
+
     def manipulability(self, side: Side, q: Array) -> float:
         """Return the smallest singular value of the arm's own (6, 7) Jacobian at `q` (15,) [m and rad mixed]."""
         self.update(q)

@@ -11,18 +11,13 @@ nearest pairs of links, if wanted, bound how fast their distance d may shrink: g
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import daqp
 import numpy as np
-import pinocchio as pin
 
 from golem.capabilities.arms.base import NUM_UPPER
-from golem.capabilities.arms.task_space import Reach, TaskSpaceConfig, TaskSpaceController
+from golem.capabilities.arms.task_kernel import COUNT
+from golem.capabilities.arms.task_space import TaskSpaceConfig, TaskSpaceController
 from golem.types import Array
-
-_DIAGONAL = np.diag_indices(NUM_UPPER)
-_FREE = 1e30
 
 
 class DiffIK(TaskSpaceController):
@@ -31,28 +26,13 @@ class DiffIK(TaskSpaceController):
     def __init__(self, config: TaskSpaceConfig | None = None) -> None:
         """Build the model; see `TaskSpaceController`."""
         super().__init__(config)
-        c = self.config
-        self._root = np.repeat(np.sqrt([c.position_weight, c.rotation_weight]), 3)
+        self._kinds = np.zeros(len(self.task.below), np.int32)
 
-    def solve(
-        self, reaches: Sequence[Reach], lower: Array, upper: Array, damping: float, dt: float
-    ) -> Array | None:
-        """Assemble H and f of the program over the (15,) step and solve it; see `TaskSpaceController.solve`."""
-        c = self.config
-        rows: list[Array] = []
-        wanted: list[Array] = []
-        for reach in reaches:
-            # d log(T_goal^-1 T_frame) = Jlog6 J dq, the exact derivative of the residual.
-            jacobian = pin.Jlog6(reach.to_frame) @ self.kinematics.jacobian(reach.side)
-            rows.append(self._root[:, None] * jacobian)
-            wanted.append(c.palm_gain * (self._root * reach.residual))
-        A = np.concatenate(rows)
-        H = A.T @ A
-        H[_DIAGONAL] += self.soft + damping
-        pull = self.soft * min(1.0, c.posture_rate * dt) * (self.rest - self.q)
-        f = -(np.concatenate(wanted) @ A + pull)
-        rows_near, bounds = self.collision_bounds()
-        above = np.concatenate([upper, np.full(len(bounds), _FREE)])
-        below = np.concatenate([lower, bounds])
-        step, _, flag, _ = daqp.solve(H, f, rows_near, above, below, np.zeros(len(below), dtype=np.int32))
+    def solve(self, dt: float) -> Array | None:
+        """Solve the program that stands in `task`; see `TaskSpaceController.solve`."""
+        task, rows = self.task, int(self.task.state[COUNT])
+        n = NUM_UPPER + rows
+        step, _, flag, _ = daqp.solve(
+            task.H, task.f, task.gradient[:rows], task.above[:n], task.below[:n], self._kinds[:n]
+        )
         return step if flag > 0 else None

@@ -77,6 +77,46 @@ def logarithm(R: Array, p: Array, out: Array) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def place_hand(q: Array, axes: Array, points: Array, grip: Array, here: Array, tip: Array, at: Array) -> None:
+    """Write the grasp frame at `q` (8,) into `here` (3, 3) and `tip` (3,), and into `at` (8, 2, 3) axes and points."""
+    R, p = np.empty((3, 3)), np.empty(3)
+    for r in range(3):
+        p[r] = 0.0
+        for k in range(3):
+            R[r, k] = 1.0 if r == k else 0.0
+    for j in range(len(q)):
+        _turn(R, p, axes[j], points[j], q[j], at[j])
+    for r in range(3):
+        tip[r] = R[r, 0] * grip[0, 3] + R[r, 1] * grip[1, 3] + R[r, 2] * grip[2, 3] + p[r]
+        for k in range(3):
+            here[r, k] = R[r, 0] * grip[0, k] + R[r, 1] * grip[1, k] + R[r, 2] * grip[2, k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def hand_jacobian(here: Array, tip: Array, at: Array, J: Array) -> None:
+    """Write the Jacobian (6, 8) of the grasp frame in its own axes, linear above angular, where `place_hand` put it."""
+    for j in range(len(at)):
+        axis, point = at[j, 0], at[j, 1]
+        u, v, w = tip[0] - point[0], tip[1] - point[1], tip[2] - point[2]
+        x, y, z = axis[1] * w - axis[2] * v, axis[2] * u - axis[0] * w, axis[0] * v - axis[1] * u
+        for r in range(3):
+            J[r, j] = here[0, r] * x + here[1, r] * y + here[2, r] * z
+            J[3 + r, j] = here[0, r] * axis[0] + here[1, r] * axis[1] + here[2, r] * axis[2]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def error_to(goal: Array, here: Array, tip: Array, error: Array) -> None:
+    """Write the twist (6,), in the axes of the frame `here`, `tip`, that takes it to `goal` (4, 4) within a second."""
+    off, gap = np.empty((3, 3)), np.empty(3)
+    for r in range(3):
+        gap[r] = 0.0
+        for k in range(3):
+            gap[r] += here[k, r] * (goal[k, 3] - tip[k])
+            off[r, k] = here[0, r] * goal[0, k] + here[1, r] * goal[1, k] + here[2, r] * goal[2, k]
+    logarithm(off, gap, error)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def descend(
     q: Array, goal: Array, axes: Array, points: Array, grip: Array, lower: Array, upper: Array, steps: int
 ) -> bool:
@@ -93,27 +133,12 @@ def descend(
         steps: how many.
     """
     n = len(q)
-    R, p, at = np.empty((3, 3)), np.empty(3), np.empty((n, 2, 3))
-    here, off, gap, tip = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
-    error, A, J, step = np.empty(6), np.empty((6, 6)), np.empty((6, n - 1)), np.empty(n - 1)
+    here, tip, at = np.empty((3, 3)), np.empty(3), np.empty((n, 2, 3))
+    error, A, J, step = np.empty(6), np.empty((6, 6)), np.empty((6, n)), np.empty(n)
     last = np.inf
     for i in range(steps + 1):
-        for r in range(3):
-            p[r] = 0.0
-            for k in range(3):
-                R[r, k] = 1.0 if r == k else 0.0
-        for j in range(n):
-            _turn(R, p, axes[j], points[j], q[j], at[j])
-        for r in range(3):
-            tip[r] = R[r, 0] * grip[0, 3] + R[r, 1] * grip[1, 3] + R[r, 2] * grip[2, 3] + p[r]
-            for k in range(3):
-                here[r, k] = R[r, 0] * grip[0, k] + R[r, 1] * grip[1, k] + R[r, 2] * grip[2, k]
-        for r in range(3):
-            gap[r] = 0.0
-            for k in range(3):
-                gap[r] += here[k, r] * (goal[k, 3] - tip[k])
-                off[r, k] = here[0, r] * goal[0, k] + here[1, r] * goal[1, k] + here[2, r] * goal[2, k]
-        logarithm(off, gap, error)
+        place_hand(q, axes, points, grip, here, tip, at)
+        error_to(goal, here, tip, error)
         distance = math.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
         angle = math.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
         if distance < POSITION and angle < ROTATION:
@@ -123,26 +148,20 @@ def descend(
             if away > PROGRESS * last:
                 return False
             last = away
-        for j in range(n - 1):
-            axis, point = at[j + 1, 0], at[j + 1, 1]
-            u, v, w = tip[0] - point[0], tip[1] - point[1], tip[2] - point[2]
-            x, y, z = axis[1] * w - axis[2] * v, axis[2] * u - axis[0] * w, axis[0] * v - axis[1] * u
-            for r in range(3):
-                J[r, j] = here[0, r] * x + here[1, r] * y + here[2, r] * z
-                J[3 + r, j] = here[0, r] * axis[0] + here[1, r] * axis[1] + here[2, r] * axis[2]
+        hand_jacobian(here, tip, at, J)
         for r in range(6):
             for k in range(r + 1):
                 A[r, k] = DAMPING**2 * min(1.0, away) if r == k else 0.0
-                for j in range(n - 1):
+                for j in range(1, n):
                     A[r, k] += J[r, j] * J[k, j]
         cholesky(A, 6)
         solve_cholesky(A, 6, error)
         most = 1e-12
-        for j in range(n - 1):
+        for j in range(1, n):
             step[j] = 0.0
             for r in range(6):
                 step[j] += J[r, j] * error[r]
             most = max(most, abs(step[j]))
-        for j in range(n - 1):
-            q[j + 1] = min(max(q[j + 1] + step[j] * min(1.0, STEP / most), lower[j]), upper[j])
+        for j in range(1, n):
+            q[j] = min(max(q[j] + step[j] * min(1.0, STEP / most), lower[j - 1]), upper[j - 1])
     return False

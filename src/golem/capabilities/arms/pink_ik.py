@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
 
 from golem.capabilities.arms.base import GRIPPER_FRAME
-from golem.capabilities.arms.task_space import Reach, TaskSpaceConfig, TaskSpaceController
+from golem.capabilities.arms.task_kernel import LAMBDA
+from golem.capabilities.arms.task_space import TaskSpaceConfig, TaskSpaceController
 from golem.errors import MissingExtra
 from golem.types import SIDES, Array
 
@@ -39,7 +39,7 @@ class PinkIK(TaskSpaceController):
         super().__init__(replace(config or TaskSpaceConfig(), collision_rows=0))
         c = self.config
         self._pink = pink
-        model = self.kinematics.model
+        model = self._kinematics.model
         model.lowerPositionLimit, model.upperPositionLimit = self.lower, self.upper
         self._palms = {
             side: pink.tasks.FrameTask(
@@ -55,28 +55,26 @@ class PinkIK(TaskSpaceController):
         self._posture.set_target(self.rest)
         self._range = pink.limits.ConfigurationLimit(model, config_limit_gain=1.0)
 
-    def solve(
-        self, reaches: Sequence[Reach], lower: Array, upper: Array, damping: float, dt: float
-    ) -> Array | None:
+    def solve(self, dt: float) -> Array | None:
         """Set Pink's targets and let it solve; see `TaskSpaceController.solve`."""
-        model, data = self.kinematics.model, self.kinematics.data
+        k, task = self.kinematics, self.task
         configuration = self._pink.Configuration(
-            model, data, self.q, copy_data=False, forward_kinematics=False
+            k.model, k.data, self.q, copy_data=False, forward_kinematics=False
         )
-        moving = upper - lower > 0.0
-        speed = self._pink.limits.VelocityLimit(model, np.where(moving, self.speed, _STILL))
-        for reach in reaches:
-            here = self.kinematics.placement(reach.side)
-            self._palms[reach.side].set_target(here * pin.exp6(reach.residual))
+        moving = (task.above > task.below)[: len(self.q)]
+        speed = self._pink.limits.VelocityLimit(k.model, np.where(moving, self.speed, _STILL))
+        wanted = [i for i in range(2) if task.wanted[i]]
+        for i in wanted:
+            self._palms[SIDES[i]].set_target(k.placement(SIDES[i]) * pin.exp6(task.residual[i]))
         self._posture.gain = min(1.0, self.config.posture_rate * dt)
-        tasks = [*(self._palms[reach.side] for reach in reaches), self._posture]
+        tasks = [*(self._palms[SIDES[i]] for i in wanted), self._posture]
         try:
             velocity = self._pink.solve_ik(
                 configuration,
                 tasks,
                 dt,
                 solver="daqp",
-                damping=damping,
+                damping=float(task.state[LAMBDA]),
                 limits=[self._range, speed],
                 safety_break=False,
             )

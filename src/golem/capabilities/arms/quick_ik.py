@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from golem.capabilities.arms import ik_kernel
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
@@ -26,18 +25,13 @@ class QuickIK:
 
     def __init__(self) -> None:
         """Build the model."""
-        self.kinematics = k = UpperKinematics()
-        k.update(np.zeros(len(k.lower)))
+        self.kinematics = UpperKinematics()
         self._arms = {side: self._arm(side) for side in SIDES}
 
     def _arm(self, side: Side) -> tuple[Array, Array, Array, Array, Array]:
         """Return what the kernel takes of an arm: axes, points, the hand at zero, and the range of the joints."""
         k, columns = self.kinematics, ARM_COLUMNS[side]
-        J = pin.getFrameJacobian(k.model, k.data, k.frame[side], pin.ReferenceFrame.WORLD)
-        J = np.column_stack([J[:, 0], J[:, columns]])
-        axes, points = J[3:].T.copy(), np.cross(J[3:].T, J[:3].T)
-        hand = k.placement(side).homogeneous.copy()
-        return axes, points, hand, k.lower[columns] + INSIDE, k.upper[columns] - INSIDE
+        return *k.exponentials(side), k.lower[columns] + INSIDE, k.upper[columns] - INSIDE
 
     def solve(self, side: Side, T: Array, starts: Array, iterations: int = ITERATIONS) -> Array | None:
         """Return the (15,) joints that put the hand at `T` (4, 4), in base_link; None where no start leads there.

@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import functools
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
+from golem.capabilities.arms import task_kernel
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.base import ARM_COLUMNS, NUM_UPPER, check_dt, check_joints, check_pose
 from golem.capabilities.arms.postures import posture
 from golem.errors import ConfigError
 from golem.interfaces.payloads import ArmCommand
 from golem.robots.model.table import JOINT_NAMES
-from golem.types import SIDES, UPPER, Array, Side
+from golem.types import SIDES, UPPER, Array
 
 if TYPE_CHECKING:
-    from golem.capabilities.collision.collision_model import CollisionModel, NearPairs
+    from golem.capabilities.collision.collision_model import CollisionModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,22 +118,6 @@ class TaskSpaceConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class Reach:
-    """One palm task of one tick; a goal out of a tick's reach is replaced by the point on the way that is not.
-
-    Attributes:
-        side: which hand.
-        to_frame: the grasp frame as seen from its goal.
-        residual: (6,) twist that leads from the grasp frame to its goal within one unit of time, in the axes of
-            the grasp frame, linear [m] above angular [rad].
-    """
-
-    side: Side
-    to_frame: pin.SE3
-    residual: Array
-
-
-@dataclass(frozen=True, slots=True)
 class ArmReport:
     """How well the arms stand.
 
@@ -155,7 +138,7 @@ class TaskSpaceController(ABC):
     Attributes:
         rate, latency: see `UpperBody`.
         config: the options.
-        kinematics: the model, always updated at the command state.
+        task: its memory, which a subclass reads; see `task_kernel.Task`.
         lower, upper: (15,) position limits it keeps, margin and torso range included [rad]; a waist that starts outside
             that range comes back to it; so does an arm once it has a target.
         speed: (15,) velocity limits it keeps [rad/s].
@@ -171,10 +154,9 @@ class TaskSpaceController(ABC):
         """
         self.config = c = config or TaskSpaceConfig()
         self.rate, self.latency = c.rate, c.latency
-        self.kinematics = UpperKinematics()
-        self.lower: Array = self.kinematics.lower + c.limit_margin
-        self.upper: Array = self.kinematics.upper - c.limit_margin
-        self._widest = self.kinematics.stops
+        self._kinematics = k = UpperKinematics()
+        self.lower: Array = k.lower + c.limit_margin
+        self.upper: Array = k.upper - c.limit_margin
         self.lower[0] = max(self.lower[0], -c.torso_range)
         self.upper[0] = min(self.upper[0], c.torso_range)
         self.speed: Array = np.full(NUM_UPPER, c.arm_speed)
@@ -182,25 +164,43 @@ class TaskSpaceController(ABC):
         self.rest: Array = np.clip(posture(c.posture), self.lower, self.upper)
         self.soft: Array = np.full(NUM_UPPER, c.posture_weight)
         self.soft[0] = c.torso_weight
-        self._left_over, self._singular, self._ticks = 0.0, 0.0, 0
-        self._near: NearPairs | None = None
-        # Here, not at the first tick: the kernel may have to be compiled.
-        self._spheres = _spheres() if c.collision_rows else None
+        self._ticks = 0
+        options = np.zeros(task_kernel.OPTIONS)
+        options[:] = (
+            c.position_weight, c.rotation_weight, c.palm_gain, c.posture_rate, c.damping, c.error_damping,
+            c.palm_speed, c.palm_turn, c.singular_value, c.clearance, c.collision_gain, NEAR,
+        )  # fmt: skip
+        n, m, arms = NUM_UPPER, c.collision_rows, [k.exponentials(side) for side in SIDES]
+        spheres = _spheres() if m else None
+        self.task = task_kernel.Task(
+            options, *(np.array(part) for part in zip(*arms, strict=True)),
+            self.lower, self.upper, self.speed, self.rest, self.soft, np.zeros(n),
+            np.zeros(2, np.int64), np.zeros((2, 4, 4)), np.zeros((2, 3, 3)), np.zeros((2, 3)), np.zeros((2, 8, 2, 3)),
+            np.zeros((2, 6)), np.zeros((2, 6, 8)), np.zeros(n), np.zeros((n, n)), np.zeros(n),
+            np.zeros(n + m), np.full(n + m, task_kernel.FAR), np.zeros((2, 2)), np.zeros(task_kernel.STATES),
+            np.zeros(0, np.int32) if spheres is None else spheres.ints,
+            np.zeros(0) if spheres is None else spheres.floats,
+            np.zeros(0, np.int64) if spheres is None else spheres.sphere_body,
+            np.zeros(m), np.zeros((m, n)), np.zeros((m, 2), np.int64),
+        )  # fmt: skip
+        self._diagonal = self.task.H.reshape(-1)[:: n + 1]
         self._move(self.rest)
 
     @abstractmethod
-    def solve(
-        self, reaches: Sequence[Reach], lower: Array, upper: Array, damping: float, dt: float
-    ) -> Array | None:
-        """Return the joint step (15,) that serves `reaches` best [rad], or None if the solver finds none.
+    def solve(self, dt: float) -> Array | None:
+        """Return the joint step (15,) that serves the `wanted` palms of `task` best [rad]; None if none is found.
+
+        The program stands in `task`: `residual`, `below` and `above`, `state[LAMBDA]`, and H and f of it all.
 
         Args:
-            reaches: one or two palm tasks.
-            lower: (15,) smallest step that position and velocity limits allow [rad].
-            upper: (15,) largest step that they allow [rad].
-            damping: lambda of this tick.
             dt: length of the tick [s].
         """
+
+    @property
+    def kinematics(self) -> UpperKinematics:
+        """The model, updated at the command state."""
+        self._kinematics.update(self.q)
+        return self._kinematics
 
     def report(self) -> ArmReport:
         """Return how well the arms stand at the command state."""
@@ -209,110 +209,66 @@ class TaskSpaceController(ABC):
         return ArmReport(
             np.array([room[ARM_COLUMNS[side]].min() for side in SIDES]),
             np.array([k.singular_value(side) for side in SIDES]),
-            float(self._near.distance[0]) if self._near is not None and len(self._near.distance) else np.inf,
+            float(self.task.distance[0]) if self.task.state[task_kernel.COUNT] else np.inf,
         )
-
-    def collision_bounds(self) -> tuple[Array, Array]:
-        """Return rows (k, 15) and bounds (k,): a step dq keeps clear of collisions where rows @ dq >= bounds."""
-        c, near = self.config, self._near
-        if near is None:
-            return _NO_ROWS, _NO_BOUNDS
-        return near.gradient, -c.collision_gain * np.maximum(near.distance - c.clearance, 0.0)
 
     def reset(self, q: Array) -> None:
         """Start from the joints `q` (27,) [rad]; see `UpperBody.reset`."""
-        self._left_over, self._singular, self._ticks = 0.0, 0.0, 0
+        self._ticks = 0
+        self.task.state[[task_kernel.LEFT_OVER, task_kernel.SINGULAR]] = 0.0
         # Not into the range of the waist: a robot that was turned further while it was limp would swing back at once.
-        self._move(np.clip(check_joints("The posture to start from", q)[UPPER], *self._widest))
+        self._move(np.clip(check_joints("The posture to start from", q)[UPPER], *self._kinematics.stops))
 
     def step(
         self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float
     ) -> ArmCommand:
         """Solve once and integrate; see `UpperBody.step`."""
-        c = self.config
+        task = self.task
         check_joints("q_measured", q_measured)
         check_dt(dt)
-        goals = (
-            None
-            if targets_left is None
-            else pin.SE3(check_pose("The target of the left hand", targets_left)),
-            None
-            if targets_right is None
-            else pin.SE3(check_pose("The target of the right hand", targets_right)),
-        )
-        room = self.speed * dt
-        reaches: list[Reach] = []
-        damping, limited = c.damping + c.error_damping * self._left_over, False
-        for side, goal in zip(SIDES, goals, strict=True):
-            if goal is None:
-                room[ARM_COLUMNS[side]] = 0.0
-                continue
-            to_frame = goal.actInv(self.kinematics.placement(side))
-            residual = -pin.log6(to_frame).vector
-            distance, angle = _norm(residual[:3]), _norm(residual[3:])
-            reach, turn = c.palm_speed * dt, c.palm_turn * dt
-            share = min(reach / max(distance, reach), turn / max(angle, turn))
-            if share < 1.0:
-                limited = True
-                residual = share * residual
-                to_frame = pin.exp6(-residual)
-            reaches.append(Reach(side, to_frame, residual))
-        if self._ticks % SINGULAR_TICKS == 0:
-            self._singular = sum(self._singular_damping(reach.side) for reach in reaches)
+        for i, target in enumerate((targets_left, targets_right)):
+            task.wanted[i] = target is not None
+            if target is not None:
+                fits = np.shape(target) == (4, 4)
+                if fits:
+                    task.goal[i] = target
+                if not fits or not task_kernel.rigid(task.goal[i]):
+                    check_pose(f"The target of the {SIDES[i]} hand", target)
+        look = self._ticks % SINGULAR_TICKS == 0
         self._ticks += 1
-        damping += self._singular
-        if reaches:
-            # A joint that starts outside its range comes back at its speed, and the others make up for it.
-            minimum, maximum = np.minimum, np.maximum  # np.clip takes three times as long
-            lower = minimum(maximum(self.lower - self.q, -room), room)
-            upper = minimum(maximum(self.upper - self.q, -room), room)
-            step = self.solve(reaches, lower, upper, damping, dt)
-            if step is None:
-                limited, step = True, np.zeros(NUM_UPPER)
-            else:
-                held = (step <= lower + 1e-9) | (step >= upper - 1e-9)
-                limited |= bool((held & (room > 0.0)).any())
-            q = self.q + minimum(maximum(step, lower), upper)
-            self._move(minimum(maximum(q, minimum(self.lower, self.q)), maximum(self.upper, self.q)))
-        position, rotation = self._errors(goals)
-        self._left_over = float(
-            np.sqrt(c.position_weight * (position @ position) + c.rotation_weight * (rotation @ rotation))
-        )
-        return ArmCommand(self.q.copy(), position, rotation, limited)
+        near = task_kernel.begin(task, dt, look)
+        if near:
+            self._damp([i for i in range(2) if near & 1 + i])
+        wanted = targets_left is not None or targets_right is not None
+        step = self.solve(dt) if wanted else None
+        task_kernel.finish(task, _NO_STEP if step is None else step)
+        if wanted:
+            self.q = task.q.copy()
+        limited = bool(task.state[task_kernel.LIMITED])
+        return ArmCommand(task.q.copy(), task.error[0].copy(), task.error[1].copy(), limited)
 
-    def _singular_damping(self, side: Side) -> float:
-        c = self.config
-        if c.singular_value == 0.0:
-            return 0.0
-        lost = 1.0 - self.kinematics.singular_value(side) / c.singular_value
-        return c.singular_damping * max(0.0, lost) ** 2
+    def _damp(self, sides: list[int]) -> None:
+        """Add the damping of arms that are near a singularity."""
+        c, added = self.config, 0.0
+        for i in sides:
+            J = self.task.J[i, :, 1:]
+            value = float(np.sqrt(max(np.linalg.eigvalsh(J @ J.T)[0], 0.0)))
+            added += c.singular_damping * max(0.0, 1.0 - value / c.singular_value) ** 2
+        self.task.state[task_kernel.SINGULAR] = added
+        self.task.state[task_kernel.LAMBDA] += added
+        self._diagonal += added
 
     def _move(self, q: Array) -> None:
         self.q: Array = q.copy()
-        self.kinematics.update(self.q)
-        if self._spheres is not None:
-            self._near = self._spheres.nearest(self.q, self.config.collision_rows, NEAR)
-
-    def _errors(self, goals: tuple[pin.SE3 | None, pin.SE3 | None]) -> tuple[Array, Array]:
-        position, rotation = np.zeros(2), np.zeros(2)
-        for i, (side, goal) in enumerate(zip(SIDES, goals, strict=True)):
-            if goal is not None:
-                here = self.kinematics.placement(side)
-                position[i] = _norm(goal.translation - here.translation)
-                rotation[i] = _norm(pin.log3(here.rotation.T @ goal.rotation))
-        return position, rotation
+        self.task.q[:] = q
+        task_kernel.place(self.task)
 
 
 SINGULAR_TICKS = 5
 """Every how many ticks the distance from singularities is looked at: it takes a fifth of a tick, and changes slowly."""
 NEAR = 0.10
 """Pairs of links farther apart than this need no row [m]: no step of a tick closes it."""
-_NO_ROWS = np.zeros((0, NUM_UPPER))
-_NO_BOUNDS = np.zeros(0)
-
-
-def _norm(v: Array) -> float:
-    return float(np.sqrt(v @ v))
+_NO_STEP = np.zeros(0)
 
 
 @functools.cache

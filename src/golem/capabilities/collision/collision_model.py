@@ -119,8 +119,7 @@ class CollisionModel:
         count = sphere_kernel.nearest_pairs(
             q, self.ints, self.floats, self.sphere_body, cutoff, distance, gradient, spheres
         )
-        order = np.argsort(distance[:count], kind="stable")
-        return NearPairs(distance[order], gradient[order], spheres[order])
+        return NearPairs(distance[:count], gradient[:count], spheres[:count])
 
     def placed(self, q: Array) -> Array:
         """Return the spheres (m, 4) at `q` (n,): centre in the base and radius [m]."""

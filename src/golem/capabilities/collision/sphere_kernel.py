@@ -218,7 +218,7 @@ def nearest_pairs(
 ) -> int:
     """Write distance (k,), gradient (k, n) and spheres (k, 2) of the nearest pairs of links; return how many.
 
-    Pairs farther than `cutoff` [m] are left out; those that are left come in no particular order.
+    Pairs farther than `cutoff` [m] are left out; the nearest comes first.
     """
     n, most, count = ints[0], len(distance), 0
     R, p = np.empty((n + 1, 9)), np.empty((n + 1, 3))
@@ -250,6 +250,15 @@ def nearest_pairs(
             gradient[slot, j] = 0.0
         add_gradient(placed, a, normal, int(sphere_body[a]), 1.0, ints, R, p, gradient, slot)
         add_gradient(placed, b, normal, int(sphere_body[b]), -1.0, ints, R, p, gradient, slot)
+    for i in range(1, count):
+        for k in range(i, 0, -1):
+            if not distance[k] < distance[k - 1]:
+                break
+            distance[k - 1], distance[k] = distance[k], distance[k - 1]
+            for c in range(2):
+                spheres[k - 1, c], spheres[k, c] = spheres[k, c], spheres[k - 1, c]
+            for j in range(n):
+                gradient[k - 1, j], gradient[k, j] = gradient[k, j], gradient[k - 1, j]
     return count
 
 
