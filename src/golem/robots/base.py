@@ -118,7 +118,9 @@ class HasLidar(Protocol):
     """A robot with a LiDAR on its torso."""
 
     def lidar(self, t: float) -> tuple[list[LidarImu], LidarScan | None]:
-        """Return the IMU's samples since the last call and the scan that has arrived, if one has; once per tick.
+        """Return the IMU's samples since the last call and the scan that has arrived, if one has.
+
+        Called once per tick, or every `lidar_period` [s] where the robot has an attribute of that name.
 
         Args:
             t: time [s].
@@ -149,6 +151,10 @@ class HasStages(Protocol):
         Args:
             joint_offset: (27,) what calibration knows of the encoders' zeros: reported minus true [rad].
         """
+        ...
+
+    def keep_moment(self, t: float) -> None:
+        """Keep the moment `t` [s] for sensors that are read later, as the stage that senses does: Python has sensed."""
         ...
 
     def take_hand_command(self, side: Side, command: HandCommand) -> None:

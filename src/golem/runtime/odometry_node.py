@@ -77,15 +77,14 @@ class OdometryNode:
 
 
 class LidarNode:
-    """Publishes what the LiDAR of a robot says."""
-
-    period = TICK
+    """Publishes what the LiDAR of a robot says: every tick, or as often as its IMU has a sample."""
 
     def __init__(
         self, bus: Bus, robot: HasLidar, wanted: Callable[[], bool], contract: ContractCheck
     ) -> None:
         """Read the LiDAR of `robot`, while `wanted` says that somebody listens."""
         self._bus, self._robot, self._wanted, self._contract = bus, robot, wanted, contract
+        self.period = contract.number("lidar_period", getattr(robot, "lidar_period", TICK), TICK)
 
     def step(self, t: float) -> None:
         """Publish what is new."""

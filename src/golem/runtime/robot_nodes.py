@@ -23,6 +23,7 @@ class SenseNode:
     def __init__(self, bus: Bus, robot: Robot, contract: ContractCheck, offset: Array | None = None) -> None:
         """Read `robot`, whose joints report `offset` (27,) more than they are [rad]; None believes them."""
         self._bus, self._robot, self._contract, self._offset = bus, robot, contract, offset
+        self._keep = robot.keep_moment if isinstance(robot, HasStages) else None
 
     def link(self) -> Link | None:
         """Return how it takes part in the chain; None for a robot without stages."""
@@ -39,6 +40,8 @@ class SenseNode:
         self._bus.publish(topics.LOW_STATE, LowState(t, q, dq, tau, call(self._robot.imu)), t)
         for side in SIDES:
             self._bus.publish(topics.hand_state(side), call(self._robot.hand, side, t), t)
+        if self._keep is not None:
+            self._keep(t)
 
 
 class ActNode:

@@ -81,6 +81,7 @@ def clear(
     The two voxels before a point are left as they are: a ray that grazes a wall shall not clear it.
     """
     rows, columns, layers = voxels.shape
+    flat_voxels, flat_stamps = voxels.reshape(-1), stamps.reshape(-1)
     # Three scalars in place of an array each: these stay in registers.
     x, y, z = origin[0], origin[1], origin[2]
     begin_x, begin_y, begin_z = (
@@ -98,6 +99,30 @@ def clear(
         k, step_k, next_z, stride_z = _axis(begin_z, along_z / length, resolution)
         end = length - 2.0 * resolution
         t = 0.0
+        # A ray whose ends are inside, and not at the border, stays inside.
+        last_c = int(math.floor((points[i, 0] - corner[0]) / resolution))
+        last_r = int(math.floor((points[i, 1] - corner[1]) / resolution))
+        last_k = int(math.floor((points[i, 2] - corner[2]) / resolution))
+        inside = 0 < min(r, last_r) and max(r, last_r) < rows - 1 and 0 < min(c, last_c)
+        inside = inside and max(c, last_c) < columns - 1 and 0 < min(k, last_k) and max(k, last_k) < layers - 1
+        if inside:
+            at, jump_r, jump_c = (r * columns + c) * layers + k, step_r * columns * layers, step_c * layers
+            while t < end:
+                if flat_stamps[at] != number:
+                    flat_stamps[at] = number
+                    flat_voxels[at] = max(flat_voxels[at] - MISS, LEAST)
+                t = min(next_x, next_y)
+                if next_z < t:
+                    t = next_z
+                    next_z += stride_z
+                    at += step_k
+                elif next_y < next_x:
+                    next_y += stride_y
+                    at += jump_r
+                else:
+                    next_x += stride_x
+                    at += jump_c
+            continue
         while t < end:
             if 0 <= r < rows and 0 <= c < columns and 0 <= k < layers and stamps[r, c, k] != number:
                 stamps[r, c, k] = number

@@ -48,25 +48,27 @@ class _Blob:
 
     Attributes:
         places: time [s], lowest and highest x, y of it [m], the newest last.
+        middle: (2,) of the newest of them [m].
         points: (n, 2) of the newest scan that showed it [m].
         velocity: (2,) [m/s]; zero while it is not known.
     """
 
     places: deque[tuple[float, ...]] = field(default_factory=lambda: deque(maxlen=HISTORY))
+    middle: Array = field(default_factory=lambda: np.zeros(2))
     points: Array = field(default_factory=lambda: np.zeros((0, 2)))
     velocity: Array = field(default_factory=lambda: np.zeros(2))
 
     def take(self, t: float, points: Array) -> None:
         """Take what a scan at time `t` showed of it."""
-        self.places.append((t, *points.min(axis=0).tolist(), *points.max(axis=0).tolist()))
-        self.points = points
+        low, high = points.min(axis=0), points.max(axis=0)
+        self.places.append((t, *low.tolist(), *high.tolist()))
+        self.middle, self.points = 0.5 * (low + high), points
         if len(self.places) >= ENOUGH:
             self.velocity = _velocity(np.array(self.places))
 
     def expected(self, t: float) -> Array:
         """Return the (2,) place at time `t` [m]."""
-        then, *edges = self.places[-1]
-        return np.array(edges).reshape(2, 2).mean(axis=0) + (t - then) * self.velocity
+        return self.middle + (t - self.places[-1][0]) * self.velocity
 
 
 class Movers:
@@ -93,9 +95,9 @@ class Movers:
         near = points[((points - here) ** 2).sum(axis=1) < REACH**2]
         for part in _blobs(near):
             middle = 0.5 * (part.min(axis=0) + part.max(axis=0))
-            away = [float(np.hypot(*(blob.expected(t) - middle))) for blob in free]
-            if away and min(away) < GATE:
-                free.pop(int(np.argmin(away))).take(t, part)
+            away = np.hypot(*(np.array([blob.expected(t) for blob in free]).reshape(-1, 2) - middle).T)
+            if len(away) and away.min() < GATE:
+                free.pop(int(away.argmin())).take(t, part)
             else:
                 blob = _Blob()
                 blob.take(t, part)

@@ -134,7 +134,7 @@ class ErrorState:
             Whether it was believed: it is not where it is off by more than 5 deviations.
         """
         own, M = self.R.T @ self.v, about_z(self.yaw) @ R_base_imu
-        told = M @ (own + np.cross(self.rate(), arm))
+        told = M @ (own + cross(self.rate(), arm))
         H = np.zeros((3, SIZE))
         H[:, :3] = M @ _skew(own)
         H[:, 6:9] = M @ self.R.T
@@ -194,6 +194,16 @@ def _skew(v: Array) -> Array:  # pragma: no cover - compiled
     out = np.zeros((3, 3))
     out[0, 1], out[0, 2], out[1, 2] = -v[2], v[1], -v[0]
     out[1, 0], out[2, 0], out[2, 1] = v[2], -v[1], v[0]
+    return out
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cross(a: Array, b: Array) -> Array:  # pragma: no cover - compiled
+    """Return a x b (3,): NumPy's takes twenty times as long."""
+    out = np.empty(3)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        out[i] = a[j] * b[k] - a[k] * b[j]
     return out
 
 

@@ -30,6 +30,7 @@ from golem.capabilities.odometry.error_state import (
     ErrorState,
     ImuNoise,
     about_z,
+    cross,
     deskew,
 )
 from golem.capabilities.odometry.moving_start import MovingStart
@@ -245,7 +246,7 @@ class Lio(Ignores):
         covariance = J @ state.P @ J.T
         covariance[:3, :3] += self._birth * np.eye(3)
         self._add_what_the_filter_does_not_know(covariance, T, arm)
-        velocity = Z @ state.v + T[:3, :3] @ np.cross(rate, -arm)
+        velocity = Z @ state.v + T[:3, :3] @ cross(rate, -arm)
         return OdometryEstimate(state.t, T, velocity, rate, covariance, T_base_lidar)
 
     def _add_what_the_filter_does_not_know(self, covariance: Array, T: Array, arm: Array) -> None:

@@ -219,11 +219,12 @@ class BalanceRecorder:
         self._next = t + PERIOD
         base = self._truth.base()
         R, position = base.T_world_base[:3, :3], base.T_world_base[:3, 3]
-        self.contact = np.linalg.norm(self._truth.foot_forces(), axis=1) > TOUCH
+        forces = self._truth.foot_forces()
+        self.contact = (forces * forces).sum(axis=1) > TOUCH**2
         if self.contact.any():  # in flight the last polygon counts
             self._polygon = _support(self._truth.soles()[self.contact])
-        self.margin = signed_margin(self._truth.com()[0], self._polygon)
-        self.fallen |= self._truth.fallen()
+        self.margin = signed_margin(self._truth.com_position, self._polygon)
+        self.fallen |= self._truth.fallen(base=base)
         roll, pitch = math.atan2(R[2, 1], R[2, 2]), -math.asin(min(max(R[2, 0], -1.0), 1.0))
         yaw = self.yaw = math.atan2(R[1, 0], R[0, 0])
         c, s = math.cos(yaw), math.sin(yaw)

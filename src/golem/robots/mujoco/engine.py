@@ -25,11 +25,20 @@ from golem.robots.mujoco.lidar_sensor import LidarMoment, LidarSensor
 from golem.robots.mujoco.motors import Motors
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP, Scene, build_scene
 from golem.robots.mujoco.truth import Truth
-from golem.robots.mujoco.twin_stages import TWIN, act_code, delicate, put_simulation, put_watch, sense_code
+from golem.robots.mujoco.twin_stages import (
+    TWIN,
+    act_code,
+    delicate,
+    keep_moment_of,
+    put_simulation,
+    put_watch,
+    sense_code,
+)
 from golem.robots.sensors.auto_exposure import AutoExposure
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import StereoDepth
 from golem.robots.sensors.imu import ImuModel
+from golem.robots.sensors.mid360 import IMU_PERIOD
 from golem.robots.sensors.profiles import load_profile, sample_episode
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds.dressing import mirror_geoms
@@ -41,6 +50,8 @@ START_GAP = 0.060
 STILL = np.zeros(2)
 """Sway of a hoist that stands still [m]."""
 
+MOMENTS = 64
+"""Ticks that the LiDAR remembers while nobody reads it."""
 _MOMENT = mujoco.mjtState.mjSTATE_INTEGRATION
 """What of the state a snapshot holds: all of it."""
 
@@ -282,12 +293,35 @@ class MujocoRobot:
             specular = self._mirrors[self._rig.segment(self.data, camera)]
         return self._exposure[camera].expose(rgb), self._depth[camera].measure(depth, specular)
 
+    lidar_period = IMU_PERIOD
+
     def lidar(self, t: float) -> tuple[list[LidarImu], LidarScan | None]:
         """Return what the LiDAR said since the last call; see `HasLidar`. The first call switches it on."""
         if self._lidar is None:
             self._lidar = LidarSensor(self.scene, self.profile.name, self._seed)
-        self._lidar.observe(LidarMoment(t, self.data.qpos.copy(), self.data.qvel.copy()))
+            self._moments: Array = np.zeros((MOMENTS, 1 + self._model.nq + self._model.nv))
+            self._seen = 0
+            memory = self._memory
+            memory["moments"], memory["moment_rows"] = address(self._moments), MOMENTS
+            memory["positions"], memory["velocities"] = self._model.nq, self._model.nv
+        self._lidar_moment(t)
         return self._lidar.read_imu(), self._lidar.read_scan(t)
+
+    def _lidar_moment(self, t: float) -> None:
+        """Let the LiDAR take what the stages have kept for it, and the moment `t` [s] where that is none of them."""
+        count, nq = int(self._memory["moment_count"][0]), self._model.nq
+        if count == 0 or self._moments[(count - 1) % MOMENTS, 0] < t - 1e-9:
+            self.keep_moment(t)
+            count += 1
+        assert self._lidar is not None
+        for k in range(max(self._seen, count - MOMENTS), count):
+            row = self._moments[k % MOMENTS].copy()
+            self._lidar.observe(LidarMoment(float(row[0]), row[1 : 1 + nq], row[1 + nq :]))
+        self._seen = count
+
+    def keep_moment(self, t: float) -> None:
+        """Keep the present moment for the LiDAR; see `HasStages`."""
+        keep_moment_of(address(self._memory), t)
 
     def save_state(self) -> bytes:
         """Return the present moment; see `Restorable`."""

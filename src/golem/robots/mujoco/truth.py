@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import product
 
@@ -32,7 +33,7 @@ class BaseTruth:
     @property
     def tilt(self) -> float:
         """Angle between the base's and the world's up [rad]."""
-        return float(np.arccos(np.clip(self.T_world_base[2, 2], -1.0, 1.0)))
+        return math.acos(min(max(float(self.T_world_base[2, 2]), -1.0), 1.0))
 
 
 class Truth:
@@ -61,11 +62,9 @@ class Truth:
 
     def base(self) -> BaseTruth:
         """Return where base_link is and how it moves."""
-        T = np.eye(4)
-        T[:3, 3] = self._data.qpos[self._q : self._q + 3]
-        R = np.empty(9)
-        mujoco.mju_quat2Mat(R, self._data.qpos[self._q + 3 : self._q + 7])
-        T[:3, :3] = R.reshape(3, 3)
+        T, R, q = np.zeros((4, 4)), np.empty(9), self._data.qpos[self._q : self._q + 7]
+        mujoco.mju_quat2Mat(R, q[3:])
+        T[:3, :3], T[:3, 3], T[3, 3] = R.reshape(3, 3), q[:3], 1.0
         v = self._data.qvel[self._v : self._v + 6]
         return BaseTruth(T, v[:3].copy(), v[3:].copy())
 
@@ -73,10 +72,15 @@ class Truth:
         """Return where the robot stands and heads in odom."""
         return PlanarPose.of(np.linalg.inv(self.T_world_odom) @ self.base().T_world_base)
 
+    @property
+    def com_position(self) -> Array:
+        """The (3,) position of `com` alone, at a tenth of the price."""
+        return self._data.subtree_com[self._base].copy()
+
     def com(self) -> tuple[Array, Array]:
         """Return position [m] and velocity [m/s] of the robot's centre of mass in the world, (3,) each."""
         mujoco.mj_subtreeVel(self._model, self._data)
-        return self._data.subtree_com[self._base].copy(), self._data.subtree_linvel[self._base].copy()
+        return self.com_position, self._data.subtree_linvel[self._base].copy()
 
     def soles(self) -> Array:
         """Return the corners of the left and the right sole in the world, (2, 4, 3) [m]."""
@@ -85,19 +89,21 @@ class Truth:
 
     def foot_forces(self) -> Array:
         """Return the force of the world on the left and the right foot, (2, 3) [N], in the world."""
-        forces, wrench = np.zeros((2, 3)), np.zeros(6)
+        forces, wrench, part = ([0.0] * 3, [0.0] * 3), np.zeros(6), self._part
         contact = self._data.contact
-        frames = contact.frame
+        frames = contact.frame.tolist()
         for i, (one, other) in enumerate(contact.geom.tolist()):
-            parts = self._part[one], self._part[other]
+            parts = part[one], part[other]
             foot = max(parts)
             if min(parts) >= 0 or foot not in (0, 1):
                 continue
             mujoco.mj_contactForce(self._model, self._data, i, wrench)
             # The contact's normal points from its first geom to its second, and so does the force on the second.
             sign = 1.0 if foot == parts[1] else -1.0
-            forces[foot] += sign * wrench[:3] @ frames[i].reshape(3, 3)
-        return forces
+            normal, tangent, other_tangent = wrench.tolist()[:3]
+            for a, (n, u, v) in enumerate(zip(frames[i][:3], frames[i][3:6], frames[i][6:], strict=True)):
+                forces[foot][a] += sign * (normal * n + tangent * u + other_tangent * v)
+        return np.array(forces)
 
     def touches(self) -> tuple[str, ...]:
         """Return the bodies other than the feet that touch something that is not the robot, sorted."""
@@ -109,8 +115,11 @@ class Truth:
                 names.add(self._model.body(self._model.geom_bodyid[geom]).name)
         return tuple(sorted(names))
 
-    def fallen(self, height: float = 0.6, tilt: float = 1.0) -> bool:
-        """Return whether base_link is less than `height` [m] above the lower sole or leans more than `tilt` [rad]."""
-        base = self.base()
-        floor = self._data.xpos[self._feet, 2].min() + SOLE.z
+    def fallen(self, height: float = 0.6, tilt: float = 1.0, base: BaseTruth | None = None) -> bool:
+        """Return whether base_link is less than `height` [m] above the lower sole or leans more than `tilt` [rad].
+
+        `base` is what `base` says now, if that is known.
+        """
+        base = base or self.base()
+        floor = min(float(self._data.xpos[foot, 2]) for foot in self._feet) + SOLE.z
         return bool(base.T_world_base[2, 3] - floor < height) or base.tilt > tilt

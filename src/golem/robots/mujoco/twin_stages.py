@@ -76,6 +76,12 @@ TWIN = np.dtype(
         ("seal_q", "i8"),
         ("seal_v", "i8"),
         ("seal_torque", "f8"),
+        # Moments for the LiDAR, the newest of them: rows of time, qpos and qvel; none where `moment_rows` is zero.
+        ("moments", "i8"),
+        ("moment_rows", "i8"),
+        ("moment_count", "i8"),
+        ("positions", "i8"),
+        ("velocities", "i8"),
     ]
 )
 """Everything the stages need of a twin: addresses of the simulation's arrays, the parts of the robot with what they
@@ -154,6 +160,29 @@ def sense(r: Record, m: Record) -> None:
     read_hand(m.left, m.qpos, m.ctrl, r.fingers[0], r.finger_force[0])
     read_hand(m.right, m.qpos, m.ctrl, r.fingers[1], r.finger_force[1])
     r.state_t = r.t
+    keep_moment(r.t, m)
+
+
+@njit(cache=True, nogil=True)
+def keep_moment(t: float, m: Record) -> None:
+    """Keep the moment `t` [s] for the LiDAR, if there is one; `m` is a `TWIN`."""
+    if m.moment_rows == 0:
+        return
+    nq, nv = m.positions, m.velocities
+    row = floats(m.moments + 8 * (1 + nq + nv) * (m.moment_count % m.moment_rows))
+    qpos, qvel = floats(m.qpos), floats(m.qvel)
+    row[0] = t
+    for i in range(nq):
+        row[1 + i] = qpos[i]
+    for i in range(nv):
+        row[1 + nq + i] = qvel[i]
+    m.moment_count += 1
+
+
+@njit(cache=True, nogil=True)
+def keep_moment_of(memory: int, t: float) -> None:
+    """Do what `keep_moment` does for the `TWIN` at an address."""
+    keep_moment(t, _memory_at(memory))
 
 
 @njit(cache=True, nogil=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.kernels import njit
-from golem.native import Record, Records, new_record
+from golem.native import Record, Records, address, new_record, view
 from golem.types import Array, Imu
 
 
@@ -90,6 +90,13 @@ def measure_imu(m: Record, quat: Array, gyro: Array, acc: Array, out: Record) ->
 
 
 _SAMPLE = np.dtype([("quat", "f8", (4,)), ("gyro", "f8", (3,)), ("acc", "f8", (3,))])
+_imu_at, _sample_at = view(IMU), view(_SAMPLE)
+
+
+@njit(cache=True, nogil=True)
+def _measure(imu: int, quat: Array, gyro: Array, acc: Array, sample: int) -> None:
+    """Do what `measure_imu` does on what stands at two addresses: Python takes 20 us to hand a record over."""
+    measure_imu(_imu_at(imu), quat, gyro, acc, _sample_at(sample))
 
 
 class ImuModel:
@@ -108,6 +115,8 @@ class ImuModel:
         memory["noise"] = errors.attitude_noise, errors.gyro_noise, errors.acc_noise
         memory["used"] = BLOCK
         self._rng = rng
+        self._sample = new_record(_SAMPLE)
+        self._places = address(memory), address(self._sample)
 
     def measure(self, quat: Array, gyro: Array, acc: Array) -> Imu:
         """Return the sample reported for the clean values.
@@ -119,8 +128,8 @@ class ImuModel:
         """
         if self.memory["used"][0] >= BLOCK:
             self.memory["drawn"], self.memory["used"] = self._rng.standard_normal((BLOCK, 3, 3)), 0
-        sample = new_record(_SAMPLE)[0]
-        measure_imu(self.memory[0], quat, gyro, np.ascontiguousarray(acc), sample)
+        _measure(self._places[0], quat, gyro, np.ascontiguousarray(acc), self._places[1])
+        sample = self._sample.copy()[0]
         return Imu(sample["quat"], sample["gyro"], sample["acc"])
 
 
