@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from golem.interfaces.lidar import LidarImu, LidarScan
+from golem.native import ORDINARY, new_shared
 from golem.robots.model.table import FRAMES
 from golem.robots.mujoco.config import MujocoConfig, World
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.robots.mujoco.lidar_sensor import LATENCY, LidarMoment, LidarSensor
 from golem.robots.worlds.furnished import CORRIDOR
 from golem.runtime.lockstep import start_posture
+from golem.types import NUM_JOINTS, TICK, LowCommand
 
 
 def robot(world: World, people: int = 0) -> MujocoRobot:
@@ -97,3 +99,34 @@ def test_people_walk_and_are_seen() -> None:
     (without, _), _ = measure(robot("furnished"), "ideal")
     n = min(len(with_people.points), len(without.points))
     assert n and not np.array_equal(with_people.points[:n], without.points[:n])
+
+
+@pytest.mark.parametrize("kept", ["by the stage", "by Python", "not at all"])
+def test_a_lidar_that_is_read_when_its_imu_has_a_sample_says_the_same(kept: str) -> None:
+    often, seldom = robot("corridor"), robot("corridor")
+    zero, due, said = np.zeros(NUM_JOINTS), 0.0, ([], [])
+    stages = seldom.native(None)
+    assert stages is not None
+    sense, record = stages[0], new_shared()
+    seldom.imu()  # draws the noise that the stage needs
+    for k in range(70):
+        t = TICK * k
+        record["t"] = t
+        if kept == "by the stage":
+            assert sense.run(record) == ORDINARY
+        elif kept == "by Python":
+            seldom.keep_moment(t)
+        said[0].append(often.lidar(t))
+        if kept == "not at all" or t >= due - 1e-9:
+            due += seldom.lidar_period
+            said[1].append(seldom.lidar(t))
+        for twin in (often, seldom):
+            twin.advance(LowCommand(t, zero, zero, zero, zero, zero), {}, TICK)
+    one, other = ([imu for samples, _ in answers for imu in samples] for answers in said)
+    assert len(one) == len(other) > 20
+    for a, b in zip(one, other, strict=True):
+        assert a.t == b.t and (a.gyro == b.gyro).all() and (a.acc == b.acc).all()
+    scans = [[scan.points for _, scan in answers if scan is not None] for answers in said]
+    assert len(scans[0]) == 1 and (scans[0][0] == scans[1][0]).all()
+    often.close()
+    seldom.close()

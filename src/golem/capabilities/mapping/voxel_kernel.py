@@ -104,7 +104,9 @@ def clear(
         last_r = int(math.floor((points[i, 1] - corner[1]) / resolution))
         last_k = int(math.floor((points[i, 2] - corner[2]) / resolution))
         inside = 0 < min(r, last_r) and max(r, last_r) < rows - 1 and 0 < min(c, last_c)
-        inside = inside and max(c, last_c) < columns - 1 and 0 < min(k, last_k) and max(k, last_k) < layers - 1
+        inside = (
+            inside and max(c, last_c) < columns - 1 and 0 < min(k, last_k) and max(k, last_k) < layers - 1
+        )
         if inside:
             at, jump_r, jump_c = (r * columns + c) * layers + k, step_r * columns * layers, step_c * layers
             while t < end:
