@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -123,14 +123,18 @@ class Bus:
         """Forget what was published on `topic` and has not been delivered yet."""
         self._pending.pop(topic.name, None)
 
-    def deliver(self, t: float) -> bool:
-        """Make every value that is due at time `t` visible, once per tick; return whether there was one."""
+    def deliver(self, t: float, besides: Container[str] = ()) -> bool:
+        """Make every value that is due at time `t` visible, once per tick.
+
+        Returns:
+            Whether there was one, `besides` those on topics of these names.
+        """
         some = False
         for name, queue in self._pending.items():
             # Half a microsecond of slack: ticks are sums of binary fractions.
             while queue and queue[0][0] <= t + 5e-7:
                 self._show(name, queue.popleft()[1])
-                some = True
+                some = some or name not in besides
         return some
 
     def clear(self) -> None:

@@ -87,7 +87,10 @@ class NativeChain:
 
     Attributes:
         members: the nodes of the links, in their order.
+        hears: commands; see `Chain`.
     """
+
+    hears = frozenset((topics.LEG_COMMAND.name, topics.ARM_COMMAND.name))
 
     def __init__(self, bus: Bus, links: Sequence[Link]) -> None:
         """Run `links`, which are in the order of their turns, on `bus`."""

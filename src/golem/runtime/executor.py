@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from enum import IntEnum
 from typing import Protocol
 
@@ -43,6 +43,11 @@ class Chain(Protocol):
     @property
     def members(self) -> Sequence[Node]:
         """The nodes, in the order of their turns."""
+        ...
+
+    @property
+    def hears(self) -> Container[str]:
+        """Names of topics on which nobody else needs a turn for news."""
         ...
 
     def run(self, t: float, first: int, last: int) -> None:
@@ -210,7 +215,7 @@ class Executor:
             until: when somebody who looks on wants to be asked [s]: the time after the last of them is not later.
         """
         t = self.t
-        came = self._bus.deliver(t)
+        came = self._bus.deliver(t, () if self._chain is None else self._chain.hears)
         due = _NEVER
         for entry in self._schedule:
             if entry.link < 0:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 
@@ -64,6 +66,7 @@ class Pushes:
         """Push bodies of `model`; there is no force yet. `memory`, a `PUSHES`, None for one of its own."""
         self._model = model
         self.memory = new_record(PUSHES) if memory is None else memory
+        self._rows: dict[str, int] = {}
 
     def set(self, force: Array, body: str, point: Array | None) -> None:
         """Replace the force on `body`; arguments as in `MujocoRobot.push`.
@@ -75,13 +78,13 @@ class Pushes:
             raise unknown_name("link to push", body, LINKS)
         force, point = np.array(force, float), None if point is None else np.array(point, float)
         for array in (force, point):
-            if array is not None and (array.shape != (3,) or not np.isfinite(array).all()):
+            if array is not None and (array.shape != (3,) or not all(map(math.isfinite, array.tolist()))):
                 raise ConfigError("A push is a force of three finite numbers [N] at a point of three [m].")
-        row, number = self.memory[0], self._model.body(body).id
-        known = np.flatnonzero(row["body"][: row["count"]] == number)
-        k = int(known[0]) if len(known) else int(row["count"])
-        row["count"] = max(int(row["count"]), k + 1)
-        row["body"][k], row["force"][k], row["off_centre"][k] = number, force, point is not None
+        row, k = self.memory[0], self._rows.get(body)
+        if k is None:
+            k = self._rows[body] = len(self._rows)
+            row["count"], row["body"][k] = k + 1, self._model.body(body).id
+        row["force"][k], row["off_centre"][k] = force, point is not None
         if point is not None:
             row["point"][k] = point
 
