@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from golem.capabilities.arms.ik_kernel import rigid
 from golem.errors import GolemError
 from golem.interfaces.payloads import ArmCommand
 from golem.types import NUM_JOINTS, UPPER, Array, Side
@@ -87,6 +88,8 @@ def check_pose(name: str, pose: Array) -> Array:
         TargetError: wrong shape, not finite, or not a rotation and a translation.
     """
     T = np.asarray(pose, dtype=np.float64)
+    if T.shape == (4, 4) and T.flags.carray and rigid(T):
+        return T
     if T.shape != (4, 4):
         raise TargetError(f"{name} must be a 4x4 homogeneous matrix, not an array of shape {T.shape}.")
     if not np.isfinite(T).all():

@@ -25,6 +25,24 @@ PATIENCE, PROGRESS = 8, 0.7
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def rigid(T: Array) -> bool:
+    """Return whether `T` (4, 4) is what `check_pose` lets pass."""
+    for i in range(3):
+        for j in range(3):
+            dot = -1.0 if i == j else 0.0
+            for k in range(3):
+                dot += T[i, k] * T[j, k]
+            if not abs(dot) <= 1e-4:
+                return False
+    x = T[1, 1] * T[2, 2] - T[1, 2] * T[2, 1]
+    y = T[1, 2] * T[2, 0] - T[1, 0] * T[2, 2]
+    z = T[1, 0] * T[2, 1] - T[1, 1] * T[2, 0]
+    last = abs(T[3, 0]) + abs(T[3, 1]) + abs(T[3, 2]) + abs(T[3, 3] - 1.0)
+    finite = math.isfinite(T[0, 3] + T[1, 3] + T[2, 3])
+    return finite and last <= 1e-9 and T[0, 0] * x + T[0, 1] * y + T[0, 2] * z > 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _turn(R: Array, p: Array, axis: Array, point: Array, angle: float, at: Array) -> None:
     """Turn the frame `R`, `p` about an axis that it carries; `at` (2, 3) is written: the axis, and a point of it."""
     x, y, z = axis[0], axis[1], axis[2]

@@ -23,13 +23,13 @@ FAR = 1e30
 """No bound."""
 (POSITION_WEIGHT, ROTATION_WEIGHT, PALM_GAIN, POSTURE_RATE, DAMPING, ERROR_DAMPING) = range(6)
 (PALM_SPEED, PALM_TURN, SINGULAR_VALUE, CLEARANCE, COLLISION_GAIN, CUTOFF, OPTIONS) = range(6, 13)
-"""Where `Task.options` has which; see `TaskSpaceConfig`, and `task_space.NEAR` for the cutoff."""
+"""Where `IkMemory.options` has which; see `TaskSpaceConfig`, and `task_space.NEAR` for the cutoff."""
 LEFT_OVER, SINGULAR, LAMBDA, LIMITED, COUNT, STATES = range(6)
-"""Where `Task.state` has: the weighted error that is left, the damping for singularities, the whole damping of this
+"""Where `IkMemory.state` has: the weighted error that is left, the damping for singularities, the whole damping of this
 tick, whether a limit was in the way, and how many pairs of links are near."""
 
 
-class Task(NamedTuple):
+class IkMemory(NamedTuple):
     """Memory of a controller; n is 15, sides are left and right, m pairs of links at most are looked at.
 
     Attributes:
@@ -80,24 +80,6 @@ class Task(NamedTuple):
     distance: Array
     gradient: Array
     spheres: Indices
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def rigid(T: Array) -> bool:
-    """Return whether `T` (4, 4) is what `check_pose` lets pass."""
-    for i in range(3):
-        for j in range(3):
-            dot = -1.0 if i == j else 0.0
-            for k in range(3):
-                dot += T[i, k] * T[j, k]
-            if not abs(dot) <= 1e-4:
-                return False
-    x = T[1, 1] * T[2, 2] - T[1, 2] * T[2, 1]
-    y = T[1, 2] * T[2, 0] - T[1, 0] * T[2, 2]
-    z = T[1, 0] * T[2, 1] - T[1, 1] * T[2, 0]
-    last = abs(T[3, 0]) + abs(T[3, 1]) + abs(T[3, 2]) + abs(T[3, 3] - 1.0)
-    finite = math.isfinite(T[0, 3] + T[1, 3] + T[2, 3])
-    return finite and last <= 1e-9 and T[0, 0] * x + T[0, 1] * y + T[0, 2] * z > 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -158,7 +140,7 @@ def _well_placed(J: Array, value: float) -> bool:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def begin(task: Task, dt: float, look: bool) -> int:
+def begin(task: IkMemory, dt: float, look: bool) -> int:
     """Write the program of a tick: residuals, H, f and the bounds of the joints' steps.
 
     Args:
@@ -222,7 +204,7 @@ def begin(task: Task, dt: float, look: bool) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def place(task: Task) -> None:
+def place(task: IkMemory) -> None:
     """Write what follows from the command state: grasp frames, and the nearest pairs of links with their bounds."""
     o, n, q = task.options, len(task.q), np.empty(ARM + 1)
     for s in range(2):
@@ -240,7 +222,7 @@ def place(task: Task) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def finish(task: Task, step: Array) -> None:
+def finish(task: IkMemory, step: Array) -> None:
     """Integrate the joint step (15,), or as much as limits allow; `step` is empty where there is none.
 
     Writes the command state, what follows from it, the errors that are left, and whether a limit was in the way.

@@ -12,6 +12,7 @@ import numpy as np
 from golem.capabilities.arms import task_kernel
 from golem.capabilities.arms.arm_kinematics import UpperKinematics
 from golem.capabilities.arms.base import ARM_COLUMNS, NUM_UPPER, check_dt, check_joints, check_pose
+from golem.capabilities.arms.ik_kernel import rigid
 from golem.capabilities.arms.postures import posture
 from golem.errors import ConfigError
 from golem.interfaces.payloads import ArmCommand
@@ -138,7 +139,7 @@ class TaskSpaceController(ABC):
     Attributes:
         rate, latency: see `UpperBody`.
         config: the options.
-        task: its memory, which a subclass reads; see `task_kernel.Task`.
+        task: its memory, which a subclass reads; see `task_kernel.IkMemory`.
         lower, upper: (15,) position limits it keeps, margin and torso range included [rad]; a waist that starts outside
             that range comes back to it; so does an arm once it has a target.
         speed: (15,) velocity limits it keeps [rad/s].
@@ -172,7 +173,7 @@ class TaskSpaceController(ABC):
         )  # fmt: skip
         n, m, arms = NUM_UPPER, c.collision_rows, [k.exponentials(side) for side in SIDES]
         spheres = _spheres() if m else None
-        self.task = task_kernel.Task(
+        self.task = task_kernel.IkMemory(
             options, *(np.array(part) for part in zip(*arms, strict=True)),
             self.lower, self.upper, self.speed, self.rest, self.soft, np.zeros(n),
             np.zeros(2, np.int64), np.zeros((2, 4, 4)), np.zeros((2, 3, 3)), np.zeros((2, 3)), np.zeros((2, 8, 2, 3)),
@@ -232,7 +233,7 @@ class TaskSpaceController(ABC):
                 fits = np.shape(target) == (4, 4)
                 if fits:
                     task.goal[i] = target
-                if not fits or not task_kernel.rigid(task.goal[i]):
+                if not fits or not rigid(task.goal[i]):
                     check_pose(f"The target of the {SIDES[i]} hand", target)
         look = self._ticks % SINGULAR_TICKS == 0
         self._ticks += 1
