@@ -172,9 +172,10 @@ class TaskSpaceController(ABC):
             c.palm_speed, c.palm_turn, c.singular_value, c.clearance, c.collision_gain, NEAR,
         )  # fmt: skip
         n, m, arms = NUM_UPPER, c.collision_rows, [k.exponentials(side) for side in SIDES]
+        axes, points, grip = (np.array(part) for part in zip(*arms, strict=True))
         spheres = _spheres() if m else None
         self.task = task_kernel.IkMemory(
-            options, *(np.array(part) for part in zip(*arms, strict=True)),
+            options, axes, points, grip,
             self.lower, self.upper, self.speed, self.rest, self.soft, np.zeros(n),
             np.zeros(2, np.int64), np.zeros((2, 4, 4)), np.zeros((2, 3, 3)), np.zeros((2, 3)), np.zeros((2, 8, 2, 3)),
             np.zeros((2, 6)), np.zeros((2, 6, 8)), np.zeros(n), np.zeros((n, n)), np.zeros(n),
