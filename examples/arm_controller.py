@@ -14,9 +14,7 @@ from golem.types import UPPER, Array
 class Unhurried(DiffIK):
     """Goes half as far in every step."""
 
-    def step(
-        self, targets_left: Array | None, targets_right: Array | None, q: Array, dt: float
-    ) -> ArmCommand:
+    def step(self, targets_left: Array | None, targets_right: Array | None, q: Array, dt: float) -> ArmCommand:
         return super().step(targets_left, targets_right, q, 0.5 * dt)
 
 

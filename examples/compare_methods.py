@@ -6,7 +6,7 @@ from golem.evaluation.base import RUNGS, TrialSpec, make_rung
 from golem.evaluation.harness.trials import run_trial
 from golem.evaluation.metrics.statistics import PairedTable, mcnemar, wilson
 
-METHODS, TRIALS = ("almi", "hold"), 1
+METHODS, TRIALS = ("almi", "wbc"), 1
 
 
 def main() -> None:

@@ -24,9 +24,7 @@ def main() -> None:
     rgb, depth = robot.capture("head")
     robot.close()
     print(f"torso at {measured[TORSO] - q[TORSO]:.2f} rad from its start, {tau[TORSO]:.1f} N m")
-    print(
-        f"the head camera sees {rgb.shape[1]} x {rgb.shape[0]} pixels, nearest {depth[depth > 0.0].min():.2f} m"
-    )
+    print(f"the head camera sees {rgb.shape[1]} x {rgb.shape[0]} pixels, nearest {depth[depth > 0.0].min():.2f} m")
 
 
 if __name__ == "__main__":

@@ -56,9 +56,7 @@ def page(records: Sequence[TrialRecord]) -> str:
 
 
 def _missing(tried: int, all_: int) -> str:
-    return (
-        "" if tried == all_ else f"With this version {tried} of {all_} were tried; the rest is left open.\n"
-    )
+    return "" if tried == all_ else f"With this version {tried} of {all_} were tried; the rest is left open.\n"
 
 
 def _commits(records: Sequence[TrialRecord]) -> str:
@@ -115,9 +113,7 @@ def _summary(records: Sequence[TrialRecord], postures: Sequence[str]) -> TextTab
     for source in FaultSource:
         for posture in postures:
             mine = [
-                r
-                for r in records
-                if r.case["posture"] == posture and FAULTS[str(r.case["fault"])].source is source
+                r for r in records if r.case["posture"] == posture and FAULTS[str(r.case["fault"])].source is source
             ]
             if not mine:
                 continue

@@ -53,9 +53,7 @@ def by_pinocchio(robot: RobotGeometry, file: Path) -> list[dict[str, Array]]:
             if not model.existJointName(name):
                 continue
             joint = model.joints[model.getJointId(name)]
-            x[joint.idx_q : joint.idx_q + joint.nq] = (
-                value if joint.nq == 1 else (np.cos(value), np.sin(value))
-            )
+            x[joint.idx_q : joint.idx_q + joint.nq] = value if joint.nq == 1 else (np.cos(value), np.sin(value))
         pin.framesForwardKinematics(model, data, x)
         found.append(
             {
@@ -108,18 +106,14 @@ def difference(robot: RobotGeometry, file: Path) -> float:
     worst = 0.0
     for q, other in zip(postures(robot), others, strict=True):
         own = link_poses(robot.links, np.array(list(q.values())))
-        pairs = [
-            (T, other[link.name]) for link, T in zip(robot.links, own, strict=True) if link.name in other
-        ]
+        pairs = [(T, other[link.name]) for link, T in zip(robot.links, own, strict=True) if link.name in other]
         worst = max(worst, *(float(np.abs(a - b).max()) for a, b in pairs)) if pairs else worst
     return worst
 
 
 def main() -> None:
     """Read the files and print the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--geometry", choices=("visual", "collision"), default="visual")
     parser.add_argument("--package", nargs="*", default=())

@@ -35,44 +35,28 @@ def _ms(seconds: float) -> str:
 
 SWITCH = "Switch the robot off, look for the cause, and reset once it reports sound values."
 REASONS: dict[Reason, ReasonText] = {
-    Reason.CLOCK: ReasonText(
-        101, "The gate's clock went back.", "Restart the gate; look for who sets the clock."
-    ),
+    Reason.CLOCK: ReasonText(101, "The gate's clock went back.", "Restart the gate; look for who sets the clock."),
     Reason.STALLED: ReasonText(
-        102,
-        f"The gate did not run for {_ms(_L.stall)}.",
-        "Give the gate a core of its own; look for what held it up.",
+        102, f"The gate did not run for {_ms(_L.stall)}.", "Give the gate a core of its own; look for what held it up."
     ),
     Reason.REQUESTED: ReasonText(103, "An operator asked.", "`golem safety reset`, then `activate`."),
     Reason.ESTOP_MISSING: ReasonText(201, "No frame of the e-stop yet.", "Connect its board."),
     Reason.ESTOP_STALE: ReasonText(
-        202,
-        f"No new frame for {_ms(_L.estop_age)}.",
-        "Look at the board's cable; `golem drivers estop PORT` tries it.",
+        202, f"No new frame for {_ms(_L.estop_age)}.", "Look at the board's cable; `golem drivers estop PORT` tries it."
     ),
     Reason.ESTOP_TIME: ReasonText(
         203, f"A stamp more than {_ms(_L.future)} ahead.", "Frames are stamped on arrival: restart the gate."
     ),
-    Reason.ESTOP_PRESSED: ReasonText(
-        204, "The button is in, or its wire is cut.", "Pull it out, then reset."
-    ),
-    Reason.STATE_MISSING: ReasonText(
-        301, "No state yet.", "Is the robot on, and the domain and interface right?"
-    ),
-    Reason.STATE_STALE: ReasonText(
-        302, f"No new state for {_ms(_L.state_age)}.", "Look at the robot's cable."
-    ),
+    Reason.ESTOP_PRESSED: ReasonText(204, "The button is in, or its wire is cut.", "Pull it out, then reset."),
+    Reason.STATE_MISSING: ReasonText(301, "No state yet.", "Is the robot on, and the domain and interface right?"),
+    Reason.STATE_STALE: ReasonText(302, f"No new state for {_ms(_L.state_age)}.", "Look at the robot's cable."),
     Reason.STATE_TIME: ReasonText(303, f"A stamp more than {_ms(_L.future)} ahead.", "Restart the gate."),
     Reason.STATE_INVALID: ReasonText(304, "A number is not finite or above 1e6.", SWITCH),
     Reason.STATE_CLOCK: ReasonText(
-        305,
-        "The robot's time runs at another rate than ours, 0.9 to 1.1.",
-        "Its tick is in another unit: see wire.",
+        305, "The robot's time runs at another rate than ours, 0.9 to 1.1.", "Its tick is in another unit: see wire."
     ),
     Reason.STATE_JUMPED: ReasonText(
-        306,
-        "The robot's clock jumped back, or ahead by 0.1 s.",
-        "It was restarted: reset and activate again.",
+        306, "The robot's clock jumped back, or ahead by 0.1 s.", "It was restarted: reset and activate again."
     ),
     Reason.STATE_FROZEN: ReasonText(
         307,
@@ -92,28 +76,18 @@ REASONS: dict[Reason, ReasonText] = {
         "The gyro has an offset or the IMU is loose: let it start at rest.",
     ),
     Reason.POSITION: ReasonText(
-        401,
-        "A joint is 0.05 rad beyond its range for 3 samples, a leg's for 25.",
-        "Move it back by hand, then reset.",
+        401, "A joint is 0.05 rad beyond its range for 3 samples, a leg's for 25.", "Move it back by hand, then reset."
     ),
     Reason.VELOCITY: ReasonText(
         402, "A joint is above 90 % of its speed for 3 samples, a leg's for 25.", "Slow the motion down."
     ),
-    Reason.TORQUE: ReasonText(
-        403, "A torque is above 90 % for 50 samples.", "Carry less; look for what it leans on."
-    ),
+    Reason.TORQUE: ReasonText(403, "A torque is above 90 % for 50 samples.", "Carry less; look for what it leans on."),
     Reason.BRAKING: ReasonText(
-        404,
-        "Braked now, a joint would leave its range, for 3 samples, a leg's for 25.",
-        "Slow down near the ends.",
+        404, "Braked now, a joint would leave its range, for 3 samples, a leg's for 25.", "Slow down near the ends."
     ),
-    Reason.TILT: ReasonText(
-        405, f"The torso leans {_L.tilt:g} rad for 3 samples.", "Lift the robot, then reset."
-    ),
+    Reason.TILT: ReasonText(405, f"The torso leans {_L.tilt:g} rad for 3 samples.", "Lift the robot, then reset."),
     Reason.BASE_STALE: ReasonText(
-        406,
-        f"The stack's estimator has found no foot for {_ms(_L.base_age)}.",
-        "Is the stack's estimator alive?",
+        406, f"The stack's estimator has found no foot for {_ms(_L.base_age)}.", "Is the stack's estimator alive?"
     ),
     Reason.BALANCE: ReasonText(
         407,
@@ -122,14 +96,10 @@ REASONS: dict[Reason, ReasonText] = {
         "The legs' controller does not balance: look at its log, and at what pushed.",
     ),
     Reason.STANDING: ReasonText(
-        408,
-        "In stop2 the gate's own controller fails, or lets go of the legs.",
-        "See the log of `golem safety`.",
+        408, "In stop2 the gate's own controller fails, or lets go of the legs.", "See the log of `golem safety`."
     ),
     Reason.WRITERS: ReasonText(501, "Two write what one alone may.", "End the one that the detail names."),
-    Reason.HELD: ReasonText(
-        502, "The robot's own controller has the motors.", "`golem safety take --hanging`."
-    ),
+    Reason.HELD: ReasonText(502, "The robot's own controller has the motors.", "`golem safety take --hanging`."),
     Reason.UNHEARD: ReasonText(503, "Nobody receives the motors' commands.", "Wrong interface or domain."),
     Reason.NOT_IN_CONTROL: ReasonText(
         504,
@@ -137,9 +107,7 @@ REASONS: dict[Reason, ReasonText] = {
         "**Alarm: press the hardware e-stop or cut the power**; then end that writer.",
     ),
     Reason.STATE_DAMAGED: ReasonText(
-        601,
-        "Three damaged states in a row, or more than 1 in 50.",
-        "Look at the cable; is the firmware another?",
+        601, "Three damaged states in a row, or more than 1 in 50.", "Look at the cable; is the firmware another?"
     ),
     Reason.MOTOR: ReasonText(602, "A motor reports an error for 50 ms.", SWITCH),
     Reason.MOTOR_DEAD: ReasonText(
@@ -155,9 +123,7 @@ REASONS: dict[Reason, ReasonText] = {
         606, f"Outside {_L.voltage[0]:g} to {_L.voltage[1]:g} V for 50 ms.", "Charge or change the battery."
     ),
     Reason.COMMAND_DAMAGED: ReasonText(
-        701,
-        "Three damaged commands in a row, or more than 1 in 50.",
-        "The sender sets no checksum, or a wrong type.",
+        701, "Three damaged commands in a row, or more than 1 in 50.", "The sender sets no checksum, or a wrong type."
     ),
     Reason.COMMAND_MISSING: ReasonText(702, "No command yet.", "Start the stack: `golem up`."),
     Reason.COMMAND_STALE: ReasonText(
@@ -166,9 +132,7 @@ REASONS: dict[Reason, ReasonText] = {
         "The stack is too slow, or has ended.",
     ),
     Reason.COMMAND_TIME: ReasonText(704, f"A stamp more than {_ms(_L.future)} ahead.", "Restart the gate."),
-    Reason.COMMAND_INVALID: ReasonText(
-        705, "A number is not finite or above 1e6.", "A bug in the stack: see its log."
-    ),
+    Reason.COMMAND_INVALID: ReasonText(705, "A number is not finite or above 1e6.", "A bug in the stack: see its log."),
     Reason.COMMAND_UNSTAMPED: ReasonText(
         706, "reserve[0] is 0.", "Copy the tick of the state that the command answers into reserve[0]."
     ),

@@ -141,10 +141,7 @@ FAULTS = {
         ("tests/test_options.py", "tests/test_stack.py", "tests/test_registry.py"),
     ),
     "cli-refusal-is-failure": PlantedFault(
-        "cli.py",
-        "BAD_INPUT = 2\n",
-        "BAD_INPUT = 1\n",
-        ("tests/test_cli.py", "tests/test_run.py"),
+        "cli.py", "BAD_INPUT = 2\n", "BAD_INPUT = 1\n", ("tests/test_cli.py", "tests/test_run.py")
     ),
     "skill-sees-the-truth": PlantedFault(
         "skills/walk.py",
@@ -158,9 +155,7 @@ FAULTS = {
 def copied(tree: Path, folder: Path) -> Path:
     """Return a copy of the checkout `tree` in `folder`, with the kernels that it has compiled."""
     target = folder / "tree"
-    listed = subprocess.run(
-        ["git", "-C", str(tree), "ls-files", "-z"], check=True, capture_output=True, text=True
-    )
+    listed = subprocess.run(["git", "-C", str(tree), "ls-files", "-z"], check=True, capture_output=True, text=True)
     kernels = [str(path.relative_to(tree)) for path in tree.glob("src/**/__pycache__/*.nb[ic]")]
     for name in [*filter(None, listed.stdout.split("\0")), *kernels]:
         (target / name).parent.mkdir(parents=True, exist_ok=True)
@@ -204,9 +199,7 @@ def main() -> int:
     """Try the faults; return 1 if one is not found."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="faults to plant; default: all")
-    parser.add_argument(
-        "--tree", type=Path, default=REPOSITORY, help="checkout whose sources and tests are taken"
-    )
+    parser.add_argument("--tree", type=Path, default=REPOSITORY, help="checkout whose sources and tests are taken")
     parser.add_argument("--select", default=CI, help="marks of the tests, as pytest's -m takes them")
     given = parser.parse_args()
     if unknown := set(given.names) - set(FAULTS):

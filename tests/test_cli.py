@@ -15,10 +15,7 @@ from golem.errors import SlowModule
 BROKEN = {
     "no command": ([], None),
     "command": (["ladr"], "Did you mean 'ladder'?"),
-    "rung": (
-        ["ladder", "--rung", "teter"],
-        "walk-twist. Did you mean 'tether'?",
-    ),
+    "rung": (["ladder", "--rung", "teter"], "walk-twist. Did you mean 'tether'?"),
     "method": (["ladder", "--method", "centriod"], "Did you mean 'centroid'?"),
     "method file": (["ladder", "--method", "x.py:Mine"], "does not exist"),
     "option of a rung": (["ladder", "--rung", "push-limit", "--first", "0"], "--first is 0; it must be more"),
@@ -40,10 +37,7 @@ BROKEN = {
     ),
     "bench seed": (["bench", "--seed", "-1"], "--seed is -1; it must be 0 or more"),
     "run profile": (["run", "--profile", "feild"], "Did you mean 'field'?"),
-    "skill": (
-        ["run", "--skill", "pik"],
-        "stand, take, walk. Did you mean 'pick'?",
-    ),
+    "skill": (["run", "--skill", "pik"], "stand, take, walk. Did you mean 'pick'?"),
     "skill goal": (["run", "--skill", "walk", "--x", "nan"], "'x' is a finite number"),
     "skill and by hand": (["run", "--skill", "pick", "--operate"], "give it or --skill, not both"),
     "skill of a domain": (["skill"], "Say which skill"),
@@ -82,15 +76,9 @@ def test_a_wrong_word_is_answered_in_one_sentence_and_writes_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    "text, sentence", [("upper_body: [", "line 1"), ("uper_body: diff_ik", "'upper_body'")]
-)
+@pytest.mark.parametrize("text, sentence", [("upper_body: [", "line 1"), ("uper_body: diff_ik", "'upper_body'")])
 def test_a_broken_stack_file_names_file_and_place(
-    text: str,
-    sentence: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    text: str, sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "mine.yaml").write_text(text)
     monkeypatch.setattr(sys, "argv", ["golem", "run", str(tmp_path / "mine.yaml")])
@@ -154,7 +142,4 @@ def test_a_slow_module_is_told_in_one_line_and_other_warnings_as_ever(
         warnings.simplefilter("always")
         monkeypatch.setattr(cli, "_SHOW_WARNING", lambda message, *_: print(f"{message!r}", file=sys.stderr))
         cli.main()
-    assert capsys.readouterr().err.splitlines() == [
-        "golem: arms take 50 ms",
-        "RuntimeWarning('something else')",
-    ]
+    assert capsys.readouterr().err.splitlines() == ["golem: arms take 50 ms", "RuntimeWarning('something else')"]

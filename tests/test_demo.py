@@ -32,15 +32,9 @@ def test_a_display_is_noticed(variable: str, monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.parametrize(
     ("options", "words"),
-    [
-        ({"screws": 0}, "from 1 on"),
-        ({"screws": 99, "layout": "nominal"}, "1 to 4"),
-        ({"profile": "dream"}, "ideal"),
-    ],
+    [({"screws": 0}, "from 1 on"), ({"screws": 99, "layout": "nominal"}, "1 to 4"), ({"profile": "dream"}, "ideal")],
 )
-def test_wrong_options_are_answered_in_one_sentence(
-    options: dict[str, object], words: str, tmp_path: Path
-) -> None:
+def test_wrong_options_are_answered_in_one_sentence(options: dict[str, object], words: str, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=words):
         run_demo(DemoConfig(headless=True, out=tmp_path, **options))  # pyright: ignore[reportArgumentType]
     assert list(tmp_path.iterdir()) == []
@@ -138,9 +132,7 @@ def test_a_folder_that_cannot_be_written_is_noticed_before_anything_runs(tmp_pat
 
 def test_the_page_names_every_pick_and_escapes_what_it_quotes() -> None:
     picks = [
-        PickRecord(
-            True, "screw_09", "done", "Fine.", 0.0, 8.5, [("detect", 0.2), ("servo", 2.0), ("done", 0.0)]
-        ),
+        PickRecord(True, "screw_09", "done", "Fine.", 0.0, 8.5, [("detect", 0.2), ("servo", 2.0), ("done", 0.0)]),
         PickRecord(False, None, "extract", "It <slipped>.", 8.5, 5.0, [("detect", 0.1), ("extract", 1.0)]),
     ]
     poster = np.zeros((9, 16, 3), np.uint8)
@@ -160,11 +152,7 @@ def test_work_and_push_are_told_apart() -> None:
     whole = BalanceTrace(t, margin, three, three, np.zeros(500), three, np.ones((500, 2), bool), three)
     assert balance_figures(whole, None)["margin_min"] == -0.15
     figures = balance_figures(whole, 1.95)
-    assert (figures["margin_min"], figures["push_margin_min"], figures["push_margin_final"]) == (
-        0.1,
-        -0.15,
-        0.1,
-    )
+    assert (figures["margin_min"], figures["push_margin_min"], figures["push_margin_final"]) == (0.1, -0.15, 0.1)
     work, push = balance_section(whole, 1.95, figures)
     assert "100 mm or more" in work[1] and "Minimum margin -150 mm" in push[1]
     assert work[2].startswith("<svg") and push[2].startswith("<svg")

@@ -75,15 +75,7 @@ def trace(eyes: Path, seed: int, profile: str) -> Trace:
         state = running.bus.latest(topics.LOW_STATE)
         base = running.bus.latest(topics.BASE)
         assert state is not None and base is not None
-        for a in (
-            state.q,
-            state.dq,
-            state.tau,
-            state.imu.quat,
-            state.imu.gyro,
-            state.imu.acc,
-            base.T_odom_base,
-        ):
+        for a in (state.q, state.dq, state.tau, state.imu.quat, state.imu.gyro, state.imu.acc, base.T_odom_base):
             states.update(np.ascontiguousarray(a).tobytes())
         for camera in counts:
             count = running.bus.count(topics.rgbd_images(camera))

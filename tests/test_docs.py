@@ -43,9 +43,7 @@ def blocks(page: str, language: str) -> list[str]:
         "how-to/write-arms.md",
     ],
 )
-def test_the_example_of_a_slot_passes_its_own_test(
-    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_example_of_a_slot_passes_its_own_test(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A block that begins with the name of a file is that file; the others are run."""
     monkeypatch.chdir(tmp_path)
     for block in blocks(page, "python"):
@@ -65,9 +63,7 @@ def test_the_example_of_a_slot_passes_its_own_test(
         ("how-to/write-a-module.md", "lower_body", "my_legs.py:Stiff"),
         ("how-to/write-a-module.md", "estimator", "my_estimator.py:Smooth"),
         ("how-to/write-a-hand.md", "hand", "my_hand.py:Simple"),
-        pytest.param(
-            "how-to/write-a-localizer.md", "localizer", "my_localizer.py:ColourTray", marks=pytest.mark.slow
-        ),
+        pytest.param("how-to/write-a-localizer.md", "localizer", "my_localizer.py:ColourTray", marks=pytest.mark.slow),
         ("how-to/write-a-navigator.md", "navigator", "my_navigator.py:TurnAndWalk"),
         ("how-to/write-a-robot.md", "robot", "my_robot.py:Kinematic"),
         ("how-to/write-a-skill.md", "skill", "wave.py:Wave"),
@@ -102,9 +98,7 @@ def test_every_slot_has_its_contract_on_the_page() -> None:
 def test_what_is_on_no_index_is_not_told_to_be_installed_from_one() -> None:
     pages = [*DOCS.rglob("*.md"), DOCS.parent / "README.md"]
     named = [
-        page.name
-        for page in pages
-        if re.search(r"pip install '?golem-humanoid(?!\[\w+\] @ file)", page.read_text())
+        page.name for page in pages if re.search(r"pip install '?golem-humanoid(?!\[\w+\] @ file)", page.read_text())
     ]
     assert named == []
 
@@ -136,9 +130,7 @@ def test_the_commands_that_export_the_model_write_what_the_page_reads(
     exec(compile(reads, "reference/model-export.md", "exec"), {})
 
 
-def test_the_module_of_write_a_module_loads_and_grasps(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_module_of_write_a_module_loads_and_grasps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     module, usage, *_ = blocks("how-to/write-a-module.md", "python")
     (tmp_path / "my_grasp.py").write_text(module)
     monkeypatch.chdir(tmp_path)
@@ -186,9 +178,7 @@ def test_the_rung_of_compare_modules_judges() -> None:
 
 def test_the_table_of_rungs_is_complete() -> None:
     page = (DOCS / "how-to/compare.md").read_text(encoding="utf-8")
-    shown = [
-        name for row in re.findall(r"^\| (`.*?`) \|", page, re.M) for name in re.findall(r"`([\w-]+)`", row)
-    ]
+    shown = [name for row in re.findall(r"^\| (`.*?`) \|", page, re.M) for name in re.findall(r"`([\w-]+)`", row)]
     assert sorted(shown) == sorted(RUNGS)
 
 
@@ -229,10 +219,7 @@ def test_the_skill_of_write_a_skill_has_the_options_that_the_page_says(
 ) -> None:
     specs = SkillTable(load_stack("my_stack.yaml")).specs
     assert specs["wave"].summary == "Raise a hand and wave it"
-    assert parse_goal(specs["wave"], ["right", "--times", "3"], "golem skill wave") == {
-        "side": "right",
-        "times": 3,
-    }
+    assert parse_goal(specs["wave"], ["right", "--times", "3"], "golem skill wave") == {"side": "right", "times": 3}
     with pytest.raises(ConfigError, match="1 to 10 times, not 11"):
         run_stack(RunConfig("my_stack.yaml", skill="wave"), ["--times", "11"])
     with pytest.raises(SystemExit):
@@ -247,9 +234,7 @@ def test_the_skill_that_runs_skills_of_write_a_skill_waves_and_picks(
     assert run_stack(RunConfig("my_stack.yaml", skill="greet", profile="ideal")).success
     said = capsys.readouterr().out
     assert (
-        said.index("Wave 1 of 1.")
-        < said.index("Looking for a screw")
-        < said.index("The screw was dropped in the tray")
+        said.index("Wave 1 of 1.") < said.index("Looking for a screw") < said.index("The screw was dropped in the tray")
     )
 
 
@@ -268,12 +253,6 @@ def test_the_table_of_slots_is_complete() -> None:
 
 
 def test_the_readme_names_every_module() -> None:
-    rows = re.findall(
-        r"^\| `(\w+)` \| (`.*?) \|", (DOCS.parent / "README.md").read_text(encoding="utf-8"), re.M
-    )
-    shown = {
-        slot: set(re.findall(r"`(\w+)`", re.sub(r"\(.*?\)", "", names)))
-        for slot, names in rows
-        if slot in SLOTS
-    }
+    rows = re.findall(r"^\| `(\w+)` \| (`.*?) \|", (DOCS.parent / "README.md").read_text(encoding="utf-8"), re.M)
+    shown = {slot: set(re.findall(r"`(\w+)`", re.sub(r"\(.*?\)", "", names))) for slot, names in rows if slot in SLOTS}
     assert shown == {slot: set(registry.names(slot)) for slot in SLOTS}

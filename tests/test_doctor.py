@@ -30,12 +30,8 @@ def test_this_environment_is_healthy() -> None:
 def test_a_missing_gl_library_is_named_with_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MUJOCO_GL", "egl")
     monkeypatch.setattr(doctor, "_loads", lambda library: False)
-    monkeypatch.setattr(
-        shutil, "which", lambda command: f"/usr/bin/{command}" if command == "apt-get" else None
-    )
-    with pytest.raises(
-        MissingSystemLibrary, match=r"libEGL.so.1 is missing; type: .*apt-get install -y .*libegl1"
-    ):
+    monkeypatch.setattr(shutil, "which", lambda command: f"/usr/bin/{command}" if command == "apt-get" else None)
+    with pytest.raises(MissingSystemLibrary, match=r"libEGL.so.1 is missing; type: .*apt-get install -y .*libegl1"):
         doctor.require_system()
 
 
@@ -63,9 +59,7 @@ def test_a_small_receive_buffer_is_named_with_its_line(monkeypatch: pytest.Monke
 
 def test_a_package_of_the_wrong_version_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     real = importlib.metadata.version
-    monkeypatch.setattr(
-        importlib.metadata, "version", lambda name: "3.2.0" if name == "mujoco" else real(name)
-    )
+    monkeypatch.setattr(importlib.metadata, "version", lambda name: "3.2.0" if name == "mujoco" else real(name))
     row = doctor.check_packages()
     assert row.failed and "mujoco is 3.2.0" in row.found
 

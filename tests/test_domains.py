@@ -18,9 +18,7 @@ with domains.free_domain() as domain:
 
 def other_process(domain: int) -> subprocess.CompletedProcess[str]:
     """Let another process ask for this very domain."""
-    return subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(domain)], capture_output=True, text=True, check=False
-    )
+    return subprocess.run([sys.executable, "-c", PROGRAM, str(domain)], capture_output=True, text=True, check=False)
 
 
 def test_a_domain_in_use_is_nobody_elses_until_it_is_given_back() -> None:

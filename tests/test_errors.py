@@ -41,7 +41,5 @@ def test_a_module_fault_names_slot_use_and_reason() -> None:
 
 def test_a_missing_extra_says_how_to_install_it() -> None:
     said = str(MissingExtra("pink", "pink"))
-    assert (
-        "make venv-pink in a clone" in said and "pip install 'golem-humanoid[pink]' where its wheel" in said
-    )
+    assert "make venv-pink in a clone" in said and "pip install 'golem-humanoid[pink]' where its wheel" in said
     assert "make venv-record" in str(MissingExtra("foxglove", "foxglove"))

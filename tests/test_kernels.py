@@ -51,15 +51,11 @@ def test_a_kernel_follows_constants_and_kernels_of_other_files(tmp_path: Path) -
     compiled = list((tmp_path / "cache").rglob("kernel.held*.nbc"))
     before = {file: file.stat().st_mtime_ns for file in compiled}
     assert result(6.0, 1.0) == 5.0
-    assert {
-        file: file.stat().st_mtime_ns for file in compiled
-    } == before  # nothing has changed: it was not compiled
+    assert {file: file.stat().st_mtime_ns for file in compiled} == before  # nothing has changed: it was not compiled
 
 
 def test_the_gate_follows_its_constants() -> None:
-    assert {Path(str(module.__file__)) for module in (base, limit_table)} <= kernels.sources(
-        Path(str(kernel.__file__))
-    )
+    assert {Path(str(module.__file__)) for module in (base, limit_table)} <= kernels.sources(Path(str(kernel.__file__)))
 
 
 def test_all_kernels_are_kept_so() -> None:

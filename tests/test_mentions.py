@@ -66,9 +66,7 @@ def wrong(text: str) -> Iterator[str]:
     for words in re.findall(r"(?<!`)`([^`\n]+)`(?!`)", text):
         named = NAME.fullmatch(words.removesuffix("()"))
         if FILE.fullmatch(words):
-            if words not in OF_OTHERS and not any(
-                path == words or path.endswith(f"/{words}") for path in FILES
-            ):
+            if words not in OF_OTHERS and not any(path == words or path.endswith(f"/{words}") for path in FILES):
                 yield words
         elif named:
             place, name = named[1].rstrip(".").split(".")[-1], named[2]
@@ -80,11 +78,7 @@ def wrong(text: str) -> Iterator[str]:
 def docstrings(path: Path) -> Iterator[str]:
     """Yield every text in a module that stands by itself."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if (
-            isinstance(node, ast.Expr)
-            and isinstance(node.value, ast.Constant)
-            and isinstance(node.value.value, str)
-        ):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
             yield node.value.value
 
 

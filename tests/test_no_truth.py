@@ -88,9 +88,7 @@ SECRET_IMPORTS = [
 ]
 
 
-@pytest.mark.parametrize(
-    "owner", ["skills/pick.py", "runtime/lockstep.py", "hardware/servo/servo.py", "stack.py"]
-)
+@pytest.mark.parametrize("owner", ["skills/pick.py", "runtime/lockstep.py", "hardware/servo/servo.py", "stack.py"])
 def test_a_secret_import_is_found(owner: str) -> None:
     assert [leak for leak in SECRET_IMPORTS if not secrets(parse(leak), owner)] == []
     assert relative(parse("from ..robots import mujoco"), owner) != []
@@ -174,11 +172,7 @@ class Inspected:
         self.running.executor.run(0.2)
         assert self.run.result is None
         coroutine = self.run._coroutine
-        self.roots += [
-            ("context", self.running._stack.context),
-            ("coroutine", coroutine),
-            ("bus", self.running.bus),
-        ]
+        self.roots += [("context", self.running._stack.context), ("coroutine", coroutine), ("bus", self.running.bus)]
 
     def module(self, slot: str) -> Any:
         return next(module for name, module in self.roots if name == slot)

@@ -65,9 +65,7 @@ def test_a_sentence_is_counted_as_it_is_read() -> None:
 def wide_lines(text: str) -> list[str]:
     """Return the lines of a page that are too wide, those of shell blocks and those of prose."""
     shell = re.findall(r"^ *```(?:sh|bash|console)\n(.*?)^ *```", text, re.S | re.M)
-    prose = [
-        line for line in text.splitlines() if "|" not in line and "](" not in line and "http" not in line
-    ]
+    prose = [line for line in text.splitlines() if "|" not in line and "](" not in line and "http" not in line]
     commands = [line for block in shell for line in block.splitlines() if len(line) > WIDEST_SHELL_LINE]
     return commands + [line for line in prose if len(line) > WIDEST_LINE]
 

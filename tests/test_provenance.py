@@ -25,9 +25,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def git(folder: Path, *arguments: str) -> str:
-    return subprocess.run(
-        ["git", "-C", str(folder), *arguments], check=True, capture_output=True, text=True
-    ).stdout
+    return subprocess.run(["git", "-C", str(folder), *arguments], check=True, capture_output=True, text=True).stdout
 
 
 def commit() -> str:
@@ -83,10 +81,7 @@ def test_a_users_policy_is_its_description_and_its_network(tmp_path: Path) -> No
     network = tmp_path / "almi_stand.onnx"
     network.write_bytes(b"one")
     policy = {"use": "policy", "options": {"file": str(mine)}}
-    for legs in (
-        Choice("policy", {"file": str(mine)}),
-        Choice("handover", {"walk": policy, "stand": policy}),
-    ):
+    for legs in (Choice("policy", {"file": str(mine)}), Choice("handover", {"walk": policy, "stand": policy})):
         before = provenance.user_files(Stack({"lower_body": legs}))
         network.write_bytes(network.read_bytes() + b"more")
         after = provenance.user_files(Stack({"lower_body": legs}))
@@ -120,9 +115,7 @@ def test_a_digest_does_not_depend_on_the_order_of_keys() -> None:
     assert provenance.digest({"a": 1}) != provenance.digest({"a": 1.5})
 
 
-def test_a_module_named_by_its_package_is_a_users_file_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_module_named_by_its_package_is_a_users_file_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "my_package").mkdir()
     (tmp_path / "my_package" / "__init__.py").touch()
     file = tmp_path / "my_package" / "legs.py"

@@ -64,9 +64,7 @@ def test_the_narrator_prints_each_new_sentence_once_whatever_its_figures(
     bus = Bus()
     monkeypatch.setattr("golem.run.News", lambda *_: bus)
     narrator = Narrator(SimpleNamespace(bus=None))  # type: ignore[arg-type]
-    for t, text in enumerate(
-        ("Looking.", "Few are seen. Looking around.", "Sure to 2.0 mm.", "Sure to 1.5 mm.")
-    ):
+    for t, text in enumerate(("Looking.", "Few are seen. Looking around.", "Sure to 2.0 mm.", "Sure to 1.5 mm.")):
         bus.said = Feedback(float(t), "pick", "detect", text, {})
         narrator()
     said = capsys.readouterr().out.splitlines()
@@ -77,9 +75,7 @@ def test_the_narrator_prints_each_new_sentence_once_whatever_its_figures(
     ]
 
 
-def test_legs_that_do_not_balance_are_said_to_fall(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_legs_that_do_not_balance_are_said_to_fall(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "held.yaml"
     path.write_text("robot: {use: mujoco, support: ground}\nlower_body: {use: hold}\n")
     with pytest.raises(ConfigError, match="not both"):

@@ -220,9 +220,7 @@ def test_the_base_layer_of_the_legs_has_options() -> None:
         ("locomoton: {}", ["'locomoton'", "Did you mean 'locomotion'?"]),
     ],
 )
-def test_wrong_options_of_the_base_layer_are_refused_where_the_file_is_read(
-    text: str, words: list[str]
-) -> None:
+def test_wrong_options_of_the_base_layer_are_refused_where_the_file_is_read(text: str, words: list[str]) -> None:
     with pytest.raises(ConfigError) as caught:
         parse_stack(text, "x")
     assert all(word in str(caught.value) for word in words), str(caught.value)
@@ -268,9 +266,7 @@ def test_the_twin_answers_the_calls_that_the_stack_makes() -> None:
 
 
 def test_a_stack_file_lists_skills_and_their_options() -> None:
-    stack = parse_stack(
-        "skills: {pick: {force: 8}, gentle: {use: pick, force: 4}, mine: my.py:Mine}", "x.yaml"
-    )
+    stack = parse_stack("skills: {pick: {force: 8}, gentle: {use: pick, force: 4}, mine: my.py:Mine}", "x.yaml")
     assert stack.skills == {
         "pick": Choice("pick", {"force": 8}),
         "gentle": Choice("pick", {"force": 4}),
@@ -284,10 +280,7 @@ def test_a_stack_file_lists_skills_and_their_options() -> None:
     ("text", "words"),
     [
         ("skills: pick", "'skills' wants '{NAME: {option: value, ...}, ...}'"),
-        (
-            "skills: {pik: {force: 8}}",
-            "stand, take, walk. Did you mean 'pick'",
-        ),
+        ("skills: {pik: {force: 8}}", "stand, take, walk. Did you mean 'pick'"),
         ("skills: {Mine: {use: my.py:Mine}}", "a skill's name is a word of a-z, 0-9 and _"),
         ("skills: {mine: {use: 3}}", "'skills: mine' wants '{use: NAME"),
         ("skills: {pick: }", "'skills: pick' wants"),

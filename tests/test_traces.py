@@ -75,9 +75,9 @@ def test_where_no_users_file_is_involved_the_packages_own_line_is_named() -> Non
 
 def test_a_recursion_without_end_is_cut(mine: Any) -> None:
     found = fault(mine.deep)
-    assert f"[Previous line repeated {DEEPEST - 3} more times]" in (
-        found.trace or ""
-    ) and found.reason.endswith("(mine.py:14)")
+    assert f"[Previous line repeated {DEEPEST - 3} more times]" in (found.trace or "") and found.reason.endswith(
+        "(mine.py:14)"
+    )
 
 
 def test_a_module_that_ends_the_process_ends_only_itself(mine: Any) -> None:
@@ -114,11 +114,7 @@ def test_a_file_that_cannot_be_built_is_named_by_its_line(text: str, reason: str
 
 @pytest.mark.parametrize(
     ("error", "line"),
-    [
-        (ValueError("a\n  b"), "ValueError: a b"),
-        (AssertionError(), "AssertionError"),
-        (KeyError("k"), "KeyError: 'k'"),
-    ],
+    [(ValueError("a\n  b"), "ValueError: a b"), (AssertionError(), "AssertionError"), (KeyError("k"), "KeyError: 'k'")],
 )
 def test_what_was_raised_is_one_line(error: Exception, line: str) -> None:
     assert describe(error) == line

@@ -104,11 +104,7 @@ class Demo:
     """One demonstration in progress."""
 
     def __init__(
-        self,
-        config: DemoConfig,
-        running: LockstepRunner,
-        robot: MujocoRobot,
-        show: Callable[[], None] = lambda: None,
+        self, config: DemoConfig, running: LockstepRunner, robot: MujocoRobot, show: Callable[[], None] = lambda: None
     ) -> None:
         """Demonstrate what `config` says with a built stack; `show` is called after every tick."""
         self._show = show
@@ -195,9 +191,7 @@ class Demo:
         stages = self._timeline.stages
         if self.picture is None and stages and stages[-1][0] == "extract":
             if self._running.executor.t - stages[-1][1] > PULLED:
-                view = SpectatorView(
-                    self._robot, shots(self._robot), PICTURE_SIZE, fancy=self._config.headless
-                )
+                view = SpectatorView(self._robot, shots(self._robot), PICTURE_SIZE, fancy=self._config.headless)
                 self.picture = view.picture("close")
                 view.close()
 
@@ -288,13 +282,9 @@ def run_demo(config: DemoConfig) -> DemoResult:
         robot = shown(running, built)
         loose = len(robot.scene.names.screws)
         if not loose:
-            raise ConfigError(
-                f"The world of the stack '{config.stack}' has no screws; give one with 'world: pack'."
-            )
+            raise ConfigError(f"The world of the stack '{config.stack}' has no screws; give one with 'world: pack'.")
         if config.screws > loose:
-            raise ConfigError(
-                f"--screws is {config.screws}, but only {loose} screws are loosened; give 1 to {loose}."
-            )
+            raise ConfigError(f"--screws is {config.screws}, but only {loose} screws are loosened; give 1 to {loose}.")
         print(
             f"The robot {'stands on its own feet' if running.stack.on_ground else 'hangs from a hoist'} in front of "
             f"a battery pack with {loose} loosened screws in reach.\n"

@@ -99,9 +99,7 @@ def check_python() -> Diagnosis:
     found = sys.version.split()[0]
     if (3, 11) <= sys.version_info < (3, 14):
         return Diagnosis("Python", found)
-    return Diagnosis(
-        "Python", found, "install Python 3.11, 3.12 or 3.13, then: make PYTHON=/path/to/python3.12 venv"
-    )
+    return Diagnosis("Python", found, "install Python 3.11, 3.12 or 3.13, then: make PYTHON=/path/to/python3.12 venv")
 
 
 def check_packages() -> Diagnosis:
@@ -132,9 +130,7 @@ def check_extras() -> list[Diagnosis]:
     rows: list[Diagnosis] = []
     for extra, modules in EXTRAS.items():
         absent = [module for module in modules if importlib.util.find_spec(module) is None]
-        line = (
-            f"make venv-{LOCKS.get(extra, extra)}" if _CHECKOUT else f"pip install 'golem-humanoid[{extra}]'"
-        )
+        line = f"make venv-{LOCKS.get(extra, extra)}" if _CHECKOUT else f"pip install 'golem-humanoid[{extra}]'"
         found = f"without {', '.join(absent)}" if absent else "installed"
         rows.append(Diagnosis(f"extra {extra}", found, line if absent else "", needed=False))
     return rows
@@ -153,11 +149,7 @@ def check_dds() -> list[Diagnosis]:
     buffer = interfaces.receive_buffer()
     if buffer is not None and buffer < BUFFER_NEEDED:
         fix = f"sudo sysctl -w net.core.rmem_max={4 * BUFFER_NEEDED}"
-        return [
-            Diagnosis(
-                "DDS", f"works, but images get lost in {buffer / 1e6:.1f} MB of buffer", fix, needed=False
-            )
-        ]
+        return [Diagnosis("DDS", f"works, but images get lost in {buffer / 1e6:.1f} MB of buffer", fix, needed=False)]
     return [Diagnosis("DDS", "works", needed=False)]
 
 
@@ -167,13 +159,9 @@ def check_disk(folder: Path | None = None) -> Diagnosis:
     free = shutil.disk_usage(folder).free
     found = f"{free / 1e9:.0f} GB free in {folder}"
     if not os.access(folder, os.W_OK):
-        return Diagnosis(
-            "disk", f"{folder} cannot be written", "work in a folder of yours, or pass --out FOLDER"
-        )
+        return Diagnosis("disk", f"{folder} cannot be written", "work in a folder of yours, or pass --out FOLDER")
     if free < DISK_NEEDED:
-        return Diagnosis(
-            "disk", found, f"free {DISK_NEEDED / 1e9:.0f} GB, or pass --out FOLDER on another disk"
-        )
+        return Diagnosis("disk", found, f"free {DISK_NEEDED / 1e9:.0f} GB, or pass --out FOLDER on another disk")
     return Diagnosis("disk", found)
 
 
@@ -198,9 +186,7 @@ def check_graphics() -> Diagnosis:
     if not problem:
         return Diagnosis("graphics", f"MuJoCo renders with MUJOCO_GL={backend}")
     if backend not in ("egl", "the default"):
-        return Diagnosis(
-            "graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {problem}", "export MUJOCO_GL=egl"
-        )
+        return Diagnosis("graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {problem}", "export MUJOCO_GL=egl")
     return Diagnosis("graphics", f"MuJoCo fails with MUJOCO_GL={backend}: {problem}", install_line())
 
 

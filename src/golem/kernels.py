@@ -20,9 +20,7 @@ from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, Use
 __all__ = ["cfunc", "njit", "sources", "stamp", "stamp_of_all"]
 
 PACKAGE = Path(__file__).resolve().parent
-_IMPORT = re.compile(
-    r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)|import[ \t]+([^\n]*))", re.M
-)
+_IMPORT = re.compile(r"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)|import[ \t]+([^\n]*))", re.M)
 
 
 def sources(path: Path) -> frozenset[Path]:
@@ -42,9 +40,7 @@ def stamp(path: Path) -> str:
 
 def stamp_of_all() -> str:
     """Return hex digits that change with any kernel of the package, as those of `stamp` do with its own."""
-    kernels = (
-        file for file in sorted(PACKAGE.rglob("*.py")) if f"from {__name__} import" in _content(file)[1]
-    )
+    kernels = (file for file in sorted(PACKAGE.rglob("*.py")) if f"from {__name__} import" in _content(file)[1])
     return _sum(" ".join(map(stamp, kernels)).encode())
 
 
@@ -79,11 +75,7 @@ def _file(name: str, folder: Path) -> Path | None:
 @functools.cache
 def _surroundings() -> str:
     """Return what identifies the package's data and the compiler."""
-    data = (
-        file
-        for file in sorted(PACKAGE.rglob("*.*"))
-        if file.suffix in (".json", ".xml", ".npz", ".yaml", ".csv")
-    )
+    data = (file for file in sorted(PACKAGE.rglob("*.*")) if file.suffix in (".json", ".xml", ".npz", ".yaml", ".csv"))
     sums = [_sum(file.read_bytes()) for file in data]
     return " ".join([*sums, *(importlib.metadata.version(name) for name in ("numba", "llvmlite", "numpy"))])
 

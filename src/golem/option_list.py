@@ -111,9 +111,7 @@ def _everything() -> str:
     rows += [(name, _first_line(registry.part_class(name))) for name in PARTS]
     wide = max(len(name) for name, _ in rows)
     lines = [f"{name:{wide}}  {text}" for name, text in rows]
-    return "\n".join(
-        [*lines, "", "golem options SLOT lists its modules, golem options SLOT USE the options of one."]
-    )
+    return "\n".join([*lines, "", "golem options SLOT lists its modules, golem options SLOT USE the options of one."])
 
 
 def _default_of(slot: str) -> str:

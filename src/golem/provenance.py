@@ -84,11 +84,7 @@ def stack_facts(stack: Stack) -> dict[str, Any]:
     from golem.robots.sensors.profiles import load_profile
 
     stack.check()
-    return {
-        "stack": asdict(stack),
-        "profile": asdict(load_profile(stack.profile)),
-        "user_files": user_files(stack),
-    }
+    return {"stack": asdict(stack), "profile": asdict(load_profile(stack.profile)), "user_files": user_files(stack)}
 
 
 def user_files(stack: Stack) -> dict[str, str]:

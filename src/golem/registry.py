@@ -223,8 +223,6 @@ def _import(slot: str, use: str, location: str) -> ModuleType:
                 f"{slot}: '{use}' names the module {location}, which cannot be found; "
                 f"registered names: {', '.join(names(slot))}."
             ) from error
-        raise ModuleFault(
-            slot, use, f"it needs the package '{error.name}', which is not installed"
-        ) from error
+        raise ModuleFault(slot, use, f"it needs the package '{error.name}', which is not installed") from error
     except (Exception, SystemExit) as error:  # a user's file may raise anything
         raise ModuleFault.of(slot, use, error, "importing it raised ") from error

@@ -139,9 +139,7 @@ def run_stack(config: RunConfig, goal_words: Sequence[str] = ()) -> SkillResult:
             result = view.run(name, goal, watch=watch)
         else:
             result = running.execute(name, goal, realtime=config.foxglove, watch=watch)
-    print(
-        f"{'Done' if result.success else 'Failed'} after {running.executor.t:.1f} s of robot time: {result.reason}"
-    )
+    print(f"{'Done' if result.success else 'Failed'} after {running.executor.t:.1f} s of robot time: {result.reason}")
     _show_trace(result)
     return result
 
@@ -151,9 +149,7 @@ def _operate(config: RunConfig, stack: Stack) -> SkillResult:
     with ExitStack() as closing:
         running, robot = build(stack, config.seed)
         closing.callback(lambda: robot.close())
-        view = closing.enter_context(
-            LiveView(running, shown(running, robot), config.port, config.host, restarts=True)
-        )
+        view = closing.enter_context(LiveView(running, shown(running, robot), config.port, config.host, restarts=True))
         print(f"Open {view.url} to drive, push and start skills. Ctrl-C ends it.", flush=True)
         if not no_display():
             webbrowser.open(view.url)
@@ -198,11 +194,7 @@ def show_trial(config: LadderConfig) -> TrialOutcome:
     if outcome.trace:
         print(outcome.trace)
     if record is not None:
-        same = (record.success, record.stage, record.detail) == (
-            outcome.success,
-            outcome.stage,
-            outcome.detail,
-        )
+        same = (record.success, record.stage, record.detail) == (outcome.success, outcome.stage, outcome.detail)
         print(f"It {'ended as' if same else 'did not end as'} its record in {config.out} says.")
     return outcome
 
@@ -235,9 +227,7 @@ def shown(running: LockstepRunner, robot: object) -> MujocoRobot:
         ConfigError: it is none.
     """
     if not isinstance(robot, MujocoRobot):
-        raise ConfigError(
-            f"The live view shows the twin; robot: {running.stack.choice('robot').use} is not 'mujoco'."
-        )
+        raise ConfigError(f"The live view shows the twin; robot: {running.stack.choice('robot').use} is not 'mujoco'.")
     return robot
 
 

@@ -59,16 +59,10 @@ SLOTS: dict[str, Slot] = {
             "invariant_ekf": "golem.hardware.estimator.invariant_ekf:InvariantEKF",
         },
     ),
-    "servo": Slot(
-        "golem.hardware.servo.base:MotorServo",
-        {"pd_gravity": "golem.hardware.servo.servo:Servo"},
-    ),
+    "servo": Slot("golem.hardware.servo.base:MotorServo", {"pd_gravity": "golem.hardware.servo.servo:Servo"}),
     "hand": Slot(
         "golem.hardware.hands.base:HandController",
-        {
-            "deligrasp": "golem.hardware.hands.deligrasp:DeliGrasp",
-            "magpie": "golem.hardware.hands.magpie:MagpieHand",
-        },
+        {"deligrasp": "golem.hardware.hands.deligrasp:DeliGrasp", "magpie": "golem.hardware.hands.magpie:MagpieHand"},
         ("side",),
     ),
     "lower_body": Slot(
@@ -86,10 +80,7 @@ SLOTS: dict[str, Slot] = {
     ),
     "upper_body": Slot(
         "golem.capabilities.arms.base:UpperBody",
-        {
-            "diff_ik": "golem.capabilities.arms.diff_ik:DiffIK",
-            "pink_ik": "golem.capabilities.arms.pink_ik:PinkIK",
-        },
+        {"diff_ik": "golem.capabilities.arms.diff_ik:DiffIK", "pink_ik": "golem.capabilities.arms.pink_ik:PinkIK"},
     ),
     "planner": Slot(
         "golem.capabilities.planning.base:ArmPlanner",
@@ -139,8 +130,7 @@ SLOTS: dict[str, Slot] = {
         },
     ),
     "mapper": Slot(
-        "golem.capabilities.mapping.base:Mapper",
-        {"grid": "golem.capabilities.mapping.voxel_grid:VoxelGridMapper"},
+        "golem.capabilities.mapping.base:Mapper", {"grid": "golem.capabilities.mapping.voxel_grid:VoxelGridMapper"}
     ),
     "memory": Slot(
         "golem.capabilities.memory.base:Memory",

@@ -295,15 +295,11 @@ def _word(name: str, key: str, value: object) -> str:
 def _skills(name: str, value: object) -> dict[str, Choice]:
     """Return the skills that a stack file lists; one without `use` is the shipped one of its name."""
     if not isinstance(value, Mapping):
-        raise ConfigError(
-            f"{name}: 'skills' wants '{{NAME: {{option: value, ...}}, ...}}', e.g. {_SKILLS_EXAMPLE}."
-        )
+        raise ConfigError(f"{name}: 'skills' wants '{{NAME: {{option: value, ...}}, ...}}', e.g. {_SKILLS_EXAMPLE}.")
     chosen: dict[str, Choice] = {}
     for key, own in cast("Mapping[object, object]", value).items():
         if not re.fullmatch(r"[a-z][a-z0-9_]*", str(key)):
-            raise ConfigError(
-                f"{name}: a skill's name is a word of a-z, 0-9 and _ such as 'pick', not {key!r}."
-            )
+            raise ConfigError(f"{name}: a skill's name is a word of a-z, 0-9 and _ such as 'pick', not {key!r}.")
         own = {"use": key, **cast("Mapping[str, object]", own)} if isinstance(own, Mapping) else own
         choice = chosen[str(key)] = _choice(name, f"{SKILLS}: {key}", registry.SKILL, own)
         if ":" not in choice.use and choice.use not in registry.names(registry.SKILL):

@@ -11,9 +11,7 @@ from types import FrameType
 
 _PACKAGE = str(Path(__file__).parent)
 _LIBRARIES = tuple({sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")})
-_MACHINERY = tuple(
-    f"{_PACKAGE}/{name}" for name in ("runtime/", "evaluation/", "registry.py", "skills/runner.py")
-)
+_MACHINERY = tuple(f"{_PACKAGE}/{name}" for name in ("runtime/", "evaluation/", "registry.py", "skills/runner.py"))
 """What calls modules, and is none of them."""
 DEEPEST = 8
 """Frames that a trace shows, the innermost; a recursion without end has a thousand."""

@@ -7,14 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from golem.dashboard.balance_chart import (
-    BAD,
-    GOOD,
-    PUSHED,
-    REACH,
-    SPAN,
-    balance_chart,
-)
+from golem.dashboard.balance_chart import BAD, GOOD, PUSHED, REACH, SPAN, balance_chart
 from golem.robots.mujoco.balance import PERIOD, BalanceTrace
 from golem.types import Array
 
@@ -76,10 +69,7 @@ def test_a_push_is_marked_where_it_was() -> None:
     force = np.zeros((len(still.t), 3))
     force[600:620, 1] = -150.0
     marked = columns(drawn(replace(still, force=force)), PUSHED)
-    assert (marked.min(), marked.max()) == (
-        pytest.approx(0.6 * SIZE[0], abs=4),
-        pytest.approx(0.62 * SIZE[0], abs=4),
-    )
+    assert (marked.min(), marked.max()) == (pytest.approx(0.6 * SIZE[0], abs=4), pytest.approx(0.62 * SIZE[0], abs=4))
 
 
 @pytest.mark.parametrize("margin", [np.array([0.11]), np.array([-2.0, 2.0]), np.zeros(3)])

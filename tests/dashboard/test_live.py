@@ -48,9 +48,7 @@ def view(twin: tuple[LockstepRunner, Any], monkeypatch: pytest.MonkeyPatch) -> I
 
 def until_state(view: LiveView, running: LockstepRunner, state: GateState, seconds: float = 2.0) -> None:
     end = running.executor.t + seconds
-    view.idle(
-        lambda: running.executor.t > end or (running.safety is not None and running.safety.state is state)
-    )
+    view.idle(lambda: running.executor.t > end or (running.safety is not None and running.safety.state is state))
     assert running.safety is not None and running.safety.state is state
 
 
@@ -68,9 +66,7 @@ def test_a_port_that_is_taken_is_named(twin: tuple[LockstepRunner, Any], view: L
 
 def test_bodies_cameras_and_target_follow(twin: tuple[LockstepRunner, Any], view: LiveView) -> None:
     running, robot = twin
-    running.bus.publish(
-        topics.FEEDBACK, Feedback(0.0, "pick", "servo", "<b>", {"target": [0.4, 0, -0.04]}), 0.0
-    )
+    running.bus.publish(topics.FEEDBACK, Feedback(0.0, "pick", "servo", "<b>", {"target": [0.4, 0, -0.04]}), 0.0)
     view._busy = True
     robot.data.body("right_hand").xpos[:] = (1.0, 2.0, 3.0)
     view.update()
@@ -135,18 +131,14 @@ def test_the_form_has_a_field_for_each_of_the_goal(view: LiveView) -> None:
     assert panel.chosen == ("walk", goal)
 
 
-def test_a_goal_without_sense_is_said_and_not_started(
-    twin: tuple[LockstepRunner, Any], view: LiveView
-) -> None:
+def test_a_goal_without_sense_is_said_and_not_started(twin: tuple[LockstepRunner, Any], view: LiveView) -> None:
     view.panel.skill.fill("stand", seconds=-1.0)
     view.panel.press(Button.START)
     view._serve_buttons()
     assert view._wanted is None and "zero or more seconds" in view._note
 
 
-def test_a_skill_can_be_cancelled_and_the_robot_stays_up(
-    twin: tuple[LockstepRunner, Any], view: LiveView
-) -> None:
+def test_a_skill_can_be_cancelled_and_the_robot_stays_up(twin: tuple[LockstepRunner, Any], view: LiveView) -> None:
     running, _ = twin
     until_state(view, running, GateState.ACTIVE)
     enabled: list[bool] = []
@@ -222,9 +214,7 @@ def test_an_emergency_stop_takes_the_sliders_back(walker: tuple[LockstepRunner, 
     assert legs.twist == Twist()
 
 
-def test_the_button_pushes_with_the_impulse_that_is_set(
-    walker: tuple[LockstepRunner, Any], walk: LiveView
-) -> None:
+def test_the_button_pushes_with_the_impulse_that_is_set(walker: tuple[LockstepRunner, Any], walk: LiveView) -> None:
     running, robot = walker
     legs = walk.panel.legs
     assert legs is not None
@@ -235,9 +225,7 @@ def test_the_button_pushes_with_the_impulse_that_is_set(
     run(walk, running, 0.1)
     assert walk._pusher.force == pytest.approx([0.0, 200.0, 0.0], abs=2.0)
     assert walk._stage._arrow.visible
-    assert (
-        robot.truth.com()[1][1] - before > 0.05
-    )  # 40 N s move 75 kg at 0.5 m/s, less what legs and band hold
+    assert robot.truth.com()[1][1] - before > 0.05  # 40 N s move 75 kg at 0.5 m/s, less what legs and band hold
     run(walk, running, 1.0)
     assert not walk._pusher.force.any() and not walk._stage._arrow.visible
     pushed = walk._recorder.trace()

@@ -51,12 +51,7 @@ def test_words_of_things_side_by_side_do_not_cover_each_other() -> None:
 
 @pytest.mark.parametrize(
     ("age", "there", "words"),
-    [
-        (12.4, True, "mug 12 s"),
-        (600.0, True, "mug 10 min"),
-        (86400.0, True, "mug 24 h"),
-        (5.0, False, "mug, gone"),
-    ],
+    [(12.4, True, "mug 12 s"), (600.0, True, "mug 10 min"), (86400.0, True, "mug 24 h"), (5.0, False, "mug, gone")],
 )
 def test_what_is_written_beside_a_place(age: float, there: bool, words: str) -> None:
     assert place_words(RememberedPlace("mug", 0.0, 0.0, age, there)) == words

@@ -39,8 +39,7 @@ def test_a_program_is_let_in(port: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "origin",
-    ["http://stranger.example", "http://localhost.stranger.example", "http://127.0.0.1.x:80", "null"],
+    "origin", ["http://stranger.example", "http://localhost.stranger.example", "http://127.0.0.1.x:80", "null"]
 )
 def test_a_page_of_a_stranger_is_not(port: int, origin: str) -> None:
     assert " 403 " in answer(port, f"Origin: {origin}")

@@ -37,9 +37,7 @@ def test_robot_screws_and_world_are_all_there(twin: tuple[LockstepRunner, Any]) 
 
 def test_the_origin_of_odom_is_the_pelvis_at_the_start(twin: tuple[LockstepRunner, Any]) -> None:
     _, robot = twin
-    np.testing.assert_allclose(
-        SpectatorView(robot).from_odom(np.zeros(3)), robot.data.body("pelvis").xpos, atol=1e-9
-    )
+    np.testing.assert_allclose(SpectatorView(robot).from_odom(np.zeros(3)), robot.data.body("pelvis").xpos, atol=1e-9)
 
 
 def test_looking_changes_neither_the_scene_nor_what_the_robot_sees(twin: tuple[LockstepRunner, Any]) -> None:

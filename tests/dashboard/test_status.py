@@ -41,9 +41,7 @@ def test_the_timeline_counts_each_stage_and_keeps_the_last_target(twin: tuple[Lo
     assert timeline.target == pytest.approx([0.4, 0.0, 0.2])
 
 
-def test_a_fresh_frame_is_shown_with_what_was_found_and_a_stale_one_is_not(
-    twin: tuple[LockstepRunner, Any],
-) -> None:
+def test_a_fresh_frame_is_shown_with_what_was_found_and_a_stale_one_is_not(twin: tuple[LockstepRunner, Any]) -> None:
     running, robot = twin
     view = SpectatorView(robot)
     info = robot.cameras["head"]

@@ -74,9 +74,7 @@ class Fake(Rung[FakeOptions]):
         seconds = rng.normal(12, 2) if spec.method == "good" else rng.normal(6, 1)
         if difficulty < self.options.skill * RATES.get(spec.method, 1.0):
             times = {"detect_to_grasp": seconds, "total": seconds + 14 + rng.random()}
-            return TrialOutcome(
-                True, "done", timings=times, series={"difficulty": difficulty}, picture=picture(spec)
-            )
+            return TrialOutcome(True, "done", timings=times, series={"difficulty": difficulty}, picture=picture(spec))
         stage, module = STAGES[rng.choice(4, p=(0.15, 0.55, 0.2, 0.1))]
         times = {} if stage == "detect" else {"detect_to_grasp": seconds}
         detail = "the palm closed 31 mm beside the screw <head>"

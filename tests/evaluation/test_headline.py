@@ -55,9 +55,7 @@ def test_the_screws_are_picked_as_the_readme_says(rung: str, tmp_path: Path) -> 
     records = run_ladder(config).records
     assert len(records) == TRIALS
     lost = [
-        f"{record.index}: {record.stage}, {record.module}: {record.detail}"
-        for record in records
-        if not record.success
+        f"{record.index}: {record.stage}, {record.module}: {record.detail}" for record in records if not record.success
     ]
     # Claimed are 99 and 98 %: with these, two losses of eight come in one run of a hundred.
     assert len(lost) <= 1, lost

@@ -57,9 +57,7 @@ def test_who_looks_for_what_it_is_not_given_is_stopped(module: ModuleType, name:
     getattr(module, name)()
 
 
-def test_what_libraries_do_for_a_module_is_no_search(
-    module: ModuleType, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_what_libraries_do_for_a_module_is_no_search(module: ModuleType, caplog: pytest.LogCaptureFixture) -> None:
     with searching_forbidden():
         assert module.point().x == 1
         logging.getLogger("golem.test").warning("said")

@@ -31,9 +31,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     """The firmware without its main."""
     built = tmp_path_factory.mktemp("firmware") / "estop.so"
     sources = [str(FIRMWARE / name) for name in ("frame.c", "button.c")]
-    subprocess.run(
-        ["cc", "-std=gnu99", "-Wall", "-Werror", "-shared", "-fPIC", "-o", built, *sources], check=True
-    )
+    subprocess.run(["cc", "-std=gnu99", "-Wall", "-Werror", "-shared", "-fPIC", "-o", built, *sources], check=True)
     library = ctypes.CDLL(str(built))
     library.crc16.restype = ctypes.c_uint16
     library.button_sample.restype = ctypes.c_uint8

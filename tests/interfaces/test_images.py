@@ -89,8 +89,7 @@ def test_a_camera_whose_numbers_are_none_is_refused(where: int, value: float, sa
 
 
 @pytest.mark.parametrize(
-    "changed",
-    [{"encoding": "bgr8"}, {"step": 100}, {"height": 49}, {"width": 0xFFFFFFFF}, {"step": 0xFFFFFFFF}],
+    "changed", [{"encoding": "bgr8"}, {"step": 100}, {"height": 49}, {"width": 0xFFFFFFFF}, {"step": 0xFFFFFFFF}]
 )
 def test_an_image_that_contradicts_itself_is_refused(changed: dict[str, object]) -> None:
     message = images.color_image(1.0, picture(), "camera")

@@ -23,9 +23,7 @@ DISTORTIONS = {
 
 
 def info(**fields: object) -> CameraInfo:
-    message = CameraInfo(
-        width=640, height=480, k=K.reshape(-1).copy(), distortion_model="plumb_bob", d=np.zeros(5)
-    )
+    message = CameraInfo(width=640, height=480, k=K.reshape(-1).copy(), distortion_model="plumb_bob", d=np.zeros(5))
     for name, value in fields.items():
         setattr(message, name, value)
     return message

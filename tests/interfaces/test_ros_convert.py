@@ -13,16 +13,7 @@ from golem.interfaces.payloads import Detections, LegStatus
 from golem.middleware.ros.message import CodecError
 from golem.middleware.ros.msgs.diagnostic_msgs import DiagnosticStatus
 from golem.middleware.ros.msgs.geometry_msgs import Point, Pose, Quaternion
-from golem.types import (
-    BaseEstimate,
-    Detection,
-    HandCommand,
-    HandState,
-    Imu,
-    LocalizedObject,
-    PlanarPose,
-    Twist,
-)
+from golem.types import BaseEstimate, Detection, HandCommand, HandState, Imu, LocalizedObject, PlanarPose, Twist
 
 
 def T(rpy: tuple[float, float, float], xyz: tuple[float, float, float]) -> np.ndarray:
@@ -71,13 +62,7 @@ def test_poses_survive(rpy: tuple[float, float, float], xyz: tuple[float, float,
 
 
 @pytest.mark.parametrize(
-    "q",
-    [
-        (0.0, 0.0, 0.0, 0.0),
-        (float("nan"), 0.0, 0.0, 1.0),
-        (1e200, 0.0, 0.0, 0.0),
-        (0.0, 0.0, 0.0, float("inf")),
-    ],
+    "q", [(0.0, 0.0, 0.0, 0.0), (float("nan"), 0.0, 0.0, 1.0), (1e200, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, float("inf"))]
 )
 def test_what_is_no_pose_is_refused(q: tuple[float, float, float, float]) -> None:
     with pytest.raises(CodecError, match="no position"):
@@ -136,12 +121,7 @@ def test_diagnostics_say_what_is_wrong() -> None:
 
 def test_base_estimates_survive() -> None:
     estimate = BaseEstimate(
-        12.5,
-        T((0.1, -0.2, 2.0), (1.0, 2.0, 1.03)),
-        np.array([0.1, 0.2, 0.3]),
-        1.02,
-        np.array([0.9, 0.1]),
-        True,
+        12.5, T((0.1, -0.2, 2.0), (1.0, 2.0, 1.03)), np.array([0.1, 0.2, 0.3]), 1.02, np.array([0.9, 0.1]), True
     )
     back = convert.to_base_estimate(convert.base_estimate(estimate))
     np.testing.assert_allclose(back.T_odom_base, estimate.T_odom_base, atol=1e-12)
@@ -154,12 +134,7 @@ def test_hands_survive() -> None:
     message = convert.hand_state(state, "left")
     back = convert.to_hand_state(message)
     assert message.header.frame_id == "left_gripper"
-    assert (back.t, back.gap, back.fingers.tolist(), back.force.tolist()) == (
-        1.0,
-        0.05,
-        [0.02, 0.03],
-        [1.0, 2.0],
-    )
+    assert (back.t, back.gap, back.fingers.tolist(), back.force.tolist()) == (1.0, 0.05, [0.02, 0.03], [1.0, 2.0])
     for change in ({"gap": np.nan}, {"fingers": np.array([0.0, np.inf])}, {"force": np.array([np.nan, 0.0])}):
         with pytest.raises(CodecError, match="reports a gap"):
             convert.to_hand_state(convert.hand_state(replace(state, **change), "left"))

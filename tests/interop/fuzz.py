@@ -85,17 +85,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     with free_domain() as domain:
-        command = [
-            sys.executable,
-            "-m",
-            "golem",
-            "launch",
-            "stand",
-            "--world",
-            "open",
-            "--domain",
-            str(domain),
-        ]
+        command = [sys.executable, "-m", "golem", "launch", "stand", "--world", "open", "--domain", str(domain)]
         log = open("fuzz.log", "w+")  # noqa: SIM115  it outlives this block's reader
         launch = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
         try:

@@ -176,9 +176,7 @@ class Peer:
             for info in self.node.get_publishers_info_by_topic(name)
         ]
 
-    def call(
-        self, name: str, type: str, request: str, count: int = 1, timeout: float = 10.0
-    ) -> dict[str, Any]:
+    def call(self, name: str, type: str, request: str, count: int = 1, timeout: float = 10.0) -> dict[str, Any]:
         """Call a service `count` times at once."""
         service = kind(type)
         client = self.clients.get(name) or self.node.create_client(service, name)
@@ -251,9 +249,7 @@ class Peer:
             return {"found": False}
         feedback = self.feedback[name] = []
         message = deserialize_message(bytes.fromhex(goal), action.Goal)
-        future = client.send_goal_async(
-            message, lambda m: feedback.append(serialize_message(m.feedback).hex())
-        )
+        future = client.send_goal_async(message, lambda m: feedback.append(serialize_message(m.feedback).hex()))
         if not wait(future.done, timeout):
             return {"found": True, "answered": False}
         handle = self.goals[name] = future.result()

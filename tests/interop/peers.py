@@ -46,9 +46,7 @@ class Setup:
         return f"{self.distro}-{self.vendor}"
 
 
-SETUPS = tuple(
-    Setup(distro, vendor) for distro in ("jazzy", "kilted") for vendor in ("fastdds", "cyclonedds")
-)
+SETUPS = tuple(Setup(distro, vendor) for distro in ("jazzy", "kilted") for vendor in ("fastdds", "cyclonedds"))
 
 
 @functools.cache
@@ -81,9 +79,7 @@ def environment(setup: Setup, domain: int) -> dict[str, str]:
     if setup.vendor == "cyclonedds":
         libraries.insert(0, root / "cyclone")
         if not (libraries[0] / "librmw_fastrtps_cpp.so").exists():
-            raise CannotError(
-                f"rmw_cyclonedds was not built for {setup.distro}: name a checkout of it, see build.sh"
-            )
+            raise CannotError(f"rmw_cyclonedds was not built for {setup.distro}: name a checkout of it, see build.sh")
         ours["CYCLONEDDS_URI"] = f"file://{ROOT / 'docker' / 'cyclonedds.xml'}"
     else:
         profile = str(ROOT / "docker" / "fastdds.xml")

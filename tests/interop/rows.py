@@ -66,20 +66,14 @@ def cdr(message: Any) -> str:
 def from_us(row: Row, node: RosNode, ros: Ros) -> Verdict:
     """Judge what ROS gets of us: our messages, our services called, our actions pursued."""
     return _judged(
-        _published if isinstance(row, TopicRow) else _asked if isinstance(row, ServiceRow) else _pursued,
-        row,
-        node,
-        ros,
+        _published if isinstance(row, TopicRow) else _asked if isinstance(row, ServiceRow) else _pursued, row, node, ros
     )
 
 
 def to_us(row: Row, node: RosNode, ros: Ros) -> Verdict:
     """Judge what we get of ROS: its messages, its services called, its actions pursued."""
     return _judged(
-        _echoed if isinstance(row, TopicRow) else _asks if isinstance(row, ServiceRow) else _pursues,
-        row,
-        node,
-        ros,
+        _echoed if isinstance(row, TopicRow) else _asks if isinstance(row, ServiceRow) else _pursues, row, node, ros
     )
 
 

@@ -91,10 +91,7 @@ def main() -> None:
         try:
             rows = {row.name: row for row in public.TOPICS}
             for row in rows.values():
-                qos: dict[str, Any] = {
-                    "reliable": row.qos.reliable,
-                    "transient_local": row.qos.transient_local,
-                }
+                qos: dict[str, Any] = {"reliable": row.qos.reliable, "transient_local": row.qos.transient_local}
                 ros.do("listen", name=row.name, type=row.type, keep=0, depth=row.qos.depth, **qos)
             memory, ended = [robot.memory()], Counter[str]()
             goal = cdr(codec.action(PICK).Goal("screw", "tray", "right"))
@@ -120,9 +117,7 @@ def main() -> None:
                     memory.append(robot.memory())
             memory.append(robot.memory())
             clock = ros.do("came", name="/clock")["robot_time"]
-            print(
-                f"{setup}, {options.minutes:g} min by the clock of the wall, {clock:.0f} s of robot time heard\n"
-            )
+            print(f"{setup}, {options.minutes:g} min by the clock of the wall, {clock:.0f} s of robot time heard\n")
             print("\n".join(f"- {count} x {text}" for text, count in ended.items()))
             print(
                 "\n| topic | came | of | longest gap [s] | latency: median [ms] | p99 [ms] |\n|---|---|---|---|---|---|"
@@ -132,9 +127,7 @@ def main() -> None:
                 if came["count"]:
                     due = "" if row.rate is None else f"{row.rate * (came['robot_time'] or clock):.0f}"
                     late = (f"{1e3 * came[what]:.1f}" for what in ("median", "p99"))
-                    print(
-                        f"| `{row.name}` | {came['count']} | {due} | {came['gap']:.2f} | {' | '.join(late)} |"
-                    )
+                    print(f"| `{row.name}` | {came['count']} | {due} | {came['gap']:.2f} | {' | '.join(late)} |")
             print(f"\n| process | memory [MB], every {EVERY:g} s, and at the end |\n|---|---|")
             for name in memory[0]:
                 print(f"| {name} | {', '.join(f'{at.get(name, 0.0):.0f}' for at in memory)} |")

@@ -40,9 +40,7 @@ def page() -> str:
         _row(["---"] * len(heads)),
     ]
     for row in unique():
-        cells = [
-            " / ".join(v.result for v in verdicts[setup].get(row.name, ())) or "not run" for setup in SETUPS
-        ]
+        cells = [" / ".join(v.result for v in verdicts[setup].get(row.name, ())) or "not run" for setup in SETUPS]
         lines.append(_row([f"`{row.name}`", *cells]))
     reasons: dict[str, set[str]] = {}
     for setup, found in verdicts.items():

@@ -96,9 +96,7 @@ def test_a_client_of_ros_cancels_what_is_not_there_and_then_everything(
     assert handler.goals[0].status is GoalStatus.CANCELING
 
 
-def test_a_client_of_ros_that_dies_leaves_its_goal(
-    node: RosNode, ros: Ros, handler: Handler, join: Any
-) -> None:
+def test_a_client_of_ros_that_dies_leaves_its_goal(node: RosNode, ros: Ros, handler: Handler, join: Any) -> None:
     assert ros.do("give", node, **GOAL)["accepted"]
     ros.kill()
     until(node, lambda: False, 0.5)

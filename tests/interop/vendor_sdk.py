@@ -136,25 +136,13 @@ def main() -> None:
         stack = Path(folder) / "vendor_legs.yaml"
         shipped = resources.files("golem").joinpath("stacks/stand.yaml").read_text()
         stack.write_text(shipped.replace("{use: almi}", "{use: vendor}"))
-        command = [
-            sys.executable,
-            "-m",
-            "golem",
-            "twin",
-            str(stack),
-            "--world",
-            "open",
-            "--domain",
-            str(domain),
-        ]
+        command = [sys.executable, "-m", "golem", "twin", str(stack), "--world", "open", "--domain", str(domain)]
         twin = subprocess.Popen(command)
         time.sleep(20.0)
         command = [sys.executable, "-m", "tests.interop.vendor_sdk", "--domain", str(domain)]
         command += ["--seconds", str(options.seconds), "--calls", str(options.calls), "--part"]
         try:
-            readers = {
-                part: subprocess.Popen([*command, part], stdout=subprocess.PIPE, text=True) for part in PARTS
-            }
+            readers = {part: subprocess.Popen([*command, part], stdout=subprocess.PIPE, text=True) for part in PARTS}
             for part, process in readers.items():
                 print(part, process.communicate()[0].strip(), flush=True)
             print("loco", subprocess.run([*command, "loco"], capture_output=True, text=True).stdout.strip())

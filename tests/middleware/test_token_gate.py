@@ -120,14 +120,7 @@ def test_a_taken_port_is_said_and_tokens_differ(gate: TokenGate) -> None:
 
 @pytest.mark.parametrize(
     ("host", "local"),
-    [
-        ("127.0.0.1", True),
-        ("localhost", True),
-        ("::1", True),
-        ("0.0.0.0", False),
-        ("192.168.1.2", False),
-        ("x", False),
-    ],
+    [("127.0.0.1", True), ("localhost", True), ("::1", True), ("0.0.0.0", False), ("192.168.1.2", False), ("x", False)],
 )
 def test_which_addresses_are_this_machines_alone(host: str, local: bool) -> None:
     assert is_loopback(host) is local

@@ -42,9 +42,7 @@ def test_a_jump_is_named_with_its_joint(limits: ArmLimits) -> None:
     limits.check(q)
     q = q.copy()
     q[4] -= 1.0
-    with pytest.raises(
-        ModuleFault, match="left_elbow_joint jumps by 1 rad in a tick of 0.01 s.* 0.2 rad at most"
-    ):
+    with pytest.raises(ModuleFault, match="left_elbow_joint jumps by 1 rad in a tick of 0.01 s.* 0.2 rad at most"):
         limits.check(q)
 
 

@@ -32,9 +32,7 @@ class Clock:
         self.wall += self.work + self.sleep
 
 
-def said(
-    monkeypatch: pytest.MonkeyPatch, clock: Clock, calls: int, allowed: float | None = 0.01
-) -> list[str]:
+def said(monkeypatch: pytest.MonkeyPatch, clock: Clock, calls: int, allowed: float | None = 0.01) -> list[str]:
     """Return the warnings of so many calls."""
     monkeypatch.setattr("golem.runtime.call_times.time", clock)
     contract = ContractCheck("upper_body", "mine.py:Arms")

@@ -68,9 +68,7 @@ def press(running: Any, twin: Any) -> None:
         ("fridge-tether", None, {}),
     ],
 )
-def test_a_stack_does_the_same_to_the_bit(
-    monkeypatch: Any, stack: str, act: Any, robot: dict[str, Any]
-) -> None:
+def test_a_stack_does_the_same_to_the_bit(monkeypatch: Any, stack: str, act: Any, robot: dict[str, Any]) -> None:
     chained, plain = (run(monkeypatch, c, stack, 3.0, act, **robot) for c in (True, False))
     np.testing.assert_array_equal(chained, plain)
 

@@ -13,9 +13,7 @@ from golem.runtime.checked import CheckedGraspMethod, CheckedNavigator
 from golem.runtime.contract_check import ContractCheck
 from golem.types import Array, Detection, LocalizedObject, PlanarPose, Twist
 
-TARGET = LocalizedObject(
-    Detection("screw", 0.9, np.zeros(4), np.zeros(2)), 0.0, np.zeros(3), np.zeros((0, 3))
-)
+TARGET = LocalizedObject(Detection("screw", 0.9, np.zeros(4), np.zeros(2)), 0.0, np.zeros(3), np.zeros((0, 3)))
 NO_SCENE = np.zeros((0, 3))
 GRIPPER = Gripper("right", np.eye(4), yaw=0.0)
 SHEARED = np.eye(4) + 0.1 * np.eye(4, k=1)

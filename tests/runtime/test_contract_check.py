@@ -43,9 +43,7 @@ def test_whatever_is_raised_is_the_modules_fault(error: Exception) -> None:
     assert caught.value.__cause__ is error
 
 
-@pytest.mark.parametrize(
-    "error", [ModuleFault("robot", "r", "x"), MissingExtra("p", "e"), MissingSystemLibrary("GL")]
-)
+@pytest.mark.parametrize("error", [ModuleFault("robot", "r", "x"), MissingExtra("p", "e"), MissingSystemLibrary("GL")])
 def test_what_is_not_the_modules_fault_passes(error: Exception) -> None:
     with pytest.raises(type(error)) as caught:
         GUARD.call(raiser(error))
@@ -104,14 +102,8 @@ def test_a_method_that_takes_the_arguments_satisfies_its_contract(step: object) 
 @pytest.mark.parametrize(
     ("step", "words"),
     [
-        (
-            lambda self, state, dt: None,
-            "its step takes (state, dt), the contract asks for step(state, dt, gains)",
-        ),
-        (
-            lambda self, state, dt, gains, more: None,
-            "its step takes (state, dt, gains, more), the contract asks for",
-        ),
+        (lambda self, state, dt: None, "its step takes (state, dt), the contract asks for step(state, dt, gains)"),
+        (lambda self, state, dt, gains, more: None, "its step takes (state, dt, gains, more), the contract asks for"),
         (lambda self, *, state, dt, gains: None, "the contract asks for step(state, dt, gains)"),
         (3.0, "its step is a float, the contract asks for a method"),
     ],

@@ -17,11 +17,7 @@ from golem.stack import Choice, Stack
 
 CROUCH = Choice("hold", {"stance": "crouch", "standing": True})
 STANDING = Stack(
-    {
-        "robot": Choice("mujoco", {"support": "ground", "world": "open"}),
-        "lower_body": CROUCH,
-        "fallback": CROUCH,
-    },
+    {"robot": Choice("mujoco", {"support": "ground", "world": "open"}), "lower_body": CROUCH, "fallback": CROUCH},
     profile="ideal",
 )
 

@@ -49,20 +49,12 @@ SPEC = SkillSpec("mine", "mine.py:Mine", "Do many things", json.loads(json.dumps
     ("words", "changes"),
     [
         (["3"], {}),
-        (
-            ["3", "right", "--fast", "--points", "1", "-2.5"],
-            {"side": "right", "fast": True, "points": [1.0, -2.5]},
-        ),
+        (["3", "right", "--fast", "--points", "1", "-2.5"], {"side": "right", "fast": True, "points": [1.0, -2.5]}),
         (["--times", "3", "--pair", "2", "b"], {"pair": [2, "b"]}),
-        (
-            ["3", "--tool-name", "x y", "--where.y", "-1"],
-            {"tool_name": "x y", "where": {"x": 1.0, "y": -1.0}},
-        ),
+        (["3", "--tool-name", "x y", "--where.y", "-1"], {"tool_name": "x y", "where": {"x": 1.0, "y": -1.0}}),
     ],
 )
-def test_every_kind_of_field_has_an_option_with_its_default(
-    words: list[str], changes: dict[str, Any]
-) -> None:
+def test_every_kind_of_field_has_an_option_with_its_default(words: list[str], changes: dict[str, Any]) -> None:
     fields = parse_goal(SPEC, words, "golem skill mine")
     assert fields == {**plain(Goal(3)), **changes}
     assert plain(read_goal("mine", Goal, fields)) == fields

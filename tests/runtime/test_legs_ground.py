@@ -112,10 +112,7 @@ def test_a_robot_whose_estimate_goes_stale_while_it_walks_is_damped_and_says_why
 @pytest.mark.slow
 def test_it_walks_with_the_robots_own_controller_and_stands_with_another() -> None:
     """The vendor's has to be brought up first, which takes a second and a half; the robot stands meanwhile."""
-    parts = {
-        "walk": {"use": "vendor"},
-        "stand": {"use": "policy", "options": {"file": "almi_stand"}},
-    }
+    parts = {"walk": {"use": "vendor"}, "stand": {"use": "policy", "options": {"file": "almi_stand"}}}
     with on_open_ground(Choice("handover", parts), "almi") as (running, robot):
         assert running.execute("stand", StandGoal(2.5), timeout=5.0).success
         assert running.execute(Drive(Twist(0.3), seconds=4.0), None, timeout=6.0).success

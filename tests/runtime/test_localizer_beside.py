@@ -80,8 +80,7 @@ def test_its_fault_arrives_while_a_skill_looks(still: bool) -> None:
         assert (fault is not None) is still
         if fault is not None:
             assert re.fullmatch(
-                r"Module localizer: eyes failed: RuntimeError: gone \(test_localizer_beside.py:\d+\)",
-                fault.reason,
+                r"Module localizer: eyes failed: RuntimeError: gone \(test_localizer_beside.py:\d+\)", fault.reason
             )
             assert fault.slot == "localizer" and 'raise RuntimeError("gone")' in (fault.trace or "")
         assert bus.latest(topics.detections("head")) is None

@@ -152,9 +152,7 @@ def test_failed_legs_go_to_the_fallback_and_the_skill_ends_with_their_name(how: 
         np.testing.assert_allclose(state.q[LEGS], command.q[LEGS], atol=0.05)
 
 
-def test_legs_that_take_longer_than_their_period_lose_them_where_the_wall_clock_counts(
-    tmp_path: Path,
-) -> None:
+def test_legs_that_take_longer_than_their_period_lose_them_where_the_wall_clock_counts(tmp_path: Path) -> None:
     use = f"{write(tmp_path, 'sleeps')}:Chosen"
     with hanging(lower_body=Choice(use)) as running:
         result = running.execute(Drive(seconds=0.6), None, timeout=5.0)

@@ -122,9 +122,7 @@ def test_map_and_scan_are_shown_where_there_are_any() -> None:
     assert inputs.grid is grid and inputs.scan is scan
 
 
-@pytest.mark.parametrize(
-    "step", [NavStep(Twist(0.5), True, HERE), NavStep.failed("A wall is in the way.", AHEAD)]
-)
+@pytest.mark.parametrize("step", [NavStep(Twist(0.5), True, HERE), NavStep.failed("A wall is in the way.", AHEAD)])
 def test_who_has_arrived_or_given_up_stands(step: NavStep) -> None:
     rig = Rig(Counts())
     rig.navigator.says = step

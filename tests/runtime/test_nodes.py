@@ -115,9 +115,7 @@ def test_a_users_module_runs_in_every_slot(slot: str, module: Callable[[str, str
 
 @pytest.mark.parametrize("broken", ["none", "nan", "shape"])
 @pytest.mark.parametrize("slot", [slot for slot in SLOTS if slot != "lower_body"])
-def test_what_a_module_returns_wrongly_is_its_fault(
-    slot: str, broken: str, module: Callable[[str, str], str]
-) -> None:
+def test_what_a_module_returns_wrongly_is_its_fault(slot: str, broken: str, module: Callable[[str, str], str]) -> None:
     use = module(slot, broken)
     stack = running(slot, use)
     if slot == "localizer":  # the robot goes on without
@@ -133,10 +131,7 @@ def test_what_a_module_returns_wrongly_is_its_fault(
 @pytest.mark.parametrize(
     ("line", "reason"),
     [
-        (
-            "return ArmCommand(np.zeros(15, int), np.zeros(2), np.zeros(2), False)",
-            "its target of .* jumps by",
-        ),
+        ("return ArmCommand(np.zeros(15, int), np.zeros(2), np.zeros(2), False)", "its target of .* jumps by"),
         (
             "self.q = self.q + 0.4 * (np.arange(15) == 1); return ArmCommand(self.q, np.zeros(2), np.zeros(2), False)",
             "jumps by 0.4 rad",
@@ -154,18 +149,11 @@ def test_arms_that_leave_their_limits_or_end_the_process_are_named(
     assert (caught.value.slot, caught.value.use) == ("upper_body", use)
 
 
-def test_a_skill_is_told_where_the_module_that_ended_it_failed(
-    module: Callable[[str, str, str], str],
-) -> None:
-    use = module(
-        "localizer", "", "def locate(self, frame, labels):\n    return 1 / 0\nEyes.locate = locate\n"
-    )
+def test_a_skill_is_told_where_the_module_that_ended_it_failed(module: Callable[[str, str, str], str]) -> None:
+    use = module("localizer", "", "def locate(self, frame, labels):\n    return 1 / 0\nEyes.locate = locate\n")
     result = running("localizer", use).execute(Look(), None, timeout=0.5)
     assert "ZeroDivisionError: division by zero (mine_localizer_good.py:" in result.reason
-    assert (result.trace or "").splitlines()[2:] == [
-        "    return 1 / 0",
-        "ZeroDivisionError: division by zero",
-    ]
+    assert (result.trace or "").splitlines()[2:] == ["    return 1 / 0", "ZeroDivisionError: division by zero"]
 
 
 def test_a_skill_that_fails_itself_is_told_where() -> None:
@@ -177,9 +165,7 @@ def test_a_skill_that_fails_itself_is_told_where() -> None:
 
     result = running("hand", "magpie").execute(Fails(), None, timeout=0.5)
     assert (result.stage, result.slot) == ("fault", "skill")
-    assert "fails failed: SystemExit: enough (test_nodes.py:" in result.reason and "in run" in (
-        result.trace or ""
-    )
+    assert "fails failed: SystemExit: enough (test_nodes.py:" in result.reason and "in run" in (result.trace or "")
 
 
 @pytest.mark.parametrize("slot", SLOTS)
@@ -203,9 +189,7 @@ def test_a_module_without_its_methods_is_refused_when_the_stack_is_built(slot: s
 def test_a_rate_or_latency_that_is_none_is_refused(
     slot: str, line: str, module: Callable[[str, str, str], str]
 ) -> None:
-    with pytest.raises(
-        ModuleFault, match=rf"{line.split('.')[1].split(' ')[0]} is .*finite number of at least"
-    ):
+    with pytest.raises(ModuleFault, match=rf"{line.split('.')[1].split(' ')[0]} is .*finite number of at least"):
         running(slot, module(slot, "", line))
 
 

@@ -61,9 +61,7 @@ def bus() -> Bus:
     bus = Bus()
     q = np.zeros(27)
     q[12] = 0.3
-    state = LowState(
-        0.0, q, np.zeros(27), np.zeros(27), Imu(np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))
-    )
+    state = LowState(0.0, q, np.zeros(27), np.zeros(27), Imu(np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3)))
     bus.publish(topics.LOW_STATE, state, 0.0)
     bus.publish(topics.BASE, BaseEstimate(0.0, np.eye(4), np.array([0.5, 0.0, 0.0])), 0.0)
     return bus
@@ -75,9 +73,7 @@ def test_it_hears_what_is_new_once_and_the_legs_every_10_ms(bus: Bus) -> None:
     bus.publish(topics.LIDAR_IMU, SAMPLE, 0.0)
     bus.publish(topics.LIDAR_SCAN, SCAN, 0.0)
     bus.publish(
-        topics.EXTERNAL_ODOMETRY,
-        ExternalOdometry(0.0, np.eye(4), np.zeros(3), np.zeros(3), np.zeros((6, 6))),
-        0.0,
+        topics.EXTERNAL_ODOMETRY, ExternalOdometry(0.0, np.eye(4), np.zeros(3), np.zeros(3), np.zeros((6, 6))), 0.0
     )
     for k in range(6):
         node.step(0.002 * k)

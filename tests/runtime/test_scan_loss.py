@@ -28,10 +28,7 @@ FAULTS: dict[str, tuple[Fault, str]] = {
         "No scan has fitted the map",
     ),
     "points without numbers": (
-        lambda samples, scan, last: (
-            samples,
-            scan and replace(scan, points=scan.points * np.float32(np.nan)),
-        ),
+        lambda samples, scan, last: (samples, scan and replace(scan, points=scan.points * np.float32(np.nan))),
         "No scan has fitted the map",
     ),
     "another clock": (

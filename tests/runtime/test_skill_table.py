@@ -22,9 +22,7 @@ def test_the_shipped_skills_are_there_without_being_named() -> None:
 
 
 def test_every_option_of_a_pick_can_be_set() -> None:
-    table = SkillTable(
-        parse_stack("skills: {pick: {force: 8, timeout: 5}, gentle: {use: pick, force: 4}}", "x")
-    )
+    table = SkillTable(parse_stack("skills: {pick: {force: 8, timeout: 5}, gentle: {use: pick, force: 4}}", "x"))
     pick, gentle = table.make("pick"), table.make("gentle")
     assert isinstance(pick, Pick) and isinstance(gentle, Pick)
     assert (pick._config.force, gentle._config.force) == (8.0, 4.0)
@@ -59,9 +57,7 @@ def test_a_wrong_option_is_said_when_the_stack_is_built(skills: str, words: str)
         ),
     ],
 )
-def test_a_class_that_is_no_skill_is_named_with_what_it_lacks(
-    source: str, words: str, tmp_path: Path
-) -> None:
+def test_a_class_that_is_no_skill_is_named_with_what_it_lacks(source: str, words: str, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(source)
     with pytest.raises(ModuleFault) as fault:
         SkillTable(parse_stack(f"skills: {{mine: '{tmp_path / 'mine.py'}:Mine'}}", "x"))

@@ -37,9 +37,7 @@ class Drifts:
         self.q = q[UPPER].copy()
         self.resets.append(self.q)
 
-    def step(
-        self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float
-    ) -> ArmCommand:
+    def step(self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float) -> ArmCommand:
         if targets_left is not None or targets_right is not None:
             self.q = self.q + 0.001
         return ArmCommand(self.q, np.zeros(2), np.zeros(2), False)

@@ -43,9 +43,7 @@ def test_trials_of_several_versions_are_counted_by_version() -> None:
     one, two = (record(name, "first") for name in NAMES)
     assert "versions of the code" not in page([one, two])
     text = page([one, two, replace(two, commit="second")])
-    assert "The trials are of 2 versions of the code: 1, 1." in text, (
-        "of a fault tried twice the later counts"
-    )
+    assert "The trials are of 2 versions of the code: 1, 1." in text, "of a fault tried twice the later counts"
 
 
 def test_what_the_judge_did_not_accept_is_in_bold() -> None:

@@ -33,9 +33,7 @@ def test_a_robot_finds_its_errors_and_uses_them(tmp_path: Path) -> None:
     result = running.execute("calibrate", {"file": file.name, "views": 12})
     assert result.success, result.reason
     found, ahead = read_calibration(file), np.array([0.0, 0.0, 1.0, 1.0])
-    before, after = (
-        np.linalg.norm(T @ ahead - ahead) for T in (robot.calibration["head"], found.cameras["head"])
-    )
+    before, after = (np.linalg.norm(T @ ahead - ahead) for T in (robot.calibration["head"], found.cameras["head"]))
     assert before > 0.05 and after < 0.008
     zeros = robot.true_joint_offset[13:]
     assert np.sqrt(np.mean((found.joint_offset[13:] - zeros) ** 2)) < 0.2 * np.sqrt(np.mean(zeros**2))

@@ -20,9 +20,7 @@ def a_head(file: Path) -> None:
     Calibration({"head": np.eye(4)}, {"head": 1e-6 * np.eye(6)}).save(file)
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"views": 0}, {"settle": -1.0}, {"turn": 2.0}, {"file": ""}, {"file": "../x.json"}]
-)
+@pytest.mark.parametrize("wrong", [{"views": 0}, {"settle": -1.0}, {"turn": 2.0}, {"file": ""}, {"file": "../x.json"}])
 def test_a_goal_without_sense_is_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(ConfigError):
         CalibrateLidarGoal(**wrong)  # type: ignore[arg-type]

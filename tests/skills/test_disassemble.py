@@ -47,9 +47,7 @@ def docked(success: bool = True, served: int = 3) -> SkillResult:
 def picked(outcome: PickOutcome) -> SkillResult:
     success = outcome is PickOutcome.PICKED
     report = PickReport(outcome.value)
-    return SkillResult(
-        success, "done" if success else "detect", None if success else "localizer", "", value=report
-    )
+    return SkillResult(success, "done" if success else "detect", None if success else "localizer", "", value=report)
 
 
 def work(
@@ -89,10 +87,7 @@ def test_it_ends_where_another_stance_would_not_help_or_none_is_left() -> None:
 def test_what_was_tight_is_avoided_at_the_next_stance() -> None:
     tight = picked(PickOutcome.TIGHT)
     tight.value.tried = [Tried("right", 0.4, -0.1, 0.0, "tight"), Tried("left", 0.5, 0.1, 0.0, "failed")]
-    skills = {
-        "dock": Scripted(Dock, [docked()] * 2),
-        "pick": Scripted(Pick, [tight, picked(PickOutcome.PICKED)]),
-    }
+    skills = {"dock": Scripted(Dock, [docked()] * 2), "pick": Scripted(Pick, [tight, picked(PickOutcome.PICKED)])}
     context = Context(Bus(), Kinematics(), 0.01, modules(skill=skills.__getitem__))
     run = SkillRun("disassemble", Disassemble().run(context, DisassembleGoal()))
     for _ in range(100):

@@ -31,9 +31,7 @@ class Before(Ground):
         top = rng.uniform((0.0, -1.0), (1.2, 1.0), (600, 2)) * ([[0.0, 1.0]] * 200 + [[1.0, 1.0]] * 400)
         c, s = math.cos(self.pack.yaw), math.sin(self.pack.yaw)
         places = top @ np.array([[c, s], [-s, c]]) + (self.pack.x, self.pack.y)
-        points = np.column_stack(
-            [places + 0.01 * rng.standard_normal((600, 2)), rng.uniform(-0.12, 0.05, 600)]
-        )
+        points = np.column_stack([places + 0.01 * rng.standard_normal((600, 2)), rng.uniform(-0.12, 0.05, 600)])
         self.bus.publish(topics.SCAN, Scan(t, points, np.zeros(3), np.array([0.0, 0.0, -1.0])), t)
 
 

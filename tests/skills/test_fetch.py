@@ -58,11 +58,7 @@ def fetch(
     state: GripState = GripState.HOLDING, closes: GripState = GripState.EMPTY,
 ) -> tuple[SkillResult, dict[str, Scripted]]:  # fmt: skip
     """Return how an errand of a robot that does not walk ended, and what was asked of which skill."""
-    skills = {
-        "take": Scripted(Take, takes),
-        "place": Scripted(SetDown, places),
-        "remember": Scripted(Remember, [DONE]),
-    }
+    skills = {"take": Scripted(Take, takes), "place": Scripted(SetDown, places), "remember": Scripted(Remember, [DONE])}
     memory = ObjectMap()
     if seen:
         memory.observe(look(98.0))
@@ -125,9 +121,7 @@ def test_a_failed_place_is_the_errands_failure() -> None:
     assert not result.success and result.reason == blocked.reason
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"text": " "}, {"text": "mug", "to": (1.0,)}, {"text": "mug", "places": 0}]
-)
+@pytest.mark.parametrize("wrong", [{"text": " "}, {"text": "mug", "to": (1.0,)}, {"text": "mug", "places": 0}])
 def test_a_goal_without_sense_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(ConfigError):
         FetchGoal(**wrong)

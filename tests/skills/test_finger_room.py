@@ -19,10 +19,7 @@ T_GRIPPER_CAMERA = np.linalg.inv(T_HAND_GRIPPER) @ T_HAND_CAMERA
 
 
 def room(
-    world: Any,
-    box: tuple[float, float] | None,
-    fingers: bool = False,
-    x: tuple[float, float] = (-1.0, 1.0),
+    world: Any, box: tuple[float, float] | None, fingers: bool = False, x: tuple[float, float] = (-1.0, 1.0)
 ) -> tuple[FingerRoom, Array]:
     """Return what a hand `HIGH` above a plate at z = 0 has seen, and its pose on the plate.
 

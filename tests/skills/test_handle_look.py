@@ -54,9 +54,7 @@ def test_the_hand_goes_before_the_handle_that_it_saw(world: Any, thing: Any, ref
 
 
 @pytest.mark.parametrize("shown_from", [0, 1, 2, None])
-def test_a_handle_that_is_not_seen_is_looked_for_from_elsewhere(
-    world: Any, thing: Any, shown_from: int | None
-) -> None:
+def test_a_handle_that_is_not_seen_is_looked_for_from_elsewhere(world: Any, thing: Any, shown_from: int | None) -> None:
     motion, config, found = Motion(False), OpenConfig(), list[Grasp]()
     world.objects["left_hand"] = lambda: (
         [thing("handle", HANDLE, world.t)] if shown_from is not None and len(motion.went) > shown_from else []

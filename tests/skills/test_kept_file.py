@@ -20,19 +20,7 @@ from golem.stack import Stack
 from golem.types import PlanarPose
 
 WRONG = (
-    *(
-        "../hall",
-        "/etc/hall",
-        "maps/hall",
-        "..",
-        ".",
-        ".hidden",
-        "~/hall",
-        "a b",
-        "hall\n",
-        "h\0all",
-        "C:\\hall",
-    ),
+    *("../hall", "/etc/hall", "maps/hall", "..", ".", ".hidden", "~/hall", "a b", "hall\n", "h\0all", "C:\\hall"),
     *("h" * 10_000, "../" * 3000, "-rf", "hälle", " "),
 )
 

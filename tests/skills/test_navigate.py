@@ -145,10 +145,7 @@ def test_the_result_says_how_sure_the_odometry_is() -> None:
 
 def test_a_goal_that_is_too_far_for_its_time_is_refused() -> None:
     ground = Mapped(offset=0.0)
-    assert (
-        outcome(ground.run(Navigate().run(ground.context, NavigateGoal(50.0, timeout=10.0)))).stage
-        == "refused"
-    )
+    assert outcome(ground.run(Navigate().run(ground.context, NavigateGoal(50.0, timeout=10.0)))).stage == "refused"
     with pytest.raises(ConfigError, match="finite"):
         NavigateGoal(float("nan"))
 

@@ -15,9 +15,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def ring(radius: float, middle: Array, low: float, high: float) -> Array:
     """Return points (n, 3) of an upright round wall around `middle` (2,) [m]."""
-    turn, z = (
-        grid.ravel() for grid in np.meshgrid(np.linspace(0, 2 * np.pi, 90), np.linspace(low, high, 30))
-    )
+    turn, z = (grid.ravel() for grid in np.meshgrid(np.linspace(0, 2 * np.pi, 90), np.linspace(low, high, 30)))
     return np.column_stack([middle[0] + radius * np.cos(turn), middle[1] + radius * np.sin(turn), z])
 
 

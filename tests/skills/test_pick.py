@@ -63,10 +63,7 @@ def picked(
 def assert_safe(world: Any, side: Side = "right") -> None:
     """Check that every camera sleeps, the hand was told to open, and the arm was sent home."""
     for camera in world.objects:
-        assert world.bus.latest(topics.detection_request(camera)) in (
-            None,
-            DetectionRequest(),
-        )
+        assert world.bus.latest(topics.detection_request(camera)) in (None, DetectionRequest())
     goal = world.bus.latest(topics.hand_goal(side))
     assert goal is not None and goal.gap is not None
     np.testing.assert_allclose(world.context.arms[side].commanded[:3, 3], [0.35, -0.2, 0.1], atol=1e-9)
@@ -167,9 +164,7 @@ def test_of_several_screws_the_most_comfortable_is_taken(world: Any, thing: Any)
     stocked(world, thing)
     near = np.array([*CONFIG.comfort, -0.03])
     others = [near + (0.1, 0.0, 0.0), near, near + (0.0, 0.15, 0.0)]
-    world.objects["head"] = lambda: (
-        [thing("screw", p, world.t) for p in others] + [thing("tray", TRAY, world.t)]
-    )
+    world.objects["head"] = lambda: [thing("screw", p, world.t) for p in others] + [thing("tray", TRAY, world.t)]
     proposals: list[Array] = []
 
     class Spy(Centroid):
@@ -254,9 +249,7 @@ def test_a_head_camera_that_says_nothing_is_the_localizers_failure(world: Any) -
         (["nut"], "screw", "nothing_there"),
     ],
 )
-def test_what_is_not_seen_is_named(
-    labels: list[str], words: str, outcome: str, world: Any, thing: Any
-) -> None:
+def test_what_is_not_seen_is_named(labels: list[str], words: str, outcome: str, world: Any, thing: Any) -> None:
     world.objects["head"] = lambda: [thing(label, SCREW, world.t) for label in labels]
     failed(picked(world), "detect", "localizer", words, outcome)
 
@@ -399,10 +392,7 @@ def test_a_pick_can_be_cancelled_at_any_time(share: float, world: Any, thing: An
     assert world.holds == held or world.stages[-2:-1] == ["grasp"]
     np.testing.assert_array_equal(world.context.arms["right"].commanded, sent)
     for camera in world.objects:
-        assert world.bus.latest(topics.detection_request(camera)) in (
-            None,
-            DetectionRequest(),
-        )
+        assert world.bus.latest(topics.detection_request(camera)) in (None, DetectionRequest())
     assert world.stages[-1] == "cancelled"
 
 
@@ -460,9 +450,7 @@ def test_an_open_loop_method_leaves_no_screw_for_the_next(world: Any, thing: Any
 
 
 @pytest.mark.parametrize(("flip", "side"), [(1.0, "right"), (-1.0, "left")])
-def test_either_hand_is_the_one_on_the_side_of_the_tray(
-    flip: float, side: Side, world: Any, thing: Any
-) -> None:
+def test_either_hand_is_the_one_on_the_side_of_the_tray(flip: float, side: Side, world: Any, thing: Any) -> None:
     mirror = np.array([1.0, flip, 1.0])
     middle = np.array([0.43, 0.0, -0.03])
     stocked(world, thing, screw=middle, tray=TRAY * mirror)

@@ -36,9 +36,7 @@ from golem.types import NUM_JOINTS, UPPER, Array, BaseEstimate, Imu, LowState
 PERIOD = 0.01
 DONE = SkillResult(True, "done", None, "There.")
 OVER: Array = downward(0.45, -0.12, 0.10, -0.5 * np.pi)
-ROLL, PITCH = (
-    JOINT_NAMES[UPPER].index(f"right_{joint}_joint") for joint in ("shoulder_roll", "shoulder_pitch")
-)
+ROLL, PITCH = (JOINT_NAMES[UPPER].index(f"right_{joint}_joint") for joint in ("shoulder_roll", "shoulder_pitch"))
 STILL = Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 9.81]))
 
 
@@ -92,9 +90,7 @@ def rig(planner: RrtConnect) -> Rig:
     return Rig(planner)
 
 
-async def _over(
-    context: Context, prepare: Callable[[PlannedMotion], Any] = lambda motion: None
-) -> SkillResult:
+async def _over(context: Context, prepare: Callable[[PlannedMotion], Any] = lambda motion: None) -> SkillResult:
     motion = PlannedMotion(context)
     prepare(motion)
     down = OVER.copy()

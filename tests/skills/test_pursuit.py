@@ -146,11 +146,7 @@ def test_what_a_caller_minds_ends_the_skill_that_it_called() -> None:
 
     _, run = bench.begin(call)
     result = bench.run(run)
-    assert result is not None and (result.stage, result.slot, result.reason) == (
-        "carry",
-        "grasp_method",
-        "It fell.",
-    )
+    assert result is not None and (result.stage, result.slot, result.reason) == ("carry", "grasp_method", "It fell.")
     assert bench.counter.log == ["end"] and set(looks) == {PERIOD * k for k in (2, 3, 4)}
 
 
@@ -193,10 +189,7 @@ def test_an_inner_skill_that_takes_too_long_is_cancelled_and_its_caller_goes_on(
     bench = Bench()
     caller, run = bench.begin(lambda context: context.run("counter", Count(1000)))
     result = bench.run(run)
-    assert result is not None and (result.stage, result.reason) == (
-        "timeout",
-        "Not done after 1 s of robot time.",
-    )
+    assert result is not None and (result.stage, result.reason) == ("timeout", "Not done after 1 s of robot time.")
     assert bench.context.t == pytest.approx(1.0, abs=0.03) and not caller.cancelled
     assert bench.counter.log == ["end"] and bench.context.skill == ""
 
@@ -267,9 +260,7 @@ def test_a_call_without_sense_is_refused(name: str, goal: Any, words: str) -> No
 
 
 @pytest.mark.parametrize("allowed", [0.0, -1.0, math.nan])
-def test_a_skill_that_allows_itself_no_time_is_at_fault(
-    allowed: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_skill_that_allows_itself_no_time_is_at_fault(allowed: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Counter, "timeout", lambda *_: allowed)
     bench = Bench()
     run = SkillRun("counter", pursue(bench.context, "counter", bench.counter, Count(), None))

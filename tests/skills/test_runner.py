@@ -113,9 +113,7 @@ def ended(coroutine: Coroutine[None, None, SkillResult]) -> SkillResult:
 def test_what_a_skill_raises_becomes_a_result_that_names_it() -> None:
     result = ended(_raises(ZeroDivisionError("by zero")))
     assert (result.success, result.stage, result.slot) == (False, "fault", "skill")
-    assert re.fullmatch(
-        r"Module skill: mine failed: ZeroDivisionError: by zero \(test_runner.py:\d+\)", result.reason
-    )
+    assert re.fullmatch(r"Module skill: mine failed: ZeroDivisionError: by zero \(test_runner.py:\d+\)", result.reason)
 
 
 def test_what_a_module_raises_under_a_skill_is_blamed_on_the_module() -> None:
@@ -171,8 +169,7 @@ def test_a_skill_that_never_lets_go_is_ended_all_the_same() -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments",
-    [(1, "done", None, ""), (True, None, None, ""), (True, "done", 3, ""), (True, "done", None, None)],
+    "arguments", [(1, "done", None, ""), (True, None, None, ""), (True, "done", 3, ""), (True, "done", None, None)]
 )
 def test_a_result_of_other_types_is_refused_where_it_is_made(arguments: tuple[Any, ...]) -> None:
     with pytest.raises(TypeError, match="of a result is a"):

@@ -27,9 +27,7 @@ def test_the_nominal_stance_serves_and_better_ones_are_near_it() -> None:
     assert np.hypot(best.pose.x, best.pose.y) < 0.35
 
 
-@pytest.mark.parametrize(
-    "off", [PlanarPose(-0.3, 0.1, 0.1), PlanarPose(-0.1, -0.5, 0.0), PlanarPose(0.05, 0.3, -0.2)]
-)
+@pytest.mark.parametrize("off", [PlanarPose(-0.3, 0.1, 0.1), PlanarPose(-0.1, -0.5, 0.0), PlanarPose(0.05, 0.3, -0.2)])
 def test_a_robot_that_stands_badly_is_sent_to_where_it_serves(off: PlanarPose) -> None:
     screws, tray = moved(SCREWS, off), moved(TRAY[None], off)[0]
     edge = off.to(EDGE)

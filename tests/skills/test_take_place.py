@@ -117,9 +117,7 @@ def test_from_above_a_cap_and_the_shoulder_below_it_are_one_thing() -> None:
     table, _ = table_with_can()
     rng = np.random.default_rng(1)
     turn, radius = rng.uniform(0, 2 * np.pi, 2000), np.sqrt(rng.uniform(0.0, 1.0, 2000))
-    cap = np.column_stack(
-        [0.5 + 0.015 * radius * np.cos(turn), 0.015 * radius * np.sin(turn), 0.0 * turn + 0.22]
-    )
+    cap = np.column_stack([0.5 + 0.015 * radius * np.cos(turn), 0.015 * radius * np.sin(turn), 0.0 * turn + 0.22])
     ring = 0.016 + 0.019 * radius
     shoulder = np.column_stack([0.5 + ring * np.cos(turn), ring * np.sin(turn), 0.17 - 1.2 * (ring - 0.016)])
     bottle = np.concatenate([cap, shoulder]) + (0.0, -0.2, TOP)

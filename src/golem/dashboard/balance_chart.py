@@ -43,9 +43,7 @@ def balance_chart(trace: BalanceTrace, size: tuple[int, int]) -> NDArray[np.uint
     for colour, chosen in ((GOOD, margin >= 0.0), (BAD, margin < 0.0)):
         axes.plot(t, np.where(chosen, margin, np.nan), color=colour, lw=1.5)
     word, points = f"{1e3 * float(trace.margin[-1]):+.0f} mm", 0.105 * height
-    axes.text(
-        0.02, 0.06, "CoM margin (simulator's truth)", color=MUTED, size=points, transform=axes.transAxes
-    )
+    axes.text(0.02, 0.06, "CoM margin (simulator's truth)", color=MUTED, size=points, transform=axes.transAxes)
     colour = INK if trace.margin[-1] >= 0.0 else BAD
     axes.text(0.98, 0.06, word, color=colour, size=points, ha="right", transform=axes.transAxes)
     return pixels(figure)

@@ -157,9 +157,7 @@ class Film:
         top = height - bar
         draw.rectangle((0, top, width, height), fill=PANEL)
         if self._recorder is not None:
-            chart = balance_chart(
-                self._recorder.trace(last=SPAN), (round(CHART[0] * unit), round(CHART[1] * unit))
-            )
+            chart = balance_chart(self._recorder.trace(last=SPAN), (round(CHART[0] * unit), round(CHART[1] * unit)))
             if chart is not None:
                 image.paste(Image.fromarray(chart), (edge, top - edge - chart.shape[0]))
         middle = top + bar / 2
@@ -207,9 +205,7 @@ class Film:
                     os.replace(video, path.with_suffix(".mp4"))
                     written.append(path.with_suffix(".mp4"))
         except OSError as error:
-            raise OutputError(
-                f"Cannot write the film {path}: {error.strerror}; choose another --out."
-            ) from error
+            raise OutputError(f"Cannot write the film {path}: {error.strerror}; choose another --out.") from error
         return written
 
     def picture(self, index: int, scale: float = 1.0) -> NDArray[np.uint8]:
@@ -226,9 +222,7 @@ class Film:
         samples = [self.picture(i, 0.25) for i in np.unique(np.linspace(0, count - 1, 24).astype(int))]
         accents = [ACCENT, *SAFETY_COLOURS.values(), *CLASS_COLOURS.values()]
         samples.append(np.resize(np.array(accents, np.uint8), (24, samples[0].shape[1], 3)))
-        palette = Image.fromarray(np.concatenate(samples)).quantize(
-            UNCHANGED, method=Image.Quantize.MEDIANCUT
-        )
+        palette = Image.fromarray(np.concatenate(samples)).quantize(UNCHANGED, method=Image.Quantize.MEDIANCUT)
         nearest = _nearest_colour(palette)
         stride = math.ceil(count / GIF_FRAMES)
 

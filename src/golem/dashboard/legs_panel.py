@@ -38,8 +38,7 @@ class LegsPanel:
 
         with gui.add_folder("Walk"):
             self._sliders = {
-                name: gui.add_slider(label, 0.0, 0.0, STEP, 0.0, disabled=True)
-                for name, label in AXES.items()
+                name: gui.add_slider(label, 0.0, 0.0, STEP, 0.0, disabled=True) for name, label in AXES.items()
             }
             self.stop_button = gui.add_button("Stop walking", color="gray", icon=Icon.PLAYER_STOP)
         with gui.add_folder("Push"):
@@ -95,9 +94,7 @@ def _legs_rows(legs: LegStatus) -> str:
     rows = _row("legs", f"<b>{escape(legs.controller)}</b>, {gait}")
     if legs.fault is not None:
         rows += _row("fallback", f'<span style="color:{AMBER}">{escape(legs.fault)}</span>')
-    rows += _row(
-        "applied", f"{applied.vx:+.2f} m/s ahead, {applied.vy:+.2f} m/s left, {applied.wz:+.2f} rad/s"
-    )
+    rows += _row("applied", f"{applied.vx:+.2f} m/s ahead, {applied.vy:+.2f} m/s left, {applied.wz:+.2f} rad/s")
     if legs.reason:
         rows += _row("", f'<span style="color:{AMBER}">{escape(legs.reason)}</span>')
     return rows

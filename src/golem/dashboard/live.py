@@ -143,12 +143,7 @@ class LiveView:
         """The panel with the operator's buttons."""
         return self._panel
 
-    def run(
-        self,
-        skill: str,
-        goal: object,
-        watch: Callable[[], None] = lambda: None,
-    ) -> SkillResult:
+    def run(self, skill: str, goal: object, watch: Callable[[], None] = lambda: None) -> SkillResult:
         """Run a skill of the stack in real time while showing it; see `LockstepRunner.execute`."""
         self._timeline = Timeline.of(self._running)
         self._busy, self._wanted = True, None

@@ -14,11 +14,7 @@ from golem.types import PlanarPose
 
 def map_view(bus: Bus) -> NDArray[np.uint8] | None:
     """Return (height, width, 3) RGB; None in a stack without a map."""
-    grid, place, odometry = (
-        bus.latest(topics.MAP),
-        bus.latest(topics.MAP_POSE),
-        bus.latest(topics.ODOMETRY),
-    )
+    grid, place, odometry = (bus.latest(topics.MAP), bus.latest(topics.MAP_POSE), bus.latest(topics.ODOMETRY))
     if grid is None or place is None or odometry is None:
         return None
     T_map_odom = place.T_odom_map.to(PlanarPose(0.0, 0.0, 0.0))
@@ -42,11 +38,5 @@ def map_view(bus: Bus) -> NDArray[np.uint8] | None:
 def place_words(place: RememberedPlace) -> str:
     """Return what is written beside a place: what is there, and how long ago it was seen, or that it is gone."""
     age = place.age
-    ago = (
-        f"{age:.0f} s"
-        if age < 120.0
-        else f"{age / 60.0:.0f} min"
-        if age < 7200.0
-        else f"{age / 3600.0:.0f} h"
-    )
+    ago = f"{age:.0f} s" if age < 120.0 else f"{age / 60.0:.0f} min" if age < 7200.0 else f"{age / 3600.0:.0f} h"
     return f"{place.label} {ago}" if place.there else f"{place.label}, gone"

@@ -67,13 +67,7 @@ class Panel:
     """
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        skills: Mapping[str, SkillSpec],
-        first: str,
-        *,
-        standing: bool,
-        restarts: bool,
+        self, server: viser.ViserServer, skills: Mapping[str, SkillSpec], first: str, *, standing: bool, restarts: bool
     ) -> None:
         """Build the panel of `server`.
 
@@ -168,11 +162,7 @@ class Panel:
             if handle.visible != visible:
                 handle.visible = visible
         idle = not busy and status.safety is GateState.ACTIVE
-        for handle, enabled in (
-            (self.skill.start, idle),
-            (self.skill.cancel, busy),
-            (self._restart, not busy),
-        ):
+        for handle, enabled in ((self.skill.start, idle), (self.skill.cancel, busy), (self._restart, not busy)):
             if handle.disabled == enabled:
                 handle.disabled = not enabled
         word = "Resume" if paused else "Pause"
@@ -181,12 +171,7 @@ class Panel:
 
 
 def _status_html(
-    status: Status,
-    stages: list[tuple[str, float]],
-    factor: float,
-    note: str,
-    paused: bool,
-    standing: bool,
+    status: Status, stages: list[tuple[str, float]], factor: float, note: str, paused: bool, standing: bool
 ) -> str:
     colour = SAFETY_COLOURS[status.safety]
     small = "font-size:12px;opacity:.75"
@@ -219,8 +204,7 @@ def _timeline_html(stages: list[tuple[str, float]]) -> str:
         return STAGE_COLOURS[names.index(name) % len(STAGE_COLOURS)]
 
     bar = "".join(
-        f'<div style="width:{100 * seconds / total:.1f}%;background:{colour(name)}"></div>'
-        for name, seconds in stages
+        f'<div style="width:{100 * seconds / total:.1f}%;background:{colour(name)}"></div>' for name, seconds in stages
     )
     legend = "".join(
         f'<span style="white-space:nowrap"><span style="color:{colour(name)}">&#9632;</span> '

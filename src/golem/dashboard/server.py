@@ -42,9 +42,7 @@ def serve(host: str, port: int) -> viser.ViserServer:
             probe.bind((host, port))
             port = probe.getsockname()[1]
     except (OSError, OverflowError) as error:
-        raise ConfigError(
-            f"Cannot serve the live view at {host}:{port} ({error}); choose another --port."
-        ) from error
+        raise ConfigError(f"Cannot serve the live view at {host}:{port} ({error}); choose another --port.") from error
     logging.getLogger("websockets").setLevel(logging.ERROR)
     strict = functools.partial(websockets.asyncio.server.serve, origins=[LOCAL, None])
     with (

@@ -29,9 +29,7 @@ class SkillPanel:
         names = sorted(skills)
         self._folder = gui.add_folder("Skill")
         with self._folder:
-            self._name = gui.add_dropdown(
-                "skill", names, initial_value=first if first in skills else names[0]
-            )
+            self._name = gui.add_dropdown("skill", names, initial_value=first if first in skills else names[0])
             self._form = gui.add_folder("goal")
             self.start = gui.add_button("Start", icon=Icon.PLAYER_PLAY)
             self.cancel = gui.add_button("Cancel", color="gray", icon=Icon.PLAYER_STOP, disabled=True)

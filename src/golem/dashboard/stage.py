@@ -51,17 +51,10 @@ class Stage:
         camera.fov = 0.75
         self._world = scene.add_frame(WORLD, show_axes=False)
         self._bodies = {mesh.name: scene.add_glb(f"{WORLD}/{mesh.name}", mesh.glb) for mesh in view.meshes()}
-        self._target = scene.add_icosphere(
-            f"{WORLD}/target", radius=0.012, color=TARGET_COLOUR, visible=False
-        )
+        self._target = scene.add_icosphere(f"{WORLD}/target", radius=0.012, color=TARGET_COLOUR, visible=False)
         self._target_label = scene.add_label(f"{WORLD}/target_label", "target", visible=False)
         self._arrow = scene.add_arrows(
-            f"{WORLD}/push",
-            np.zeros((1, 2, 3)),
-            PUSH_COLOUR,
-            shaft_radius=0.014,
-            head_radius=0.035,
-            visible=False,
+            f"{WORLD}/push", np.zeros((1, 2, 3)), PUSH_COLOUR, shaft_radius=0.014, head_radius=0.035, visible=False
         )
         self._followed: Array = np.zeros(2)
         self.show(0.0, None)

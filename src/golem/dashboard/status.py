@@ -99,10 +99,7 @@ class Timeline:
     def durations(self, end: float) -> list[tuple[str, float]]:
         """Return each stage with how long it took [s]; the last lasts until time `end` [s]."""
         ends = [start for _, start in self.stages] + [end]
-        return [
-            (stage, max(0.0, stop - start))
-            for (stage, start), stop in zip(self.stages, ends[1:], strict=True)
-        ]
+        return [(stage, max(0.0, stop - start)) for (stage, start), stop in zip(self.stages, ends[1:], strict=True)]
 
 
 def camera_picture(running: LockstepRunner, view: SpectatorView, camera: str) -> NDArray[np.uint8]:

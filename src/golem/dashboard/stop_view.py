@@ -111,9 +111,7 @@ def read_stop(path: Path) -> Stop:
         except WireError:
             continue
     if stop is None or not states:
-        raise ConfigError(
-            f"'{path}' is no black box of a stop; the safety process writes them into runs/stops."
-        )
+        raise ConfigError(f"'{path}' is no black box of a stop; the safety process writes them into runs/stops.")
     return Stop(stop[1], np.array(times) - stop[0], states, commands)
 
 
@@ -122,11 +120,7 @@ def nearest(state: LowState, command: LowCommand | None, limits: SafetyLimits) -
     rest = at_rest(state.q, state.dq, limits.deceleration)
     reach = limits.state_upper - limits.middle
     shares = np.array(
-        (
-            np.abs(rest - limits.middle) / reach,
-            np.abs(state.dq) / limits.velocity,
-            np.abs(state.tau) / limits.torque,
-        )
+        (np.abs(rest - limits.middle) / reach, np.abs(state.dq) / limits.velocity, np.abs(state.tau) / limits.torque)
     )
     rows = ["| joint | of | q [rad] | told | dq [rad/s] | tau [N m] |", "|---|---:|---:|---:|---:|---:|"]
     for i in np.argsort(-shares.max(axis=0))[:ROWS]:

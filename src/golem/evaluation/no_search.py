@@ -11,9 +11,7 @@ from typing import Any
 
 from golem.traces import is_users
 
-SEARCHES = frozenset(
-    {"gc.get_objects", "gc.get_referrers", "gc.get_referents", "sys._getframe", "sys._current_frames"}
-)
+SEARCHES = frozenset({"gc.get_objects", "gc.get_referrers", "gc.get_referents", "sys._getframe", "sys._current_frames"})
 """Audit events of CPython of what leads from a module to objects that it was not given."""
 _open = 0
 

@@ -9,13 +9,7 @@ from numpy.typing import NDArray
 
 from golem.interfaces.ros_convert import header
 from golem.middleware.ros.message import CodecError
-from golem.middleware.ros.msgs.sensor_msgs import (
-    CameraInfo,
-    CompressedImage,
-    Image,
-    PointCloud2,
-    PointField,
-)
+from golem.middleware.ros.msgs.sensor_msgs import CameraInfo, CompressedImage, Image, PointCloud2, PointField
 from golem.types import CameraInfo as Camera
 
 JPEG_QUALITY = 80
@@ -115,9 +109,7 @@ def to_camera(message: CameraInfo, name: str, near: float, far: float, rate: flo
             f"A camera of {message.width} x {message.height} pixels with fx {fx:g}, fy {fy:g}, cx {cx:g}, cy {cy:g}."
         )
     if not (abs(skew) < 1e-3 and abs(low) < 1e-3):
-        raise CodecError(
-            f"A camera with a skew of {skew or low:g} pixels; a pinhole camera's axes are square."
-        )
+        raise CodecError(f"A camera with a skew of {skew or low:g} pixels; a pinhole camera's axes are square.")
     roi, bin_x, bin_y = message.roi, max(message.binning_x, 1), max(message.binning_y, 1)
     width, height = roi.width or message.width, roi.height or message.height
     inside = roi.x_offset + width <= message.width and roi.y_offset + height <= message.height

@@ -52,10 +52,7 @@ class Lens:
         maps = _maps(self.camera, self.fisheye, self.distortion)
         import cv2
 
-        straight = (
-            cv2.remap(rgb, *maps, cv2.INTER_LINEAR),
-            cv2.remap(depth, *maps, cv2.INTER_NEAREST),
-        )
+        straight = (cv2.remap(rgb, *maps, cv2.INTER_LINEAR), cv2.remap(depth, *maps, cv2.INTER_NEAREST))
         return np.asarray(straight[0], np.uint8), np.asarray(straight[1], np.float32)
 
 

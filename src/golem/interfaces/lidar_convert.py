@@ -43,9 +43,7 @@ def to_scan(message: PointCloud2) -> LidarScan:
     names = points.dtype.names or ()
     missing = [name for name in ("x", "y", "z", "timestamp") if name not in names]
     if missing:
-        raise CodecError(
-            f"The cloud has no field '{missing[0]}'; a LiDAR scan has x, y, z and timestamp [ns]."
-        )
+        raise CodecError(f"The cloud has no field '{missing[0]}'; a LiDAR scan has x, y, z and timestamp [ns].")
     begin = seconds(message.header.stamp)
     offsets = 1e-9 * points["timestamp"].astype(np.float64) - begin
     order = np.argsort(offsets, kind="stable")
@@ -63,8 +61,7 @@ def custom(scan: LidarScan) -> CustomMsg:
     begin = scan.t - scan.duration
     times = np.round(1e9 * scan.offsets.astype(np.float64)).astype(np.int64).tolist()
     points = [
-        CustomPoint(at, x, y, z, 0, GOOD_RETURN, 0)
-        for at, (x, y, z) in zip(times, scan.points.tolist(), strict=True)
+        CustomPoint(at, x, y, z, 0, GOOD_RETURN, 0) for at, (x, y, z) in zip(times, scan.points.tolist(), strict=True)
     ]
     return CustomMsg(header(begin, FRAME), round(1e9 * begin), len(points), points=points)
 

@@ -22,12 +22,7 @@ from golem.middleware.ros.msgs.rosgraph_msgs import Clock
 from golem.middleware.ros.msgs.sensor_msgs import CameraInfo
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
 from golem.middleware.wire import hg
-from golem.middleware.wire.convert import (
-    decode_low_command,
-    decode_low_state,
-    encode_low_command,
-    encode_low_state,
-)
+from golem.middleware.wire.convert import decode_low_command, decode_low_state, encode_low_command, encode_low_state
 from golem.types import LEGS, NUM_JOINTS, SIDES, BaseEstimate, LowCommand, LowState, Side
 
 _TO_SERVO = 1

@@ -10,15 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from golem.interfaces.payloads import (
-    Detections,
-    EstopMessage,
-    GateState,
-    GateStatus,
-    HandStatus,
-    LegStatus,
-    Reason,
-)
+from golem.interfaces.payloads import Detections, EstopMessage, GateState, GateStatus, HandStatus, LegStatus, Reason
 from golem.middleware.ros.message import NANO, CodecError
 from golem.middleware.ros.msgs import diagnostic_msgs, geometry_msgs, golem_interfaces, sensor_msgs
 from golem.middleware.ros.msgs.builtin_interfaces import Duration, Time
@@ -165,9 +157,7 @@ def odometry(estimate: BaseEstimate, rate: Array) -> Odometry:
     return message
 
 
-def diagnostics(
-    t: float, statuses: Sequence[diagnostic_msgs.DiagnosticStatus]
-) -> diagnostic_msgs.DiagnosticArray:
+def diagnostics(t: float, statuses: Sequence[diagnostic_msgs.DiagnosticStatus]) -> diagnostic_msgs.DiagnosticArray:
     """Return what is known of the health of the robot's parts."""
     return diagnostic_msgs.DiagnosticArray(header(t), list(statuses))
 
@@ -235,9 +225,7 @@ def to_hand_state(message: golem_interfaces.HandState) -> HandState:
     """
     fingers, force = np.array(message.fingers), np.array(message.force)
     if not np.isfinite([message.gap, *fingers, *force]).all():
-        raise CodecError(
-            f"A hand reports a gap of {message.gap} m, fingers at {fingers}, forces of {force} N."
-        )
+        raise CodecError(f"A hand reports a gap of {message.gap} m, fingers at {fingers}, forces of {force} N.")
     return HandState(seconds(message.header.stamp), message.gap, fingers, force)
 
 

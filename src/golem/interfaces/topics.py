@@ -38,17 +38,7 @@ from golem.interfaces.payloads import (
 )
 from golem.middleware.bus import Topic
 from golem.middleware.wire.api import ApiRequest, Response, request_topic, response_topic
-from golem.types import (
-    BaseEstimate,
-    HandCommand,
-    HandState,
-    LowCommand,
-    LowState,
-    PalmTargets,
-    RgbdImage,
-    Side,
-    Twist,
-)
+from golem.types import BaseEstimate, HandCommand, HandState, LowCommand, LowState, PalmTargets, RgbdImage, Side, Twist
 
 LOW_STATE = Topic("lowstate", LowState)
 """At 500 Hz, from the robot."""

@@ -82,9 +82,7 @@ class Bus:
         """
         # Without a call of `isinstance` or `get`: nothing runs as often as this.
         if type(value) is not topic.kind and not isinstance(value, topic.kind):
-            raise WrongType(
-                f"Topic '{topic.name}' carries {topic.kind.__name__}, not {type(value).__name__}."
-            )
+            raise WrongType(f"Topic '{topic.name}' carries {topic.kind.__name__}, not {type(value).__name__}.")
         name = topic.name
         if latency <= 0.0 and (name not in self._pending or not self._pending[name]):
             self._show(name, value)

@@ -43,9 +43,7 @@ class Relay(ABC):
             family = socket.AF_INET6 if ":" in host else socket.AF_INET
             self._listener = socket.create_server((host, port), family=family)
         except (OSError, OverflowError) as error:
-            raise ConfigError(
-                f"Cannot listen on {host}:{port} ({error}); choose another port or host."
-            ) from error
+            raise ConfigError(f"Cannot listen on {host}:{port} ({error}); choose another port or host.") from error
         self.port = int(self._listener.getsockname()[1])
         self._open: set[socket.socket] = set()
         self._lock = threading.Lock()
@@ -134,11 +132,7 @@ class _Waiting:
         for late in [each for each, until in self._until.items() if until < now]:
             self._leave(late)
             late.close()
-        return [
-            key.fileobj
-            for key, _ in found
-            if isinstance(key.fileobj, socket.socket) and key.fileobj.fileno() >= 0
-        ]
+        return [key.fileobj for key, _ in found if isinstance(key.fileobj, socket.socket) and key.fileobj.fileno() >= 0]
 
     def read(self, connection: socket.socket) -> bytes | None:
         """Read on, or take a new connection where it is the listener; return the head once it is whole.

@@ -80,9 +80,7 @@ class TokenGate(Relay):
     def admits(self, head: bytes) -> bool:
         """Return whether the head of a request shows the token."""
         kept = re.search(
-            rf"^cookie:.*?\b{COOKIE}=([A-Za-z0-9_-]+)",
-            head.decode("latin-1").partition("\r\n")[2],
-            re.I | re.M,
+            rf"^cookie:.*?\b{COOKIE}=([A-Za-z0-9_-]+)", head.decode("latin-1").partition("\r\n")[2], re.I | re.M
         )
         return self._by_address(head) or (kept is not None and hmac.compare_digest(kept[1], self.token))
 

@@ -59,9 +59,7 @@ class _Port:
 
     __slots__ = ("deferred", "load", "name", "seen")
 
-    def __init__(
-        self, topic: Topic[Any], load: Callable[[Any], None] | None, make: Callable[[], Any] | None
-    ) -> None:
+    def __init__(self, topic: Topic[Any], load: Callable[[Any], None] | None, make: Callable[[], Any] | None) -> None:
         self.name, self.load = topic.name, load
         self.deferred = None if make is None else Deferred(topic, make)
         self.seen: object = None
@@ -103,9 +101,7 @@ class NativeChain:
         ports = {port.name: port for port in _ports(record)}
         n = len(links)
         self._segments = {
-            (first, last): _Segment(links[first:last], ports)
-            for first in range(n)
-            for last in range(first + 1, n + 1)
+            (first, last): _Segment(links[first:last], ports) for first in range(n) for last in range(first + 1, n + 1)
         }
         self._prepare = [(k, link.prepare) for k, link in enumerate(links) if link.prepare is not None]
         self._passed = [(k, link.passed) for k, link in enumerate(links) if link.passed is not None]
@@ -156,8 +152,7 @@ class NativeChain:
             assert port.load is not None
             port.load(value.value() if isinstance(value, Deferred) else value)
         done, at = divmod(
-            run_stages(self._place, self._functions, self._memories, first, last, t, tick, offset, ticks),
-            _STAGES,
+            run_stages(self._place, self._functions, self._memories, first, last, t, tick, offset, ticks), _STAGES
         )
         if at > first and at < last:
             bus.defer(self._segments[first, at].written, done + 1)
@@ -269,10 +264,6 @@ def _ports(record: Records) -> list[_Port]:
         _Port(topics.ESTOP, load_estop, None),
         _Port(topics.LOW_CMD_REQUEST, *command("request")),
         _Port(topics.LOW_CMD, *command("command")),
-        _Port(
-            topics.SAFETY,
-            load_safety,
-            lambda: GateStatus(float(row["command_t"]), GateState.ACTIVE, None, ""),
-        ),
+        _Port(topics.SAFETY, load_safety, lambda: GateStatus(float(row["command_t"]), GateState.ACTIVE, None, "")),
         *(_Port(topics.hand_state(side), None, hand(k)) for k, side in enumerate(SIDES)),
     ]

@@ -147,9 +147,7 @@ class _Entry:
 class Executor:
     """Drives nodes in the given order on one clock."""
 
-    def __init__(
-        self, bus: Bus, nodes: Sequence[Node], start: float = 0.0, chain: Chain | None = None
-    ) -> None:
+    def __init__(self, bus: Bus, nodes: Sequence[Node], start: float = 0.0, chain: Chain | None = None) -> None:
         """Schedule `nodes`, which exchange messages over `bus`.
 
         Args:

@@ -34,9 +34,7 @@ def parse_goal(spec: SkillSpec, words: list[str], prog: str, taken: Collection[s
     properties: dict[str, Schema] = spec.goal["properties"]
     for name in properties:
         if name in taken:
-            raise ConfigError(
-                f"The goal's field '{name}' of the skill '{spec.name}' is an option of {prog} itself."
-            )
+            raise ConfigError(f"The goal's field '{name}' of the skill '{spec.name}' is an option of {prog} itself.")
     kind = _dataclass(spec.name, {**spec.goal, "description": spec.summary})
     return plain(tyro.cli(kind, prog=prog, args=_named(words, properties)))
 

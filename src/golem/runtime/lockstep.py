@@ -46,11 +46,7 @@ class LockstepRunner:
     """
 
     def __init__(
-        self,
-        stack: Stack,
-        robot: Robot,
-        limits: SafetyLimits | None = None,
-        localizer: Localizer | None = None,
+        self, stack: Stack, robot: Robot, limits: SafetyLimits | None = None, localizer: Localizer | None = None
     ) -> None:
         """Wire the modules of `stack` to `robot`.
 
@@ -117,9 +113,7 @@ class LockstepRunner:
         """Ask something of the safety gate as an operator does: activate, stop, reset; it decides."""
         self._safety.request(request)
 
-    def start(
-        self, skill: str | Routine[Context, Any], goal: object, timeout: float | None = None
-    ) -> SkillRun:
+    def start(self, skill: str | Routine[Context, Any], goal: object, timeout: float | None = None) -> SkillRun:
         """Start a skill; see `StackNodes.start`."""
         return self._stack.start(skill, goal, timeout)
 
@@ -212,9 +206,7 @@ def build_robot(stack: Stack, seed: int) -> Any:
     if seed < 0:
         raise ConfigError(f"The seed is {seed}; it must be 0 or more.")
     choice, posture = stack.choice("robot"), start_posture(stack.on_ground)
-    robot = registry.create(
-        "robot", choice.use, choice.options, profile=stack.profile, seed=seed, posture=posture
-    )
+    robot = registry.create("robot", choice.use, choice.options, profile=stack.profile, seed=seed, posture=posture)
     ContractCheck("robot", choice.use).satisfies(robot, Robot)
     return robot
 

@@ -88,9 +88,7 @@ class LowerBodyNode:
         realtime: whether the wall clock counts; in lock-step a controller pays by its declared latency.
     """
 
-    def __init__(
-        self, bus: Bus, legs: CheckedLowerBody, fallback: CheckedLowerBody, config: LocomotionConfig
-    ) -> None:
+    def __init__(self, bus: Bus, legs: CheckedLowerBody, fallback: CheckedLowerBody, config: LocomotionConfig) -> None:
         """Run `legs`, with `fallback` in reserve, under a base layer with `config`."""
         self._bus, self._legs, self._fallback = bus, legs, fallback
         self._locomotion = Locomotion(legs.controller, config)
@@ -125,9 +123,7 @@ class LowerBodyNode:
                 raise self._both(fault) from fault
             # A copy: the one that was raised holds every frame it passed.
             self._fault = ModuleFault(fault.slot, fault.use, fault.reason, fault.trace)
-            self._bus.publish(
-                topics.MODULE_FAULT, ModuleFaultMsg(fault.slot, str(fault), trace=fault.trace), t
-            )
+            self._bus.publish(topics.MODULE_FAULT, ModuleFaultMsg(fault.slot, str(fault), trace=fault.trace), t)
             self._failed_at = t
             self._legs, self._overruns = self._fallback, 0
             self._bus.withdraw(topics.LEG_COMMAND)  # what the failed one sent late shall not come any more
@@ -165,9 +161,7 @@ class LowerBodyNode:
         first = self._fault
         assert first is not None
         reason = f"{first.reason}; the fallback {second.use} failed too: {second.reason}"
-        return ModuleFault(
-            first.slot, first.use, reason, "\n".join(filter(None, (first.trace, second.trace)))
-        )
+        return ModuleFault(first.slot, first.use, reason, "\n".join(filter(None, (first.trace, second.trace))))
 
     def _report(self, t: float) -> None:
         locomotion, envelope = self._locomotion, self._legs.controller.envelope

@@ -20,9 +20,7 @@ class BusNav2:
         """Propose a goal; see `Nav2Link`."""
         self._number += 1
         self._twists.read()
-        self._bus.publish(
-            topics.NAV2_GOAL, Nav2Goal(self._number, pose), 0.0
-        )  # no latency: the time has no meaning
+        self._bus.publish(topics.NAV2_GOAL, Nav2Goal(self._number, pose), 0.0)  # no latency: the time has no meaning
 
     def reply(self) -> Nav2Reply | None:
         """Return how the newest goal stands; see `Nav2Link`."""

@@ -51,13 +51,7 @@ class NavigatorNode:
             legs: the lower body, as the running skill reads it.
             pool: where a navigator with a latency runs; None is here, at the price of the latency that it declares.
         """
-        self._bus, self._navigator, self._slot, self._legs, self._pool = (
-            bus,
-            navigator,
-            contract.slot,
-            legs,
-            pool,
-        )
+        self._bus, self._navigator, self._slot, self._legs, self._pool = (bus, navigator, contract.slot, legs, pool)
         self._worker = pool if navigator.latency > 0.0 else None
         self._latency = 0.0 if self._worker is not None else navigator.latency
         self._every = max(1, round(1.0 / (navigator.rate * self.period)))

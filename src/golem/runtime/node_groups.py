@@ -27,13 +27,7 @@ from golem.robots.model.kinematics import Kinematics
 from golem.robots.unitree import motion_switcher
 from golem.robots.unitree.motion_switcher import MotionSwitcher
 from golem.runtime import nodes, perception_nodes, robot_nodes, safety_nodes
-from golem.runtime.checked import (
-    CheckedGraspMethod,
-    CheckedMemory,
-    CheckedNavigator,
-    CheckedPlanner,
-    CheckedProperties,
-)
+from golem.runtime.checked import CheckedGraspMethod, CheckedMemory, CheckedNavigator, CheckedPlanner, CheckedProperties
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Phase, Placed
 from golem.runtime.gantry_release import GantryReleaseNode
@@ -88,9 +82,7 @@ def hears_lidar(stack: Stack) -> bool:
         ConfigError, ModuleFault: a class cannot be loaded.
     """
     sources = getattr(registry.load("odometry", stack.choice("odometry").use), "sources", ())
-    return bool({"imu", "scan"} & set(sources)) or SCAN in registry.requires(
-        "navigator", stack.choice("navigator").use
-    )
+    return bool({"imu", "scan"} & set(sources)) or SCAN in registry.requires("navigator", stack.choice("navigator").use)
 
 
 class RobotNodes:
@@ -126,9 +118,7 @@ class RobotNodes:
         """
         contract = ContractCheck("robot", stack.choice("robot").use)
         self.act = robot_nodes.ActNode(bus, robot, contract, joint_offset)
-        self.nodes: list[Placed] = [
-            (Phase.MEASURE, robot_nodes.SenseNode(bus, robot, contract, joint_offset))
-        ]
+        self.nodes: list[Placed] = [(Phase.MEASURE, robot_nodes.SenseNode(bus, robot, contract, joint_offset))]
         if wanted is not None:
             for name in robot.cameras:
                 camera = perception_nodes.CameraNode(bus, robot, name, wanted(name), contract)
@@ -247,10 +237,7 @@ class StackNodes:
             (Phase.ESTIMATE, nodes.EstimatorNode(bus, estimator, estimator_contract)),
             (Phase.PERCEIVE, perception_nodes.ImagePoseNode(bus, calibration, latency)),
             *(
-                (
-                    Phase.PERCEIVE,
-                    perception_nodes.LocalizerNode(bus, eyes, name, contract, pools.get("localizer")),
-                )
+                (Phase.PERCEIVE, perception_nodes.LocalizerNode(bus, eyes, name, contract, pools.get("localizer")))
                 for name in calibration
             ),
             (Phase.DECIDE, self.running),
@@ -268,10 +255,7 @@ class StackNodes:
             (Phase.CONTROL, nodes.UpperBodyNode(bus, *make("upper_body"))),
         ]
         self.nodes.append(
-            (
-                Phase.PERCEIVE,
-                MemoryNode(bus, self.memory, calibration, hears_lidar(stack), epoch, pools.get("memory")),
-            )
+            (Phase.PERCEIVE, MemoryNode(bus, self.memory, calibration, hears_lidar(stack), epoch, pools.get("memory")))
         )
         if tuple(odometry.sources) != LEGS_ALONE or hears_lidar(stack):
             self.nodes.append((Phase.PERCEIVE, OdometryNode(bus, odometry, odometry_contract, mount)))
@@ -284,9 +268,7 @@ class StackNodes:
         self.nodes.append((Phase.CONTROL, nodes.ServoNode(bus, *make("servo"))))
         if gantry is not None:
             robot_contract = ContractCheck("robot", stack.choice("robot").use)
-            self.nodes.append(
-                (Phase.OPERATE, GantryReleaseNode(bus, gantry, robot_contract, estimator_contract))
-            )
+            self.nodes.append((Phase.OPERATE, GantryReleaseNode(bus, gantry, robot_contract, estimator_contract)))
 
     @property
     def safety(self) -> GateStatus | None:
@@ -304,9 +286,7 @@ class StackNodes:
         """The twists that the leg controller in charge can follow."""
         return self.legs.envelope
 
-    def start(
-        self, skill: str | Routine[Context, Any], goal: object, timeout: float | None = None
-    ) -> SkillRun:
+    def start(self, skill: str | Routine[Context, Any], goal: object, timeout: float | None = None) -> SkillRun:
         """Start a skill; it advances with the executor.
 
         Args:

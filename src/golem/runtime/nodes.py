@@ -12,12 +12,7 @@ from golem.hardware.estimator.base import BaseEstimator
 from golem.hardware.hands.base import HandController
 from golem.hardware.servo.base import MotorServo
 from golem.interfaces import topics
-from golem.interfaces.payloads import (
-    ArmCommand,
-    GateState,
-    HandStatus,
-    JointTrajectory,
-)
+from golem.interfaces.payloads import ArmCommand, GateState, HandStatus, JointTrajectory
 from golem.middleware.bus import Bus, News
 from golem.native import HasStage
 from golem.robots.model.spatial import seen_from

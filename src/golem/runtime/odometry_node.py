@@ -27,9 +27,7 @@ class OdometryNode:
     period = PERIOD
     wakes = topics.LIDAR_IMU, topics.LIDAR_SCAN, topics.EXTERNAL_ODOMETRY
 
-    def __init__(
-        self, bus: Bus, odometry: LidarOdometry, contract: ContractCheck, mount: Array | None = None
-    ) -> None:
+    def __init__(self, bus: Bus, odometry: LidarOdometry, contract: ContractCheck, mount: Array | None = None) -> None:
         """Run `odometry`, with the LiDAR at `mount` (4, 4) in the nominal lidar_link; None is there."""
         self._bus, self._odometry, self._contract = bus, odometry, contract
         self._correction = LidarCorrection(mount)
@@ -79,9 +77,7 @@ class OdometryNode:
 class LidarNode:
     """Publishes what the LiDAR of a robot says: every tick, or as often as its IMU has a sample."""
 
-    def __init__(
-        self, bus: Bus, robot: HasLidar, wanted: Callable[[], bool], contract: ContractCheck
-    ) -> None:
+    def __init__(self, bus: Bus, robot: HasLidar, wanted: Callable[[], bool], contract: ContractCheck) -> None:
         """Read the LiDAR of `robot`, while `wanted` says that somebody listens."""
         self._bus, self._robot, self._wanted, self._contract = bus, robot, wanted, contract
         self.period = contract.number("lidar_period", getattr(robot, "lidar_period", TICK), TICK)

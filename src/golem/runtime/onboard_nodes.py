@@ -97,9 +97,7 @@ class LocoServiceNode:
 
     period = TICK
 
-    def __init__(
-        self, bus: Bus, api: LocoApi, legs: CheckedLowerBody, config: LocomotionConfig | None = None
-    ) -> None:
+    def __init__(self, bus: Bus, api: LocoApi, legs: CheckedLowerBody, config: LocomotionConfig | None = None) -> None:
         """Serve `api` on `bus`, with `legs` for the start state, under a base layer with `config`."""
         self._bus, self._legs = bus, legs
         self.service = LocoService(api)

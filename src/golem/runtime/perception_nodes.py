@@ -29,9 +29,7 @@ MEMORY = 1.0
 class CameraNode:
     """Exposes one camera at its frame rate while somebody wants its frames."""
 
-    def __init__(
-        self, bus: Bus, robot: Robot, name: str, wanted: Callable[[], bool], contract: ContractCheck
-    ) -> None:
+    def __init__(self, bus: Bus, robot: Robot, name: str, wanted: Callable[[], bool], contract: ContractCheck) -> None:
         """Expose camera `name` whenever `wanted()` is true at its time."""
         self._bus, self._robot, self._info, self._contract = bus, robot, robot.cameras[name], contract
         self._wanted = wanted
@@ -164,9 +162,7 @@ class LocalizerNode:
     def _check_mask(self, mask: Mask, points: int) -> None:
         count = self._contract.call(np.count_nonzero, mask.pixels)
         if count != points:
-            raise self._contract.fault(
-                f"mask has {count} pixels, the contract asks for one per point: {points}"
-            )
+            raise self._contract.fault(f"mask has {count} pixels, the contract asks for one per point: {points}")
 
 
 def _message(fault: ModuleFault) -> ModuleFaultMsg:

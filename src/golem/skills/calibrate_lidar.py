@@ -100,9 +100,7 @@ class CalibrateLidar:
         file = kept_file(self.config.folder, goal.file, read_calibration)
         before = read_calibration(file) if file.exists() else None
         if before is None or CAMERA not in before.cameras:
-            raise ConfigError(
-                f"'{file}' has no head camera, by which the LiDAR is calibrated: golem calibrate head."
-            )
+            raise ConfigError(f"'{file}' has no head camera, by which the LiDAR is calibrated: golem calibrate head.")
         views, info = await self._views(context, goal)
         context.say("fit", f"Fitting {len(views)} views.")
         head, covariance = before.cameras[CAMERA], before.covariances[CAMERA]
@@ -118,9 +116,7 @@ class CalibrateLidar:
         context.say("done", text)
         return SkillResult(True, "done", None, f"{text}.", {"calibrate": context.t - start}, report)
 
-    async def _views(
-        self, context: Context, goal: CalibrateLidarGoal
-    ) -> tuple[list[SurfaceView], CameraInfo]:
+    async def _views(self, context: Context, goal: CalibrateLidarGoal) -> tuple[list[SurfaceView], CameraInfo]:
         """Return what was seen from each angle of the torso that it could be turned to; it comes back at the end."""
         motion, home = PlannedMotion(context), context.commanded_joints.copy()
         motion.world = WORK_PLACE

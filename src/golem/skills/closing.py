@@ -40,9 +40,7 @@ class KeptGrip:
         elif now - self._since > (HEARD if hand.status.state is GripState.EMPTY else PATIENCE):
             x, y = self._context.arms[self._side].pose[:2, 3]
             raise StageFailed(
-                "carry",
-                "grasp_method",
-                f"The {self._thing} was lost on the way, near ({x:.2f}, {y:.2f}) in odom.",
+                "carry", "grasp_method", f"The {self._thing} was lost on the way, near ({x:.2f}, {y:.2f}) in odom."
             )
 
 

@@ -18,9 +18,7 @@ SURE = 0.3
 class DetectionStream:
     """A camera that streams sightings while it is open (a context manager)."""
 
-    def __init__(
-        self, context: Context, camera: str, labels: tuple[str, ...], doubtful: tuple[str, ...]
-    ) -> None:
+    def __init__(self, context: Context, camera: str, labels: tuple[str, ...], doubtful: tuple[str, ...]) -> None:
         """Watch `camera` for `labels`; of those in `doubtful`, sightings below `SURE` are passed on, too."""
         self._context = context
         self._camera = camera

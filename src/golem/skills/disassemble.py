@@ -13,13 +13,7 @@ from golem.skills.pick_report import PickOutcome, PickReport, Sight
 
 LEFT = (PickOutcome.TIGHT, PickOutcome.JAMMED, PickOutcome.SLIPPED, PickOutcome.NOTHING_THERE)
 """What is said of a fastener that is tried again only where there is no other."""
-AGAIN = (
-    *LEFT,
-    PickOutcome.OUT_OF_REACH,
-    PickOutcome.BLOCKED,
-    PickOutcome.TRAY_MISSING,
-    PickOutcome.TRAY_OUT_OF_REACH,
-)
+AGAIN = (*LEFT, PickOutcome.OUT_OF_REACH, PickOutcome.BLOCKED, PickOutcome.TRAY_MISSING, PickOutcome.TRAY_OUT_OF_REACH)
 """What a pick says where another stance may help: others are within reach there, or it is free."""
 
 

@@ -150,9 +150,7 @@ class Dock:
         view, approaches = await self._look(context, goal), 0
         while not _good(view, goal) and approaches < goal.approaches:
             if view.distance > FARTHEST:
-                raise StageFailed(
-                    "look", "dock", f"The stance is {view.distance:.2f} m away; navigate nearer first."
-                )
+                raise StageFailed("look", "dock", f"The stance is {view.distance:.2f} m away; navigate nearer first.")
             context.say("approach", f"{100 * view.distance:.0f} cm to go.")
             await approach(context, navigator, PlanarPose.of(context.legs.pose) @ view.left)
             approaches += 1

@@ -95,9 +95,7 @@ async def step_back(context: Context) -> None:
 def before(here: PlanarPose, place: Array, distance: float) -> PlanarPose:
     """Return the pose at `distance` [m] before `place` (2,) or (3,) that faces it, all in one frame with `here`."""
     yaw = math.atan2(float(place[1]) - here.y, float(place[0]) - here.x)
-    return PlanarPose(
-        float(place[0]) - distance * math.cos(yaw), float(place[1]) - distance * math.sin(yaw), yaw
-    )
+    return PlanarPose(float(place[0]) - distance * math.cos(yaw), float(place[1]) - distance * math.sin(yaw), yaw)
 
 
 NEAR = 1.3
@@ -209,9 +207,7 @@ class Fetch:
         place = home @ place
         return context.T_odom_map.to(place) if context.mapped else place
 
-    async def _take_one(
-        self, context: Context, goal: FetchGoal, report: FetchReport, walks: bool
-    ) -> TakeReport:
+    async def _take_one(self, context: Context, goal: FetchGoal, report: FetchReport, walks: bool) -> TakeReport:
         """Go from place to place until it is in a hand."""
         context.say("recall", f"Where is the {goal.text}?")
         places, result = await self._remembered(context, goal), None

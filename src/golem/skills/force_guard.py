@@ -27,9 +27,7 @@ class ForceGuard:
         largest: largest force of the hand along the motion while it was asked, averaged over `TICKS` [N].
     """
 
-    def __init__(
-        self, context: Context, side: Side, axis: Array, force: float, length: float = np.inf
-    ) -> None:
+    def __init__(self, context: Context, side: Side, axis: Array, force: float, length: float = np.inf) -> None:
         """Begin where the hand is now; see `at_rest`."""
         self._context, self._axis = context, axis
         self._side: Side = side

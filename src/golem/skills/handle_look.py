@@ -30,12 +30,7 @@ NEAR = 0.03
 
 
 async def seen_before(
-    context: Context,
-    motion: PlannedMotion,
-    config: OpenConfig,
-    handle: LocalizedObject,
-    grasp: Grasp,
-    side: Side,
+    context: Context, motion: PlannedMotion, config: OpenConfig, handle: LocalizedObject, grasp: Grasp, side: Side
 ) -> Grasp:
     """Return the grasp moved to where the palm camera sees the handle; as it is where it sees none.
 
@@ -69,12 +64,7 @@ async def seen_before(
 
 
 async def _searched(
-    context: Context,
-    motion: PlannedMotion,
-    config: OpenConfig,
-    handle: LocalizedObject,
-    grasp: Grasp,
-    side: Side,
+    context: Context, motion: PlannedMotion, config: OpenConfig, handle: LocalizedObject, grasp: Grasp, side: Side
 ) -> Array | None:
     """Return where (3,) the palm camera shows the handle from further back or from a side; None where it does not."""
     for across, back in VIEWS:

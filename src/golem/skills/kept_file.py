@@ -58,7 +58,5 @@ def kept_file(folder: str, name: str, read: Callable[[Path], object]) -> Path:
         try:
             read(path)
         except ConfigError as problem:
-            raise ConfigError(
-                f"'{path}' is there already and is something else; choose another name."
-            ) from problem
+            raise ConfigError(f"'{path}' is there already and is something else; choose another name.") from problem
     return path

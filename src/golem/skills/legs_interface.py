@@ -70,9 +70,7 @@ class LegsInterface:
             StageFailed: it does not.
         """
         if self.silence:
-            raise StageFailed(
-                "locate", "odometry", f"The odometry does not know where the robot is: {self.silence}"
-            )
+            raise StageFailed("locate", "odometry", f"The odometry does not know where the robot is: {self.silence}")
 
     @property
     def doubt(self) -> str:

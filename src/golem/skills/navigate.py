@@ -37,9 +37,7 @@ class NavigateGoal:
 
     def __post_init__(self) -> None:
         check_numbers(self.x, self.y, self.yaw, self.timeout)
-        require(
-            "", ("content of a goal", self.content, 0.0 <= self.content <= 1.0, "a distance of at most 1 m")
-        )
+        require("", ("content of a goal", self.content, 0.0 <= self.content <= 1.0, "a distance of at most 1 m"))
 
 
 class Navigate:
@@ -64,9 +62,7 @@ class Navigate:
             context.say(failure.stage, str(failure), failed=True)
             return SkillResult(False, failure.stage, failure.slot, str(failure))
 
-    async def _target(
-        self, context: Context, goal: NavigateGoal
-    ) -> tuple[PlanarPose, Literal["odom", "map"]]:
+    async def _target(self, context: Context, goal: NavigateGoal) -> tuple[PlanarPose, Literal["odom", "map"]]:
         """Return the goal, and the frame it is pursued in: the map's where there is a map."""
         await context.until(lambda: context.legs.reporting, FIRST_REPORT)
         target = PlanarPose(goal.x, goal.y, goal.yaw)

@@ -173,9 +173,7 @@ class OpenDoor:
         timings["total"] = context.t - timings.pop("start")
         if result.success:
             angle = np.rad2deg(self._report.angle)
-            text = (
-                f"The door is open by {angle:.0f} deg, {self._report.arm:.2f} m from its hinge to the handle."
-            )
+            text = f"The door is open by {angle:.0f} deg, {self._report.arm:.2f} m from its hinge to the handle."
             context.say("done", text)
             result = replace(result, reason=text)
         return replace(result, timings=timings, value=self._report)
@@ -221,13 +219,7 @@ class OpenDoor:
         return "left" if float((T[:3, :3].T @ (position - T[:3, 3]))[1]) > 0.0 else "right"
 
     async def _approach(
-        self,
-        context: Context,
-        motion: PlannedMotion,
-        whole: Array,
-        handle: LocalizedObject,
-        door: Door,
-        side: Side,
+        self, context: Context, motion: PlannedMotion, whole: Array, handle: LocalizedObject, door: Door, side: Side
     ) -> Grasp:
         """Bring the open hand before the handle; returns the grasp that it can go on to."""
         from golem.skills.planned_motion import Then

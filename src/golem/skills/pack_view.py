@@ -68,9 +68,7 @@ async def see_edge(context: Context) -> NearEdge:
             points.append(scan.points[:, :2])
             heights.append(scan.heights)
     if not points:
-        raise StageFailed(
-            "look", "robot", "No scan comes: docking needs a LiDAR, and an odometry that goes by it."
-        )
+        raise StageFailed("look", "robot", "No scan comes: docking needs a LiDAR, and an odometry that goes by it.")
     here = PlanarPose.of(context.legs.pose)
     T = here.matrix()
     local = (np.concatenate(points) - T[:2, 3]) @ T[:2, :2]
@@ -85,9 +83,7 @@ async def see_edge(context: Context) -> NearEdge:
     return edge
 
 
-async def see_fasteners(
-    context: Context, label: str, container: str, avoid: Array, around: bool
-) -> SeenFasteners:
+async def see_fasteners(context: Context, label: str, container: str, avoid: Array, around: bool) -> SeenFasteners:
     """Return what the head camera shows of fasteners and container; nothing where no frame comes.
 
     Args:

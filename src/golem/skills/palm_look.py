@@ -165,9 +165,7 @@ class PalmLook:
         self._side: Side = side
         self.off: Array = np.zeros(2)
 
-    async def at(
-        self, target: LocalizedObject, way: Array, yaw: float
-    ) -> tuple[LocalizedObject, Array, Array]:
+    async def at(self, target: LocalizedObject, way: Array, yaw: float) -> tuple[LocalizedObject, Array, Array]:
         """Return the thing, the points (n, 3) around it, and the way (3,) to it as the palm camera shows them, in odom.
 
         It looks again from where it saw the thing, until that is where it was expected. The way keeps its angle to the

@@ -24,9 +24,7 @@ from golem.skills.travel import LineTravel, PlannedTravel, Travel
 from golem.types import Array, Side
 
 
-async def pull(
-    context: Context, config: PickConfig, travel: Travel, attempt: Attempt, heights: list[float]
-) -> None:
+async def pull(context: Context, config: PickConfig, travel: Travel, attempt: Attempt, heights: list[float]) -> None:
     """Pull straight out against the approach direction, then lift; the grip must hold.
 
     Args:
@@ -58,9 +56,7 @@ async def pull(
         text = f"The {attempt.label} does not move at {guard.largest:.0f} N."
         raise PickFailed(slipped(heights), "extract", "grasp_method", text)
     await arm.move(
-        lifted(arm.commanded, config.clearance - config.pull),
-        config.travel_speed,
-        stop=lambda: not hand.status.holding,
+        lifted(arm.commanded, config.clearance - config.pull), config.travel_speed, stop=lambda: not hand.status.holding
     )
     if not hand.status.holding:
         text = f"The {attempt.label} slipped out of the fingers."
@@ -235,13 +231,7 @@ class Pick:
         context.hands[attempt.side].open(grasp.gap)
         await self._travel.over(attempt.side, lifted(T, self._config.clearance), T, self._config.travel_speed)
 
-    async def _take(
-        self,
-        context: Context,
-        attempt: Attempt,
-        grasp: Grasp,
-        timings: dict[str, float],
-    ) -> None:
+    async def _take(self, context: Context, attempt: Attempt, grasp: Grasp, timings: dict[str, float]) -> None:
         """Grasp and pull out. A method that looks again may try again; an open-loop one would only repeat itself."""
         self._heights = list[float]()
         for count in range(1, self._config.attempts + 1):
@@ -278,9 +268,7 @@ class Pick:
         await self._travel.line(attempt.side, grasp.T_odom_gripper, self._config.descend_speed, "descend")
         left = await arm.settle(self._config.tolerance, 2.0)
         if left > 2.0 * self._config.tolerance:
-            raise StageFailed(
-                "descend", "localizer", f"The hand was stopped {left * 1e3:.0f} mm before the grasp."
-            )
+            raise StageFailed("descend", "localizer", f"The hand was stopped {left * 1e3:.0f} mm before the grasp.")
         self._close(context, attempt)
         hand = context.hands[attempt.side]
         await context.until(lambda: hand.status.state in CLOSED, self._config.close_timeout)
@@ -291,9 +279,7 @@ class Pick:
         arm, hand = context.arms[attempt.side], context.hands[attempt.side]
         end = context.t + law.patience
         closing, camera, self._seen = False, f"{attempt.side}_hand", None
-        below = await ForceGuard.at_rest(
-            context, attempt.side, arm.commanded[:3, 2], self._config.press_force
-        )
+        below = await ForceGuard.at_rest(context, attempt.side, arm.commanded[:3, 2], self._config.press_force)
         room = FingerRoom(context, attempt.side, gap)
         with context.watch(camera, attempt.label, doubtful=(attempt.label,)) as eye:
             while context.t < end and not (closing and hand.status.state in CLOSED):

@@ -66,17 +66,13 @@ async def place(
             T = turned(arm.commanded, turn)
             T[:3, 3] = spot + (0.0, 0.0, config.drop_height)
             goals.append(T)
-    context.say(
-        "place", f"Carrying it to the {attempt.container}.", target=container.sighting.position.tolist()
-    )
+    context.say("place", f"Carrying it to the {attempt.container}.", target=container.sighting.position.tolist())
     try:
         await travel.carry(attempt.side, goals, config.travel_speed)
     except StageFailed as failure:
         cause = failure.__cause__
         if isinstance(cause, PlanRefused) and cause.refusal is Refusal.UNREACHABLE:
-            raise PickFailed(
-                PickOutcome.TRAY_OUT_OF_REACH, failure.stage, failure.slot, str(failure)
-            ) from cause
+            raise PickFailed(PickOutcome.TRAY_OUT_OF_REACH, failure.stage, failure.slot, str(failure)) from cause
         raise
     for _ in range(CORRECTIONS):
         if not await _nearer(context, config, travel, attempt):

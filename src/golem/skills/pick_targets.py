@@ -167,11 +167,7 @@ class TargetChoice:
         share = {side: float(reach.drops(side, places, slack=False).mean()) for side in SIDES}
 
         def order(a: Attempt) -> tuple[bool, bool, float]:
-            return (
-                share[a.side] < MOST,
-                self._stands_low(a.target),
-                reach.discomfort(a.side, a.target.position),
-            )
+            return (share[a.side] < MOST, self._stands_low(a.target), reach.discomfort(a.side, a.target.position))
 
         chosen = sorted(view.attempts, key=order)[: self._config.candidates]
         text = f"{len(view.attempts)} {goal.label}s in reach."
@@ -220,13 +216,9 @@ class TargetChoice:
         """Return what is known after one more picture."""
         container, objects = view.container, list(view.objects)
         containers = [
-            Container.of(o, self._config.container_radius)
-            for o in sightings.objects
-            if o.label == goal.container
+            Container.of(o, self._config.container_radius) for o in sightings.objects if o.label == goal.container
         ]
-        believed = [
-            c for c in containers if c.box is not None or c.sighting.detection.score >= self._config.sure
-        ]
+        believed = [c for c in containers if c.box is not None or c.sighting.detection.score >= self._config.sure]
         container = max(believed, key=lambda c: c.sighting.detection.score, default=container)
         for new in (o for o in sightings.objects if o.label == goal.label):
             if all(np.linalg.norm(new.position - known.position) > SAME for known in objects):

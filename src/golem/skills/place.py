@@ -36,10 +36,7 @@ IN_HAND = 0.16
 IN_BOWL = 0.10
 """The same around the middle of what hangs beside the fingers [m]: a bowl is 80 mm in radius."""
 BESIDE: Array = np.array(
-    [
-        (0.0, 0.0),
-        *((r * math.cos(a), r * math.sin(a)) for r in (0.015, 0.03) for a in np.arange(8) * math.pi / 4),
-    ]
+    [(0.0, 0.0), *((r * math.cos(a), r * math.sin(a)) for r in (0.015, 0.03) for a in np.arange(8) * math.pi / 4)]
 )
 """Places (17, 2) beside the one that is asked for that will do where something stands there, nearest first [m]."""
 HANDS = 0.25
@@ -222,9 +219,7 @@ class SetDown:
         spot[2] = level
         away = np.linalg.norm(scene[:, :2] - spot[:2], axis=1)
         if np.count_nonzero((scene[:, 2] < level - EDGE) & (away < goal.radius)) > MIN_POINTS:
-            raise StageFailed(
-                "detect", "skill", "The surface ends within the width of what would stand at that place."
-            )
+            raise StageFailed("detect", "skill", "The surface ends within the width of what would stand at that place.")
         proud = scene[(scene[:, 2] > level + PROUD) & (scene[:, 2] < level + 0.4), :2]
         c = self._config
         # The head camera is off by centimetres: what looks too narrow for the thing may do, less than `room` does not.
@@ -234,9 +229,7 @@ class SetDown:
                 return spot + (*beside, 0.0)
         raise StageFailed("detect", "localizer", "Something else stands at that place.")
 
-    async def _carry(
-        self, context: Context, motion: PlannedMotion, goal: PlaceGoal, side: Side, spot: Array
-    ) -> None:
+    async def _carry(self, context: Context, motion: PlannedMotion, goal: PlaceGoal, side: Side, spot: Array) -> None:
         """Bring the hand above the place, what it holds upright."""
         from golem.skills.planned_motion import Then
         from golem.skills.travel import APPROACH, OVER, failed
@@ -329,9 +322,7 @@ class SetDown:
             await arm.move(lifted(T, c.hover + c.lower + c.deeper), c.lower_speed)
             away = 100 * (c.lower + c.deeper)
             raise StageFailed(
-                "lower",
-                "localizer",
-                f"No surface was felt to {away:.0f} cm below where it was seen; it stays held.",
+                "lower", "localizer", f"No surface was felt to {away:.0f} cm below where it was seen; it stays held."
             )
         self._report.touched = guard.stuck
         if guard.stuck:

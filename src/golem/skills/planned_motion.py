@@ -277,9 +277,7 @@ class PlannedMotion:
                 return False
             try:
                 for line in lines:
-                    self._lines.check(
-                        line.side, line.T_odom_gripper, goal, line.speed, 1.5, *line.tolerance, itself
-                    )
+                    self._lines.check(line.side, line.T_odom_gripper, goal, line.speed, 1.5, *line.tolerance, itself)
             except PlanRefused as error:
                 found.append(str(error))
                 return False
@@ -300,6 +298,4 @@ class PlannedMotion:
                 Refusal.UNREACHABLE,
                 f"The {which} hand gets no nearer than {self._goals.nearest * 1e3:.0f} mm to where it is to go.",
             )
-        raise PlanRefused(
-            Refusal.GOAL, f"The {which} hand cannot be where it is to go: {found[0]}.".replace("..", ".")
-        )
+        raise PlanRefused(Refusal.GOAL, f"The {which} hand cannot be where it is to go: {found[0]}.".replace("..", "."))

@@ -74,9 +74,7 @@ async def go_to(
             distance, turn = math.hypot(left.x, left.y), math.degrees(left.yaw)
             near = distance < content and abs(left.yaw) < TURNED
             if step is not None and (step.arrived or near):
-                text = (
-                    f"Standing {distance * 1e3:.0f} mm and {turn:.1f} deg from the goal{context.legs.doubt}."
-                )
+                text = f"Standing {distance * 1e3:.0f} mm and {turn:.1f} deg from the goal{context.legs.doubt}."
                 context.say("done", text, left=[left.x, left.y, left.yaw])
                 return SkillResult(True, "done", None, text, {"walk": context.t - start})
             if step is not None and step.failure is not None:

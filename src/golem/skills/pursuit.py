@@ -72,7 +72,5 @@ async def _pursue(
         run.close()
         context.skill = caller
     if late and result.stage != FAULT:
-        result = SkillResult(
-            False, TIMEOUT, None, f"Not done after {allowed:g} s of robot time.", result.timings
-        )
+        result = SkillResult(False, TIMEOUT, None, f"Not done after {allowed:g} s of robot time.", result.timings)
     return run, cancelled, result

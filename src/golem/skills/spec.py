@@ -151,9 +151,7 @@ def _check(what: str, value: Any, depth: int = 0) -> None:
     elif isinstance(value, list | tuple | Mapping):
         members = cast("list[Any] | Mapping[str, Any]", value)
         if len(members) > MAX_ITEMS or depth >= MAX_DEPTH:
-            raise ConfigError(
-                f"The {what} is larger than {MAX_ITEMS} members or {MAX_DEPTH} lists in one another."
-            )
+            raise ConfigError(f"The {what} is larger than {MAX_ITEMS} members or {MAX_DEPTH} lists in one another.")
         for each in members.values() if isinstance(members, Mapping) else members:
             _check(what, each, depth + 1)
 

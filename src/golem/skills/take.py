@@ -152,9 +152,7 @@ class Take:
         would sweep over what stands there. None turns into what the camera shows ahead.
         """
         c, ahead, home = self._config, context.commanded_joints.copy(), posture("home")
-        away: list[Side] = [
-            side for side in SIDES if np.abs((ahead - home)[ARM_COLUMNS[side]]).max() > AT_HOME
-        ]
+        away: list[Side] = [side for side in SIDES if np.abs((ahead - home)[ARM_COLUMNS[side]]).max() > AT_HOME]
         motion.look()
         for side in away:
             if context.hands[side].status.holding:
@@ -248,9 +246,7 @@ class Take:
         level, down = math.cos(self._config.lean), -math.sin(self._config.lean)
         return np.array([level * math.cos(heading), level * math.sin(heading), down])
 
-    async def _reach_before(
-        self, context: Context, motion: PlannedMotion, side: Side, grasps: list[Grasp]
-    ) -> Grasp:
+    async def _reach_before(self, context: Context, motion: PlannedMotion, side: Side, grasps: list[Grasp]) -> Grasp:
         """Bring the hand before the first grasp that it gets to, and on to; returns that grasp.
 
         Those that the arm alone reaches from where it is are tried first: a planner takes longer to refuse.

@@ -77,9 +77,7 @@ class StandGoal:
     seconds: float = 60.0
 
     def __post_init__(self) -> None:
-        require(
-            "", ("time to stand for", self.seconds, 0.0 <= self.seconds < math.inf, "zero or more seconds")
-        )
+        require("", ("time to stand for", self.seconds, 0.0 <= self.seconds < math.inf, "zero or more seconds"))
 
 
 class Stand:

@@ -22,9 +22,7 @@ def test_the_hands_do_not_depend_on_the_legs(kinematics: UpperKinematics) -> Non
         q = rng.uniform(-0.4, 0.4, NUM_JOINTS)
         whole.update(q)
         for side in SIDES:
-            np.testing.assert_allclose(
-                kinematics.pose(side, q[UPPER]), whole.pose(f"{side}_gripper"), atol=1e-12
-            )
+            np.testing.assert_allclose(kinematics.pose(side, q[UPPER]), whole.pose(f"{side}_gripper"), atol=1e-12)
 
 
 @pytest.mark.parametrize("side", SIDES)

@@ -141,9 +141,7 @@ SHARED = DiffIK()
     start=st.lists(st.floats(-4, 4), min_size=NUM_JOINTS, max_size=NUM_JOINTS),
     dt=st.floats(1e-4, 0.1),
 )
-def test_limits_hold_for_any_target(
-    left: Array | None, right: Array | None, start: list[float], dt: float
-) -> None:
+def test_limits_hold_for_any_target(left: Array | None, right: Array | None, start: list[float], dt: float) -> None:
     ik = SHARED
     ik.reset(np.array(start))
     before = ik.q.copy()
@@ -159,9 +157,7 @@ def test_limits_hold_for_any_target(
         before = command.q
 
 
-def test_a_waist_that_was_turned_far_stays_until_a_hand_is_sent_and_then_comes_back_slowly(
-    ik: DiffIK,
-) -> None:
+def test_a_waist_that_was_turned_far_stays_until_a_hand_is_sent_and_then_comes_back_slowly(ik: DiffIK) -> None:
     q = whole(posture("ready"))
     q[12] = 1.2
     ik.reset(q)
@@ -245,8 +241,7 @@ def test_an_unsolved_program_holds_still(ik: DiffIK, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize(
-    "options",
-    [{"palm_gain": 0.0}, {"arm_speed": -1.0}, {"damping": 0.0}, {"limit_margin": -0.1}, {"posture": "redy"}],
+    "options", [{"palm_gain": 0.0}, {"arm_speed": -1.0}, {"damping": 0.0}, {"limit_margin": -0.1}, {"posture": "redy"}]
 )
 def test_options_out_of_range_are_named(options: dict[str, Any]) -> None:
     with pytest.raises(ConfigError, match=next(iter(options))):

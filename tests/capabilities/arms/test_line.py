@@ -42,9 +42,7 @@ def test_speed_and_acceleration_stay_bounded_and_the_ends_are_exact(
 
 
 @given(p0=vector, p1=vector, w0=vector, w1=vector, at=st.floats(0.0, 1.0))
-def test_straight_in_position_and_geodesic_in_rotation(
-    p0: Array, p1: Array, w0: Array, w1: Array, at: float
-) -> None:
+def test_straight_in_position_and_geodesic_in_rotation(p0: Array, p1: Array, w0: Array, w1: Array, at: float) -> None:
     start, goal = pose(p0, w0), pose(p1, w1)
     line = Line(start, goal)
     t = at * line.duration

@@ -39,9 +39,7 @@ def test_an_extraction_is_straight_and_along_the_tool(checker: LineChecker, side
 
 
 def test_a_line_out_of_reach_is_refused_with_its_deviation(checker: LineChecker) -> None:
-    with pytest.raises(
-        PlanRefused, match=r"leave the straight line of 500 mm by \d+\.\d mm .*at a limit: "
-    ) as caught:
+    with pytest.raises(PlanRefused, match=r"leave the straight line of 500 mm by \d+\.\d mm .*at a limit: ") as caught:
         checker.check("right", moved(checker, "right", 0.5, 0.0, 0.0), READY, 0.25)
     assert caught.value.refusal is Refusal.OFF_LINE
 

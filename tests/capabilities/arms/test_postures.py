@@ -22,9 +22,7 @@ def test_the_hands_point_down_where_the_docs_say(name: str, side: Side) -> None:
     sign = 1.0 if side == "left" else -1.0
     kinematics = UpperKinematics()
     q = posture(name)
-    np.testing.assert_allclose(
-        kinematics.pose(side, q), downward(x, sign * y, z, sign * np.pi / 2), atol=1e-3
-    )
+    np.testing.assert_allclose(kinematics.pose(side, q), downward(x, sign * y, z, sign * np.pi / 2), atol=1e-3)
     assert kinematics.margin(side, q) > 0.15
     assert kinematics.manipulability(side, q) > 0.11
 

@@ -75,9 +75,7 @@ class PythonIK:
                 here = k.placement(side)
                 position[i] = np.linalg.norm(goal[:3, 3] - here.translation)
                 rotation[i] = np.linalg.norm(pin.log3(here.rotation.T @ goal[:3, :3]))
-        self.left_over = np.sqrt(
-            c.position_weight * position @ position + c.rotation_weight * rotation @ rotation
-        )
+        self.left_over = np.sqrt(c.position_weight * position @ position + c.rotation_weight * rotation @ rotation)
         return self.q, position, rotation, limited
 
 

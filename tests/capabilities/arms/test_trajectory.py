@@ -105,10 +105,7 @@ def test_a_sound_one_passes() -> None:
             r"torso_joint is to move at 300 rad/s; possible: -2.7 to 2.7",
         ),
         ({"dq": np.full((2, 15), 99.0)}, "torso_joint is to move at 99 rad/s"),
-        (
-            {"times": np.array([0.0, 1.0]), "q": np.tile(MIDDLE, (2, 1)) + 0.2},
-            "at once with an offset of 0.2 rad",
-        ),
+        ({"times": np.array([0.0, 1.0]), "q": np.tile(MIDDLE, (2, 1)) + 0.2}, "at once with an offset of 0.2 rad"),
         ({"times": np.array([1e-3, 1.0]), "q": np.tile(MIDDLE, (2, 1)) + 0.2}, "is to move at 200 rad/s"),
     ],
 )

@@ -67,9 +67,7 @@ def test_postures_show_the_other_hand_within_the_range() -> None:
     limits, found = SafetyLimits.from_profile(), postures("left")
     assert len(found) == 16
     for q in found:
-        assert np.all(q >= limits.lower[UPPER] + SPARE - 1e-9) and np.all(
-            q <= limits.upper[UPPER] - SPARE + 1e-9
-        )
+        assert np.all(q >= limits.lower[UPPER] + SPARE - 1e-9) and np.all(q <= limits.upper[UPPER] - SPARE + 1e-9)
     blocked = hand_view_postures("left", 4, lambda q: False, lambda q: np.zeros((0, 4)), ZERO)
     assert blocked == []
 

@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 
 from golem.capabilities.calibration.kinematic_fit import pose
-from golem.capabilities.calibration.scan_fit import (
-    T_TORSO_LIDAR,
-    WINDOW,
-    SurfaceView,
-    fit_lidar,
-    planes_of,
-)
+from golem.capabilities.calibration.scan_fit import T_TORSO_LIDAR, WINDOW, SurfaceView, fit_lidar, planes_of
 from golem.errors import ConfigError
 from golem.robots.model.spatial import rotation_rpy, transform
 from golem.robots.model.table import T_TORSO_HEAD_OPTICAL
@@ -21,11 +15,7 @@ from golem.robots.sensors.depth import STEREO
 from golem.types import Array
 
 FLOOR = (np.array([0.0, 0.0, 1.0]), -1.0)
-WALLS = (
-    (np.array([-1.0, 0.0, 0.0]), -1.1),
-    (np.array([0.0, -1.0, 0.0]), -1.0),
-    (np.array([0.0, 1.0, 0.0]), -1.0),
-)
+WALLS = ((np.array([-1.0, 0.0, 0.0]), -1.1), (np.array([0.0, -1.0, 0.0]), -1.0), (np.array([0.0, 1.0, 0.0]), -1.0))
 """Normal and distance from the torso's frame, before it turns [m]."""
 MOUNT = np.array([0.008, -0.009, 0.012, 0.004, -0.003, 0.005])
 
@@ -47,8 +37,7 @@ def view(angle: float, planes: tuple[tuple[Array, float], ...], rng: np.random.G
     depth = ranges(camera[:3, 3], rays(HEAD).astype(np.float64) @ camera[:3, :3].T, planes)
     fB = STEREO["head"].focal * STEREO["head"].baseline
     images = [
-        np.where(depth < HEAD.far, fB / (fB / depth + 0.08 * rng.standard_normal(depth.shape)), 0.0)
-        for _ in range(4)
+        np.where(depth < HEAD.far, fB / (fB / depth + 0.08 * rng.standard_normal(depth.shape)), 0.0) for _ in range(4)
     ]
     along = rng.standard_normal((60_000, 3))
     along /= np.linalg.norm(along, axis=1)[:, None]
@@ -87,9 +76,7 @@ def test_a_floor_alone_does_not_fix_it() -> None:
 
 
 def test_nothing_to_see_is_said() -> None:
-    dark = SurfaceView(
-        [np.zeros((HEAD.height, HEAD.width), np.float32)], np.full((10, 3), np.nan, np.float32)
-    )
+    dark = SurfaceView([np.zeros((HEAD.height, HEAD.width), np.float32)], np.full((10, 3), np.nan, np.float32))
     with pytest.raises(ConfigError, match="saw 0 points of the same even surfaces"):
         fit_lidar([dark], HEAD, np.eye(4), np.zeros((6, 6)))
 

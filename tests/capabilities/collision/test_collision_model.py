@@ -63,9 +63,7 @@ def test_the_kernel_agrees_with_plain_arithmetic(robot: SphereRobot, whole: Coll
     assert whole.collides_each(postures).tolist() == plain.tolist()
 
 
-def test_distances_are_those_of_spheres_and_their_gradients_those_of_differences(
-    upper: CollisionModel,
-) -> None:
+def test_distances_are_those_of_spheres_and_their_gradients_those_of_differences(upper: CollisionModel) -> None:
     checked = 0
     for q in np.random.default_rng(1).uniform(-0.4, 0.4, (10, 15)):
         near = upper.nearest(q, most=5, cutoff=0.15)
@@ -78,9 +76,7 @@ def test_distances_are_those_of_spheres_and_their_gradients_those_of_differences
                 return float(np.linalg.norm(p[a, :3] - p[b, :3]) - p[a, 3] - p[b, 3])
 
             pair = {int(upper.sphere_link[a]), int(upper.sphere_link[b])}
-            (depth,) = [
-                d for p, d in zip(upper.robot.pairs, upper.robot.allowed, strict=True) if set(p) == pair
-            ]
+            (depth,) = [d for p, d in zip(upper.robot.pairs, upper.robot.allowed, strict=True) if set(p) == pair]
             assert distance == pytest.approx(gap(q) + depth, abs=1e-12)
             assert gradient == pytest.approx(numeric(gap, q), abs=1e-7)
             checked += 1
@@ -111,9 +107,7 @@ def test_the_world_is_seen_with_its_gradient(upper: CollisionModel) -> None:
     hand = upper.placed(q)[upper.sphere_body == 8][0]
     T = np.eye(4)
     T[:3, 3] = hand[:3] + (0.0, 0.0, -0.2)
-    world = World(
-        [Obstacle("box", T, (0.1, 0.1, 0.05)), Obstacle("half_space", np.diag([1.0, 1.0, 1.0, 1.0]))]
-    )
+    world = World([Obstacle("box", T, (0.1, 0.1, 0.05)), Obstacle("half_space", np.diag([1.0, 1.0, 1.0, 1.0]))])
     near = upper.nearest_world(q, world, most=6, cutoff=0.3)
     assert len(near.distance) > 2
     for distance, gradient, (i,) in zip(near.distance, near.gradient, near.spheres, strict=True):
@@ -130,9 +124,7 @@ def test_a_cloud_holds_every_point_and_nothing_far_from_one() -> None:
     rng = np.random.default_rng(2)
     points = rng.uniform((0.2, -0.5, -0.2), (0.8, 0.5, 0.4), (3000, 3))
     world = World(cloud=cloud_grid(points))
-    balls = np.column_stack(
-        [rng.uniform((-0.9, -1.4, -1.2), (1.6, 1.4, 1.6), (2000, 3)), np.full(2000, 0.04)]
-    )
+    balls = np.column_stack([rng.uniform((-0.9, -1.4, -1.2), (1.6, 1.4, 1.6), (2000, 3)), np.full(2000, 0.04)])
     distance, _ = world.distance(balls, cutoff=0.3)
     truth = np.linalg.norm(balls[:, None, :3] - points, axis=2).min(axis=1) - 0.04
     near = truth < 0.3
@@ -161,10 +153,7 @@ def test_ten_million_points_take_no_time_to_speak_of() -> None:
 def test_what_a_hand_holds_collides(robot: SphereRobot, upper: CollisionModel) -> None:
     q = posture("ready")
     placed = upper.placed(q)
-    hands = (
-        [x.name for x in robot.links].index("right_hand"),
-        [x.name for x in robot.links].index("left_hand"),
-    )
+    hands = ([x.name for x in robot.links].index("right_hand"), [x.name for x in robot.links].index("left_hand"))
     own, other = (placed[upper.sphere_link == link] for link in hands)
     kinematics = Kinematics()
     whole_q = np.zeros(NUM_JOINTS)

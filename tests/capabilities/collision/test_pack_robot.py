@@ -90,9 +90,7 @@ def test_a_gripper_whose_fingers_follow_each_other_is_packed(
     read = load_spheres(out)
     assert joint_names(read.links) == ["left"]
     for q in (0.0, 0.3, 0.7, 1.0):  # the tips meet at 0.4 rad
-        assert (
-            spheres_collide(read, np.array([q])) == spheres_collide(packed.robot, np.array([q])) == (q > 0.35)
-        )
+        assert spheres_collide(read, np.array([q])) == spheres_collide(packed.robot, np.array([q])) == (q > 0.35)
     with pytest.raises(ConfigError, match="Joint 'right' follows 'left', which can only be held here"):
         CollisionModel(read)
     link, centres, _ = sphere_columns(read)
@@ -104,9 +102,7 @@ def test_a_gripper_whose_fingers_follow_each_other_is_packed(
 
 def test_a_urdf_without_meshes_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "bare.urdf"
-    inertial = (
-        "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
-    )
+    inertial = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
     path.write_text(f"<robot name='bare'><link name='base'>{inertial}</link></robot>")
     with pytest.raises(ConfigError, match="has no geometry"):
         run_spheres(SpheresConfig(path))

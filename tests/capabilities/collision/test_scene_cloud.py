@@ -15,9 +15,7 @@ def patch(x: float, y: float, z: float, n: int = 200) -> Array:
     return np.array([x, y, z]) + np.random.default_rng(0).uniform(-0.03, 0.03, (n, 3))
 
 
-def near(
-    points: Array, at: Array, spheres: Array = NONE, spared: list[tuple[Array, float]] | None = None
-) -> float:
+def near(points: Array, at: Array, spheres: Array = NONE, spared: list[tuple[Array, float]] | None = None) -> float:
     return float(scene_world(points, spheres, spared or []).distance(np.append(at, 0.0)[None])[0][0])
 
 

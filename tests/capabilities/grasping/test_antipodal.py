@@ -63,9 +63,7 @@ def test_normals_of_a_plane_are_its_own() -> None:
 
 @pytest.mark.parametrize("approach", [DOWN, AHEAD], ids=["down", "ahead"])
 @pytest.mark.parametrize("thing", [things.can(), things.bar()], ids=["can", "bar"])
-def test_a_grasp_closes_on_two_sides_along_the_wanted_approach(
-    thing: LocalizedObject, approach: Array
-) -> None:
+def test_a_grasp_closes_on_two_sides_along_the_wanted_approach(thing: LocalizedObject, approach: Array) -> None:
     if thing.label == "handle" and approach is DOWN:
         pytest.skip("nobody takes an upright bar before a door from above")
     config = AntipodalConfig()
@@ -120,9 +118,7 @@ def test_what_has_moved_is_found_again_though_a_part_is_hidden() -> None:
 
 @pytest.mark.parametrize("lean", [0.0, 0.2, 0.4])
 def test_of_a_bottle_the_cap_says_how_far_it_moved_though_more_of_it_is_seen(lean: float) -> None:
-    turn, down = (
-        grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 6.3, 60), np.arange(0.0, 0.14, 0.003))
-    )
+    turn, down = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 6.3, 60), np.arange(0.0, 0.14, 0.003)))
     ring = np.column_stack([np.cos(turn), np.sin(turn)])
     neck = np.column_stack([0.015 * ring, 0.22 - 0.4 * down])
     shoulder = np.column_stack([(0.015 + 0.14 * down)[:, None] * ring, 0.165 - 0.2 * down])

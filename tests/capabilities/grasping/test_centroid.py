@@ -46,8 +46,7 @@ def test_without_a_cloud_the_depth_is_the_usual_one() -> None:
 
 
 @pytest.mark.parametrize(
-    ("height", "depth"),
-    [(0.030, 0.0115), (0.0145, 0.0115), (0.010, 0.007), (0.005, 0.0115 / 3.0), (0.0, 0.0115 / 3.0)],
+    ("height", "depth"), [(0.030, 0.0115), (0.0145, 0.0115), (0.010, 0.007), (0.005, 0.0115 / 3.0), (0.0, 0.0115 / 3.0)]
 )
 def test_the_tips_stay_clear_of_the_ground_but_grip_a_third(height: float, depth: float) -> None:
     assert grasp_depth(thing(head_on_ground(height)), 0.0115, 0.003) == pytest.approx(depth)
@@ -59,9 +58,7 @@ def test_a_few_points_below_the_ground_are_not_the_ground() -> None:
 
 
 @given(st.floats(-0.05, 0.2), st.floats(0.001, 0.03), st.floats(0.0, 0.01))
-def test_the_depth_is_always_between_a_third_and_all_of_it(
-    height: float, depth: float, clearance: float
-) -> None:
+def test_the_depth_is_always_between_a_third_and_all_of_it(height: float, depth: float, clearance: float) -> None:
     got = grasp_depth(thing(head_on_ground(height)), depth, clearance)
     assert depth / 3.0 - 1e-12 <= got <= depth + 1e-12
 

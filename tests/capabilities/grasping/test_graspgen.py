@@ -72,15 +72,11 @@ def test_grasps_come_into_our_frame_best_first() -> None:
 
     def answer(request: dict[str, Any]) -> bytes:
         asked.append(request)
-        poses = np.array(
-            [their_pose(bar.position - (0.195, 0, 0)), their_pose(bar.position - (0.195, 0, 0), 0.3)] * 2
-        )
+        poses = np.array([their_pose(bar.position - (0.195, 0, 0)), their_pose(bar.position - (0.195, 0, 0), 0.3)] * 2)
         poses[2, :3, 2] *= -1  # from behind
         poses[2, :3, 0] *= -1
         confidences = np.array([0.5, 0.9, 0.95, 0.1], np.float32)
-        return packed(
-            {"grasps": poses, "confidences": confidences, "num_grasps": 4, "timing": {"infer_ms": 50.0}}
-        )
+        return packed({"grasps": poses, "confidences": confidences, "num_grasps": 4, "timing": {"infer_ms": 50.0}})
 
     with server(answer) as port:
         grasps = client(port).propose(bar, bar.points, HAND)
@@ -98,11 +94,7 @@ def test_grasps_come_into_our_frame_best_first() -> None:
 
 
 def test_no_grasps_are_no_grasps() -> None:
-    none = {
-        "grasps": np.empty((0, 4, 4), np.float32),
-        "confidences": np.empty(0, np.float32),
-        "num_grasps": 0,
-    }
+    none = {"grasps": np.empty((0, 4, 4), np.float32), "confidences": np.empty(0, np.float32), "num_grasps": 0}
     bar = things.bar()
     with server(lambda _: packed(none)) as port:
         assert client(port).propose(bar, bar.points, HAND) == []
@@ -125,9 +117,7 @@ WRONG = {
     "no rotation": (packed({"grasps": 2 * POSE, "confidences": ONE}), "no rotations"),
     "text for grasps": (packed({"grasps": "many", "confidences": ONE}), "no grasps"),
     "a false array": (
-        packed(
-            {"grasps": {b"nd": True, b"type": "<f4", b"shape": [9, 9], b"data": b"12"}, "confidences": ONE}
-        ),
+        packed({"grasps": {b"nd": True, b"type": "<f4", b"shape": [9, 9], b"data": b"12"}, "confidences": ONE}),
         "no msgpack",
     ),
 }

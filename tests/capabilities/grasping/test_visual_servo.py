@@ -24,9 +24,7 @@ HEAD_ERROR = np.array([0.04, -0.03, 0.02])
 """What the head camera is off by."""
 
 
-def thing(
-    position: Array, label: str = "screw", points: Array | None = None, score: float = 0.9
-) -> LocalizedObject:
+def thing(position: Array, label: str = "screw", points: Array | None = None, score: float = 0.9) -> LocalizedObject:
     box = np.array([0.0, 0.0, 10.0, 10.0])
     cloud = np.zeros((0, 3)) if points is None else points
     return LocalizedObject(Detection(label, score, box, box[:2] + 5), 0.0, np.array(position, float), cloud)
@@ -179,9 +177,7 @@ def test_a_target_never_seen_makes_it_back_off_and_then_give_up() -> None:
     config = ServoLawConfig()
     assert last.status is ServoStatus.LOST
     assert chase.t == pytest.approx((config.retreats + 1) * config.lost_after, abs=0.1)
-    lifts = {
-        round(float(s.T_odom_gripper[2, 3] - chase.steps[0].T_odom_gripper[2, 3]), 6) for s in chase.steps
-    }
+    lifts = {round(float(s.T_odom_gripper[2, 3] - chase.steps[0].T_odom_gripper[2, 3]), 6) for s in chase.steps}
     assert sorted(lifts)[:3] == [0.0, 0.05, 0.10]
 
 
@@ -302,9 +298,7 @@ def test_the_ground_under_a_low_head_lifts_the_grasp() -> None:
         (0.006, "nut", ServoStatus.CONVERGED),
     ],
 )
-def test_a_screw_that_stands_as_low_as_a_tight_one_is_left(
-    height: float, label: str, status: ServoStatus
-) -> None:
+def test_a_screw_that_stands_as_low_as_a_tight_one_is_left(height: float, label: str, status: ServoStatus) -> None:
     chase = Chase(lambda t: [standing(SCREW, height, label)])
     chase.law.label = label
     assert chase.run(8.0).status is status

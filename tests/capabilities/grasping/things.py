@@ -37,16 +37,10 @@ def bar(noise: float = 0.002) -> LocalizedObject:
     """Return the visible half of an upright bar of 25 mm, 5 cm before a door."""
     rng = np.random.default_rng(0)
     angle = rng.uniform(np.pi / 2, 3 * np.pi / 2, 600)
-    handle = BAR + np.column_stack(
-        [0.0125 * np.cos(angle), 0.0125 * np.sin(angle), rng.uniform(0.0, 0.3, 600)]
-    )
-    door = np.column_stack(
-        [np.full(1500, 0.63), rng.uniform(-0.30, -0.20, 1500), rng.uniform(0.1, 0.4, 1500)]
-    )
+    handle = BAR + np.column_stack([0.0125 * np.cos(angle), 0.0125 * np.sin(angle), rng.uniform(0.0, 0.3, 600)])
+    door = np.column_stack([np.full(1500, 0.63), rng.uniform(-0.30, -0.20, 1500), rng.uniform(0.1, 0.4, 1500)])
     points = np.concatenate([handle, door])
-    return seen(
-        points + noise * rng.standard_normal(points.shape), BAR + (-0.0125, 0.0, 0.15), label="handle"
-    )
+    return seen(points + noise * rng.standard_normal(points.shape), BAR + (-0.0125, 0.0, 0.15), label="handle")
 
 
 BOTTLE = np.array([0.50, -0.20, 0.10])

@@ -70,9 +70,7 @@ class ClockTwin:
         wanted = config.start == "always" or commanded or lost
         begins = wanted and not self.stepping
         if begins:
-            self.phase = (0.0 if capture[1] >= 0.0 else 0.5) + (
-                config.stance - 0.5 if lost and not commanded else 0.0
-            )
+            self.phase = (0.0 if capture[1] >= 0.0 else 0.5) + (config.stance - 0.5 if lost and not commanded else 0.0)
         self.idle = 0.0 if wanted else self.idle + dt / config.period
         content = misplaced < config.feet_stop or self.idle >= config.patience
         settled = np.hypot(*capture) < config.capture_stop and content

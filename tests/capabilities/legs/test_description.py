@@ -76,9 +76,7 @@ def test_the_peers_have_the_layout_their_networks_ask_for() -> None:
         ("kp: 100", "kp: 100\nkp: 100", ["'kp' occurs twice", "line"]),
     ],
 )
-def test_a_wrong_description_is_answered_in_one_sentence(
-    tmp_path: Path, old: str, new: str, words: list[str]
-) -> None:
+def test_a_wrong_description_is_answered_in_one_sentence(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
     assert old in TEXT
     with pytest.raises(ConfigError) as caught:
         load_description(write(tmp_path, TEXT.replace(old, new)))

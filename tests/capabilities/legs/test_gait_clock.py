@@ -83,11 +83,7 @@ def test_many_robots_are_many_twins() -> None:
 def test_the_balance_errors_of_many_are_those_of_each() -> None:
     rng, shape = np.random.default_rng(5), (3, 4)
     R = np.array([rotation_rpy(*x) for x in rng.normal(0.0, 0.7, (12, 3))]).reshape(3, 4, 3, 3)
-    com, velocity, soles = (
-        rng.normal(size=(*shape, 3)),
-        rng.normal(size=(*shape, 3)),
-        rng.normal(size=(*shape, 2, 3)),
-    )
+    com, velocity, soles = (rng.normal(size=(*shape, 3)), rng.normal(size=(*shape, 3)), rng.normal(size=(*shape, 2, 3)))
     stance = np.array([0.02, 0.3])
     capture, misplaced = balance_errors(R, com, velocity, soles, stance)
     for at in np.ndindex(*shape):

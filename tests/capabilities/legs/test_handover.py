@@ -162,9 +162,7 @@ def kicking(state: LowState) -> LowState:
 
 def leaning(state: LowState) -> LowState:
     angle = np.arcsin(0.27)
-    return replace(
-        state, imu=replace(state.imu, quat=np.array([np.cos(angle / 2), 0.0, np.sin(angle / 2), 0.0]))
-    )
+    return replace(state, imu=replace(state.imu, quat=np.array([np.cos(angle / 2), 0.0, np.sin(angle / 2), 0.0])))
 
 
 @pytest.mark.parametrize("upset", [rotating, kicking, leaning])

@@ -24,9 +24,7 @@ def test_moves_to_the_stance_without_a_step_and_stays() -> None:
     hold.reset(state(0.1))
     previous = np.full(12, 0.1)
     for _ in range(100):
-        command = hold.step(
-            state(0.1), BASE, LocomotionCommand(Twist(1.0, 0.0, 0.0), np.zeros(2), True, True), 0.02
-        )
+        command = hold.step(state(0.1), BASE, LocomotionCommand(Twist(1.0, 0.0, 0.0), np.zeros(2), True, True), 0.02)
         assert np.abs(command.q - previous).max() <= 0.5 * 0.02 + 1e-12
         previous = command.q
     np.testing.assert_allclose(previous, np.tile(STANCES["stand"], 2))

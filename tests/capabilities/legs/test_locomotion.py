@@ -70,9 +70,7 @@ def test_a_huge_twist_is_clamped_to_the_envelope_and_reported(driver: Driver, hu
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("component", ["vx", "vy", "wz"])
-def test_a_twist_that_is_not_finite_stops_the_robot_and_is_reported(
-    driver: Driver, bad: float, component: str
-) -> None:
+def test_a_twist_that_is_not_finite_stops_the_robot_and_is_reported(driver: Driver, bad: float, component: str) -> None:
     driver.run(1.0, Twist(0.5))
     driver.run(1.0, replace(Twist(0.5), **{component: bad}))
     assert driver.applied == ZERO
@@ -112,9 +110,7 @@ def test_nobody_walks_before_the_estimate_has_found_the_floor(driver: Driver) ->
     driver.base = found
     driver.run(1.0, Twist(0.5))
     assert driver.applied == Twist(0.5)
-    driver.base = replace(
-        found, stale=True
-    )  # lost for a moment, as in a shove: how long is the gate's business
+    driver.base = replace(found, stale=True)  # lost for a moment, as in a shove: how long is the gate's business
     driver.run(0.1, Twist(0.5))
     assert driver.applied == Twist(0.5)
     driver.layer.reset(driver.state)

@@ -42,9 +42,7 @@ def test_standing_is_its_doing() -> None:
     assert not FloorPlant(velocity_noise=0.03).run(MPC(never), 2.5, PUSH)
 
 
-def test_a_robot_of_which_no_rollout_is_finite_is_given_up(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_robot_of_which_no_rollout_is_finite_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings where it is called
     legs, plant = MPC(QUICK), FloorPlant()
     state, base = plant.sense()

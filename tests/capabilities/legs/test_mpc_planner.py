@@ -43,9 +43,7 @@ def test_predictive_sampling_never_gets_worse_and_takes_the_best() -> None:
 
 
 @pytest.mark.parametrize(("present", "gain"), [(3.0, 1.0), (1.5, 0.4)])
-def test_cem_moves_to_the_mean_of_the_elite_but_slowly_while_the_plan_is_good(
-    present: float, gain: float
-) -> None:
+def test_cem_moves_to_the_mean_of_the_elite_but_slowly_while_the_plan_is_good(present: float, gain: float) -> None:
     tried = planner(PlannerConfig(samples=8, elite=0.25, gain=0.4))
     knots = tried.sample()
     tried.update(knots, np.full(8, np.nan))

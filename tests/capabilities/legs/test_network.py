@@ -34,9 +34,7 @@ def write_onnx(
         nodes.append(helper.make_node("MatMul", ["x", "W"], ["z"]))
         y.append(helper.make_tensor_value_info("z", kind, [*batch, outputs]))
     model = helper.make_model(
-        helper.make_graph(nodes, "net", [x], y, [W]),
-        opset_imports=[helper.make_opsetid("", 17)],
-        ir_version=9,
+        helper.make_graph(nodes, "net", [x], y, [W]), opset_imports=[helper.make_opsetid("", 17)], ir_version=9
     )
     onnx.save(model, str(path))
     return path

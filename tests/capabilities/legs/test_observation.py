@@ -20,9 +20,7 @@ POSTURE = np.linspace(-1.0, 1.0, NUM_JOINTS)
 
 def signals(shape: tuple[int, ...] = (), seed: int = 0) -> Signals:
     rng = np.random.default_rng(seed)
-    values: dict[str, Any] = {
-        f.name: rng.uniform(size=(*shape, WIDTH.get(f.name, 3))) for f in fields(Signals)
-    }
+    values: dict[str, Any] = {f.name: rng.uniform(size=(*shape, WIDTH.get(f.name, 3))) for f in fields(Signals)}
     values["stepping"] = rng.uniform(size=shape) < 0.5
     return Signals(**values)
 

@@ -61,9 +61,7 @@ def test_feet_that_were_set_elsewhere_count_where_they_are() -> None:
     robot = Robot()
     robot.run(1.0, moving=False)
     there = PlanarPose(-1.0, 0.3, 3.0)  # the heading wraps between the feet
-    robot.feet = [
-        there @ foot @ PlanarPose(0.0, 0.0, turn) for foot, turn in zip(FEET, (0.2, -0.2), strict=True)
-    ]
+    robot.feet = [there @ foot @ PlanarPose(0.0, 0.0, turn) for foot, turn in zip(FEET, (0.2, -0.2), strict=True)]
     robot.base = there @ PlanarPose(0.0, 0.0, -0.04)
     robot.run(6.0, moving=True)
     same(robot.base @ robot.rest.pose, there)

@@ -11,9 +11,7 @@ from golem.types import Array
 DT = 0.01
 
 
-def walk(
-    trim: VelocityIntegrator, wanted: Array, seconds: float, yaw: float = 0.0, push: float = 0.0
-) -> Array:
+def walk(trim: VelocityIntegrator, wanted: Array, seconds: float, yaw: float = 0.0, push: float = 0.0) -> Array:
     """Let a robot at heading `yaw` walk that does 85 % of what it is told and drifts; return its last twist."""
     c, s = np.cos(yaw), np.sin(yaw)
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -26,11 +26,7 @@ def test_a_map_is_read_as_it_was_written(tmp_path: Path) -> None:
     save_map(tmp_path / "new" / "hall", a_map())
     read = load_map(tmp_path / "new" / "hall.yaml")
     assert (read.cells == a_map().cells).all() and read.origin == a_map().origin
-    assert (
-        read.resolution == 0.05
-        and (read.cloud == a_map().cloud).all()
-        and (read.walls == a_map().walls).all()
-    )
+    assert read.resolution == 0.05 and (read.cloud == a_map().cloud).all() and (read.walls == a_map().walls).all()
     facts = yaml.safe_load((tmp_path / "new" / "hall.yaml").read_text())
     assert facts["free_thresh"] == 0.196 and facts["mode"] == "trinary" and facts["image"] == "hall.pgm"
     pgm = (tmp_path / "new" / "hall.pgm").read_bytes()
@@ -42,9 +38,7 @@ def test_a_map_is_read_as_it_was_written(tmp_path: Path) -> None:
 def test_any_cells_come_back(rows: int, columns: int, data: st.DataObject) -> None:
     import tempfile
 
-    values = data.draw(
-        st.lists(st.sampled_from([-1, 0, 100]), min_size=rows * columns, max_size=rows * columns)
-    )
+    values = data.draw(st.lists(st.sampled_from([-1, 0, 100]), min_size=rows * columns, max_size=rows * columns))
     cells = np.array(values, np.int8).reshape(rows, columns)
     with tempfile.TemporaryDirectory() as folder:
         one = a_map()
@@ -115,9 +109,7 @@ def written(folder: Path, image: str, extra: str = "", resolution: str = "0.05")
         ("raw", "mode: raw\n", [[0, -1, -1], [0, -1, -1]]),
     ],
 )
-def test_what_is_transparent_is_unknown(
-    mode: str, extra: str, cells: list[list[int]], tmp_path: Path
-) -> None:
+def test_what_is_transparent_is_unknown(mode: str, extra: str, cells: list[list[int]], tmp_path: Path) -> None:
     grey = np.array([[0, 128, 255], [0, 128, 255]], np.uint8)
     alpha = np.array([[255, 255, 255], [127, 0, 255]], np.uint8)
     expected = cells

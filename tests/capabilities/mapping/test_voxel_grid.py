@@ -44,9 +44,7 @@ def scans(count: int, at: PlanarPose | None = None, first: int = 1) -> list[Scan
 def with_box(scan: Scan, x: float, y: float) -> Scan:
     """Return a scan in which somebody stands at a place: 200 points instead of what is behind."""
     rng = np.random.default_rng(round(100 * scan.t))
-    body = np.column_stack(
-        [x + 0.1 * rng.random(200), y + 0.2 * rng.random(200), -0.8 + 1.1 * rng.random(200)]
-    )
+    body = np.column_stack([x + 0.1 * rng.random(200), y + 0.2 * rng.random(200), -0.8 + 1.1 * rng.random(200)])
     bearing = np.arctan2(scan.points[:, 1], scan.points[:, 0]) - math.atan2(y + 0.1, x)
     return replace(scan, points=np.concatenate([scan.points[np.abs(bearing) > 0.2 / x], body]))
 

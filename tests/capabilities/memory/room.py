@@ -16,9 +16,7 @@ WALL = 2.5
 """Distance of the wall from the eye [m]."""
 KINDS = ("mug", "can", "bowl")
 
-T_LOOK: Array = np.array(
-    [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.2], [0.0, 0.0, 0.0, 1.0]]
-)
+T_LOOK: Array = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.2], [0.0, 0.0, 0.0, 1.0]])
 """The eye at 1.2 m height, looking along x."""
 
 

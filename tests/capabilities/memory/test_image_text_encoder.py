@@ -23,9 +23,7 @@ SMALL = {"hidden_size": 16, "intermediate_size": 16, "num_hidden_layers": 1, "nu
 
 
 @pytest.fixture(scope="module")
-def clip(
-    hub: Any, letter_tokenizer: Callable[[Path, int], Any], tmp_path_factory: pytest.TempPathFactory
-) -> Path:
+def clip(hub: Any, letter_tokenizer: Callable[[Path, int], Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
     import torch
 
     folder = tmp_path_factory.mktemp("clip")
@@ -72,9 +70,7 @@ def check(network: str, folder: Path) -> None:
     dark = replace(LOOK, frame=replace(FRAME, rgb=np.zeros_like(FRAME.rgb)))
     assert not np.allclose(encoder.frame(dark), image)
     np.testing.assert_array_equal(ImageTextEncoder(network, folder).frame(LOOK), image)  # type: ignore[arg-type]
-    memory = registry.create(
-        "memory", "frame_index", {"encoder": network, "weights": str(folder), "least": 0.0}
-    )
+    memory = registry.create("memory", "frame_index", {"encoder": network, "weights": str(folder), "least": 0.0})
     memory.observe(LOOK)
     places = memory.query("mug")
     assert len(places) <= 1 and (not places or places[0].score == pytest.approx(float(mug @ image)))
@@ -100,9 +96,7 @@ def test_without_weights_a_sentence_says_what_is_missing() -> None:
         registry.create("memory", "frame_index", {"encoder": "sigclip"})
 
 
-def test_without_the_extra_a_sentence_says_what_installs_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_the_extra_a_sentence_says_what_installs_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "transformers", None)
     monkeypatch.setitem(__import__("sys").modules, "torch", None)
     assert hub_model.EXTRA == "vision"

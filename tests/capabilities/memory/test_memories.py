@@ -69,9 +69,7 @@ def test_cells_answer_with_where_it_was_as_well() -> None:
     for t in range(6):
         memory.observe(look(float(t), {"mug": HERE}))
     memory.observe(look(6.0, {"mug": THERE}))
-    old, new = (
-        np.linalg.norm([p.position[:2] - at[:2] for p in memory.query("mug")], axis=1) for at in (HERE, THERE)
-    )
+    old, new = (np.linalg.norm([p.position[:2] - at[:2] for p in memory.query("mug")], axis=1) for at in (HERE, THERE))
     assert old.min() < 0.2 and new.min() < 0.2
     assert old.argmin() < new.argmin()  # what was seen more often comes first: the failure the paper reports
 

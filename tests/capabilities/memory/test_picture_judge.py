@@ -82,8 +82,7 @@ def test_what_is_nowhere_any_more_is_told_as_moved() -> None:
 
 
 @pytest.mark.parametrize(
-    "said",
-    [[], {}, "mug", [1], [{"place": 7, "then": True, "now": True}], [{"place": 0, "then": 1, "now": 1}]],
+    "said", [[], {}, "mug", [1], [{"place": 7, "then": True, "now": True}], [{"place": 0, "then": 1, "now": 1}]]
 )
 def test_what_is_no_verdict_names_no_place(said: Any) -> None:
     with judged(lambda _: said) as (memory, _):

@@ -23,9 +23,7 @@ def pack(pose: PlanarPose, rng: np.random.Generator, count: int = 3000) -> np.nd
     return local @ np.array([[c, s], [-s, c]]) + (T.x, T.y)
 
 
-@pytest.mark.parametrize(
-    "pose", [PlanarPose(0.9, 0.1, 0.0), PlanarPose(0.7, -0.2, 0.3), PlanarPose(1.2, 0.0, -0.4)]
-)
+@pytest.mark.parametrize("pose", [PlanarPose(0.9, 0.1, 0.0), PlanarPose(0.7, -0.2, 0.3), PlanarPose(1.2, 0.0, -0.4)])
 def test_the_edge_is_where_the_pack_is(pose: PlanarPose) -> None:
     rng = np.random.default_rng(1)
     edge = near_edge(pack(pose, rng), VIEW)

@@ -15,9 +15,7 @@ def person(rng: np.random.Generator, at: Array) -> Array:
 
 
 def wall(rng: np.random.Generator) -> Array:
-    return np.column_stack([rng.uniform(-3.0, 3.0, 300), np.full(300, 3.5)]) + 0.02 * rng.standard_normal(
-        (300, 2)
-    )
+    return np.column_stack([rng.uniform(-3.0, 3.0, 300), np.full(300, 3.5)]) + 0.02 * rng.standard_normal((300, 2))
 
 
 def watch(velocity: Array, scans: int = 12) -> tuple[Movers, Array]:

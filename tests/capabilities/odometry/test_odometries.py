@@ -33,9 +33,7 @@ def test_legs_count_from_where_the_robot_stood_first() -> None:
     odometry.add_legs(legs_at(0.0, 0.0))
     first = odometry.estimate()
     assert first is not None
-    np.testing.assert_allclose(
-        first.T_odom_base, transform(np.zeros(3), rotation_rpy(0.0, 0.1, 0.0)), atol=1e-9
-    )
+    np.testing.assert_allclose(first.T_odom_base, transform(np.zeros(3), rotation_rpy(0.0, 0.1, 0.0)), atol=1e-9)
     odometry.add_legs(legs_at(0.1, 1.0))
     after = odometry.estimate()
     assert after is not None
@@ -116,19 +114,9 @@ def flipped(t: float) -> np.ndarray:
 
 IMPOSSIBLE = {
     "a jump of 3 m": (lambda t: transform((0.3 * t + 3.0 * (t > 2.0), 0.0, 0.0)), 10.0, 0.0, "3.03 m"),
-    "a jump of 1 m": (
-        lambda t: transform((0.3 * t, 1.0 * (t > 2.0), 0.0)),
-        10.0,
-        0.0,
-        "has moved the robot 1.0",
-    ),
+    "a jump of 1 m": (lambda t: transform((0.3 * t, 1.0 * (t > 2.0), 0.0)), 10.0, 0.0, "has moved the robot 1.0"),
     "a jump up": (lambda t: transform((0.0, 0.0, 0.9 * (t > 2.0))), 10.0, 0.0, "has moved the robot 0.90 m"),
-    "a restart at zero": (
-        lambda t: transform((1.0 * t * (t < 2.0), 0.0, 0.0)),
-        10.0,
-        0.0,
-        "has moved the robot",
-    ),
+    "a restart at zero": (lambda t: transform((1.0 * t * (t < 2.0), 0.0, 0.0)), 10.0, 0.0, "has moved the robot"),
     "100 m/s": (lambda t: transform((100.0 * t, 0.0, 0.0)), 10.0, 0.0, "has moved the robot 10.00 m"),
     "100 m/s, 500 Hz": (lambda t: transform((100.0 * t, 0.0, 0.0)), 500.0, 0.0, "has moved the robot 0"),
     "10 m/s": (lambda t: transform((10.0 * t, 0.0, 0.0)), 100.0, 0.0, "has moved the robot"),
@@ -139,12 +127,7 @@ IMPOSSIBLE = {
         "3.1 rad in 0.1",
     ),
     "upside down": (flipped, 10.0, 0.0, "tilted by 180 degrees"),
-    "on its side": (
-        lambda t: transform((0.0, 0.0, 0.0), rotation_rpy(1.57, 0.0, 0.0)),
-        10.0,
-        0.0,
-        "by 90 deg",
-    ),
+    "on its side": (lambda t: transform((0.0, 0.0, 0.0), rotation_rpy(1.57, 0.0, 0.0)), 10.0, 0.0, "by 90 deg"),
     "a velocity of 100 m/s": (lambda t: transform((0.3 * t, 0.0, 0.0)), 10.0, 100.0, "move at 100.0 m/s"),
 }
 
@@ -215,9 +198,7 @@ def test_an_adapter_registers_scans_and_leaves_bad_ones_out(use: str) -> None:
     assert odometry.estimate() is None and "fewer than" in odometry.why
 
 
-def test_points_without_times_of_their_own_are_not_corrected_for_motion(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_points_without_times_of_their_own_are_not_corrected_for_motion(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("kiss_icp")
     odometry = registry.create("odometry", "kiss_icp", {})
     given: list[int] = []

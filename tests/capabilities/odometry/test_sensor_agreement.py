@@ -40,17 +40,12 @@ def shifted(kind: type | tuple[type, ...], by: float, since: float = 0.0) -> Cha
 
 
 def scaled(by: float) -> Change:
-    return lambda reading: (
-        replace(reading, acc=by * reading.acc) if isinstance(reading, LidarImu) else reading
-    )
+    return lambda reading: replace(reading, acc=by * reading.acc) if isinstance(reading, LidarImu) else reading
 
 
 LOST = {
     "points upside down": (turned(points=FLIP), "outside the LiDAR's field of view"),
-    "points on their side": (
-        turned(points=rotation_rpy(np.pi / 2, 0, 0)),
-        "outside the LiDAR's field of view",
-    ),
+    "points on their side": (turned(points=rotation_rpy(np.pi / 2, 0, 0)), "outside the LiDAR's field of view"),
     "points face back": (turned(points=BACK), "legs and the LiDAR contradict"),
     "points face left": (turned(points=LEFT), "legs and the LiDAR contradict"),
     "imu upside down": (turned(imu=FLIP), "leans by"),

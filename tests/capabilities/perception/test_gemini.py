@@ -82,8 +82,7 @@ def test_boxes_come_into_space_and_the_question_is_the_papers() -> None:
     assert (mug.label, mug.t) == ("coffee_mug", 0.3)
     height, width = FRAME.depth.shape
     np.testing.assert_allclose(
-        mug.detection.box,
-        [0.475 * width - 0.5, 0.45 * height - 0.5, 0.525 * width - 0.5, 0.55 * height - 0.5],
+        mug.detection.box, [0.475 * width - 0.5, 0.45 * height - 0.5, 0.525 * width - 0.5, 0.55 * height - 0.5]
     )
     assert mug.position[2] == pytest.approx(0.3 - 0.49, abs=0.02)
     path, key, body = asked[0]

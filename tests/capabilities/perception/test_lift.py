@@ -47,12 +47,7 @@ def test_a_pixel_at_integer_coordinates_lies_on_its_own_ray() -> None:
 
 @pytest.mark.parametrize(
     ("label", "inside", "found"),
-    [
-        ("screw", PLATE + 0.02, False),
-        ("screw", PLATE, True),
-        ("screw", HEAD, True),
-        ("tray", PLATE + 0.02, True),
-    ],
+    [("screw", PLATE + 0.02, False), ("screw", PLATE, True), ("screw", HEAD, True), ("tray", PLATE + 0.02, True)],
 )
 def test_what_lies_deeper_than_its_ground_is_no_screw(label: str, inside: float, found: bool) -> None:
     c = (300.0, 200.0)
@@ -137,7 +132,5 @@ def test_the_nearest_mode_is_found_under_noise(z: float, noise: float, seed: int
     rng = np.random.default_rng(seed)
     near = z + noise * rng.standard_normal(round(100 * share))
     far = z + 0.05 + noise * rng.standard_normal(100 - len(near))
-    depth = surface_depth(
-        rng.permutation(np.concatenate([near, far])).astype(np.float32), LiftConfig(), flush=False
-    )
+    depth = surface_depth(rng.permutation(np.concatenate([near, far])).astype(np.float32), LiftConfig(), flush=False)
     assert depth is not None and abs(depth - z) < 0.0015

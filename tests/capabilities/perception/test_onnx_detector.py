@@ -111,9 +111,7 @@ def test_the_head_sees_the_parts_where_they_are(
     truth = tops(stage, label)
     beside_tray = truth[:, 1] > -0.18
     truth = truth[
-        beside_tray
-        & in_view(head, truth)
-        & (np.linalg.norm(truth - head.T_odom_optical[:3, 3], axis=1) < 1.1)
+        beside_tray & in_view(head, truth) & (np.linalg.norm(truth - head.T_odom_optical[:3, 3], axis=1) < 1.1)
     ]
     found = np.array([o.position for o in detector.locate(head, [label])])
     missed = nearest(truth, found) > tolerance
@@ -176,8 +174,6 @@ def test_a_network_of_another_kind_is_refused(tmp_path: Path) -> None:
     value = onnx.helper.make_tensor_value_info("x", onnx.TensorProto.FLOAT, [1])
     graph = onnx.helper.make_graph([onnx.helper.make_node("Identity", ["x"], ["y"])], "g", [value], [
         onnx.helper.make_tensor_value_info("y", onnx.TensorProto.FLOAT, [1])])  # fmt: skip
-    onnx.save(
-        onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 17)], ir_version=8), other
-    )
+    onnx.save(onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 17)], ir_version=8), other)
     with pytest.raises(ConfigError, match="no 'classes'"):
         OnnxDetector(OnnxDetectorConfig(weights=str(other)))

@@ -21,9 +21,7 @@ SIZE = FRAME.rgb.shape[:2]
 
 
 @pytest.fixture(scope="module")
-def owl(
-    hub: Any, letter_tokenizer: Callable[[Path, int], Any], tmp_path_factory: pytest.TempPathFactory
-) -> Path:
+def owl(hub: Any, letter_tokenizer: Callable[[Path, int], Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
     import torch
 
     folder = tmp_path_factory.mktemp("owlv2")
@@ -131,9 +129,7 @@ def test_folders_that_hold_no_such_model_are_one_sentence(owl: Path, tmp_path: P
         Owlv2(OpenWordsConfig(tmp_path))
 
 
-def test_without_the_extra_the_line_that_installs_it_is_told(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_without_the_extra_the_line_that_installs_it_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(__import__("sys").modules, "transformers", None)
     pytest.importorskip("torch", reason="torch is told first where both are absent")
     with pytest.raises(MissingExtra, match=r"'transformers' is not installed; .*golem-humanoid\[vision\]"):

@@ -53,10 +53,7 @@ def dense(*rows: tuple[float, ...]) -> Array:
 def test_the_dense_answer_comes_back_into_the_image(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     # 640 x 480 in 640 x 640: no scale, 80 px of grey above.
     answer = dense(
-        (320, 320, 40, 20, 0.9, 0.1),
-        (322, 320, 40, 20, 0.5, 0.0),
-        (100, 200, 30, 30, 0.1, 0.8),
-        (9, 99, 9, 9, 0.1, 0),
+        (320, 320, 40, 20, 0.9, 0.1), (322, 320, 40, 20, 0.5, 0.0), (100, 200, 30, 30, 0.1, 0.8), (9, 99, 9, 9, 0.1, 0)
     )
     module = network(monkeypatch, tmp_path, Session(answer))
     assert module.classes == ("screw", "bus_bar")
@@ -106,9 +103,7 @@ def test_one_class_of_yolov5_is_no_corners(
         network(monkeypatch, tmp_path, Session(np.array([[row]]), "{0: 'screw'}"))
 
 
-def test_a_network_that_cannot_run_is_found_at_the_start(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_network_that_cannot_run_is_found_at_the_start(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def run(outputs: list[str], inputs: dict[str, Array]) -> list[Array]:
         raise RuntimeError("INVALID_ARGUMENT")
 

@@ -152,9 +152,7 @@ def test_the_goal_that_is_free_is_taken(planner: RrtConnect) -> None:
 
 def test_a_start_in_collision_is_refused(planner: RrtConnect) -> None:
     inside = World([box(0.36, -0.44, 0.25, 0.1, 0.1, 0.1)])
-    refused(
-        planner, Refusal.START, "cannot set out from where they are: something is in the way", world=inside
-    )
+    refused(planner, Refusal.START, "cannot set out from where they are: something is in the way", world=inside)
     through = HOME.copy()
     through[9] = 0.1895
     refused(planner, Refusal.START, "the robot touches itself", q=through)

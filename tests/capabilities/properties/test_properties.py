@@ -10,11 +10,7 @@ import pytest
 from tests.capabilities.perception.test_gemini import fault, service, words
 
 from golem.capabilities.properties.base import Properties, holding_force
-from golem.capabilities.properties.gemini_estimate import (
-    GeminiEstimate,
-    GeminiEstimateConfig,
-    read_properties,
-)
+from golem.capabilities.properties.gemini_estimate import GeminiEstimate, GeminiEstimateConfig, read_properties
 from golem.capabilities.properties.property_table import PropertyTable, PropertyTableConfig
 from golem.errors import ConfigError, ServiceUnavailable
 

@@ -205,10 +205,7 @@ def _lets_nan_through(module: Any, method: Callable[..., Any]) -> Callable[..., 
 def _holds_nan(given: tuple[Any, ...]) -> bool:
     return any(
         (isinstance(v, float) and v != v)
-        or (
-            dataclasses.is_dataclass(v)
-            and _holds_nan(tuple(getattr(v, f.name) for f in dataclasses.fields(v)))
-        )
+        or (dataclasses.is_dataclass(v) and _holds_nan(tuple(getattr(v, f.name) for f in dataclasses.fields(v))))
         for v in given
     )
 
@@ -219,9 +216,7 @@ GENERAL: dict[str, Mutant] = {
     "returns nothing": Mutant("answers_soundly", _nothing, never=("odometry", "mapper")),
     "returns NaN": Mutant("answers_soundly", _of(lambda a: a * np.nan)),
     "counts over all instances": Mutant("repeats_itself", _counts_over_all),
-    "never forgets": Mutant(
-        "starts_over", _never_forgets, only=("estimator", "servo", "lower_body", "upper_body")
-    ),
+    "never forgets": Mutant("starts_over", _never_forgets, only=("estimator", "servo", "lower_body", "upper_body")),
     "asks for the time": Mutant("reads_no_clock", _first(time.perf_counter)),
     "sleeps": Mutant("reads_no_clock", _first(lambda: time.sleep(1e-4))),
     "reads a file": Mutant("opens_no_file", _first(_read_file)),
@@ -230,18 +225,14 @@ GENERAL: dict[str, Mutant] = {
     "draws from numpy": Mutant("draws_no_shared_randomness", _first(np.random.rand)),
     "draws from the system": Mutant("draws_no_shared_randomness", _first(np.random.default_rng)),
     "writes into its input": Mutant(
-        "leaves_inputs_alone",
-        _writes_input,
-        never=("robot", "navigator", "localizer", "odometry", "mapper", "memory"),
+        "leaves_inputs_alone", _writes_input, never=("robot", "navigator", "localizer", "odometry", "mapper", "memory")
     ),
     "returns one buffer": Mutant(
         "leaves_answers_alone", _one_buffer, never=("hand", "navigator", "localizer", "mapper", "memory")
     ),
     "is slow": Mutant("keeps_its_time", _slow, only=("estimator", "hand")),
     "lets NaN through": Mutant(
-        "stops_nan",
-        _lets_nan_through,
-        never=("robot", "localizer", "grasp_method", "odometry", "mapper", "memory"),
+        "stops_nan", _lets_nan_through, never=("robot", "localizer", "grasp_method", "odometry", "mapper", "memory")
     ),
 }
 
@@ -255,9 +246,7 @@ def changed(**fields: Any) -> Change:
     def change(answer: Any) -> Any:
         if answer is None:
             return None
-        new = {
-            name: value(getattr(answer, name)) if callable(value) else value for name, value in fields.items()
-        }
+        new = {name: value(getattr(answer, name)) if callable(value) else value for name, value in fields.items()}
         return dataclasses.replace(answer, **new)
 
     return change
@@ -292,15 +281,9 @@ OWN: dict[tuple[str, str], tuple[str, Change]] = {
     ("estimator", "stamps with its own time"): ("stamps_are_the_states", changed(t=lambda t: t - 1.0)),
     ("servo", "has negative gains"): ("gains_are_not_negative", changed(kp=lambda kp: kp - 300.0)),
     ("servo", "is stiff at once"): ("starts_softly", changed(kp=np.full(27, 100.0))),
-    ("servo", "has gains of its own for the legs"): (
-        "obeys_the_gains_of_the_legs",
-        changed(kd=lambda kd: 0.5 * kd),
-    ),
+    ("servo", "has gains of its own for the legs"): ("obeys_the_gains_of_the_legs", changed(kd=lambda kd: 0.5 * kd)),
     ("hand", "opens wider than it can"): ("keeps_the_range_of_the_hand", changed(gap=lambda gap: gap + 1.0)),
-    ("hand", "presses harder than it can"): (
-        "keeps_the_range_of_the_hand",
-        changed(force=lambda f: f + 99.0),
-    ),
+    ("hand", "presses harder than it can"): ("keeps_the_range_of_the_hand", changed(force=lambda f: f + 99.0)),
     ("lower_body", "sends degrees"): ("targets_are_angles_of_joints", changed(q=np.degrees)),
     ("lower_body", "has negative damping"): ("gains_are_possible", changed(kd=lambda kd: -kd)),
     ("lower_body", "is stiffer than any motor"): ("gains_are_possible", changed(kp=lambda kp: 1e4 + kp)),
@@ -314,10 +297,7 @@ OWN: dict[tuple[str, str], tuple[str, Change]] = {
     ),
     ("grasp_method", "puts the worse first"): ("best_grasp_comes_first", _worse_first),
     ("grasp_method", "opens wider than the hand"): ("gap_fits_the_hand", _each(changed(gap=0.2))),
-    ("grasp_method", "grasps thin air"): (
-        "grasps_the_object",
-        _each(changed(T_odom_gripper=moved((2, 3), 0.5))),
-    ),
+    ("grasp_method", "grasps thin air"): ("grasps_the_object", _each(changed(T_odom_gripper=moved((2, 3), 0.5)))),
     ("odometry", "is elsewhere"): ("stays_where_the_robot_stands", changed(T_odom_base=moved((0, 3), 1.0))),
     ("odometry", "tilts"): (
         "stays_where_the_robot_stands",
@@ -327,10 +307,7 @@ OWN: dict[tuple[str, str], tuple[str, Change]] = {
         "begins_at_the_origin",
         changed(T_odom_base=lambda T: transform((0, 0, 0), rotation_rpy(0.0, 0.0, 0.1)) @ T),
     ),
-    ("odometry", "stands for ever"): (
-        "notices_that_the_robot_walks",
-        changed(T_odom_base=lambda T: np.eye(4)),
-    ),
+    ("odometry", "stands for ever"): ("notices_that_the_robot_walks", changed(T_odom_base=lambda T: np.eye(4))),
     ("odometry", "stamps with its own time"): ("stamps_are_of_now", changed(t=lambda t: t - 1.0)),
     ("odometry", "is surer than sure"): ("answers_soundly", changed(covariance=-np.eye(6))),
     ("mapper", "forgets the walls"): (
@@ -371,10 +348,7 @@ OWN: dict[tuple[str, str], tuple[str, Change]] = {
         "best_score_comes_first",
         _each(changed(detection=changed(score=lambda score: score + 1.0))),
     ),
-    ("localizer", "stamps with its own time"): (
-        "stamps_are_the_frames",
-        _each(changed(t=lambda t: t + 0.03)),
-    ),
+    ("localizer", "stamps with its own time"): ("stamps_are_the_frames", _each(changed(t=lambda t: t + 0.03))),
 }
 """What one slot alone promises: (slot, what is wrong) -> (the check that names it, what happens to each answer)."""
 

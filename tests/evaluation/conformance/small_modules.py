@@ -31,9 +31,7 @@ class DarkSpots:
             ray = np.array([(u - info.cx) / info.fx, (v - info.cy) / info.fy, 1.0, 0.0])
             p = frame.T_odom_optical @ (ray * float(frame.depth[v, u]) + (0, 0, 0, 1))
             box, center = np.array([u - 5.0, v - 5.0, u + 5.0, v + 5.0]), np.array([float(u), float(v)])
-            found.append(
-                LocalizedObject(Detection("screw", score, box, center), frame.t, p[:3], p[None, :3].copy())
-            )
+            found.append(LocalizedObject(Detection("screw", score, box, center), frame.t, p[:3], p[None, :3].copy()))
         return found
 
 

@@ -273,9 +273,7 @@ def _guesses_a_depth(eyes: Any) -> None:
         ("robot", "cameras_see", _wrap("capture", lambda images: (images[0], -images[1]))),
     ],
 )
-def test_a_promise_that_takes_more_than_an_answer_to_break_is_named(
-    slot: str, check: str, change: Change
-) -> None:
+def test_a_promise_that_takes_more_than_an_answer_to_break_is_named(slot: str, check: str, change: Change) -> None:
     report = examine(broken(slot, change))
     assert check in named(report), [(f.check, f.reason) for f in report.failed]
     assert len(named(report)) <= 2

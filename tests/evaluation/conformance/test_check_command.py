@@ -60,9 +60,7 @@ def run(monkeypatch: pytest.MonkeyPatch, *words: str) -> int:
     return end.value.code
 
 
-def test_a_module_that_is_right_ends_in_0(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_module_that_is_right_ends_in_0(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(monkeypatch, "grasp_method", "{use: centroid, depth: 0.01}") == 0
     said = capsys.readouterr().out
     assert "keeps all" in said and "gap fits the hand" in said

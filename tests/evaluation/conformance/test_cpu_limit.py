@@ -70,7 +70,5 @@ def test_ctrl_c_says_which_promise_was_asked(monkeypatch: pytest.MonkeyPatch) ->
             interrupted(check)
 
     monkeypatch.setattr("golem.evaluation.conformance.check_command.examine", ask)
-    with pytest.raises(
-        KeyboardInterrupt, match="interrupted while properties: table was asked: repeats itself"
-    ):
+    with pytest.raises(KeyboardInterrupt, match="interrupted while properties: table was asked: repeats itself"):
         run_check(CheckConfig(slot="properties", use="table"))

@@ -59,14 +59,9 @@ def test_what_is_written_is_clean(there: Path) -> None:
     for slot in SUITES:
         run_new(NewConfig(slot, f"my_{slot}"), there)
     ruff = Path(sys.executable).parent / "ruff"
-    for words in (
-        ["check", "--select", RULES, "--ignore", "D105,D107,D203,D213,N806"],
-        ["format", "--check"],
-    ):
+    for words in (["check", "--select", RULES, "--ignore", "D105,D107,D203,D213,N806"], ["format", "--check"]):
         ran = subprocess.run(
-            [ruff, words[0], "--isolated", "--line-length", "110", *words[1:], "."],
-            capture_output=True,
-            text=True,
+            [ruff, words[0], "--isolated", "--line-length", "110", *words[1:], "."], capture_output=True, text=True
         )
         assert ran.returncode == 0, ran.stdout
 
@@ -86,9 +81,7 @@ def test_nothing_is_overwritten(there: Path) -> None:
         ("hand", "import", "not 'import'"),
     ],
 )
-def test_a_name_that_cannot_be_is_answered_with_one_that_can(
-    slot: str, name: str, sentence: str, there: Path
-) -> None:
+def test_a_name_that_cannot_be_is_answered_with_one_that_can(slot: str, name: str, sentence: str, there: Path) -> None:
     with pytest.raises(ConfigError, match=sentence.replace("?", r"\?")):
         run_new(NewConfig(slot, name), there)
 
@@ -98,9 +91,7 @@ def test_a_users_tests_name_the_promise_that_is_broken(there: Path) -> None:
     source = (there / "mine.py").read_text()
     (there / "mine.py").write_text(source.replace("self._gap, target", "9.0, target"))
     ran = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_mine.py"],
-        capture_output=True,
-        text=True,
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_mine.py"], capture_output=True, text=True
     )
     assert ran.returncode == 1
     assert "test_mine[gap_fits_the_hand]" in ran.stdout and "1 failed" in ran.stdout

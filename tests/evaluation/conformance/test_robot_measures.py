@@ -119,15 +119,11 @@ def _xyzw(state: LowState) -> LowState:
 
 
 def _falls_freely(state: LowState) -> LowState:
-    return LowState(
-        state.t, state.q, state.dq, state.tau, Imu(state.imu.quat, state.imu.gyro, 0.1 * state.imu.acc)
-    )
+    return LowState(state.t, state.q, state.dq, state.tau, Imu(state.imu.quat, state.imu.gyro, 0.1 * state.imu.acc))
 
 
 def _backward(state: LowState) -> LowState:
-    return LowState(
-        state.t, state.q, state.dq, state.tau, Imu(state.imu.quat, -state.imu.gyro, state.imu.acc)
-    )
+    return LowState(state.t, state.q, state.dq, state.tau, Imu(state.imu.quat, -state.imu.gyro, state.imu.acc))
 
 
 def test_a_robot_that_does_as_it_is_told_keeps_every_promise() -> None:

@@ -30,15 +30,11 @@ def test_a_method_is_a_lower_body_or_the_files_of_a_policy() -> None:
     assert with_legs(stack, "legs.py:Mine").choice("lower_body") == Choice("legs.py:Mine")
     files = {"file": "almi_open", "network": "net.pt"}
     assert with_legs(stack, "policy:almi_open:net.pt").choice("lower_body") == Choice("policy", files)
-    assert with_legs(stack, "policy:mine.yaml").choice("lower_body") == Choice(
-        "policy", {"file": "mine.yaml"}
-    )
+    assert with_legs(stack, "policy:mine.yaml").choice("lower_body") == Choice("policy", {"file": "mine.yaml"})
     vendor = with_legs(stack, "vendor:almi_open:net.pt")
     assert vendor.choice("lower_body") == Choice("vendor")
     assert vendor.choice("onboard") == Choice("policy", files)
-    assert with_legs(stack, "{use: almi, walk: net.onnx}").choice("lower_body") == Choice(
-        "almi", {"walk": "net.onnx"}
-    )
+    assert with_legs(stack, "{use: almi, walk: net.onnx}").choice("lower_body") == Choice("almi", {"walk": "net.onnx"})
 
 
 def test_what_is_compared_is_not_replaced_as_well() -> None:

@@ -10,8 +10,7 @@ from golem.robots.mujoco.spectator import Shot
 
 
 @pytest.mark.parametrize(
-    ("point", "side"),
-    [((0.0, 0.0, 1.0), "middle"), ((0.0, -0.5, 1.0), "right"), ((0.0, 0.0, 1.5), "above")],
+    ("point", "side"), [((0.0, 0.0, 1.0), "middle"), ((0.0, -0.5, 1.0), "right"), ((0.0, 0.0, 1.5), "above")]
 )
 def test_points_are_projected_as_the_camera_sees_them(point: tuple[float, ...], side: str) -> None:
     shot = Shot(look_at=(0.0, 0.0, 1.0), azimuth=0.0, elevation=-10.0, distance=4.0)  # looks along x

@@ -21,9 +21,7 @@ SCREWS = [fastener(0.43, -0.10, True), fastener(0.43, -0.20, False)]
 
 def said(outcome: str, x: float = 0.43, y: float = -0.10, in_tray: bool = False) -> dict[str, float]:
     hands = {0: np.array([x, y, 0.0])}
-    return claims(
-        PickReport(outcome, [Tried("right", 0.0, 0.0, 0.0, outcome)]), SCREWS, set(), in_tray, hands
-    )
+    return claims(PickReport(outcome, [Tried("right", 0.0, 0.0, 0.0, outcome)]), SCREWS, set(), in_tray, hands)
 
 
 @pytest.mark.parametrize(

@@ -7,13 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from golem.evaluation.episodes.simulated_odometry import (
-    LATENCY,
-    PERIOD,
-    POSITION_NOISE,
-    YAW_NOISE,
-    SimulatedOdometry,
-)
+from golem.evaluation.episodes.simulated_odometry import LATENCY, PERIOD, POSITION_NOISE, YAW_NOISE, SimulatedOdometry
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.robots.mujoco.engine import MujocoRobot

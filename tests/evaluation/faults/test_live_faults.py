@@ -23,12 +23,6 @@ def test_each_is_answered_rightly(tmp_path: Path, domain: int) -> None:
     pytest.importorskip("cyclonedds")
     command = [sys.executable, "-m", "golem", "faults", "--live", "--domain", str(domain)]
     done = subprocess.run(
-        command,
-        capture_output=True,
-        text=True,
-        timeout=800,
-        check=False,
-        cwd=tmp_path,
-        stdin=subprocess.DEVNULL,
+        command, capture_output=True, text=True, timeout=800, check=False, cwd=tmp_path, stdin=subprocess.DEVNULL
     )
     assert done.returncode == 0, done.stdout

@@ -21,9 +21,7 @@ def run(fake: Make, method: str, limit: float = 60.0) -> LadderResult:
     return result
 
 
-@pytest.mark.parametrize(
-    ("method", "says"), [("leaves", "SystemExit: 3"), ("interrupts", "KeyboardInterrupt")]
-)
+@pytest.mark.parametrize(("method", "says"), [("leaves", "SystemExit: 3"), ("interrupts", "KeyboardInterrupt")])
 def test_who_wants_to_end_the_process_loses_its_trial(
     fake: Make, method: str, says: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -71,9 +69,7 @@ def test_native_code_that_hangs_and_lets_no_python_run_is_ended(fake: Make) -> N
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="no /proc here")
-def test_what_a_module_started_ends_with_it(
-    fake: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_module_started_ends_with_it(fake: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GOLEM_TEST", str(tmp_path))
     run(fake, "orphans", limit=2.0)
     assert marked(tmp_path) == []

@@ -148,9 +148,7 @@ def test_a_replaced_module_is_another_configuration(fake: Make) -> None:
 
 
 @pytest.mark.slow
-def test_ctrl_c_keeps_what_finished_and_tells_the_command(
-    fake: Make, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ctrl_c_keeps_what_finished_and_tells_the_command(fake: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     config = fake("good", n=5)
     append, kept = RunFolder.append, []
 
@@ -174,9 +172,7 @@ def test_ctrl_c_keeps_what_finished_and_tells_the_command(
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="no /proc here")
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
-def test_a_killed_run_leaves_no_process_and_continues_to_the_same_bytes(
-    fake: Make, tmp_path: Path, how: int
-) -> None:
+def test_a_killed_run_leaves_no_process_and_continues_to_the_same_bytes(fake: Make, tmp_path: Path, how: int) -> None:
     script, config = tmp_path / "script.py", fake("poor", "slow", n=20, out="killed", j=2)
     script.write_text(SCRIPT)
     path = os.pathsep.join(sys.path)
@@ -235,9 +231,7 @@ def test_workers_compute_in_one_thread_and_the_parents_environment_comes_back(
 
 def test_the_command_line_that_a_run_names_is_the_one_that_makes_it(fake: Make) -> None:
     options = FakeOptions(skill=0.5)
-    config = fake(
-        "good", "poor", n=7, seed=3, j=2, use=("upper_body=my ik.py:MyIk",), json=True, options=options
-    )
+    config = fake("good", "poor", n=7, seed=3, j=2, use=("upper_body=my ik.py:MyIk",), json=True, options=options)
     words = shlex.split(config.command())
     assert words[:2] == ["golem", "ladder"]
     again = read_ladder(words[2:])
@@ -275,9 +269,7 @@ def test_an_adaptive_rung_goes_where_the_results_lead(fake: Make) -> None:
     assert content(one) == content(two)
 
 
-def test_help_lists_the_rungs_and_what_each_can_be_told(
-    fake: Make, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_help_lists_the_rungs_and_what_each_can_be_told(fake: Make, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         read_ladder(["--rung", "fake", "--help"])
     said = capsys.readouterr().out

@@ -19,14 +19,7 @@ PROVENANCE = Provenance({"a": FACTS, "b": {}}, {"stack.py": 16 * "c"}, "commit",
 def trial(method: str, index: int, picture: bytes | None = None) -> tuple[TrialRecord, Finished]:
     spec = TrialSpec("tether", method, "field", 0, index)
     outcome = TrialOutcome(
-        False,
-        "reach",
-        "upper_body: diff_ik",
-        "short",
-        {"total": 2.5},
-        {"x": 1.0},
-        picture,
-        costs={"tick": 0.5},
+        False, "reach", "upper_body: diff_ik", "short", {"total": 2.5}, {"x": 1.0}, picture, costs={"tick": 0.5}
     )
     return PROVENANCE.record(spec, outcome), Finished(outcome, 3.0, 2.0, {"trace.npz": b"trace"})
 
@@ -84,19 +77,10 @@ def other(**config: object) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("what", "options"),
     [
-        (
-            "configuration.*config.stack.latency was 0.02 and is 0.04",
-            other(stack={"latency": 0.04}),
-        ),
-        (
-            "configuration.*config.user_files.lower_body/use has changed",
-            other(user_files={"lower_body/use": 16 * "b"}),
-        ),
+        ("configuration.*config.stack.latency was 0.02 and is 0.04", other(stack={"latency": 0.04})),
+        ("configuration.*config.user_files.lower_body/use has changed", other(user_files={"lower_body/use": 16 * "b"})),
         ("code.*stack.py has changed", {"provenance": replace(PROVENANCE, files={"stack.py": 16 * "d"})}),
-        (
-            "package versions.*numpy was 2 and is 3",
-            {"provenance": replace(PROVENANCE, versions={"numpy": "3"})},
-        ),
+        ("package versions.*numpy was 2 and is 3", {"provenance": replace(PROVENANCE, versions={"numpy": "3"})}),
         ("profile.*profile was field and is ideal", {"profile": "ideal"}),
         ("seed.*seed was 0 and is 1", {"seed": 1}),
     ],
@@ -171,9 +155,7 @@ def test_an_unwritable_folder_is_refused(tmp_path: Path) -> None:
 
 
 def test_methods_have_files_of_their_own() -> None:
-    names = {
-        trial_name(TrialSpec("tether", method, "field", 0, 7)) for method in ("legs/v1.py:M", "legs_v1.py:M")
-    }
+    names = {trial_name(TrialSpec("tether", method, "field", 0, 7)) for method in ("legs/v1.py:M", "legs_v1.py:M")}
     assert len(names) == 2 and all(name.endswith("-00007") and "/" not in name for name in names)
     assert trial_name(TrialSpec("tether", "centroid", "field", 0, 7)) == "centroid-00007"
     pushed = TrialSpec("push-limit", "almi", "bench", 0, 7, case={"direction": "front_left", "level": 2.5})

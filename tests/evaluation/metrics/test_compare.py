@@ -40,16 +40,10 @@ def test_trials_are_paired_across_rungs(runs: tuple[Path, Path], capsys: pytest.
     assert (found.a, found.b) == ("good on fake", "good on harder")
     said = capsys.readouterr().out
     assert "The runs are of two rungs, fake and harder: the same draws in two tasks" in said
-    assert (
-        "good on fake against good on harder" in said
-        and f"{sum(won)}/12" in said
-        and f"{sum(lost)}/12" in said
-    )
+    assert "good on fake against good on harder" in said and f"{sum(won)}/12" in said and f"{sum(lost)}/12" in said
 
 
-def test_runs_that_cannot_be_paired_are_refused(
-    runs: tuple[Path, Path], fake: Callable[..., LadderConfig]
-) -> None:
+def test_runs_that_cannot_be_paired_are_refused(runs: tuple[Path, Path], fake: Callable[..., LadderConfig]) -> None:
     first, _ = runs
     with pytest.raises(ConfigError, match="holds no trials"):
         run_compare(CompareConfig(first, first.with_name("absent")))
@@ -67,8 +61,7 @@ def test_whatever_else_differs_is_said(runs: tuple[Path, Path], capsys: pytest.C
     first, second = runs
     path = second / "trials.jsonl"
     records = [
-        replace(r, overrides={"servo": "mine"}, versions={**r.versions, "numpy": "1"})
-        for r in read_records(path)
+        replace(r, overrides={"servo": "mine"}, versions={**r.versions, "numpy": "1"}) for r in read_records(path)
     ]
     path.write_text("".join(r.line() for r in records))
     run_compare(CompareConfig(first, second))

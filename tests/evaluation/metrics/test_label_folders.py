@@ -109,26 +109,14 @@ def test_what_pycocotools_takes(changes: dict[str, Any], boxes: list[list[float]
         ({"images": [{"id": 1}]}, "an image has no `file_name`"),
         ({"annotations": [{"image_id": 1, "bbox": [1, 1, 2, 2]}]}, "an annotation has no `category_id`"),
         ({"annotations": [{"image_id": 1, "category_id": 3}]}, "the bbox of .* is no list of x, y, width"),
-        (
-            {"annotations": [{"image_id": 1, "category_id": 4, "bbox": [1, 1, 2, 2]}]},
-            r"of class 4; .* 3 \(screw",
-        ),
-        (
-            {"annotations": [{"image_id": 1, "category_id": 3, "bbox": [50, 20, 20, 20]}]},
-            "not in its 64 x 48 pixels",
-        ),
-        (
-            {"annotations": [{"image_id": 1, "category_id": 3, "bbox": [-9, 20, 20, 20]}]},
-            r"corner \(-9, 20, 11, 40\)",
-        ),
+        ({"annotations": [{"image_id": 1, "category_id": 4, "bbox": [1, 1, 2, 2]}]}, r"of class 4; .* 3 \(screw"),
+        ({"annotations": [{"image_id": 1, "category_id": 3, "bbox": [50, 20, 20, 20]}]}, "not in its 64 x 48 pixels"),
+        ({"annotations": [{"image_id": 1, "category_id": 3, "bbox": [-9, 20, 20, 20]}]}, r"corner \(-9, 20, 11, 40\)"),
         (
             {"images": [{"id": 1, "file_name": "a.png", "width": 128, "height": 96}]},
             "has 64 x 48 pixels, in .* 128 x 96: boxes do not fit",
         ),
-        (
-            {"images": [{"id": k, "file_name": "a.png"} for k in (1, 2)]},
-            "a.png is listed twice",
-        ),
+        ({"images": [{"id": k, "file_name": "a.png"} for k in (1, 2)]}, "a.png is listed twice"),
     ],
 )
 def test_what_is_wrong_is_said_without_python(changes: dict[str, Any], match: str, tmp_path: Path) -> None:

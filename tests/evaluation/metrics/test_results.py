@@ -62,16 +62,10 @@ def test_what_is_no_run_folder_is_named(tmp_path: Path) -> None:
 
 def test_a_paper_gets_rows_per_trial_tables_in_latex_and_figures(fake: Make, tmp_path: Path) -> None:
     result = run_ladder(fake("good", "poor", n=4))
-    text = run_results(
-        ResultsConfig((result.out,), tmp_path / "new" / "trials.csv", "csv", tmp_path / "figures")
-    )
+    text = run_results(ResultsConfig((result.out,), tmp_path / "new" / "trials.csv", "csv", tmp_path / "figures"))
     assert (tmp_path / "new" / "trials.csv").read_text() == text
     rows = list(csv.DictReader(io.StringIO(text)))
-    assert [(row["method"], row["index"]) for row in rows[:3]] == [
-        ("good", "0"),
-        ("poor", "0"),
-        ("good", "1"),
-    ]
+    assert [(row["method"], row["index"]) for row in rows[:3]] == [("good", "0"), ("poor", "0"), ("good", "1")]
     for row, record in zip(rows, result.records, strict=True):
         assert row["success"] == str(record.success) and row["stage"] == record.stage
         assert float(row["difficulty"]) == record.series["difficulty"]

@@ -30,17 +30,7 @@ def test_what_is_reported_can_be_undone(fault: str) -> None:
 
 def golem(domain: int, report: Path, fault: str, *more: str) -> subprocess.CompletedProcess[str]:
     """Rehearse the bring-up on a domain."""
-    words = [
-        "bringup",
-        "--rehearse",
-        "--fault",
-        fault,
-        "--report",
-        str(report),
-        "--domain",
-        str(domain),
-        *more,
-    ]
+    words = ["bringup", "--rehearse", "--fault", fault, "--report", str(report), "--domain", str(domain), *more]
     return subprocess.run(
         [sys.executable, "-m", "golem", *words],
         capture_output=True,

@@ -50,7 +50,5 @@ def test_a_panel_per_condition_is_drawn(trials: list[Placed]) -> None:
         condition_plot({"a": trials, "b": trials[:20]}, figure)
         titles = [panel.get_title(loc="left") for panel in figure.axes if panel.axison]
     assert titles == [name.replace("_", " ") for name in (*RANGES, *CHOICES)]
-    heights = [
-        line.get_ydata()[0] for panel in figure.axes for line in panel.lines if len(line.get_ydata()) == 1
-    ]
+    heights = [line.get_ydata()[0] for panel in figure.axes for line in panel.lines if len(line.get_ydata()) == 1]
     assert np.min(heights) == 0.0

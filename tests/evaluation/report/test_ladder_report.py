@@ -114,9 +114,7 @@ def test_a_run_of_one_method_without_failures_has_a_report(fake: Callable[..., L
     assert "What it looks like" not in page.words
 
 
-def test_series_and_margins_are_shown_where_a_rung_has_them(
-    fake: Callable[..., LadderConfig],
-) -> None:
+def test_series_and_margins_are_shown_where_a_rung_has_them(fake: Callable[..., LadderConfig]) -> None:
     result = run_ladder(fake("sure", "good", n=2))
     kept = replace(result.records[0], series={"margin_min": -0.05, "own_figure": 3.0})
     n = 100

@@ -107,14 +107,8 @@ def test_an_estimator_is_judged_on_the_velocity_and_what_depends_on_the_machine_
     gliding: RecordedWalk,
 ) -> None:
     outcome = follow(trial("random_walk_kf"), gliding)
-    assert (outcome.success, outcome.stage, outcome.module) == (
-        False,
-        "velocity",
-        "estimator: random_walk_kf",
-    )
-    assert outcome.series["velocity_walking"] == pytest.approx(0.5, abs=0.05), (
-        "joints at rest hide the motion"
-    )
+    assert (outcome.success, outcome.stage, outcome.module) == (False, "velocity", "estimator: random_walk_kf")
+    assert outcome.series["velocity_walking"] == pytest.approx(0.5, abs=0.05), "joints at rest hide the motion"
     assert outcome.series["distance"] == pytest.approx(1.0, abs=0.05)
     assert set(outcome.costs) == {"tick", "tick_p99"} and not set(outcome.costs) & set(outcome.series)
 
@@ -124,8 +118,7 @@ def test_the_estimators_meet_their_target_on_a_short_walk(monkeypatch: pytest.Mo
     monkeypatch.setattr(walks, "TWISTS", walks.TWISTS[:1])
     rung = BaseEstimation()
     specs = [
-        TrialSpec("base-estimation", m, "field", 0, 0, case={"condition": "nominal"})
-        for m in rung.default_methods
+        TrialSpec("base-estimation", m, "field", 0, 0, case={"condition": "nominal"}) for m in rung.default_methods
     ]
     for outcome in rung.run_together(specs):
         series = outcome.series

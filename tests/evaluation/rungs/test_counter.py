@@ -42,16 +42,12 @@ def test_only_places_with_room_are_asked_for() -> None:
     for index, (kind, hand) in enumerate([(kind, hand) for kind in KINDS for hand in ("left", "right")] * 12):
         kitchen = draw_counter(np.random.default_rng(index))
         case: Case = {"thing": kind, "hand": hand}
-        _, _, place = draw_errand(
-            TrialSpec("counter-tether", "centroid", "field", 1, index, case=case), kitchen
-        )
+        _, _, place = draw_errand(TrialSpec("counter-tether", "centroid", "field", 1, index, case=case), kitchen)
         (thing,) = (one for one in kitchen.things if one.kind == kind)
         back += place == pytest.approx(tuple(thing.position[:2]))
         for other in kitchen.things:
             if other is not thing:
-                room = (
-                    np.hypot(*np.subtract(other.position[:2], place)) - KINDS[kind][0] - KINDS[other.kind][0]
-                )
+                room = np.hypot(*np.subtract(other.position[:2], place)) - KINDS[kind][0] - KINDS[other.kind][0]
                 assert room > 0.01
     assert 0 < back < 20
 
@@ -62,9 +58,7 @@ def test_the_things_that_are_asked_for_are_tried_case_by_case() -> None:
     assert cases == [{"thing": "can"}, {"thing": "bowl"}]
     kitchen = draw_counter(np.random.default_rng(0))
     for case in cases:
-        kind, hand, _ = draw_errand(
-            TrialSpec("counter-tether", "centroid", "field", 1, 0, case=case), kitchen
-        )
+        kind, hand, _ = draw_errand(TrialSpec("counter-tether", "centroid", "field", 1, 0, case=case), kitchen)
         (thing,) = (one for one in kitchen.things if one.kind == case["thing"])
         assert kind == case["thing"] and (thing.position[1] > 0.0) == (hand == "left")
     both = CounterTether(CounterOptions(thing=("can",), each=True)).cases(lambda case: None)

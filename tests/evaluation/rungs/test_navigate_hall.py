@@ -33,22 +33,14 @@ class Ended:
     """An episode whose skill has ended as a test says."""
 
     def __init__(self, episode: Episode, result: SkillResult | None, at: PlanarPose = HERE) -> None:
-        self.running, self.robot, self.result, self.loss, self.t = (
-            episode.running,
-            episode.robot,
-            result,
-            None,
-            9.0,
-        )
+        self.running, self.robot, self.result, self.loss, self.t = (episode.running, episode.robot, result, None, 9.0)
         self.running.bus.publish(topics.ODOMETRY, Odometry(9.0, transform((at.x, at.y, 0.0))), 9.0)
 
 
 DONE = SkillResult(True, "done", None, "")
 
 
-def outcome(
-    episode: Episode, result: SkillResult | None, goal: PlanarPose, **how: Any
-) -> tuple[str, str | None]:
+def outcome(episode: Episode, result: SkillResult | None, goal: PlanarPose, **how: Any) -> tuple[str, str | None]:
     contacts = ContactWatch(episode.robot)
     contacts.touched |= how.pop("touched", {})
     spec = how.pop("spec", SPEC)
@@ -59,10 +51,7 @@ def outcome(
 def test_it_compares_navigators_under_the_maps_that_are_asked_for() -> None:
     assert rung_class("navigate") is NavigateRung
     rung = make_rung("golem.evaluation.rungs.navigate_hall:NavigateRung", {"map": ["none", "survey"]})
-    assert "costmap_astar" in rung.methods() and [c["map"] for c in rung.cases(lambda case: None)] == [
-        "none",
-        "survey",
-    ]
+    assert "costmap_astar" in rung.methods() and [c["map"] for c in rung.cases(lambda case: None)] == ["none", "survey"]
 
 
 def test_the_module_that_lost_it_is_named(episode: Episode) -> None:
@@ -76,17 +65,12 @@ def test_the_module_that_lost_it_is_named(episode: Episode) -> None:
     assert outcome(episode, DONE, GOAL) == ("goal", "navigator: costmap_astar")
     touched = {"left_wrist on course": 3.0}
     assert outcome(episode, DONE, HERE, touched=touched) == ("contact", "navigator: costmap_astar")
-    assert outcome(episode, DONE, HERE, touched=touched, at=PlanarPose(0.5, 0.0, 0.0)) == (
-        "contact",
-        "odometry: lio",
-    )
+    assert outcome(episode, DONE, HERE, touched=touched, at=PlanarPose(0.5, 0.0, 0.0)) == ("contact", "odometry: lio")
     silent = SkillResult(False, "navigate", "odometry", "The odometry has been silent for 0.6 s.")
     assert outcome(episode, silent, GOAL) == ("navigate", "odometry: lio")
 
 
 @pytest.mark.slow
 def test_a_trial_arrives() -> None:
-    found = NavigateRung().run(
-        TrialSpec("navigate", "costmap_astar", "field", 0, 1, case={"map": "survey"}), None
-    )
+    found = NavigateRung().run(TrialSpec("navigate", "costmap_astar", "field", 0, 1, case={"map": "survey"}), None)
     assert found.success and found.series["goal_radial"] < 0.1

@@ -25,9 +25,7 @@ def test_a_lower_body_that_cannot_walk_is_not_sent(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_ours_walks_a_line_and_is_judged_where_it_truly_stands(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ours_walks_a_line_and_is_judged_where_it_truly_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(navigate_line, "DISTANCE", 1.5)
     outcome = NavigateLine().run(spec("almi"), tmp_path / "trial")
     assert outcome.success, outcome.detail

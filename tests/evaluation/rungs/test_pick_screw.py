@@ -73,13 +73,9 @@ def test_a_trial_depends_on_its_spec_alone(rung: TetherRung) -> None:
 
 
 @pytest.mark.parametrize(
-    "name, reason",
-    [("Raises", "my bug"), ("Nan", "NaN"), ("Short", "shape (7,)")],
-    ids=["raises", "nan", "shape"],
+    "name, reason", [("Raises", "my bug"), ("Nan", "NaN"), ("Short", "shape (7,)")], ids=["raises", "nan", "shape"]
 )
-def test_a_module_that_breaks_its_contract_is_named(
-    name: str, reason: str, tmp_path: Path, rung: TetherRung
-) -> None:
+def test_a_module_that_breaks_its_contract_is_named(name: str, reason: str, tmp_path: Path, rung: TetherRung) -> None:
     from golem.errors import ModuleFault
 
     file = tmp_path / "mine.py"
@@ -130,9 +126,7 @@ def truth(
         ("place", "grasp_method", truth(), "localizer"),
     ],
 )
-def test_the_larger_error_takes_the_blame(
-    stage: str, slot: str, seen: GraspTruth | None, culprit: str
-) -> None:
+def test_the_larger_error_takes_the_blame(stage: str, slot: str, seen: GraspTruth | None, culprit: str) -> None:
     assert blame(stage, slot, seen) == culprit
 
 
@@ -163,9 +157,7 @@ def test_a_file_in_the_home_folder_may_be_named_by_the_tilde(
 ) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
     (tmp_path / "mine.py").write_text("class Arms:\n    pass\n")
-    assert rung.config("centroid", "ideal", {"upper_body": "~/mine.py:Arms"})["user_files"].keys() == {
-        "upper_body/use"
-    }
+    assert rung.config("centroid", "ideal", {"upper_body": "~/mine.py:Arms"})["user_files"].keys() == {"upper_body/use"}
 
 
 @pytest.mark.parametrize("slot, use", [("grasp_method", "centroid"), ("robot", "mujoco")])
@@ -211,13 +203,7 @@ def test_both_rungs_meet_the_same_screws_and_errors() -> None:
         friction = model.geom_friction[np.isin(model.geom_bodyid, screws)]
         tables = [robot.calibration[camera] for camera in sorted(robot.calibration)]
         # A robot on its feet is lower than one in its hoist, and so is its table.
-        found.append(
-            (
-                heads - np.array([0.0, 0.0, heads[0][2]]),
-                np.array(tables),
-                friction,
-            )
-        )
+        found.append((heads - np.array([0.0, 0.0, heads[0][2]]), np.array(tables), friction))
         robot.close()
     for one, other in zip(*found, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-12)

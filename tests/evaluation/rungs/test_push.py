@@ -73,9 +73,7 @@ def test_standing_again_is_a_success_with_the_time_it_took() -> None:
     ],
     ids=["outside at the end", "still stepping", "fell"],
 )
-def test_what_was_lost_names_stage_and_lower_body(
-    margin: float, loss: Loss | None, rests: bool, stage: str
-) -> None:
+def test_what_was_lost_names_stage_and_lower_body(margin: float, loss: Loss | None, rests: bool, stage: str) -> None:
     outcome = judge(trace(margin), 2.0, rod("left", 22.0), loss, rests, "mine")
     assert not outcome.success and outcome.stage == stage and outcome.module == "lower_body: mine"
     assert "22 N to the left" in outcome.detail

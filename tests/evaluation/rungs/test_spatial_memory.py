@@ -25,10 +25,7 @@ def test_an_episode_is_what_the_paper_describes(episode: Relocation) -> None:
     assert len(episode.observations) == 16
     times = [look.frame.t for look in episode.observations]
     assert times == sorted(times) and times[7] < episode.moved_at < times[8]
-    for walk, things in (
-        (episode.observations[:8], episode.before),
-        (episode.observations[8:], episode.after),
-    ):
+    for walk, things in ((episode.observations[:8], episode.before), (episode.observations[8:], episode.after)):
         seen = {found.label: found.position for look in walk for found in look.objects}
         assert set(seen) == {thing.kind for thing in things}
         for thing in things:
@@ -82,9 +79,7 @@ def test_conditions_are_what_they_are_called(condition: str, looks: int) -> None
     found = relocation(np.random.default_rng(3), CONDITIONS[condition])
     assert len(found.observations) == looks and found.split == looks - 8
     assert sum(len(look.objects) for look in found.observations[-16:-8]) >= 2
-    assert sum(len(look.objects) for look in found.observations[: looks - 16]) == (
-        1000 if looks == 116 else 0
-    )
+    assert sum(len(look.objects) for look in found.observations[: looks - 16]) == (1000 if looks == 116 else 0)
 
 
 @pytest.mark.slow
@@ -97,9 +92,7 @@ def test_a_day_ends_with_the_target_at_its_last_place() -> None:
         for look in found.observations
     ]
     old, new = found.before[0].position, found.after[0].position
-    early, last = (
-        [one[found.target] for one in part if found.target in one] for part in (seen[:8], seen[56:])
-    )
+    early, last = ([one[found.target] for one in part if found.target in one] for part in (seen[:8], seen[56:]))
     assert min(np.linalg.norm(at[:2] - new[:2]) for at in early) < 0.2
     assert min(np.linalg.norm(at[:2] - new[:2]) for at in last) < 0.2
     middle = [one[found.target] for one in seen[8:56] if found.target in one]

@@ -25,13 +25,9 @@ for name, module in sorted(sys.modules.items()):
 """
 
 
-def test_only_what_is_older_than_its_source_is_compiled(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_what_is_older_than_its_source_is_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     codes = [1, 0]
-    monkeypatch.setattr(
-        subprocess, "run", lambda words, check: subprocess.CompletedProcess(words, codes.pop(0))
-    )
+    monkeypatch.setattr(subprocess, "run", lambda words, check: subprocess.CompletedProcess(words, codes.pop(0)))
     monkeypatch.setattr(plan_kernel.verdict, "_cache", type("Cache", (), {"cache_path": str(tmp_path)}))
     assert compile_ahead.compile_if_cold() is not None  # it failed: the next one tries again
     assert compile_ahead.compile_if_cold() is not None

@@ -18,13 +18,9 @@ def test_every_object_is_kept_and_nothing_lost(capsys: pytest.CaptureFixture[str
     assert figures[-1].median == 0 and "object_map" in capsys.readouterr().out
 
 
-def test_looks_that_were_acknowledged_and_not_kept_are_counted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_looks_that_were_acknowledged_and_not_kept_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file that is written by nobody, beside a process that acknowledges."""
-    monkeypatch.setattr(
-        memory_bench.ObjectMap, "last", property(lambda self: 0.0, lambda self, t: None), False
-    )
+    monkeypatch.setattr(memory_bench.ObjectMap, "last", property(lambda self: 0.0, lambda self, t: None), False)
     assert memory_bench._killed(tmp_path / "memory.sqlite", 1) > 0
     assert MemoryFile(tmp_path / "memory.sqlite").read()[1] > 0  # which the process itself has written
 

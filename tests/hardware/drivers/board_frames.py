@@ -17,9 +17,5 @@ def crc16(data: bytes) -> int:
 
 def frame_bytes(frame: BoardFrame) -> bytes:
     """Return the eight bytes of a frame."""
-    body = (
-        b"\xa5\x5a"
-        + frame.sequence.to_bytes(2, "little")
-        + bytes((0xC3 if frame.pressed else 0x3C, frame.echo))
-    )
+    body = b"\xa5\x5a" + frame.sequence.to_bytes(2, "little") + bytes((0xC3 if frame.pressed else 0x3C, frame.echo))
     return body + crc16(body).to_bytes(2, "little")

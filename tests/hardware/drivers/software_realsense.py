@@ -67,9 +67,7 @@ class SoftwareRealSense:
         found = self._syncer.poll_for_frames()
         return found if found and found.size() else None
 
-    def show(
-        self, stamp: float, depth: NDArray[np.uint16], color: NDArray[np.uint8], wall: bool = False
-    ) -> None:
+    def show(self, stamp: float, depth: NDArray[np.uint16], color: NDArray[np.uint8], wall: bool = False) -> None:
         """Expose a picture at `stamp` [s] of the camera's clock, or of the `wall`'s; `depth` [mm], `color` rgb."""
         rs = self._rs
         self.number += 1

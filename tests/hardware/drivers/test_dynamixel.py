@@ -18,8 +18,7 @@ def status_bytes(packet: StatusPacket) -> bytes:
 def test_instructions_are_those_of_the_manual() -> None:
     assert read_packet(1, 43, 1).hex(" ") == "ff ff 01 04 02 2b 01 cc"
     values = {
-        i: bytes.fromhex(data)
-        for i, data in enumerate(("10 00 50 01", "20 02 60 03", "30 00 70 01", "20 02 80 03"))
+        i: bytes.fromhex(data) for i, data in enumerate(("10 00 50 01", "20 02 60 03", "30 00 70 01", "20 02 80 03"))
     }
     assert sync_write_packet(30, values).hex(" ") == (
         "ff ff fe 18 83 1e 04 00 10 00 50 01 01 20 02 60 03 02 30 00 70 01 03 20 02 80 03 12"

@@ -39,9 +39,7 @@ class Hand:
     """A hand: controller, driver, bus, servos; time is simulated."""
 
     bus: SimulatedBus = field(
-        default_factory=lambda: SimulatedBus(
-            {i + 1: SimulatedAx12(i + 1, OPEN[i] * 1023.0 / 300.0) for i in range(2)}
-        )
+        default_factory=lambda: SimulatedBus({i + 1: SimulatedAx12(i + 1, OPEN[i] * 1023.0 / 300.0) for i in range(2)})
     )
     t: float = 0.0
     reports: list[HandState] = field(default_factory=list)
@@ -101,16 +99,12 @@ def test_it_opens_and_reports_a_hundred_times_a_second(hand: Hand) -> None:
     hand.run(1.0)
     assert hand.state is GripState.OPEN
     assert 95 <= sum(report.t > hand.t - 1.0 for report in hand.reports) <= 101
-    assert (
-        hand.reports[-1].gap == pytest.approx(hand.reports[-1].fingers.sum()) and hand.reports[-1].gap > 0.102
-    )
+    assert hand.reports[-1].gap == pytest.approx(hand.reports[-1].fingers.sum()) and hand.reports[-1].gap > 0.102
     assert (hand.driver.lost, hand.driver.strays, hand.driver.skipped, hand.faults) == (0, 0, 0, [])
 
 
 @pytest.mark.parametrize("gap", [0.005, 0.02, 0.05, 0.09, 0.10])
-def test_a_commanded_gap_is_reached_and_reported_within_two_ticks_of_the_servos(
-    hand: Hand, gap: float
-) -> None:
+def test_a_commanded_gap_is_reached_and_reported_within_two_ticks_of_the_servos(hand: Hand, gap: float) -> None:
     hand.controller.open(gap)
     hand.run(2.0)
     assert hand.state is GripState.OPEN
@@ -205,9 +199,7 @@ def test_the_cable_is_missed_within_a_tenth_of_a_second_and_found_again(hand: Ha
 
 
 @pytest.mark.parametrize("servo", [1, 2])
-def test_a_servo_that_dies_while_it_holds_is_missed_and_the_other_one_holds_on(
-    hand: Hand, servo: int
-) -> None:
+def test_a_servo_that_dies_while_it_holds_is_missed_and_the_other_one_holds_on(hand: Hand, servo: int) -> None:
     hand.grip(8.0)
     hand.bus.servos[servo].dead = True
     died = hand.t

@@ -9,23 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.hardware.drivers.mid360_peer import (
-    PERIOD,
-    POINTS,
-    Mid360Peer,
-    datagram,
-    imu_datagram,
-    points_datagram,
-)
+from tests.hardware.drivers.mid360_peer import PERIOD, POINTS, Mid360Peer, datagram, imu_datagram, points_datagram
 
 from golem.hardware.drivers.device_clock import DeviceClock
-from golem.hardware.drivers.mid360_driver import (
-    ImuDatagram,
-    LidarError,
-    Mid360,
-    PointDatagram,
-    decode_datagram,
-)
+from golem.hardware.drivers.mid360_driver import ImuDatagram, LidarError, Mid360, PointDatagram, decode_datagram
 from golem.interfaces.lidar import LidarImu, LidarScan
 
 OURS = 100.0

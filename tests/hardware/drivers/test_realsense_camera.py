@@ -120,10 +120,7 @@ def test_stamps_of_the_wall_clock_become_ours() -> None:
 def test_stamps_of_the_cameras_own_clock_become_ours_by_the_quickest_picture() -> None:
     rig = Rig()
     rig.warm_up(0.0)
-    times = [
-        rig.see(0.066 * (i + 1), dt=0.066 + (0.02 if i == 3 else -0.02 if i == 4 else 0.0)).t
-        for i in range(8)
-    ]
+    times = [rig.see(0.066 * (i + 1), dt=0.066 + (0.02 if i == 3 else -0.02 if i == 4 else 0.0)).t for i in range(8)]
     assert np.diff(times) == pytest.approx(0.066, abs=1e-3)
     assert times[-1] == pytest.approx(rig.now, abs=1e-3)
 

@@ -59,9 +59,7 @@ def test_rotation_and_rate_are_mujocos(seed: int, tumbling: Callable[[int], Any]
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_foot_implies_the_velocity_of_the_base_less_its_own(
-    seed: int, tumbling: Callable[[int], Any]
-) -> None:
+def test_a_foot_implies_the_velocity_of_the_base_less_its_own(seed: int, tumbling: Callable[[int], Any]) -> None:
     world = tumbling(seed)
     state, R = world.state(), world.T[:3, :3]
     feet, omega = Feet(FeetConfig()), base_rate(state.imu.gyro, state.q[TORSO], state.dq[TORSO])

@@ -74,14 +74,10 @@ def test_it_follows_a_push(world: Callable[..., Any], estimator: BaseEstimator) 
     assert np.abs(error[150:]).max() < 0.03
 
 
-def test_imu_errors_of_the_field_profile_do_not_move_it(
-    world: Callable[..., Any], estimator: BaseEstimator
-) -> None:
+def test_imu_errors_of_the_field_profile_do_not_move_it(world: Callable[..., Any], estimator: BaseEstimator) -> None:
     errors = ImuErrors(gyro_noise=0.0039, acc_noise=0.028)
     tilt = np.array([1.0, 0.0026, -0.0026, 0.0])
-    bias = ImuBias(
-        tilt / np.linalg.norm(tilt), np.array([0.002, -0.002, 0.002]), np.array([0.05, 0.05, -0.05])
-    )
+    bias = ImuBias(tilt / np.linalg.norm(tilt), np.array([0.002, -0.002, 0.002]), np.array([0.05, 0.05, -0.05]))
     imu = ImuModel(errors, bias, np.random.default_rng(0))
 
     def sensors(state: LowState) -> LowState:
@@ -92,9 +88,7 @@ def test_imu_errors_of_the_field_profile_do_not_move_it(
     assert np.sqrt((error**2).sum(axis=1).mean()) < 0.02
 
 
-def test_in_the_air_it_predicts_and_says_that_it_is_stale(
-    world: Callable[..., Any], estimator: BaseEstimator
-) -> None:
+def test_in_the_air_it_predicts_and_says_that_it_is_stale(world: Callable[..., Any], estimator: BaseEstimator) -> None:
     robot = world()
     estimates, *_ = follow(robot, estimator, 0.3)
     assert not any(e.stale for e in estimates[100:])
@@ -103,9 +97,7 @@ def test_in_the_air_it_predicts_and_says_that_it_is_stale(
     assert 0.2 <= first * DT < 0.35 and all(stale[first:])
 
 
-def test_hanging_feet_are_stale_and_the_base_stays(
-    world: Callable[..., Any], estimator: BaseEstimator
-) -> None:
+def test_hanging_feet_are_stale_and_the_base_stays(world: Callable[..., Any], estimator: BaseEstimator) -> None:
     state = world(floor=False).state()
     # At rest in a band: a specific force of one g with a bias, legs that carry only themselves.
     acc = np.array([0.05, 0.05, 9.86])

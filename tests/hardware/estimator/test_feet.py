@@ -72,9 +72,7 @@ def test_the_pressure_is_where_mujoco_has_it(world: Callable[..., Any]) -> None:
 
 
 @pytest.mark.parametrize("beside", [False, True])
-def test_a_foot_on_the_other_one_does_not_stand_on_the_ground(
-    world: Callable[..., Any], beside: bool
-) -> None:
+def test_a_foot_on_the_other_one_does_not_stand_on_the_ground(world: Callable[..., Any], beside: bool) -> None:
     """The right leg is raised and carries 600 N, the left one, which it pins to the ground in one case, hangs."""
     state = world().advance()
     q = np.zeros(NUM_JOINTS)
@@ -91,9 +89,7 @@ def test_a_foot_on_the_other_one_does_not_stand_on_the_ground(
     felt = np.einsum("kij,ki->kj", legs.jacobians, wrench)
     tau[LEGS] = (legs.gravity(q[LEGS], np.array([0.0, 0.0, -9.81])) - felt).ravel()
     feet = Feet(FeetConfig())
-    feet.step(
-        replace(state, q=q, dq=np.zeros(NUM_JOINTS), tau=tau), np.array([0.0, 0.0, 1.0]), np.zeros(3), DT
-    )
+    feet.step(replace(state, q=q, dq=np.zeros(NUM_JOINTS), tau=tau), np.array([0.0, 0.0, 1.0]), np.zeros(3), DT)
     expected = (-100.0, 600.0) if beside else (500.0, 0.0)
     np.testing.assert_allclose(feet.force, expected, atol=5.0)
     assert feet.contact.argmax() == int(beside)

@@ -43,9 +43,7 @@ class Fingers:
 
 def run(hand: MagpieHand, fingers: Fingers, seconds: float) -> list[GripState]:
     states: list[GripState] = []
-    command = hand.step(
-        HandState(fingers.t, fingers.gap, np.full(2, fingers.gap / 2), np.zeros(2)), fingers.t
-    )
+    command = hand.step(HandState(fingers.t, fingers.gap, np.full(2, fingers.gap / 2), np.zeros(2)), fingers.t)
     for _ in range(round(seconds / DT)):
         command = hand.step(fingers.report(command), fingers.t)
         if not states or states[-1] is not hand.status().state:
@@ -53,9 +51,7 @@ def run(hand: MagpieHand, fingers: Fingers, seconds: float) -> list[GripState]:
     return states
 
 
-def grasp(
-    width: float | None, force: float = 4.0, **options: float
-) -> tuple[MagpieHand, Fingers, list[GripState]]:
+def grasp(width: float | None, force: float = 4.0, **options: float) -> tuple[MagpieHand, Fingers, list[GripState]]:
     hand, fingers = MagpieHand(), Fingers(width, **options)
     run(hand, fingers, 0.1)
     hand.close(force)

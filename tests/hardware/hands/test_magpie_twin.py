@@ -31,9 +31,7 @@ class Twin:
             body = spec.worldbody.add_body(name="bolt", pos=site.xpos)
             body.add_freejoint()
             size = [width / 2, 0.02, 0.0]
-            body.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size, mass=0.05, friction=[0.6, 0.005, 1e-4]
-            )
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=size, mass=0.05, friction=[0.6, 0.005, 1e-4])
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self.servos = HandServos(self.model, "left")

@@ -49,9 +49,7 @@ class Event:
 
 
 EVENTS = st.lists(
-    st.builds(Event, st.sampled_from(KINDS), st.integers(1, 30), st.integers(0, 2**32 - 1)),
-    min_size=1,
-    max_size=25,
+    st.builds(Event, st.sampled_from(KINDS), st.integers(1, 30), st.integers(0, 2**32 - 1)), min_size=1, max_size=25
 )
 
 
@@ -243,9 +241,7 @@ def test_random_states_and_commands_let_no_dangerous_command_out(most: int) -> N
             inputs = world.tick("sound", rng)
             assert inputs.state is not None and inputs.command is not None
             state = replace(inputs.state, q=q, dq=dq, tau=tau)
-            result = check(
-                replace(inputs, state=state, command=LowCommand(world.t, *command)), limits, memory
-            )
+            result = check(replace(inputs, state=state, command=LowCommand(world.t, *command)), limits, memory)
             assert_safe(result, memory)
             active += result.state is GateState.ACTIVE
             memory, n = result.memory, n + 1

@@ -106,11 +106,9 @@ def test_a_fault_stops_at_once_latched_with_its_name(
 def test_silence_stops_within_the_age_however_it_looks(
     silent: str, reason: Reason, age: str, how: str, bench: Any, state_at: Make, command_at: Make
 ) -> None:
-    make = {
-        "estop": lambda t: EstopMessage(t, round(t / 0.002), False),
-        "state": state_at,
-        "command": command_at,
-    }[silent]
+    make = {"estop": lambda t: EstopMessage(t, round(t / 0.002), False), "state": state_at, "command": command_at}[
+        silent
+    ]
     bench.activate()
     for _ in range(20):
         bench.tick()
@@ -204,10 +202,7 @@ def test_a_stuck_request_restarts_nothing(stuck: OperatorRequest, bench: Any) ->
 
 def test_releasing_the_button_before_activation_starts_nothing(bench: Any) -> None:
     bench.tick()
-    assert (
-        bench.tick(estop=EstopMessage(bench.t, 999, True), request=OperatorRequest.ACTIVATE).state
-        is GateState.INIT
-    )
+    assert bench.tick(estop=EstopMessage(bench.t, 999, True), request=OperatorRequest.ACTIVATE).state is GateState.INIT
     for _ in range(100):
         assert bench.tick(request=OperatorRequest.ACTIVATE).state is GateState.ARMED
 

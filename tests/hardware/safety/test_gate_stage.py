@@ -70,11 +70,7 @@ def put(record: Any, inputs: GateInputs) -> None:
     put_state(record, state)
     put_command(record["request"][0], command)
     record["request_t"] = command.t
-    record["estop_t"], record["estop_sequence"], record["estop_pressed"] = (
-        estop.t,
-        estop.sequence,
-        estop.pressed,
-    )
+    record["estop_t"], record["estop_sequence"], record["estop_pressed"] = (estop.t, estop.sequence, estop.pressed)
     record["base_t"], record["stale"] = base.t, base.stale
 
 

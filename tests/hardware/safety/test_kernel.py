@@ -140,11 +140,7 @@ def episode(seed: int, ticks: int) -> Iterator[GateInputs]:
     """Frames of a robot that moves more or less, leans, jumps now and then, and gets strange commands."""
     rng = np.random.default_rng(seed)
     hard = 10.0 ** rng.uniform(-1.5, 0.3)
-    rate, phase, swing = (
-        rng.uniform(2.0, 20.0, 27),
-        rng.uniform(0.0, 6.0, 27),
-        0.1 * hard * rng.uniform(0.0, 1.0, 27),
-    )
+    rate, phase, swing = (rng.uniform(2.0, 20.0, 27), rng.uniform(0.0, 6.0, 27), 0.1 * hard * rng.uniform(0.0, 1.0, 27))
     for i in range(1, ticks):
         t = i * DT
         q, dq = swing * np.sin(rate * t + phase), swing * rate * np.cos(rate * t + phase)
@@ -157,9 +153,7 @@ def episode(seed: int, ticks: int) -> Iterator[GateInputs]:
         if rng.random() < 0.01 * hard:
             q = q + 0.2 * (rng.random(27) < 0.1)
         tau = 20.0 * hard * rng.standard_normal(27)
-        state = LowState(
-            t, q + noise[0], dq + noise[1], tau, Imu(quat, gyro + noise[2, :3], acc + noise[3, :3])
-        )
+        state = LowState(t, q + noise[0], dq + noise[1], tau, Imu(quat, gyro + noise[2, :3], acc + noise[3, :3]))
         far = 100.0 if rng.random() < 0.01 * hard else 1.0
         gains = np.abs(50.0 + 30.0 * noise[2] * 1e3), np.abs(2.0 + 0.5 * noise[3] * 1e3)
         command = LowCommand(t, far * (q + 10.0 * hard * noise[0]), dq, 3e3 * hard * noise[1], *gains)
@@ -180,10 +174,7 @@ def test_the_gate_decides_the_same_without_its_short_cuts(monkeypatch: pytest.Mo
         for a, b in zip(mine, results(seed), strict=True):
             assert (a.state, a.reason, a.detail) == (b.state, b.reason, b.detail)
             assert a.memory.counters == b.memory.counters and a.memory.senses.bad == b.memory.senses.bad
-            assert (a.memory.sender.jolts, a.memory.sender.refused) == (
-                b.memory.sender.jolts,
-                b.memory.sender.refused,
-            )
+            assert (a.memory.sender.jolts, a.memory.sender.refused) == (b.memory.sender.jolts, b.memory.sender.refused)
             for one, other in zip(numbers(a), numbers(b), strict=True):
                 np.testing.assert_array_equal(one, other)
             states.add(a.state)

@@ -71,9 +71,7 @@ def test_the_target_slows_down_towards_the_end_of_the_range(
     q, speeds = np.zeros(27), []
     last = at_rest(limits, q)
     for _ in range(1500):
-        sent, new = limit_command(
-            0.0, state_at(0.0, last.q), command_at(0.0, np.full(27, 9.0)), limits, last, DT
-        )
+        sent, new = limit_command(0.0, state_at(0.0, last.q), command_at(0.0, np.full(27, 9.0)), limits, last, DT)
         speeds.append((new.q[16] - last.q[16]) / DT)
         distance = limits.upper[16] - last.q[16]
         assert speeds[-1] ** 2 <= 2.0 * limits.deceleration[16] * distance + 1e-6
@@ -101,11 +99,7 @@ def test_negative_gains_become_zero(
     assert not sent.kp.any() and not sent.kd.any()
 
 
-ANY = st.one_of(
-    st.floats(-5.0, 5.0),
-    st.floats(-1000.0, 1000.0),
-    st.floats(-1e6, 1e6),
-)
+ANY = st.one_of(st.floats(-5.0, 5.0), st.floats(-1000.0, 1000.0), st.floats(-1e6, 1e6))
 
 
 @given(
@@ -150,12 +144,7 @@ def test_the_receiver_cannot_reach_into_the_memory(
 @pytest.mark.parametrize(("dq", "share"), [(0.0, 1.0), (0.75, 1.0), (0.9, 0.5), (1.0, 0.0), (2.0, -BRAKE)])
 def test_a_joint_near_its_speed_is_driven_on_less_and_braked_beyond(dq: float, share: float) -> None:
     up, down = spared(
-        np.zeros(1),
-        np.array([10.0 * dq]),
-        np.array([1e6]),
-        np.array([10.0]),
-        np.array([-1.0]),
-        np.array([1.0]),
+        np.zeros(1), np.array([10.0 * dq]), np.array([1e6]), np.array([10.0]), np.array([-1.0]), np.array([1.0])
     )
     assert up[0] == pytest.approx(share) and down[0] == 1.0
 
@@ -167,9 +156,7 @@ def test_a_joint_near_the_end_of_its_range_is_driven_on_less_and_braked_beyond()
 
 
 def test_no_command_drives_a_fast_joint_on() -> None:
-    state = LowState(
-        0.0, np.zeros(27), LIMITS.velocity, np.zeros(27), Imu(np.eye(4)[0], np.zeros(3), np.zeros(3))
-    )
+    state = LowState(0.0, np.zeros(27), LIMITS.velocity, np.zeros(27), Imu(np.eye(4)[0], np.zeros(3), np.zeros(3)))
     command = LowCommand(0.0, np.zeros(27), np.zeros(27), LIMITS.torque, np.zeros(27), np.zeros(27))
     sent, _ = limit_command(0.0, state, command, LIMITS, at_rest(LIMITS), DT, strained=True)
     assert np.all(predicted(sent, state) <= 1e-9)

@@ -87,12 +87,8 @@ def violations(limits: SafetyLimits) -> dict[Reason, dict[str, np.ndarray]]:
     }
 
 
-@pytest.mark.parametrize(
-    "reason", [Reason.POSITION, Reason.VELOCITY, Reason.TORQUE, Reason.BRAKING, Reason.TILT]
-)
-def test_a_violation_must_persist(
-    reason: Reason, limits: SafetyLimits, state_at: Callable[..., LowState]
-) -> None:
+@pytest.mark.parametrize("reason", [Reason.POSITION, Reason.VELOCITY, Reason.TORQUE, Reason.BRAKING, Reason.TILT])
+def test_a_violation_must_persist(reason: Reason, limits: SafetyLimits, state_at: Callable[..., LowState]) -> None:
     needed = limits.torque_samples if reason is Reason.TORQUE else limits.samples
     changes = violations(limits)[reason]
     reasons = persistent(state_at(0.0, **changes), limits, needed)
@@ -140,9 +136,7 @@ def test_a_gross_violation_needs_one_sample_and_names_its_joint(
     assert "left_elbow_joint" in fault.detail
 
 
-def test_moving_away_from_a_limit_is_no_braking_fault(
-    limits: SafetyLimits, state_at: Callable[..., LowState]
-) -> None:
+def test_moving_away_from_a_limit_is_no_braking_fault(limits: SafetyLimits, state_at: Callable[..., LowState]) -> None:
     q, dq = np.zeros(27), np.zeros(27)
     q[JOINT], dq[JOINT] = limits.state_upper[JOINT] - 0.01, -5.0
     assert persistent(state_at(0.0, q, dq=dq), limits, 5) == [None] * 5
@@ -161,8 +155,7 @@ def test_a_status_says_why_in_one_line(reason: Reason | None, detail: str, why: 
 
 
 @pytest.mark.parametrize(
-    ("beside", "samples", "stands"),
-    [(None, 3, True), (4, 3, True), (12, 3, False), (4, 25, False)],
+    ("beside", "samples", "stands"), [(None, 3, True), (4, 3, True), (12, 3, False), (4, 25, False)]
 )
 def test_an_arm_that_is_too_fast_leaves_legs_sound_that_are_wrong_for_a_moment(
     beside: int | None, samples: int, stands: bool, state_at: Callable[..., LowState]

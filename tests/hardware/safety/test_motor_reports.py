@@ -12,9 +12,7 @@ from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.safety.motor_reports import PERSISTENT, MotorReports, MotorWatch
 from golem.interfaces.payloads import Reason
 
-WELL = MotorReports(
-    np.ones(27, dtype=bool), np.zeros(27, dtype=np.uint32), np.full((27, 2), 40.0), np.full(27, 58.0)
-)
+WELL = MotorReports(np.ones(27, dtype=bool), np.zeros(27, dtype=np.uint32), np.full((27, 2), 40.0), np.full(27, 58.0))
 
 
 def ill(field: str, value: Any) -> MotorReports:

@@ -83,9 +83,7 @@ def walking(bench: Any) -> Any:
     bench.carry()
     bench.rng = np.random.default_rng(0)
     for k in range(600):
-        result = bench.tick(
-            request=OperatorRequest.ACTIVATE if k else OperatorRequest.NONE, **living(bench, k // 10)
-        )
+        result = bench.tick(request=OperatorRequest.ACTIVATE if k else OperatorRequest.NONE, **living(bench, k // 10))
     assert result.state is GateState.ACTIVE, result.detail
     return bench
 
@@ -150,8 +148,6 @@ def test_every_state_that_arrives_is_integrated(bench: Any, state_at: Make) -> N
                 states.append((1.0 + s, state_at(t, q, dq=dq)))
             newest = states.pop()
             bench.t += 0.008
-            result = bench.tick(
-                state=replace(newest[1], t=bench.t + 0.002), tick=newest[0], earlier=tuple(states)
-            )
+            result = bench.tick(state=replace(newest[1], t=bench.t + 0.002), tick=newest[0], earlier=tuple(states))
             found = found or result.reason
         assert found is (Reason.STATE_IMPLAUSIBLE if drifts else None)

@@ -62,9 +62,7 @@ def test_a_robot_at_work_is_believed() -> None:
     assert run() == (None, 0.0, 0)
 
 
-@pytest.mark.parametrize(
-    ("limb", "stands"), [(slice(0, 6), False), (slice(13, 20), True), (slice(0, 27), False)]
-)
+@pytest.mark.parametrize(("limb", "stands"), [(slice(0, 6), False), (slice(13, 20), True), (slice(0, 27), False)])
 def test_a_limb_that_repeats_its_numbers_is_frozen_within_50_ms(limb: slice, stands: bool) -> None:
     old: list[LowState] = []
 

@@ -97,9 +97,7 @@ def test_what_makes_standing_impossible_damps(
     assert not result.command.kp.any() and (result.command.kd > 0.0).all()
 
 
-def test_a_fault_of_the_arms_leaves_it_standing_and_one_of_the_legs_does_not(
-    standing: Any, state_at: Make
-) -> None:
+def test_a_fault_of_the_arms_leaves_it_standing_and_one_of_the_legs_does_not(standing: Any, state_at: Make) -> None:
     for joint, state in ((16, GateState.STOP2), (3, GateState.STOP1)):
         standing.gate.gate.memory = standing.results[-1].memory
         dq = np.zeros(27)
@@ -157,9 +155,7 @@ def test_in_stop2_a_motor_without_torque_is_named_and_an_outlier_is_borne(
     assert (result.state, result.reason) == (GateState.STOP1, Reason.MOTOR_DEAD)
 
 
-def test_a_robot_that_stands_goes_on_after_reset_and_activation_and_not_before(
-    standing: Any, command_at: Make
-) -> None:
+def test_a_robot_that_stands_goes_on_after_reset_and_activation_and_not_before(standing: Any, command_at: Make) -> None:
     standing.tick(command=nan(command_at, standing.t + 0.002))
     standing.tick()
     assert standing.tick(request=OperatorRequest.ACTIVATE).state is GateState.STOP2, "the reason still stands"

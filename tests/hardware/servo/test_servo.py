@@ -55,9 +55,7 @@ def test_the_command_is_the_papers(state_at: Callable[..., LowState]) -> None:
     assert -12.0 < command.tau[ELBOW] < -2.0
 
 
-def test_stiffness_ramps_up_while_gravity_is_carried_from_the_first_tick(
-    state_at: Callable[..., LowState],
-) -> None:
+def test_stiffness_ramps_up_while_gravity_is_carried_from_the_first_tick(state_at: Callable[..., LowState]) -> None:
     servo = Servo(ServoConfig(ramp=1.0))
     state = state_at(0.0, READY)
     servo.reset(state)

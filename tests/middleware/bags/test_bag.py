@@ -240,9 +240,7 @@ def test_what_a_user_can_do_wrong(tmp_path: Path) -> None:
         ("foxglove_server", "foxglove", "foxglove"),
     ],
 )
-def test_a_missing_extra_is_named(
-    monkeypatch: pytest.MonkeyPatch, module: str, absent: str, extra: str
-) -> None:
+def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch, module: str, absent: str, extra: str) -> None:
     name = f"golem.middleware.bags.{module}"
     monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setitem(sys.modules, absent, None)

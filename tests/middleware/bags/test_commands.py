@@ -48,9 +48,7 @@ def writer(robot: CycloneParticipant, name: str) -> Writer:
 
 def state(t: float) -> bytes:
     zero = np.zeros(27)
-    return encode_low_state(
-        LowState(t, zero + t, zero, zero, Imu(np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3)))
-    )
+    return encode_low_state(LowState(t, zero + t, zero, zero, Imu(np.array([1.0, 0, 0, 0]), np.zeros(3), np.zeros(3))))
 
 
 def image(i: int) -> bytes:
@@ -161,9 +159,7 @@ def test_a_bag_is_played_onto_a_domain(robot: CycloneParticipant, domain: int, t
     with golem("replay", str(tmp_path / "bag"), "--domain", str(domain), "--rate", "0.5") as player:
         out = player.communicate(timeout=30)[0]
         assert player.returncode == 0 and "200 messages" in out
-    assert [decode_low_state(s.payload).t for s in _all(states)] == pytest.approx(
-        [i * 0.002 for i in range(200)]
-    )
+    assert [decode_low_state(s.payload).t for s in _all(states)] == pytest.approx([i * 0.002 for i in range(200)])
     assert len(_all(clock)) == 40
     writer(robot, STATE)
     with golem("replay", str(tmp_path / "bag"), "--domain", str(domain)) as player:

@@ -124,11 +124,7 @@ def test_recorded_by_the_time_of_the_domain() -> None:
         wall.now += 0.001
         say(other, WORDS, text)
     recorder.poll()
-    assert [(t, text) for _, t, text in pile.said()] == [
-        (12.5, "a"),
-        (12.502, "b"),
-        (0.25, "after a restart"),
-    ]
+    assert [(t, text) for _, t, text in pile.said()] == [(12.5, "a"), (12.502, "b"), (0.25, "after a restart")]
     assert {m.publish_time > WALL * NANO for m in pile.messages} == {True}
 
 
@@ -198,9 +194,7 @@ def test_of_two_clocks_the_first_counts_until_it_stops() -> None:
         recorder.poll()
         return pile.said()[-1][1]
 
-    assert (
-        told(lambda: first(12.5), lambda: second(3.0), lambda: first(12.502), lambda: second(3.002)) == 12.502
-    )
+    assert told(lambda: first(12.5), lambda: second(3.0), lambda: first(12.502), lambda: second(3.002)) == 12.502
     assert recorder.received["/clock"] == 2
     wall.now += GONE
     assert told(lambda: second(4.0)) == 4.0
@@ -330,9 +324,7 @@ class Found:
 def test_what_is_found_on_a_domain_is_recorded_as_it_is_offered() -> None:
     writers = [
         Found("rt/chatter", "std_msgs::msg::dds_::String_", LATCHED),
-        Found(
-            "rt/skill/pick/_action/feedback", "golem_interfaces::action::dds_::Pick_FeedbackMessage_", DEFAULT
-        ),
+        Found("rt/skill/pick/_action/feedback", "golem_interfaces::action::dds_::Pick_FeedbackMessage_", DEFAULT),
         Found("rt/secret", "their_msgs::msg::dds_::Unknown_", DEFAULT),
         Found("rt/plain", "Plain", DEFAULT),
         Found("rq/somethingRequest", "std_srvs::srv::dds_::Trigger_Request_", DEFAULT),
@@ -343,9 +335,7 @@ def test_what_is_found_on_a_domain_is_recorded_as_it_is_offered() -> None:
     assert feedback.name == "/skill/pick/_action/feedback"
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"rate": 0.0}, {"rate": float("inf")}, {"start": 3.0, "stop": 2.0}, {"start": -1.0}]
-)
+@pytest.mark.parametrize("wrong", [{"rate": 0.0}, {"rate": float("inf")}, {"start": 3.0, "stop": 2.0}, {"start": -1.0}])
 def test_impossible_plays_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ConfigError):
         PlayConfig(**wrong)  # pyright: ignore[reportArgumentType]

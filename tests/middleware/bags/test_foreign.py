@@ -38,9 +38,7 @@ FOREIGN: dict[str, tuple[tuple[str, str, str, bytes] | tuple[str], bytes, str]] 
 }
 
 
-def write(
-    path: Path, channels: Mapping[str, tuple[tuple[str, ...], list[bytes]]], chunks: bool = True
-) -> None:
+def write(path: Path, channels: Mapping[str, tuple[tuple[str, ...], list[bytes]]], chunks: bool = True) -> None:
     """Write an MCAP file: per topic its encoding, schema and messages, 10 ms apart."""
     with path.open("wb") as file:
         writer = Writer(file, use_chunking=chunks)
@@ -59,9 +57,7 @@ def write(
 
 @pytest.mark.parametrize("chunks", [True, False], ids=["chunks", "no chunks"])
 @pytest.mark.parametrize("kind", FOREIGN)
-def test_what_is_not_of_ros_2_is_named_and_the_rest_is_played(
-    kind: str, chunks: bool, tmp_path: Path
-) -> None:
+def test_what_is_not_of_ros_2_is_named_and_the_rest_is_played(kind: str, chunks: bool, tmp_path: Path) -> None:
     channel, payload, why = FOREIGN[kind]
     sound = [text(f"hi {k}") for k in range(5)]
     path = tmp_path / "mixed.mcap"

@@ -50,9 +50,7 @@ def _ordered(names: list[str], types: dict[str, Definition]) -> list[str]:
 
 def _struct(name: str, definition: Definition) -> str:
     package, kind, short = name.split("/")
-    header = (
-        "unsigned long long guid_; long long sequence_; " if name.endswith(("_Request", "_Response")) else ""
-    )
+    header = "unsigned long long guid_; long long sequence_; " if name.endswith(("_Request", "_Response")) else ""
     members = " ".join(_member(field, kind) for field, kind in definition[1])
     body = f"struct {short}_ {{ {header}{members} }};"
     return f"module {package} {{ module {kind} {{ module dds_ {{ {body} }}; }}; }};"

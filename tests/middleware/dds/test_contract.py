@@ -8,17 +8,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from golem.middleware.dds.base import (
-    ENCAPSULATION,
-    LATCHED,
-    SENSOR,
-    DdsError,
-    Participant,
-    Qos,
-    Reader,
-    Sample,
-    Writer,
-)
+from golem.middleware.dds.base import ENCAPSULATION, LATCHED, SENSOR, DdsError, Participant, Qos, Reader, Sample, Writer
 from golem.middleware.dds.local import LocalDomain
 
 Pair = tuple[Participant, Participant]

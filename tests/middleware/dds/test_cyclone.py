@@ -162,12 +162,7 @@ def test_discovery_tells_who_is_there(participant: CycloneParticipant, domain: i
             participant.guid: "enclave=/;",
             other.guid: "",
         }
-        assert (wrote.topic, wrote.type_name, wrote.qos, wrote.user_data) == (
-            "rt/a",
-            TYPE,
-            qos,
-            "typehash=x;",
-        )
+        assert (wrote.topic, wrote.type_name, wrote.qos, wrote.user_data) == ("rt/a", TYPE, qos, "typehash=x;")
         assert (wrote.guid, wrote.participant) == (writer.guid, participant.guid)
         assert (read.topic, read.qos, read.guid) == ("rt/b", Qos(depth=None), reader.guid)
     finally:
@@ -192,9 +187,7 @@ def test_nobody_there_is_said_with_the_reason(participant: CycloneParticipant, d
     other.close()
     other = connect(DdsConfig(domain))
     other.writer("rt/a", TYPE, Qos(reliable=False))
-    with pytest.raises(
-        DdsError, match="offers best effort, volatile, its reader requests reliable, volatile"
-    ):
+    with pytest.raises(DdsError, match="offers best effort, volatile, its reader requests reliable, volatile"):
         wait()
     other.writer("rt/a", TYPE, Qos()).write(SAMPLE)
     wait()
@@ -267,9 +260,7 @@ sys.stdin.read()
 """
 
 
-def test_another_process_sends_all_and_leaves_at_its_end(
-    participant: CycloneParticipant, domain: int
-) -> None:
+def test_another_process_sends_all_and_leaves_at_its_end(participant: CycloneParticipant, domain: int) -> None:
     reader = participant.reader("rt/a", TYPE, Qos(depth=None))
     arguments = [sys.executable, "-c", OTHER, str(domain), TYPE]
     other = subprocess.Popen(arguments, stdin=subprocess.PIPE)

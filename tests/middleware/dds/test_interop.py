@@ -45,16 +45,7 @@ def build(work: Path, idl: Path) -> list[str]:
         pytest.skip("needs Cyclone DDS 0.10 in C; the idlc found first is another: " + version.stdout)
     for command in (
         ["idlc", str(idl)],
-        [
-            "gcc",
-            "-rdynamic",
-            str(PEER / "peer.c"),
-            idl.with_suffix(".c").name,
-            "-lddsc",
-            "-ldl",
-            "-o",
-            "peer",
-        ],
+        ["gcc", "-rdynamic", str(PEER / "peer.c"), idl.with_suffix(".c").name, "-lddsc", "-ldl", "-o", "peer"],
     ):
         subprocess.run(command, cwd=work, check=True, capture_output=True)
     return [str(work / "peer")]
@@ -114,9 +105,7 @@ def test_an_old_peer_sends_back_what_we_send(
 
 
 @pytest.mark.parametrize("language", ["c", "python"])
-def test_an_old_peer_copes_with_our_large_datagrams(
-    language: str, domain: int, request: pytest.FixtureRequest
-) -> None:
+def test_an_old_peer_copes_with_our_large_datagrams(language: str, domain: int, request: pytest.FixtureRequest) -> None:
     sent = []
     for seed in range(5):
         cdr = Cdr()
@@ -126,15 +115,11 @@ def test_an_old_peer_copes_with_our_large_datagrams(
 
 
 @pytest.mark.parametrize("name", interfaces())
-def test_an_old_peer_takes_part_in_every_topic_of_ours(
-    name: str, domain: int, c_peer_of_all: list[str]
-) -> None:
+def test_an_old_peer_takes_part_in_every_topic_of_ours(name: str, domain: int, c_peer_of_all: list[str]) -> None:
     rng = random.Random(name)
     sent = [serialize(random_message(codec(), name, rng)) for _ in range(COUNT)]
     if name.endswith(("_Request", "_Response")):
-        header = rng.randbytes(
-            16
-        )  # client and sequence number, before the body (rmw_cyclonedds, cdds_request_header)
+        header = rng.randbytes(16)  # client and sequence number, before the body (rmw_cyclonedds, cdds_request_header)
         sent = [payload[:4] + header + payload[4:] for payload in sent]
     exchange(c_peer_of_all, domain, wire_name(name), sent)
 

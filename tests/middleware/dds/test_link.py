@@ -97,9 +97,7 @@ def run(end: End, script: str, *arguments: str) -> subprocess.Popen[str]:
 
 
 @pytest.mark.parametrize("seconds", [1.0, 5.0])
-def test_a_cut_link_neither_holds_up_the_writer_nor_ends_the_stream(
-    ends: tuple[End, End], seconds: float
-) -> None:
+def test_a_cut_link_neither_holds_up_the_writer_nor_ends_the_stream(ends: tuple[End, End], seconds: float) -> None:
     here, there = ends
     reader, writer = run(there, READER), run(here, WRITER, str(seconds))
     try:

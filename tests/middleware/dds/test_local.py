@@ -33,18 +33,14 @@ def test_callbacks_do_not_nest(participant: LocalParticipant) -> None:
         replies_out.write(SAMPLE)
         order.append("request out")
 
-    replies = participant.reader(
-        "rr/s", TYPE, Qos(), on_data=lambda: order.append(f"{len(replies.take())} reply")
-    )
+    replies = participant.reader("rr/s", TYPE, Qos(), on_data=lambda: order.append(f"{len(replies.take())} reply"))
     replies_out = participant.writer("rr/s", TYPE, Qos())
     requests = participant.reader("rq/s", TYPE, Qos(), on_data=on_request)
     participant.writer("rq/s", TYPE, Qos()).write(SAMPLE)
     assert order == ["request in", "request out", "1 reply"]
 
 
-def test_a_callback_that_takes_one_by_one_is_called_until_nothing_is_left(
-    participant: LocalParticipant,
-) -> None:
+def test_a_callback_that_takes_one_by_one_is_called_until_nothing_is_left(participant: LocalParticipant) -> None:
     taken: list[int] = []
     ready: list[bool] = []
     reader = participant.reader(

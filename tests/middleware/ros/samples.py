@@ -12,15 +12,7 @@ from golem.middleware.ros.codec import Codec
 from golem.middleware.ros.definitions import EMPTY_MEMBER
 from golem.middleware.ros.message_class import ARRAY, BASE, NAME
 
-INTEGERS = {
-    "byte": "b",
-    "int8": "b",
-    "uint8": "B",
-    "int16": "h",
-    "uint16": "H",
-    "int32": "i",
-    "uint32": "I",
-} | {
+INTEGERS = {"byte": "b", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I"} | {
     "int64": "q",
     "uint64": "Q",
 }
@@ -31,21 +23,14 @@ EXTREMES = (0, 1, 2, 0x7F, 0xFF, 0x7FFF, 0xFFFF, 0x10000, 0x7FFFFFFF, 0x80000000
 def travelling(codec: Codec) -> list[str]:
     """Return the names of all types whose messages travel: not services and actions as a whole, nor their events."""
     names = codec.names()
-    whole = {
-        name.removesuffix(suffix)
-        for name in names
-        for suffix in ("_Request", "_Goal")
-        if name.endswith(suffix)
-    }
+    whole = {name.removesuffix(suffix) for name in names for suffix in ("_Request", "_Goal") if name.endswith(suffix)}
     return [name for name in names if name not in whole and not name.endswith("_Event")]
 
 
 def random_message(codec: Codec, name: str, rng: random.Random) -> Any:
     """Return a message of type `name` whose fields hold random values."""
     _, fields = codec._types[name]
-    return codec.message(name)(
-        *(0 if field == EMPTY_MEMBER else _value(codec, kind, rng) for field, kind in fields)
-    )
+    return codec.message(name)(*(0 if field == EMPTY_MEMBER else _value(codec, kind, rng) for field, kind in fields))
 
 
 def _value(codec: Codec, kind: tuple[int, Any], rng: random.Random) -> Any:

@@ -31,9 +31,7 @@ def test_a_twist_is_written_as_six_doubles_behind_the_encapsulation_header() -> 
 
 
 def test_a_string_is_written_with_its_length_and_a_zero_and_padded_to_four_bytes() -> None:
-    assert (
-        codec.serialize(String("golem")) == b"\x00\x01\x00\x00" + b"\x06\x00\x00\x00golem\x00" + b"\x00\x00"
-    )
+    assert codec.serialize(String("golem")) == b"\x00\x01\x00\x00" + b"\x06\x00\x00\x00golem\x00" + b"\x00\x00"
 
 
 def test_a_big_endian_payload_is_read() -> None:
@@ -85,9 +83,7 @@ def _same(ours: Any, theirs: Any, where: str) -> None:
 
 
 def test_arrays_of_a_received_message_are_views_that_nobody_can_write() -> None:
-    payload = codec.serialize(
-        Image(height=1, width=4, encoding="mono8", step=4, data=np.arange(4, dtype=np.uint8))
-    )
+    payload = codec.serialize(Image(height=1, width=4, encoding="mono8", step=4, data=np.arange(4, dtype=np.uint8)))
     data = codec.deserialize(payload, Image).data
     assert data.base is not None and not data.flags.writeable
 

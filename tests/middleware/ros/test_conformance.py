@@ -134,9 +134,7 @@ def test_nobody_gets_the_answer_of_another(world: World) -> None:
     clients = [world.node(f"caller_{i}").client("set", SET_BOOL) for i in range(2)]
     for client in clients:
         ready(world, client)
-    answers = [
-        client.call(SetBool.Request(value)) for client, value in zip(clients, (True, False), strict=True)
-    ]
+    answers = [client.call(SetBool.Request(value)) for client, value in zip(clients, (True, False), strict=True)]
     assert [world.get(a).success for a in answers] == [True, False]
     world.settle()
 

@@ -58,10 +58,7 @@ def test_a_node_is_announced_in_the_layout_of_its_peers(distro: str, store: Stor
     assert list(entry.writer_gid_seq[-1].data) == gid(publisher.writer.guid, size)
     assert list(entry.reader_gid_seq[-1].data) == gid(subscription.inbox.guid, size)
     assert len(entry.writer_gid_seq) == len(entry.reader_gid_seq) == 1 + len(parameters.SERVICES)
-    assert (
-        bytes(types.serialize_cdr(info, INFO))
-        == bytes(sample.payload)[: len(types.serialize_cdr(info, INFO))]
-    )
+    assert bytes(types.serialize_cdr(info, INFO)) == bytes(sample.payload)[: len(types.serialize_cdr(info, INFO))]
 
 
 def test_what_is_closed_is_announced_no_more() -> None:
@@ -120,11 +117,7 @@ def test_peers_are_told_hashes_and_identities(domain: int) -> None:
 
 def user_data(domain: int) -> dict[tuple[str, str], dict[str, str]]:
     """Return the USER_DATA of every endpoint on a domain, as keys and values, by topic and kind."""
-    from cyclonedds.builtin import (
-        BuiltinDataReader,
-        BuiltinTopicDcpsPublication,
-        BuiltinTopicDcpsSubscription,
-    )
+    from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
     from cyclonedds.domain import DomainParticipant
     from cyclonedds.qos import Policy
 

@@ -65,9 +65,7 @@ class Scene:
         assert self.world.get(self.setter.call(SetBool.Request(True))).success
         self.handler.finish = False
         heard: list[str] = []
-        goal = self.world.get(
-            self.client.send_goal(Pick.Goal("screw"), lambda f: heard.append(f.feedback.text))
-        )
+        goal = self.world.get(self.client.send_goal(Pick.Goal("screw"), lambda f: heard.append(f.feedback.text)))
         work = self.handler.goals[-1]
         work.execute()
         work.feedback(feedback("here"))

@@ -33,10 +33,7 @@ class Peer:
 
     def __init__(self, domain: int) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, str(PEER), str(domain)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
+            [sys.executable, str(PEER), str(domain)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
         assert self._process.stdout is not None
         assert self._process.stdout.readline() == "ready\n"
@@ -76,9 +73,7 @@ def test_a_service_and_an_action_between_two_processes(node: RosNode, domain: in
     setter, picker = node.client("set", SET_BOOL), node.action_client("pick", PICK)
     reach(node, picker)
     assert setter.ready()
-    assert node.wait(setter.call(SetBool.Request(True)), TIMEOUT) == SetBool.Response(
-        True, "from another process"
-    )
+    assert node.wait(setter.call(SetBool.Request(True)), TIMEOUT) == SetBool.Response(True, "from another process")
 
     stages: list[str] = []
     goal = node.wait(picker.send_goal(Pick.Goal("screw"), lambda f: stages.append(f.feedback.stage)), TIMEOUT)

@@ -99,9 +99,7 @@ def pursue(world: World, skills: SkillServer, outcome: Any) -> Any:
 
 
 @pytest.mark.parametrize(("label", "status"), [("3", GoalStatus.SUCCEEDED), ("0", GoalStatus.ABORTED)])
-def test_a_skill_runs_behind_an_action(
-    world: World, skills: SkillServer, label: str, status: GoalStatus
-) -> None:
+def test_a_skill_runs_behind_an_action(world: World, skills: SkillServer, label: str, status: GoalStatus) -> None:
     heard: list[str] = []
     _, outcome = send(world, skills, label, heard)
     assert pursue(world, skills, outcome).status is status

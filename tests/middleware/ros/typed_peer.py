@@ -37,10 +37,7 @@ class Endpoints:
         participant = DomainParticipant(domain)
         reliable = Policy.Reliability.Reliable(1_000_000_000)
         qos = Qos(reliable, Policy.DataRepresentation(use_cdrv0_representation=True))
-        topics: list[Any] = [
-            Topic(participant, "rq/setRequest", Request),
-            Topic(participant, "rr/setReply", Response),
-        ]
+        topics: list[Any] = [Topic(participant, "rq/setRequest", Request), Topic(participant, "rr/setReply", Response)]
         out, back = reversed(topics) if server else topics
         self.writer, self.reader = DataWriter(participant, out, qos), DataReader(participant, back, qos)
 

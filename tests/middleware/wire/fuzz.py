@@ -199,10 +199,7 @@ def main() -> None:
         taken, refused = attack(target, arguments.count, arguments.seed)
         each = (time.process_time() - start) / arguments.count * 1e6
         grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-        print(
-            f"{name:20} {taken:8} {refused:8} {each:8.1f} {peak(target, 500) / 1024:8.1f} {grown:9}",
-            flush=True,
-        )
+        print(f"{name:20} {taken:8} {refused:8} {each:8.1f} {peak(target, 500) / 1024:8.1f} {grown:9}", flush=True)
 
 
 if __name__ == "__main__":

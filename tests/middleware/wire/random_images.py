@@ -80,8 +80,7 @@ def sdk_sport(sdk: SimpleNamespace, image: Any) -> Any:
     """Return the vendor's `SportModeState_` with the values of `image`."""
     names = go.SPORT_MODE_STATE.dtype.names or ()
     path = [
-        sdk.go.PathPoint_(*values(point, *(image["path_point"].dtype.names or ())))
-        for point in image["path_point"]
+        sdk.go.PathPoint_(*values(point, *(image["path_point"].dtype.names or ()))) for point in image["path_point"]
     ]
     return sdk.go.SportModeState_(
         sdk.go.TimeSpec_(*values(image, "sec", "nanosec")),

@@ -93,9 +93,7 @@ def test_time_is_the_tick_and_starts_again() -> None:
 def test_roll_pitch_and_yaw_are_those_of_scipy() -> None:
     for rotation in Rotation.random(50, rng=rng()):
         yaw, pitch, roll = rotation.as_euler("ZYX")
-        np.testing.assert_allclose(
-            convert.rpy(rotation.as_quat(scalar_first=True)), (roll, pitch, yaw), atol=1e-9
-        )
+        np.testing.assert_allclose(convert.rpy(rotation.as_quat(scalar_first=True)), (roll, pitch, yaw), atol=1e-9)
     image = hg.LOW_STATE.read(convert.encode_low_state(samples.state(rng())))["imu"]
     np.testing.assert_allclose(image["rpy"], convert.rpy(image["quaternion"]), atol=1e-5)
 
@@ -117,11 +115,7 @@ def test_a_motor_that_is_off_gets_nothing() -> None:
 
 
 DECODERS: dict[str, tuple[StructLayout, Callable[[], bytes], Callable[[bytes], object]]] = {
-    "state": (
-        hg.LOW_STATE,
-        lambda: convert.encode_low_state(samples.state(rng())),
-        convert.decode_low_state,
-    ),
+    "state": (hg.LOW_STATE, lambda: convert.encode_low_state(samples.state(rng())), convert.decode_low_state),
     "command": (
         hg.LOW_CMD,
         lambda: convert.encode_low_command(samples.command(rng()), 0),

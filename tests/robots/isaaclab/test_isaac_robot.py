@@ -47,9 +47,7 @@ def hanging() -> Iterator[tuple[MujocoRobot, IsaacLabRobot]]:
     robot.close()
 
 
-def test_every_motor_turns_its_own_joint_against_the_same_weight(
-    hanging: tuple[MujocoRobot, IsaacLabRobot],
-) -> None:
+def test_every_motor_turns_its_own_joint_against_the_same_weight(hanging: tuple[MujocoRobot, IsaacLabRobot]) -> None:
     start = start_posture()
     step = np.where(np.arange(NUM_JOINTS) % 2, 0.1, -0.1) * np.linspace(0.5, 1.0, NUM_JOINTS)
     reports = []

@@ -9,14 +9,7 @@ import numpy as np
 import pytest
 
 from golem.errors import ConfigError, MissingEnvironment
-from golem.robots.isaaclab.isaac_robot import (
-    VARIABLE,
-    IsaacLabConfig,
-    IsaacLabRobot,
-    Layers,
-    WorkerLink,
-    isaac_python,
-)
+from golem.robots.isaaclab.isaac_robot import VARIABLE, IsaacLabConfig, IsaacLabRobot, Layers, WorkerLink, isaac_python
 from golem.robots.isaaclab.isaac_worker import WorkerScene, reply_type, request_type
 from golem.runtime.lockstep import start_posture
 

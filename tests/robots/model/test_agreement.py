@@ -104,10 +104,7 @@ def test_mass_matrix_of_the_moving_hand_agrees_in_the_body_joints(
         for side in SIDES:
             for finger in magpie_model.FINGERS:
                 crank, blade, _ = magpie_model.finger_names(side, finger)
-                twin.data.joint(crank).qpos[0], twin.data.joint(blade).qpos[0] = (
-                    magpie_model.MID,
-                    -magpie_model.MID,
-                )
+                twin.data.joint(crank).qpos[0], twin.data.joint(blade).qpos[0] = (magpie_model.MID, -magpie_model.MID)
         mujoco.mj_forward(robot, twin.data)
         M = pin.crba(model, data, q)
         M = np.triu(M) + np.triu(M, 1).T

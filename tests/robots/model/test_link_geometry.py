@@ -111,10 +111,7 @@ def test_joints_that_an_equality_couples_follow(tmp_path: Path) -> None:
     assert joint_names(links) == ["a", "slide"]
     # b - 0.7 = 0.1 - 2 (a - 0.4)
     assert (links[-1].leader, links[-1].ratio, links[-1].offset) == ("a", -2.0, pytest.approx(1.6))
-    assert (
-        joint_names(read_geometry(mjcf(tmp_path, FOLLOWS.replace("/>", ' active="false"/>'))).links)[-1]
-        == "b"
-    )
+    assert joint_names(read_geometry(mjcf(tmp_path, FOLLOWS.replace("/>", ' active="false"/>'))).links)[-1] == "b"
     with pytest.raises(ConfigError, match="'b' follows no other by a straight line"):
         read_geometry(mjcf(tmp_path, FOLLOWS.replace("-2 0", "-2 1")))
 

@@ -68,17 +68,13 @@ def test_torque_for_force_is_virtual_work(theta: float, force: float) -> None:
     step = 1e-6
     travel = (magpie_model.pad_offset(theta - step) - magpie_model.pad_offset(theta + step)) / (2.0 * step)
     assert magpie_model.torque_for_force(force, theta) == pytest.approx(force * travel, rel=1e-6)
-    assert magpie_model.force_for_torque(magpie_model.torque_for_force(force, theta), theta) == pytest.approx(
-        force
-    )
+    assert magpie_model.force_for_torque(magpie_model.torque_for_force(force, theta), theta) == pytest.approx(force)
     assert magpie_model.torque_for_force(force, theta) <= magpie_model.MAX_TORQUE
 
 
 def test_hand_weighs_what_the_paper_says(robot: mujoco.MjModel) -> None:
     for side in SIDES:
-        assert robot.body_subtreemass[robot.body(f"{side}_hand").id] == pytest.approx(
-            magpie_model.MASS, abs=1e-6
-        )
+        assert robot.body_subtreemass[robot.body(f"{side}_hand").id] == pytest.approx(magpie_model.MASS, abs=1e-6)
     assert magpie_model.lump().mass == pytest.approx(magpie_model.MASS, abs=1e-6)
 
 
@@ -99,9 +95,7 @@ def test_pads_meet_at_the_grasp_frame_when_closed(robot: mujoco.MjModel) -> None
             assert pad[2] + magpie_model.PAD_HALF_SIZE[2] == pytest.approx(0.0, abs=1e-4)
 
 
-def test_fingers_translate_without_turning_in_simulation(
-    floating: tuple[mujoco.MjModel, mujoco.MjData],
-) -> None:
+def test_fingers_translate_without_turning_in_simulation(floating: tuple[mujoco.MjModel, mujoco.MjData]) -> None:
     model, data = floating
     turned, off = 0.0, 0.0
     for torque in (0.05, -0.05):
@@ -113,9 +107,7 @@ def test_fingers_translate_without_turning_in_simulation(
                 for finger in magpie_model.FINGERS:
                     crank, blade, pad = magpie_model.finger_names(side, finger)
                     relative = hand.T @ data.body(blade).xmat.reshape(3, 3)
-                    turned = max(
-                        turned, float(np.arccos(np.clip((np.trace(relative) - 1.0) / 2.0, -1.0, 1.0)))
-                    )
+                    turned = max(turned, float(np.arccos(np.clip((np.trace(relative) - 1.0) / 2.0, -1.0, 1.0))))
                     theta = float(data.joint(crank).qpos[0])
                     position = hand.T @ (data.geom(pad).xpos - data.body(f"{side}_hand").xpos)
                     error = position - magpie_model.mirror(finger, closed_form_pad(theta))

@@ -83,6 +83,4 @@ def test_a_loft_is_closed_with_its_faces_outward(axis: str) -> None:
 def test_a_ring_is_closed_with_its_faces_outward() -> None:
     # Pappus: area of the octagon that stands for the tube, times the length of the ellipse.
     octagon = 2.0 * np.sqrt(2.0) * 0.01**2
-    assert volume(*ring(0.08, 0.08, 0.01, segments=128)) == pytest.approx(
-        octagon * 2.0 * np.pi * 0.08, rel=2e-3
-    )
+    assert volume(*ring(0.08, 0.08, 0.01, segments=128)) == pytest.approx(octagon * 2.0 * np.pi * 0.08, rel=2e-3)

@@ -51,9 +51,7 @@ def mesh_link(name: str, what: str = "collision", scale: str = "") -> str:
     return f'<{what}><geometry><mesh filename="{name}" {scale}/></geometry></{what}>'
 
 
-@pytest.mark.parametrize(
-    ("choice", "expected"), [("visual", [0.1, 0.1, 0.1]), ("collision", [0.1, 0.2, 0.3])]
-)
+@pytest.mark.parametrize(("choice", "expected"), [("visual", [0.1, 0.1, 0.1]), ("collision", [0.1, 0.2, 0.3])])
 def test_either_surface_is_read_and_the_other_where_it_is_alone(
     choice: str, expected: list[float], tmp_path: Path
 ) -> None:
@@ -83,9 +81,7 @@ SHAPES = {
 def test_shapes_have_the_sizes_of_a_urdf(shape: str, tmp_path: Path) -> None:
     read = arm(tmp_path, f"<visual><origin xyz='1 0 0'/><geometry>{shape}</geometry></visual>")
     assert sides(read) == pytest.approx(SHAPES[shape], abs=2e-3)
-    middle = np.mean(
-        [read.links[1].parts[0].vertices.max(axis=0), read.links[1].parts[0].vertices.min(axis=0)], axis=0
-    )
+    middle = np.mean([read.links[1].parts[0].vertices.max(axis=0), read.links[1].parts[0].vertices.min(axis=0)], axis=0)
     assert middle == pytest.approx([1.0, 0.0, 0.0], abs=1e-3)
 
 
@@ -144,8 +140,7 @@ def test_where_a_mesh_may_lie(
     trimesh.creation.box(SIZE).export(mesh)
     filename = name.format(tmp=tmp_path)
     path = robot(
-        tmp_path / "ws" / "arm" / "urdf",
-        f'<link name="tip">{mesh_link(filename)}</link>{joint("tip", "fixed")}',
+        tmp_path / "ws" / "arm" / "urdf", f'<link name="tip">{mesh_link(filename)}</link>{joint("tip", "fixed")}'
     )
     found = find_mesh(filename, path, packages)
     assert found is not None and found.resolve() == mesh.resolve()
@@ -162,9 +157,7 @@ def test_meshdir_counts_though_the_names_have_it_already(name: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize("ending", ["stl", "STL", "obj", "ply", "glb", "off", "ascii.stl", "dae"])
-@pytest.mark.parametrize(
-    ("scale", "factor"), [("", (1, 1, 1)), ('scale="0.001 -0.002 0.003"', (0.001, 0.002, 0.003))]
-)
+@pytest.mark.parametrize(("scale", "factor"), [("", (1, 1, 1)), ('scale="0.001 -0.002 0.003"', (0.001, 0.002, 0.003))])
 def test_meshes_of_many_formats(ending: str, scale: str, factor: tuple[float, ...], tmp_path: Path) -> None:
     file, box = tmp_path / f"c.{ending}", trimesh.creation.box(SIZE)
     if ending == "dae":
@@ -178,9 +171,7 @@ def test_meshes_of_many_formats(ending: str, scale: str, factor: tuple[float, ..
     assert len(read.links[1].parts[0].faces) == 12
 
 
-@pytest.mark.parametrize(
-    ("unit", "up", "moved"), [("0.001", "Z_UP", 0.0), ("0.0254", "Y_UP", 0.0), ("1", "X_UP", 3.0)]
-)
+@pytest.mark.parametrize(("unit", "up", "moved"), [("0.001", "Z_UP", 0.0), ("0.0254", "Y_UP", 0.0), ("1", "X_UP", 3.0)])
 def test_a_collada_file_counts_in_its_unit_and_stands_as_in_rviz(
     unit: str, up: str, moved: float, tmp_path: Path
 ) -> None:
@@ -231,9 +222,7 @@ def test_joints_that_follow_another_are_not_free(tmp_path: Path) -> None:
     free = read_geometry(robot(tmp_path, follower("").replace("<mimic", "<no"))).links
     order = [link.joint for link in free if link.joint]
     q = {"a": 0.4, "b": -2 * 0.4 + 0.3, "c": -0.4 + 0.25}
-    np.testing.assert_allclose(
-        link_poses(links, np.array([0.4])), link_poses(free, np.array([q[j] for j in order]))
-    )
+    np.testing.assert_allclose(link_poses(links, np.array([0.4])), link_poses(free, np.array([q[j] for j in order])))
     held = hold_joints(links, {"a": 0.4})
     assert joint_names(held) == []
     np.testing.assert_allclose(link_poses(held, np.zeros(0)), link_poses(links, np.array([0.4])))
@@ -244,8 +233,7 @@ def test_every_kind_of_joint_moves_as_in_pinocchio(tmp_path: Path) -> None:
     names = [f"{kind}{k}" for k in range(2) for kind in kinds]
     body = "".join(f'<link name="{name}">{SHAPE}</link>' for name in names)
     body += "".join(
-        joint(name, name[:-1], LIMIT, parent)
-        for name, parent in zip(names, ["base", *names[:-1]], strict=True)
+        joint(name, name[:-1], LIMIT, parent) for name, parent in zip(names, ["base", *names[:-1]], strict=True)
     )
     path = robot(tmp_path, body)
     links, model = read_geometry(path).links, pin.buildModelFromUrdf(str(path))
@@ -256,9 +244,7 @@ def test_every_kind_of_joint_moves_as_in_pinocchio(tmp_path: Path) -> None:
     data = model.createData()
     pin.framesForwardKinematics(model, data, x)
     for link, T in zip(links, link_poses(links, q), strict=True):
-        np.testing.assert_allclose(
-            T, data.oMf[model.getFrameId(link.name, pin.FrameType.BODY)].homogeneous, atol=1e-12
-        )
+        np.testing.assert_allclose(T, data.oMf[model.getFrameId(link.name, pin.FrameType.BODY)].homogeneous, atol=1e-12)
 
 
 WRONG = {
@@ -296,13 +282,7 @@ def test_all_that_is_wrong_is_named_at_once(tmp_path: Path) -> None:
     with pytest.raises(ConfigError) as refusal:
         read_geometry(robot(tmp_path, body))
     said = str(refusal.value)
-    for words in (
-        "'package://far/a.stl'",
-        "Git LFS",
-        "bad.dae holds no mesh",
-        "empty.obj holds",
-        "'gone.stl'",
-    ):
+    for words in ("'package://far/a.stl'", "Git LFS", "bad.dae holds no mesh", "empty.obj holds", "'gone.stl'"):
         assert words in said
     assert said.count("above its upper limit") == 5
 
@@ -333,10 +313,7 @@ def test_what_xacro_left_behind_and_shapes_of_no_size_do_not_matter(tmp_path: Pa
     path.write_text(path.read_text().replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" '))
     assert [len(link.parts) for link in read_geometry(path).links] == [1, 0]
     path.write_text(path.read_text().replace(' xmlns:xacro="http://ros.org/wiki/xacro"', ""))
-    assert [len(link.parts) for link in read_geometry(path).links] == [
-        1,
-        0,
-    ]  # of a space that is not declared
+    assert [len(link.parts) for link in read_geometry(path).links] == [1, 0]  # of a space that is not declared
 
 
 def test_folders_of_packages_are_named_with_them(tmp_path: Path) -> None:

@@ -54,10 +54,7 @@ def test_total_mass_within_one_gram(bare_robot: mujoco.MjModel, vendor_mjcf: muj
 
 
 def test_joint_positions_mass_matrix_and_gravity_match_the_mjcf(
-    bare_robot: mujoco.MjModel,
-    vendor_mjcf: mujoco.MjModel,
-    reader: type[Any],
-    postures: Callable[[int], Array],
+    bare_robot: mujoco.MjModel, vendor_mjcf: mujoco.MjModel, reader: type[Any], postures: Callable[[int], Array]
 ) -> None:
     ours, theirs = reader(bare_robot), reader(vendor_mjcf)
     for q in postures(POSTURES):

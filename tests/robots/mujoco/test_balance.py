@@ -10,13 +10,7 @@ import numpy as np
 import pytest
 
 from golem.robots.model.table import SOLE
-from golem.robots.mujoco.balance import (
-    PERIOD,
-    BalanceRecorder,
-    BalanceTrace,
-    convex_hull,
-    signed_margin,
-)
+from golem.robots.mujoco.balance import PERIOD, BalanceRecorder, BalanceTrace, convex_hull, signed_margin
 from golem.robots.mujoco.engine import MujocoRobot, standing_height
 from golem.runtime.lockstep import start_posture
 
@@ -39,13 +33,7 @@ def test_the_hull_leaves_out_what_is_inside_and_runs_counter_clockwise() -> None
 
 @pytest.mark.parametrize(
     ("point", "margin"),
-    [
-        ((0.5, 0.5), 0.5),
-        ((0.9, 0.5), 0.1),
-        ((1.2, 0.5), -0.2),
-        ((1.3, 1.4), -0.5),
-        ((0.5, 0.0), 0.0),
-    ],
+    [((0.5, 0.5), 0.5), ((0.9, 0.5), 0.1), ((1.2, 0.5), -0.2), ((1.3, 1.4), -0.5), ((0.5, 0.0), 0.0)],
     ids=["middle", "near an edge", "beyond an edge", "beyond a corner", "on the edge"],
 )
 def test_the_margin_is_the_signed_distance_to_the_edge(point: tuple[float, float], margin: float) -> None:

@@ -160,11 +160,7 @@ def test_the_models_own_settings_survive() -> None:
     before = (model.vis.global_.offwidth, model.vis.quality.offsamples, model.vis.quality.shadowsize)
     with CameraRig(model, [HEAD]):
         pass
-    assert (
-        model.vis.global_.offwidth,
-        model.vis.quality.offsamples,
-        model.vis.quality.shadowsize,
-    ) == before
+    assert (model.vis.global_.offwidth, model.vis.quality.offsamples, model.vis.quality.shadowsize) == before
 
 
 def test_spawned_workers_see_what_this_process_sees() -> None:

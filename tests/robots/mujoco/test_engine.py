@@ -164,9 +164,7 @@ def over(robot: MujocoRobot, height: float) -> None:
 
 
 @pytest.mark.parametrize(("factor", "step"), [(0.9, FINE_STEP), (1.1, COARSE_STEP)])
-def test_physics_is_fine_only_where_a_finger_is_near_a_screw(
-    factor: float, step: float, robot: MujocoRobot
-) -> None:
+def test_physics_is_fine_only_where_a_finger_is_near_a_screw(factor: float, step: float, robot: MujocoRobot) -> None:
     over(robot, factor * robot.config.near)
     robot.advance(hold(start_posture()), {}, TICK)
     assert robot.scene.model.opt.timestep == step

@@ -23,9 +23,7 @@ def robot() -> MujocoRobot:
 
 def run(robot: MujocoRobot, seconds: float) -> Array:
     """Hold still for a while; returns the pelvis' position at the end."""
-    command = LowCommand(
-        0.0, start_posture(), ZERO, ZERO, np.full(NUM_JOINTS, 800.0), np.full(NUM_JOINTS, 20.0)
-    )
+    command = LowCommand(0.0, start_posture(), ZERO, ZERO, np.full(NUM_JOINTS, 800.0), np.full(NUM_JOINTS, 20.0))
     for _ in range(round(seconds / TICK)):
         robot.advance(command, {}, TICK)
     return robot.truth.base().T_world_base[:3, 3]
@@ -105,9 +103,7 @@ def test_the_caller_may_reuse_its_array(robot: MujocoRobot) -> None:
         ([np.nan, 0.0, 0.0], "pelvis", "three finite"),
     ],
 )
-def test_a_push_that_is_none_is_refused(
-    force: list[float], body: str, words: str, robot: MujocoRobot
-) -> None:
+def test_a_push_that_is_none_is_refused(force: list[float], body: str, words: str, robot: MujocoRobot) -> None:
     with pytest.raises(ConfigError, match=words):
         robot.push(np.array(force), body)
 

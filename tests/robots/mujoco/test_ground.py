@@ -23,9 +23,7 @@ TICK = 0.002
 ZERO = np.zeros(NUM_JOINTS)
 LIMP = LowCommand(0.0, ZERO, ZERO, ZERO, ZERO, ZERO)
 # Stiff enough for all joints in series to carry the robot as one inverted pendulum, which needs 590 N m/rad.
-STIFF = LowCommand(
-    0.0, start_posture(True), ZERO, ZERO, np.full(NUM_JOINTS, 3000.0), np.full(NUM_JOINTS, 40.0)
-)
+STIFF = LowCommand(0.0, start_posture(True), ZERO, ZERO, np.full(NUM_JOINTS, 3000.0), np.full(NUM_JOINTS, 40.0))
 
 
 def twin(**options: Any) -> MujocoRobot:
@@ -112,9 +110,7 @@ def test_the_hoist_never_lets_go() -> None:
 def test_the_pack_is_as_far_from_the_pelvis_as_in_the_hoist_and_from_the_legs() -> None:
     hung, stands = twin(support="hoist", world="pack"), twin(world="pack")
     for name in (*hung.scene.names.screws, "tray", "pack"):
-        in_hoist, on_ground = (
-            robot.data.body(name).xpos - robot.data.body("pelvis").xpos for robot in (hung, stands)
-        )
+        in_hoist, on_ground = (robot.data.body(name).xpos - robot.data.body("pelvis").xpos for robot in (hung, stands))
         np.testing.assert_allclose(on_ground, in_hoist, atol=1e-9)
     model, data = stands.scene.model, stands.data
     scenery = [g for g in range(model.ngeom) if model.body(model.geom_bodyid[g]).name in ("pack", "tray")]
@@ -122,8 +118,7 @@ def test_the_pack_is_as_far_from_the_pelvis_as_in_the_hoist_and_from_the_legs() 
     legs = [
         g
         for g in range(model.ngeom)
-        if model.geom_contype[g]
-        and any(w in model.body(model.geom_bodyid[g]).name for w in ("hip", "knee", "ankle"))
+        if model.geom_contype[g] and any(w in model.body(model.geom_bodyid[g]).name for w in ("hip", "knee", "ankle"))
     ]
     assert len(solid) > 20 and len(legs) > 10
     nearest = min(mujoco.mj_geomDistance(model, data, a, b, 1.0, None) for a in legs for b in solid)
@@ -238,9 +233,7 @@ def test_a_robot_whose_names_are_the_worlds_is_refused_in_a_sentence(tmp_path: P
     spec = mujoco.MjSpec.from_string(export_mjcf(hands=False))
     spec.body("pelvis").add_geom(name="floor", size=[0.01, 0.01, 0.01])
     (tmp_path / "robot.xml").write_text(spec.to_xml())
-    with pytest.raises(
-        ConfigError, match="does not fit into the world 'open': .*repeated name 'floor'"
-    ) as error:
+    with pytest.raises(ConfigError, match="does not fit into the world 'open': .*repeated name 'floor'") as error:
         twin(mjcf=str(tmp_path / "robot.xml"))
     assert "\n" not in str(error.value)
 

@@ -19,9 +19,7 @@ WIDTH = 0.010
 class Bench:
     """One hand of a robot whose joints are locked, in free fall, with or without a block between the fingers."""
 
-    def __init__(
-        self, side: Side = "right", block: float | None = None, gap: float = 0.06, loose: bool = True
-    ) -> None:
+    def __init__(self, side: Side = "right", block: float | None = None, gap: float = 0.06, loose: bool = True) -> None:
         """Put a block of `WIDTH` at `block` [m] off the hand's centre; `loose` along the closing axis, or fixed."""
         spec = robot_spec(hands=True)
         spec.option.gravity = [0.0, 0.0, 0.0]
@@ -35,9 +33,7 @@ class Bench:
             body = hand.add_body(name="block", pos=[-0.004, block, 0.185])
             if loose:
                 body.add_joint(name="block", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 1, 0], damping=0.5)
-            body.add_geom(
-                name="block", type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.006, WIDTH / 2, 0.006], mass=0.03
-            )
+            body.add_geom(name="block", type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.006, WIDTH / 2, 0.006], mass=0.03)
         self.model = spec.compile()
         self.model.opt.timestep = STEP
         self.model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST

@@ -23,9 +23,7 @@ class Hanging:
         self.model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         self.model.opt.timestep = 0.002
         self.model.geom_contype[:] = 0
-        hinges = [
-            i for i in range(self.model.njnt) if self.model.joint(i).type == mujoco.mjtJoint.mjJNT_HINGE
-        ]
+        hinges = [i for i in range(self.model.njnt) if self.model.joint(i).type == mujoco.mjtJoint.mjJNT_HINGE]
         for i in hinges:
             self.model.jnt_stiffness[i] = 5000.0
             self.model.dof_damping[self.model.jnt_dofadr[i]] = 50.0

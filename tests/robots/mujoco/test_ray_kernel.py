@@ -19,9 +19,7 @@ GROUPS = np.array([1, 1, 0, 0, 0, 0], dtype=np.uint8)
 @pytest.mark.parametrize("world", ["plant", "rubble"])
 def test_rays_hit_what_mujoco_says(world: World) -> None:
     plant = world == "plant"
-    config = MujocoConfig(
-        support="ground", world=world, stance=(2.0, 0.1, 0.1), obstacles=4 * plant, people=2 * plant
-    )
+    config = MujocoConfig(support="ground", world=world, stance=(2.0, 0.1, 0.1), obstacles=4 * plant, people=2 * plant)
     twin = MujocoRobot("ideal", 0, start_posture(True), config)
     model, data = visible(twin.scene.model), mujoco.MjData(twin.scene.model)
     data.qpos[:] = twin.data.qpos

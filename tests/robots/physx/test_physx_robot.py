@@ -31,10 +31,7 @@ def twins(**options: Any) -> tuple[MujocoRobot, PhysxRobot]:
     ground = options.get("support") == "ground"
     q = start_posture(ground)
     plain = fill("option", MujocoConfig, {"world": "open", **options, "self_collision": False})
-    return (
-        MujocoRobot("ideal", 0, q, plain),
-        PhysxRobot("ideal", 0, q, fill("option", PhysxConfig, options)),
-    )
+    return (MujocoRobot("ideal", 0, q, plain), PhysxRobot("ideal", 0, q, fill("option", PhysxConfig, options)))
 
 
 def run(robot: MujocoRobot, command: LowCommand, seconds: float, hands: Any = None) -> None:

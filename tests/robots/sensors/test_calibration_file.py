@@ -67,9 +67,7 @@ def test_a_lidar_comes_back_and_a_wild_one_is_refused(tmp_path: Path) -> None:
     path, mount = tmp_path / "lidar.json", LidarMount(pose(np.full(6, 0.01)), 1e-6 * np.eye(6))
     replace(example(), lidar=mount).save(path)
     back = read_calibration(path).lidar
-    assert (
-        back is not None and (back.pose == mount.pose).all() and (back.covariance == mount.covariance).all()
-    )
+    assert back is not None and (back.pose == mount.pose).all() and (back.covariance == mount.covariance).all()
     replace(example(), lidar=replace(mount, pose=pose(np.full(6, 0.5)))).save(path)
     with pytest.raises(ConfigError, match="the LiDAR is 0.866025 m off its place"):
         read_calibration(path)

@@ -6,9 +6,7 @@ from golem.robots.sensors.imu import ImuErrors, ImuModel
 from golem.robots.sensors.streams import stream
 from golem.types import Imu
 
-ERRORS = ImuErrors(
-    gyro_noise=0.004, acc_noise=0.03, gyro_bias=0.002, acc_bias=0.05, tilt=0.005, attitude_noise=0.0005
-)
+ERRORS = ImuErrors(gyro_noise=0.004, acc_noise=0.03, gyro_bias=0.002, acc_bias=0.05, tilt=0.005, attitude_noise=0.0005)
 QUAT = Rotation.from_euler("zyx", [1.0, 0.3, -0.2]).as_quat(scalar_first=True)
 GYRO, ACC = np.array([0.1, -0.2, 0.3]), np.array([0.5, 0.2, 9.7])
 

@@ -13,13 +13,7 @@ def cells(seconds: float, start: float = 0.0) -> set[tuple[int, int]]:
     """Return the cells of one degree that are looked at."""
     d = directions(start + np.arange(round(seconds * POINT_RATE)) / POINT_RATE)
     azimuth, elevation = np.arctan2(d[:, 1], d[:, 0]), np.arcsin(d[:, 2])
-    return set(
-        zip(
-            np.floor(np.rad2deg(azimuth)).astype(int),
-            np.floor(np.rad2deg(elevation)).astype(int),
-            strict=True,
-        )
-    )
+    return set(zip(np.floor(np.rad2deg(azimuth)).astype(int), np.floor(np.rad2deg(elevation)).astype(int), strict=True))
 
 
 def test_it_looks_all_around_and_within_its_elevation() -> None:

@@ -29,10 +29,7 @@ def sdk() -> Iterator[Started]:
     def start(script: str, *arguments: str) -> subprocess.Popen[str]:
         path = Path(__file__).with_name(script)
         process = subprocess.Popen(
-            [python, "-u", str(path), *arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
+            [python, "-u", str(path), *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )
         processes.append(process)
         return process

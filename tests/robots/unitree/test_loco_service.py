@@ -1,14 +1,6 @@
 from __future__ import annotations
 
-from golem.interfaces.unitree_api import (
-    BAD_PARAMETER,
-    GET_VERSION,
-    LOCO_APIS,
-    NOT_IMPLEMENTED,
-    OK,
-    decode_int,
-    encode,
-)
+from golem.interfaces.unitree_api import BAD_PARAMETER, GET_VERSION, LOCO_APIS, NOT_IMPLEMENTED, OK, decode_int, encode
 from golem.middleware.wire.api import ApiRequest, Response
 from golem.robots.unitree.loco_service import LocoService
 from golem.types import Twist

@@ -20,9 +20,7 @@ def microseconds(step: float, sleep: bool) -> float:
     layout = replace(PackLayout(), tray_xy=(0.75, -0.7), tray_z=PackLayout().top_z)
     spec = mujoco.MjSpec()
     spec.option.timestep = step
-    add_pack(
-        spec, layout, draw_screws(np.random.default_rng(0), ScrewRanges(), layout.reachable()), sleep=sleep
-    )
+    add_pack(spec, layout, draw_screws(np.random.default_rng(0), ScrewRanges(), layout.reachable()), sleep=sleep)
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 200)

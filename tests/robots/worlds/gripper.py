@@ -57,12 +57,7 @@ def build(draw: ScrewDraw) -> mujoco.MjModel:
     hand = spec.worldbody.add_body(name="hand", pos=[0, 0, height], gravcomp=1)
     hand.add_freejoint(name="hand")
     hand.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[0.02, 0.04, 0.02],
-        pos=[0, 0, 0.05],
-        mass=0.3,
-        contype=0,
-        conaffinity=0,
+        type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.02, 0.04, 0.02], pos=[0, 0, 0.05], mass=0.3, contype=0, conaffinity=0
     )
     for side, name in ((1, "a"), (-1, "b")):
         finger = hand.add_body(name=name, pos=[0, side * (draw.head_diameter / 2 + 0.006), 0], gravcomp=1)

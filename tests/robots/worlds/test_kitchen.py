@@ -51,10 +51,7 @@ def test_a_pad_beside_the_middle_of_a_can_presses_on_it_and_not_aside() -> None:
     radius = KINDS["can"][0]
     add_object(spec, "can", "held", (0.0, 0.0, 3.0), 0.0, (1.0, 1.0, 1.0))
     spec.worldbody.add_geom(
-        name="pad",
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[0.008, 0.0015, 0.04],
-        pos=[0.01, radius + 0.0012, 3.05],
+        name="pad", type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.008, 0.0015, 0.04], pos=[0.01, radius + 0.0012, 3.05]
     )
     model = spec.compile()
     data = mujoco.MjData(model)

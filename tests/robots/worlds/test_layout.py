@@ -13,9 +13,7 @@ def test_sixty_eight_fasteners_on_the_rim_one_pitch_apart() -> None:
     assert spots.shape == (68, 2)
     steps = np.linalg.norm(np.roll(spots, -1, axis=0) - spots, axis=1)
     assert steps.min() > 0.085 and steps.max() < 0.098
-    to_edge = np.minimum.reduce(
-        [spots[:, 0], layout.size_x - spots[:, 0], layout.size_y / 2 - np.abs(spots[:, 1])]
-    )
+    to_edge = np.minimum.reduce([spots[:, 0], layout.size_x - spots[:, 0], layout.size_y / 2 - np.abs(spots[:, 1])])
     np.testing.assert_allclose(to_edge, RIM_INSET, atol=1e-12)
 
 

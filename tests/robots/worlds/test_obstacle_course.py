@@ -20,9 +20,7 @@ def test_a_way_is_left_and_it_is_not_the_straight_one(seed: int) -> None:
 def test_the_same_seed_draws_the_same_course() -> None:
     one, other = (draw_course(np.random.default_rng(5), 4) for _ in range(2))
     for a, b in zip(one, other, strict=True):
-        assert (
-            (a.place == b.place).all() and (a.size == b.size).all() and (a.yaw, a.round) == (b.yaw, b.round)
-        )
+        assert (a.place == b.place).all() and (a.size == b.size).all() and (a.yaw, a.round) == (b.yaw, b.round)
 
 
 def test_a_wall_across_the_hall_is_no_course() -> None:

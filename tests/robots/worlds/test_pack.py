@@ -20,9 +20,7 @@ def height(model: mujoco.MjModel, data: mujoco.MjData, x: float, y: float) -> fl
     groups[COLLISION_GROUP] = 1
     start = 2.0
     geom = np.zeros(1, np.int32)
-    down = mujoco.mj_ray(
-        model, data, np.array([x, y, start]), np.array([0.0, 0.0, -1.0]), groups, 1, -1, geom
-    )
+    down = mujoco.mj_ray(model, data, np.array([x, y, start]), np.array([0.0, 0.0, -1.0]), groups, 1, -1, geom)
     return start - down
 
 
@@ -54,9 +52,7 @@ def test_a_dropped_screw_stays_on_the_cover_and_in_the_tray(world: Builder) -> N
         mujoco.mj_step(w.model, w.data)
     z = w.data.qpos[on_cover + 2] - w.layout.top_z
     assert 0.0 < z < 0.03
-    inside = (
-        np.abs(w.data.qpos[in_tray : in_tray + 2] - w.layout.tray_xy) < np.array(w.layout.tray_size[:2]) / 2
-    )
+    inside = np.abs(w.data.qpos[in_tray : in_tray + 2] - w.layout.tray_xy) < np.array(w.layout.tray_size[:2]) / 2
     assert inside.all() and 0.0 < w.data.qpos[in_tray + 2] - w.layout.tray_z < 0.03
 
 

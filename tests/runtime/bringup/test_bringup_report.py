@@ -85,13 +85,7 @@ def test_a_report_of_another_robot_or_none_is_refused(tmp_path: Path) -> None:
 
 
 def test_what_must_hold_each_time_is_repeated_each_time() -> None:
-    assert {check.name for check in CHECKS if not check.lasting} == {
-        "domain",
-        "hoist",
-        "state",
-        "estop",
-        "release",
-    }
+    assert {check.name for check in CHECKS if not check.lasting} == {"domain", "hoist", "state", "estop", "release"}
 
 
 def test_a_real_robot_needs_its_button_and_devices_have_names() -> None:

@@ -56,9 +56,7 @@ class Live:
         # In this one process nobody could answer while the twin waits.
         self.twin = Twin(self.stack, self.robot, *self.member("twin"), patience=0.0)
 
-    def start_gate(
-        self, patient: bool = False, real: bool = False, estop: EmergencyStop | None = None
-    ) -> None:
+    def start_gate(self, patient: bool = False, real: bool = False, estop: EmergencyStop | None = None) -> None:
         """Put a new gate on the domain, with a virtual e-stop if none is given."""
         limits = SafetyLimits.from_profile(self.stack.limits).still()
         estop = estop or VirtualEstop()

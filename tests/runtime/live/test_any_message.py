@@ -53,20 +53,7 @@ BATCH = 25
 """Random messages between two looks at the answers."""
 FLOATS = (0.0, -1.0, 1e9, 1e308, -1e308, 5e-324, float("nan"), float("inf"), float("-inf"))
 TEXTS = ("", "\0", "odom", "ø" * 300, "x" * 10_000_000)
-JSONS = (
-    '""',
-    "null",
-    "true",
-    "-1",
-    "1e308",
-    "1e999",
-    "NaN",
-    "[]",
-    "{}",
-    '[{"a": []}]',
-    '"\\ud800"',
-    "9" * 5000,
-)
+JSONS = ('""', "null", "true", "-1", "1e308", "1e999", "NaN", "[]", "{}", '[{"a": []}]', '"\\ud800"', "9" * 5000)
 SOUND: dict[str, Any] = {
     "/skill/run": RunSkill_Goal("stand", '{"seconds": 0.02}'),
     "/skill/pick": Pick_Goal("screw", "tray", "right"),
@@ -206,11 +193,7 @@ def crowd(live: Live, capsys: pytest.CaptureFixture[str]) -> Iterator[Crowd]:
 @pytest.mark.parametrize("action", [row.name for row in public.ACTIONS])
 def test_every_field_of_every_goal_at_its_edges(crowd: Crowd, action: str) -> None:
     kind = codec.action(next(row.type for row in public.ACTIONS if row.name == action))
-    stages = [
-        crowd.pursue(action, goal)[1].stage
-        for base in (kind.Goal(), SOUND[action])
-        for goal in variants(base)
-    ]
+    stages = [crowd.pursue(action, goal)[1].stage for base in (kind.Goal(), SOUND[action]) for goal in variants(base)]
     assert len(stages) > 15 and "refused" in stages
     assert {"done", "cancelled", "detect"} & set(stages) or action in WALKS  # whose legs do not
 
@@ -291,16 +274,12 @@ def _send(crowd: Crowd, rng: random.Random) -> None:
         case 1:
             spec = rng.choice(list(SPECS.values()))
             fields = rng.choices(sorted(spec.goal["properties"]), k=rng.randrange(3))
-            text = ", ".join(
-                f'"{field}": {rng.choice(JSONS)}' for field in (*fields, rng.choice(("x", "seconds")))
-            )
+            text = ", ".join(f'"{field}": {rng.choice(JSONS)}' for field in (*fields, rng.choice(("x", "seconds"))))
             goal = RunSkill_Goal(rng.choice((spec.name, "", "pik")), f"{{{text}}}"[: rng.choice((None, -1))])
             crowd.goals.append(crowd.actions["/skill/run"].send_goal(goal))
         case 2:
             row = rng.choice([row for row in public.SERVICES if row.name not in STOPS])
-            crowd.calls.append(
-                crowd.services[row.name].call(random_message(KNOWN, f"{row.type}_Request", rng))
-            )
+            crowd.calls.append(crowd.services[row.name].call(random_message(KNOWN, f"{row.type}_Request", rng)))
         case 3:
             row = rng.choice(COMMANDS)
             crowd.publishers[row].publish(random_message(KNOWN, row.type, rng))
@@ -344,12 +323,7 @@ def test_thousands_of_random_goals_requests_and_commands(crowd: Crowd) -> None:
 @pytest.mark.timeout(120 + COUNT // 20)
 def test_thousands_of_random_frames_of_the_vendors(live: Live) -> None:
     targets = fuzz.targets()
-    row = {
-        "/lowstate": "LowState_",
-        "/lowcmd": "LowCmd_",
-        "/safety/lowcmd_in": "LowCmd_",
-        "/onboard/lowcmd": "LowCmd_",
-    }
+    row = {"/lowstate": "LowState_", "/lowcmd": "LowCmd_", "/safety/lowcmd_in": "LowCmd_", "/onboard/lowcmd": "LowCmd_"}
     row |= {each.name: "Request_" for each in public.TOPICS if each.name.endswith("/request")}
     row |= {each.name: "Response_" for each in public.TOPICS if each.name.endswith("/response")}
     live.activate()
@@ -358,9 +332,7 @@ def test_thousands_of_random_frames_of_the_vendors(live: Live) -> None:
         name: participant.writer(names.topic(name), codec.dds_name(public.topic(name).type), Qos(depth=1000))
         for name in row
     }
-    streams = {
-        name: fuzz.payloads(targets[kind], COUNT, seed) for seed, (name, kind) in enumerate(row.items())
-    }
+    streams = {name: fuzz.payloads(targets[kind], COUNT, seed) for seed, (name, kind) in enumerate(row.items())}
     for _ in range(COUNT // BATCH):
         for name, payloads in streams.items():
             for _ in range(1 + BATCH // len(streams)):

@@ -48,9 +48,7 @@ def test_a_stop_leaves_a_bag_of_the_seconds_around_it(live: Live, tmp_path: Path
     assert stopped - 5.1 < times.min() < stopped - 4.9 and stopped + 1.9 < times.max() < stopped + 2.1
     counts = {name: sum(m.topic.name == name for m in messages) for name in ("/lowstate", "/lowcmd")}
     assert all(abs(n - 3500) < 20 for n in counts.values()), counts
-    (status,) = [
-        codec.deserialize(m.payload, SafetyStatus) for m in messages if m.topic.name == "/safety/status"
-    ]
+    (status,) = [codec.deserialize(m.payload, SafetyStatus) for m in messages if m.topic.name == "/safety/status"]
     assert to_gate_status(status).state is GateState.STOP1
 
 

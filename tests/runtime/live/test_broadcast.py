@@ -34,9 +34,7 @@ def test_viewers_see_a_stack_in_lock_step() -> None:
         def pass_time(seconds: float) -> None:
             running.executor.run(running.executor.t + seconds, lambda: show() is not None)
 
-        with connect(
-            f"ws://127.0.0.1:{port}", subprotocols=[Subprotocol("foxglove.sdk.v1")], max_size=None
-        ) as viewer:
+        with connect(f"ws://127.0.0.1:{port}", subprotocols=[Subprotocol("foxglove.sdk.v1")], max_size=None) as viewer:
             ids: dict[str, int] = {}
             while not set(wanted) <= ids.keys():
                 frame = viewer.recv(10.0)

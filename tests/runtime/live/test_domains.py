@@ -111,17 +111,7 @@ def test_every_process_is_told_what_concerns_it() -> None:
     dds = DdsConfig(domain=7, interface="eth7", peers=("10.0.0.2",))
     words = commands(LaunchConfig("stand", world="rubble", profile="ideal", seed=3, dds=dds))
     where = ["--domain", "7", "--interface", "eth7", "--peers", "10.0.0.2"]
-    assert words["twin"] == [
-        "twin",
-        "stand",
-        "--seed",
-        "3",
-        "--profile",
-        "ideal",
-        "--world",
-        "rubble",
-        *where,
-    ]
+    assert words["twin"] == ["twin", "stand", "--seed", "3", "--profile", "ideal", "--world", "rubble", *where]
     assert words["safety"] == ["safety", "--limits", "urdf", "--stand", "--still", *where]
     assert words["up"] == ["up", "stand", "--profile", "ideal", *where]
     strict = commands(LaunchConfig(strict=True, dds=dds))
@@ -141,9 +131,7 @@ def test_who_else_is_there_is_said_with_what_to_look_at(here: DdsConfig) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "words", [["record", "BAG", "--topics", "/lowcmd"], ["view", "--foxglove", "--port", "0"]]
-)
+@pytest.mark.parametrize("words", [["record", "BAG", "--topics", "/lowcmd"], ["view", "--foxglove", "--port", "0"]])
 def test_who_reads_for_golem_is_known_by_name_recorders_and_viewers_too(
     words: list[str], here: DdsConfig, tmp_path: Path
 ) -> None:
@@ -185,9 +173,7 @@ def test_rates_and_bytes_of_a_topic_are_measured(here: DdsConfig) -> None:
     assert 10.0 < row.rate < 110.0 and row.size == pytest.approx(row.rate * hg.LOW_CMD.size)
 
 
-def test_a_second_gate_is_refused_before_it_joins_and_a_robots_own_writer_is_left_to_the_first(
-    here: DdsConfig,
-) -> None:
+def test_a_second_gate_is_refused_before_it_joins_and_a_robots_own_writer_is_left_to_the_first(here: DdsConfig) -> None:
     kind, qos = hg.LOW_CMD.type_name, Qos(depth=1)
     with member("looker", here) as (participant, _):
         with closing(connect(here, "another make")) as stranger:

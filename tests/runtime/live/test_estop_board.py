@@ -45,11 +45,7 @@ def estop(live: Live) -> Plugged:
 def test_the_gate_says_what_the_board_says_is_wrong(live: Live, estop: Plugged) -> None:
     live.run(0.2)
     assert live.gate is not None
-    assert (live.state, live.reason, live.gate.status.detail) == (
-        GateState.INIT,
-        "estop_never_seen",
-        UNPLUGGED,
-    )
+    assert (live.state, live.reason, live.gate.status.detail) == (GateState.INIT, "estop_never_seen", UNPLUGGED)
     estop.plugged = True
     live.activate()
     estop.plugged = False

@@ -39,8 +39,7 @@ class Rig:
         here, there = domain.participant(), domain.participant()
         self.stack = RosNode(there, "stack")
         self.drivers: dict[Side, MagpieServos] = {
-            side: MagpieServos(MagpieServoConfig(bus.line.name), bus.connect)
-            for side, bus in self.buses.items()
+            side: MagpieServos(MagpieServoConfig(bus.line.name), bus.connect) for side, bus in self.buses.items()
         }
         node = RosNode(here, "hands")
         self.process = HandProcess(here, node, self.drivers, lambda: self.now, self.told.append)
@@ -51,10 +50,7 @@ class Rig:
             state, command = (public.topic(public.gripper(side, what)) for what in ("state", "command"))
             self.commands[side] = self.stack.publisher(command.name, command.type, command.qos)
             self.stack.subscription(
-                state.name,
-                state.type,
-                lambda m, s=side: self.heard[s].append(ros_convert.to_hand_state(m)),
-                state.qos,
+                state.name, state.type, lambda m, s=side: self.heard[s].append(ros_convert.to_hand_state(m)), state.qos
             )
 
     def command(self, side: Side, gap: float, force: float) -> None:

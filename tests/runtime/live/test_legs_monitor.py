@@ -30,9 +30,7 @@ class Failing(JointHold):
 """
 
 
-def test_a_fallback_that_takes_the_legs_is_said_once(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_fallback_that_takes_the_legs_is_said_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.py").write_text(FAILING)
     (tmp_path / "blind.py").write_text(BLIND)
     live = Live(

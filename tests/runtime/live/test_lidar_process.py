@@ -33,9 +33,7 @@ class Rig:
         self.lidar = Mid360("127.0.0.1", point_port=0, imu_port=0)
         self.peer = Mid360Peer(self.lidar.ports)
         self.listener = RosNode(there, "listener")
-        self.process = LidarProcess(
-            here, RosNode(here, "lidar"), self.lidar, lambda: self.now, self.lines.append
-        )
+        self.process = LidarProcess(here, RosNode(here, "lidar"), self.lidar, lambda: self.now, self.lines.append)
         row = public.topic("/clock")
         self.clock = self.listener.publisher(row.name, row.type, row.qos)
         self.heard: dict[str, list[Any]] = {CLOUD: [], IMU: []}
@@ -76,9 +74,7 @@ def test_clouds_and_samples_bear_the_robots_time(rig: Rig) -> None:
     assert np.abs(points["x"]).max() < 9.0
     assert samples[-1].linear_acceleration.z == pytest.approx(9.80665)
     assert samples[-1].orientation_covariance[0] == -1.0
-    assert ros_convert.seconds(samples[-1].header.stamp) == pytest.approx(
-        rig.now - BEGIN + ROBOT_TIME, abs=0.012
-    )
+    assert ros_convert.seconds(samples[-1].header.stamp) == pytest.approx(rig.now - BEGIN + ROBOT_TIME, abs=0.012)
     assert rig.lines == []
 
 

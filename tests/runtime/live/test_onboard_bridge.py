@@ -19,13 +19,7 @@ from golem.robots.unitree.motion_switcher import CHECK_MODE, MotionSwitcher
 from golem.runtime.contract_check import ContractCheck
 from golem.runtime.executor import Executor
 from golem.runtime.live.bridge import StreamIn, StreamOut
-from golem.runtime.live.onboard_bridge import (
-    AnswersIn,
-    AnswersOut,
-    CallsIn,
-    CallsOut,
-    Identities,
-)
+from golem.runtime.live.onboard_bridge import AnswersIn, AnswersOut, CallsIn, CallsOut, Identities
 from golem.runtime.live.role_endpoints import RoleEndpoints
 from golem.runtime.lower_body_node import CheckedLowerBody
 from golem.runtime.onboard_nodes import BusOnboard, LocoServiceNode, ServiceNode

@@ -62,18 +62,14 @@ def test_a_best_effort_writer_is_another_writer(live: Live) -> None:
 
 
 @pytest.mark.parametrize(("topic", "kind"), [("/safety/lowcmd_in", hg.LOW_CMD), ("/lowstate", hg.LOW_STATE)])
-def test_a_second_stack_and_a_second_robot_stop_the_first(
-    live: Live, topic: str, kind: hg.StructLayout
-) -> None:
+def test_a_second_stack_and_a_second_robot_stop_the_first(live: Live, topic: str, kind: hg.StructLayout) -> None:
     live.activate()
     second, _ = live.member("second")
     writer = second.writer(f"rt{topic}", kind.type_name, public.topic(topic).qos)
     live.run(0.1)
     assert (live.state, live.reason) == (GateState.STOP1, "two_writers")
     assert live.gate is not None
-    assert (
-        f"{topic} is written by 2" in live.gate.status.detail and writer.guid.hex() in live.gate.status.detail
-    )
+    assert f"{topic} is written by 2" in live.gate.status.detail and writer.guid.hex() in live.gate.status.detail
 
 
 def test_an_operator_hands_over_to_a_second_stack_and_the_first_is_heard_no_more(live: Live) -> None:
@@ -148,9 +144,7 @@ def test_only_the_robots_own_frames_calibrate_a_camera(live: Live, parent: str) 
     assert (abs(moved - 0.5) < 1e-9) == (parent == OPTICAL_FRAMES["head"])
 
 
-def test_images_of_another_clock_are_refused_with_a_remedy(
-    live: Live, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_images_of_another_clock_are_refused_with_a_remedy(live: Live, capsys: pytest.CaptureFixture[str]) -> None:
     live.run(0.02)
     assert live.up is not None and live.up.side is not None
     bus = live.up.side.bus

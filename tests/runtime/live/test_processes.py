@@ -117,9 +117,7 @@ def test_a_dead_process_is_named_the_robot_stopped_and_the_process_restarted(
         raise AssertionError("the robot cannot be set free again:\n" + "\n".join(launched.lines))
 
 
-def test_another_writer_of_the_motors_command_is_named_by_its_process(
-    launched: Launched, domain: int
-) -> None:
+def test_another_writer_of_the_motors_command_is_named_by_its_process(launched: Launched, domain: int) -> None:
     with closing(connect(DdsConfig(domain=domain))) as participant:
         participant.writer("rt/lowcmd", hg.LOW_CMD.type_name, Qos(depth=1))
         line = launched.wait_for(r"^\[safety\] Safety gate: \w+ \(two_writers")
@@ -155,11 +153,7 @@ def alive(pid: int) -> bool:
 
 def test_a_second_twin_is_refused_and_told_who_is_there(launched: Launched) -> None:
     answer = launched.golem("twin", "tether")
-    assert (
-        answer.returncode == 2
-        and "There is a robot on domain" in answer.stderr
-        and "golem twin" in answer.stderr
-    )
+    assert answer.returncode == 2 and "There is a robot on domain" in answer.stderr and "golem twin" in answer.stderr
     status = launched.golem("safety", "status")
     assert status.stdout.strip()
 

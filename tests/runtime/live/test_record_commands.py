@@ -32,7 +32,5 @@ def test_it_is_said_once_how_fast_a_bag_grows(tmp_path: Path, monkeypatch: pytes
         growth.look()
     bag.close()
     (line,) = said
-    figures = re.fullmatch(
-        r"The bag grows by (\d+) MB a minute; the disk has room for (\d+) minutes\. .*", line
-    )
+    figures = re.fullmatch(r"The bag grows by (\d+) MB a minute; the disk has room for (\d+) minutes\. .*", line)
     assert figures is not None and [int(figure) for figure in figures.groups()] == [60, 10]

@@ -94,9 +94,7 @@ def of_role(role: Role) -> Ends:
     return ends
 
 
-@pytest.mark.parametrize(
-    ("support", "vendor", "unread"), [("hoist", "h1", "sport"), ("ground", "g1", "loco")]
-)
+@pytest.mark.parametrize(("support", "vendor", "unread"), [("hoist", "h1", "sport"), ("ground", "g1", "loco")])
 def test_processes_offer_what_the_table_says(support: str, vendor: str, unread: str, tmp_path: Path) -> None:
     (tmp_path / "blind.py").write_text(BLIND)
     robot = Choice("mujoco", {"world": "open", "support": support})

@@ -24,18 +24,14 @@ from golem.types import PlanarPose
 @pytest.mark.timeout(600)
 def test_the_client_is_told_and_the_robot_stands(tmp_path: Path) -> None:
     (tmp_path / "blind.py").write_text(BLIND)
-    live = Live(
-        load_stack("hall", profile="bench").with_choice("localizer", f"{tmp_path / 'blind.py'}:Blind")
-    )
+    live = Live(load_stack("hall", profile="bench").with_choice("localizer", f"{tmp_path / 'blind.py'}:Blind"))
     live.start_twin()
     live.start_gate()
     live.start_up()
     live.activate()
     client = Client(live, live.member("client")[1])
     live.run(4.0)
-    goal = Walk_Goal(
-        PoseStamped(convert.header(0.0, "base_link"), convert.pose(PlanarPose(5.0, 0.0, 0.0).matrix()))
-    )
+    goal = Walk_Goal(PoseStamped(convert.header(0.0, "base_link"), convert.pose(PlanarPose(5.0, 0.0, 0.0).matrix())))
     walk = client.send("/skill/navigate", goal)
     client.until(lambda: bool(np.linalg.norm(live.robot.data.qpos[:2]) > 0.5), 20.0)
     lidar = live.robot.lidar

@@ -34,9 +34,7 @@ class Drives:
         domain = LocalDomain()
         robot, safety = domain.participant(), domain.participant()
         self.bus = Bus()
-        self.commands = CommandIn(
-            self.bus, RoleEndpoints("robot", robot, RosNode(robot, "twin")), print, patience
-        )
+        self.commands = CommandIn(self.bus, RoleEndpoints("robot", robot, RosNode(robot, "twin")), print, patience)
         self._writer: Writer = RoleEndpoints("safety", safety, RosNode(safety, "safety")).writer("/lowcmd")
 
     def send(self, answers: float, kp: float = 0.0) -> None:
@@ -65,9 +63,7 @@ def test_time_stands_still_until_a_state_long_past_is_answered() -> None:
 
 
 @pytest.mark.parametrize("answers", [0.0, 50.0])
-def test_nobody_is_waited_for_who_does_not_say_what_he_answers_or_answered_another_robot(
-    answers: float,
-) -> None:
+def test_nobody_is_waited_for_who_does_not_say_what_he_answers_or_answered_another_robot(answers: float) -> None:
     drives = Drives(patience=LONG)
     drives.send(answers, kp=1.0)
     for k in range(1000):

@@ -110,9 +110,7 @@ def test_a_goal_is_pursued_to_its_end(client: Client) -> None:
     status, result = client.outcome(goal)
     assert (status, result.success, result.stage) == (GoalStatus.SUCCEEDED, True, "done")
     assert client.said == ["Standing for 0.2 s."]
-    assert [t.name for t in result.timings] == ["stand"] and result.timings[0].seconds == pytest.approx(
-        0.2, abs=0.02
-    )
+    assert [t.name for t in result.timings] == ["stand"] and result.timings[0].seconds == pytest.approx(0.2, abs=0.02)
 
 
 def test_a_second_goal_is_refused_with_the_reason_and_the_first_goes_on(client: Client) -> None:
@@ -222,9 +220,7 @@ def test_a_robot_that_is_started_anew_aborts_its_skill(client: Client) -> None:
         ("/skill/walk", Walk_Goal(PoseStamped(convert.header(0.0, "map"))), "'map'; valid: base_link, odom"),
     ],
 )
-def test_a_goal_without_sense_is_refused_with_the_reason(
-    client: Client, action: str, goal: Any, reason: str
-) -> None:
+def test_a_goal_without_sense_is_refused_with_the_reason(client: Client, action: str, goal: Any, reason: str) -> None:
     status, result = client.outcome(client.send(action, goal))
     assert (status, result.stage) == (GoalStatus.ABORTED, "refused") and reason in result.reason
 
@@ -236,16 +232,9 @@ def test_hands_obey_services_while_the_gate_is_open(client: Client) -> None:
     def goal() -> HandGoal | None:
         return side.bus.latest(topics.hand_goal("left"))
 
-    assert client.call("/left/gripper/set_position", SetGap_Request(0.03)).success and goal() == HandGoal(
-        0.03
-    )
-    assert client.call("/left/gripper/set_force", SetForce_Request(5.0)).success and goal() == HandGoal(
-        None, 5.0
-    )
-    assert (
-        "between 0 and 0.108 m"
-        in client.call("/left/gripper/set_position", SetGap_Request(float("nan"))).message
-    )
+    assert client.call("/left/gripper/set_position", SetGap_Request(0.03)).success and goal() == HandGoal(0.03)
+    assert client.call("/left/gripper/set_force", SetForce_Request(5.0)).success and goal() == HandGoal(None, 5.0)
+    assert "between 0 and 0.108 m" in client.call("/left/gripper/set_position", SetGap_Request(float("nan"))).message
     client.live.ask("stop")
     client.live.run(0.02)
     answer = client.call("/left/gripper/open", Trigger_Request())
@@ -347,9 +336,7 @@ def mine(live: Live, tmp_path: Any) -> Callable[[str], Client]:
     def make(fails: str) -> Client:
         live.leave("up")
         count = Choice(f"{tmp_path / 'mine.py'}:Count", {"fails": fails})
-        live.stack = replace(
-            live.stack, skills={"count": count, "asleep": Choice(f"{tmp_path}/mine.py:Asleep")}
-        )
+        live.stack = replace(live.stack, skills={"count": count, "asleep": Choice(f"{tmp_path}/mine.py:Asleep")})
         live.start_up()
         live.activate()
         live.run(0.02)
@@ -365,9 +352,7 @@ def run(client: Client, skill: str, goal: str) -> tuple[GoalStatus, Any]:
     return future.result().status, future.result().result
 
 
-def test_a_skill_of_ones_own_is_run_by_its_name_and_its_value_comes_back(
-    mine: Callable[[str], Client],
-) -> None:
+def test_a_skill_of_ones_own_is_run_by_its_name_and_its_value_comes_back(mine: Callable[[str], Client]) -> None:
     status, answer = run(mine(""), "count", '{"to": 3}')
     assert (status, answer.result.reason) == (GoalStatus.SUCCEEDED, "Counted.")
     assert json.loads(answer.value) == {"numbers": [0, 1, 2]}
@@ -389,11 +374,7 @@ def test_the_skills_and_their_goals_are_on_a_latched_topic(mine: Callable[[str],
 @pytest.mark.parametrize(
     ("skill", "goal", "words"),
     [
-        (
-            "cuont",
-            "{}",
-            "stand, take, walk. Did you mean 'count'?",
-        ),
+        ("cuont", "{}", "stand, take, walk. Did you mean 'count'?"),
         ("", "", "Unknown skill ''"),
         ("count", "", "'to' has no default"),
         ("count", '{"two": 1}', "Unknown goal field of count 'two'; valid: by, to. Did you mean 'to'?"),

@@ -79,9 +79,7 @@ def test_the_stack_on_the_domain_says_what_a_goal_consists_of(waving: Live) -> N
     assert (goal.skill, json.loads(goal.goal)) == ("wave", {"times": 5})
 
 
-def test_a_class_of_a_file_is_found_by_the_name_that_the_stack_has_for_it(
-    waving: Live, tmp_path: Path
-) -> None:
+def test_a_class_of_a_file_is_found_by_the_name_that_the_stack_has_for_it(waving: Live, tmp_path: Path) -> None:
     goal = say(waving, f"{tmp_path / 'wave.py'}:Wave", "--times", "2")
     assert (goal.skill, json.loads(goal.goal)) == ("wave", {"times": 2})
     (tmp_path / "other.py").write_text(WAVE)

@@ -43,14 +43,10 @@ def test_the_labelled_spot_is_in_the_crop_where_the_label_says() -> None:
 def test_what_is_outside_of_an_image_is_one_colour_or_its_edge() -> None:
     images = augment.Images([np.full((100, 120, 3), 200, np.uint8), np.zeros((300, 400, 3), np.uint8)], "cpu")
     many = 40
-    crops = images.cut(
-        [0] * many, np.ones((many, 2)), np.full((many, 2), 60.0), torch.Generator().manual_seed(0)
-    )
+    crops = images.cut([0] * many, np.ones((many, 2)), np.full((many, 2), 60.0), torch.Generator().manual_seed(0))
     assert torch.allclose(crops[:, :, 60:160, 60:180], torch.tensor(200 / 255))
     outside = crops[:, :, :50, :50]
-    assert (outside == outside[:, :, :1, :1]).all() and 4 < len(
-        {round(float(o[0, 0, 0]), 4) for o in outside}
-    ) < 40
+    assert (outside == outside[:, :, :1, :1]).all() and 4 < len({round(float(o[0, 0, 0]), 4) for o in outside}) < 40
 
 
 def test_decoding_the_targets_gives_the_labels_back() -> None:
@@ -104,10 +100,7 @@ def test_blurs_keep_the_brightness_and_where_things_are() -> None:
     image = torch.zeros((3, 1, 31, 31))
     image[:, :, 15, 15] = 1.0
     kernels = torch.cat(
-        [
-            augment.gaussians(torch.tensor([1.0, 1.2])),
-            augment.strokes(torch.tensor([4.0]), torch.tensor([0.0])),
-        ]
+        [augment.gaussians(torch.tensor([1.0, 1.2])), augment.strokes(torch.tensor([4.0]), torch.tensor([0.0]))]
     )
     out = augment.filtered(image, kernels, torch.tensor([False, True, True]))[:, 0]
     assert torch.allclose(out.sum(dim=(1, 2)), torch.ones(3), atol=1e-5)

@@ -41,9 +41,7 @@ def test_labelled_centres_lie_on_the_geoms_of_their_part(kind: str, classes: set
                 total += 1
                 right += owner[segmentation[round(y), round(x)]] == row[0]
     assert seen == classes and total > (60 if kind == "pack" else 20)
-    assert right / total > (
-        0.93 if kind == "pack" else 0.7
-    )  # the rest is hidden behind a finger, a cable or a thing
+    assert right / total > (0.93 if kind == "pack" else 0.7)  # the rest is hidden behind a finger, a cable or a thing
 
 
 def test_small_parts_that_the_border_cuts_are_ignored_and_large_ones_are_not_told() -> None:
@@ -76,9 +74,7 @@ def test_a_pulled_screw_leaves_a_hole_label() -> None:
                 data.qpos[at + 2] -= 3.0 * out
             refresh(scene.world)
             labels = label_image(scene, info, plain.segment(data, info.name))
-            counts.append(
-                [int((labels[:, 0] == CLASSES.index(name)).sum()) for name in ("screw", "screw_hole")]
-            )
+            counts.append([int((labels[:, 0] == CLASSES.index(name)).sum()) for name in ("screw", "screw_hole")])
     (screws, holes), (screws_out, holes_out) = counts
     assert screws_out < screws and holes_out > holes
 
@@ -101,9 +97,7 @@ def test_a_world_depends_on_its_seed_alone(kind: str) -> None:
     pairs = [list(dataset.render(3, 0, "train", 1, kind)) for _ in range(2)]
     assert len(pairs[0]) == 2
     for (image, labels, camera, place), (image_2, labels_2, camera_2, place_2) in zip(*pairs, strict=True):
-        assert (
-            (camera, place) == (camera_2, place_2) and (image == image_2).all() and (labels == labels_2).all()
-        )
+        assert (camera, place) == (camera_2, place_2) and (image == image_2).all() and (labels == labels_2).all()
         assert labels.shape[1] == len(COLUMNS)
     held_out = next(iter(dataset.render(3, 0, "held_out", 1)))
     assert (held_out[0] != pairs[0][0][0]).any()

@@ -48,9 +48,7 @@ def coco(folder: Path, count: int = 5) -> Path:
     data = {
         "images": [{"id": k, "file_name": f"{k}.png"} for k in range(count)],
         "categories": [{"id": 3, "name": "Cap"}],
-        "annotations": [
-            {"image_id": k, "category_id": 3, "bbox": [*place, 40, 40]} for k, place in enumerate(places)
-        ],
+        "annotations": [{"image_id": k, "category_id": 3, "bbox": [*place, 40, 40]} for k, place in enumerate(places)],
     }
     (folder / "labels.json").write_text(json.dumps(data))
     return folder
@@ -60,12 +58,7 @@ def test_folders_of_yolo_say_what_is_held_out(tmp_path: Path) -> None:
     data, held, classes = load_own(yolo(tmp_path), 0, 640)
     assert (len(data.images), len(held.images), classes) == (4, 2, ("orange_cover",))
     kind, x, y, x0, y0, x1, y1, ignored = data.labels[0][0]
-    assert (kind, x1 - x0, y1 - y0, ignored) == (
-        0.0,
-        pytest.approx(40, abs=0.1),
-        pytest.approx(40, abs=0.1),
-        0.0,
-    )
+    assert (kind, x1 - x0, y1 - y0, ignored) == (0.0, pytest.approx(40, abs=0.1), pytest.approx(40, abs=0.1), 0.0)
     np.testing.assert_array_equal(data.images[0][round(y), round(x)], (250, 220, 40))
     corner = round(y0 + 0.5), round(x0 + 0.5)
     assert tuple(data.images[0][corner]) == (250, 220, 40)
@@ -79,9 +72,7 @@ def test_of_coco_every_fifth_is_held_out_and_large_images_shrink(tmp_path: Path)
     assert data.labels[0][0, 5] - data.labels[0][0, 3] == pytest.approx(20)
 
 
-def test_one_command_makes_weights_that_the_localizer_takes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_command_makes_weights_that_the_localizer_takes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = yolo(tmp_path / "mine")
     main(["--labels", str(folder), "--out", str(tmp_path / "run"), "--steps", "2"])
     said = capsys.readouterr().out

@@ -63,10 +63,7 @@ def test_an_interrupted_run_ends_with_the_same_weights(splits: Path, tmp_path: P
 def test_the_exported_network_computes_what_the_trained_one_does(tmp_path: Path) -> None:
     torch.manual_seed(1)
     model = PartNet(len(CLASSES))
-    for (
-        name,
-        value,
-    ) in model.state_dict().items():  # as after training: no batch normalisation is the identity
+    for name, value in model.state_dict().items():  # as after training: no batch normalisation is the identity
         if "running" in name:
             value.uniform_(0.5, 1.5)
     model.eval()
@@ -79,17 +76,12 @@ def test_the_exported_network_computes_what_the_trained_one_does(tmp_path: Path)
         image = torch.randn(1, 3, *size)
         with torch.inference_mode():
             expected = model(image).numpy()
-        np.testing.assert_allclose(
-            np.asarray(session.run(["maps"], {"image": image.numpy()})[0]), expected, atol=1e-4
-        )
+        np.testing.assert_allclose(np.asarray(session.run(["maps"], {"image": image.numpy()})[0]), expected, atol=1e-4)
 
 
 def test_training_goes_on_from_an_exported_network(tmp_path: Path) -> None:
     torch.manual_seed(1)
-    torch.save(
-        {"average": PartNet(len(CLASSES)).state_dict(), "step": 7, "classes": list(CLASSES)},
-        tmp_path / "x.pt",
-    )
+    torch.save({"average": PartNet(len(CLASSES)).state_dict(), "step": 7, "classes": list(CLASSES)}, tmp_path / "x.pt")
     path = export_onnx(tmp_path / "x.pt", tmp_path / "x.onnx")
     model = PartNet(len(CLASSES)).eval()
     load_onnx(model, path, CLASSES)
@@ -107,8 +99,6 @@ def test_the_curve_of_the_shipped_weights_reaches_their_step() -> None:
     import onnx
 
     file = resources.files("golem.capabilities.perception").joinpath("weights/detector.onnx")
-    facts = {
-        p.key: json.loads(p.value) for p in onnx.load_model_from_string(file.read_bytes()).metadata_props
-    }
+    facts = {p.key: json.loads(p.value) for p in onnx.load_model_from_string(file.read_bytes()).metadata_props}
     curve = Path(__file__).parents[3] / "docs" / "images" / "detector_curve.csv"
     assert str(facts["step"]) in [row.split(",")[0] for row in curve.read_text().splitlines()]

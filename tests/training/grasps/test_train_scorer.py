@@ -20,9 +20,7 @@ def made_up(seed: int, n: int = 600) -> GraspLabels:
     """Grasps that hold where the opening is small."""
     rng = np.random.default_rng(seed)
     facts = rng.uniform(0.0, 1.0, (n, FACTS)).astype(np.float32)
-    return GraspLabels(
-        rng.random((n, SEEN)) < 0.01, facts, facts[:, 0] < 0.4, np.arange(n) // 6, np.arange(n) % 4
-    )
+    return GraspLabels(rng.random((n, SEEN)) < 0.01, facts, facts[:, 0] < 0.4, np.arange(n) // 6, np.arange(n) % 4)
 
 
 def test_area_under_the_curve_counts_ordered_pairs() -> None:
@@ -34,9 +32,7 @@ def test_area_under_the_curve_counts_ordered_pairs() -> None:
 
 def test_slopes_are_those_of_the_loss() -> None:
     rng = np.random.default_rng(0)
-    values: train_scorer.Pass = [
-        rng.standard_normal(s).astype(np.float64) for s in ((6, 5), (5, 1), (5,), (1,))
-    ]
+    values: train_scorer.Pass = [rng.standard_normal(s).astype(np.float64) for s in ((6, 5), (5, 1), (5,), (1,))]
     x, held = rng.standard_normal((7, 6)), rng.random(7) < 0.5
     _, slopes = train_scorer._slopes(values, x, held, 0.0, rng)
     for value, slope in zip(values, slopes, strict=True):
@@ -52,8 +48,7 @@ def test_slopes_are_those_of_the_loss() -> None:
 def test_it_learns_and_is_the_same_again(tmp_path: Path) -> None:
     data, held = made_up(0), made_up(1)
     nets = [
-        train(data, held, TrainScorerConfig(epochs=8, batch=8, rate=3e-3), tmp_path / "curve.csv")
-        for _ in range(2)
+        train(data, held, TrainScorerConfig(epochs=8, batch=8, rate=3e-3), tmp_path / "curve.csv") for _ in range(2)
     ]
     scores = nets[0].logits(held.cells, held.facts)
     assert auc(scores, held.held) > 0.8

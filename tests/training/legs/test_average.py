@@ -27,8 +27,7 @@ def weights(path: Path) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("name", "parts", "shares"),
-    [("almi_stand", PARTS, (2.0, 1.0, 1.0)), ("almi_walk_rough", ROUGH, (1.0, 1.0))],
+    ("name", "parts", "shares"), [("almi_stand", PARTS, (2.0, 1.0, 1.0)), ("almi_walk_rough", ROUGH, (1.0, 1.0))]
 )
 def test_a_shipped_network_is_the_mean_that_the_docs_say(
     name: str, parts: list[Path], shares: tuple[float, ...], tmp_path: Path
@@ -62,9 +61,7 @@ def test_the_mean_is_weighted_and_says_of_what(tmp_path: Path) -> None:
         ([PARTS[0], Path("nope.onnx")], (1.0, 1.0), "cannot be read"),
     ],
 )
-def test_what_is_no_mean_is_refused(
-    parts: list[Path], shares: tuple[float, ...], words: str, tmp_path: Path
-) -> None:
+def test_what_is_no_mean_is_refused(parts: list[Path], shares: tuple[float, ...], words: str, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=words):
         average(parts, shares, tmp_path / "mean.onnx")
     assert not (tmp_path / "mean.onnx").exists()

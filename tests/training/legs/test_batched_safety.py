@@ -24,9 +24,7 @@ ROBOTS = 16
 def state(q: np.ndarray, dq: np.ndarray, tau: np.ndarray) -> LowState:
     full = np.zeros((3, NUM_JOINTS))
     full[:, LEGS] = q, dq, tau
-    return LowState(
-        0.0, full[0], full[1], full[2], Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3))
-    )
+    return LowState(0.0, full[0], full[1], full[2], Imu(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3)))
 
 
 def test_what_it_lets_through_is_what_the_real_gate_does_from_a_state_as_old_as_the_command() -> None:

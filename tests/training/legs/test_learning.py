@@ -19,26 +19,13 @@ from golem.errors import ConfigError
 from golem.provenance import commit
 from golem.robots.model.leg_kinematics import leg_poses
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, read_checkpoint, read_curve
-from golem.training.legs.disturbances import (
-    GENTLE,
-    STRAIGHT,
-    Difficulty,
-    RandomPushes,
-    UpperBodyMotion,
-)
+from golem.training.legs.disturbances import GENTLE, STRAIGHT, Difficulty, RandomPushes, UpperBodyMotion
 from golem.training.legs.env import LAYOUT, TASKS, LegsEnv, Task
 from golem.training.legs.export_policy import TRAINED, command_of, export, load_actor
 from golem.training.legs.learning_curve import draw_curves
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
-from golem.training.legs.train_legs import (
-    EXPORTED_NOISE,
-    EXPORTED_PUSH,
-    Adversary,
-    TrainLegsConfig,
-    _Run,
-    train,
-)
+from golem.training.legs.train_legs import EXPORTED_NOISE, EXPORTED_PUSH, Adversary, TrainLegsConfig, _Run, train
 from golem.training.legs.training_model import STANCE
 
 QUARTERS = TASKS["stand"].quarters
@@ -47,9 +34,7 @@ QUARTERS = TASKS["stand"].quarters
 def small(
     out: Path, seed: int = 0, updates: int = 2, *, robots: int = 8, threads: int = 1, **changes: Any
 ) -> TrainLegsConfig:
-    return TrainLegsConfig(
-        out=out, seed=seed, robots=robots, steps=robots * 24 * updates, threads=threads, **changes
-    )
+    return TrainLegsConfig(out=out, seed=seed, robots=robots, steps=robots * 24 * updates, threads=threads, **changes)
 
 
 def test_the_number_of_threads_changes_nothing(tmp_path: Path) -> None:
@@ -75,9 +60,7 @@ def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(
     with monkeypatch.context() as changed:
         changed.setattr("golem.training.legs.train_legs.commit", lambda: "later")
         train(small(tmp_path / "a", updates=12, learned_from=0.0))
-    assert command_of(read_checkpoint(tmp_path / "a" / CHECKPOINT)).endswith(
-        f"(commit {commit()}, then later)"
-    )
+    assert command_of(read_checkpoint(tmp_path / "a" / CHECKPOINT)).endswith(f"(commit {commit()}, then later)")
     with pytest.raises(ConfigError, match="another configuration"):
         train(small(tmp_path / "a", seed=5, updates=12))
     with monkeypatch.context() as changed, pytest.raises(ConfigError, match="other rewards"):
@@ -100,9 +83,7 @@ def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(
     assert float(rows[0]["steps"]) == read_curve(tmp_path / "a")["steps"][0]
     draw_curves([curves / "curve.csv:b", tmp_path / "a"], tmp_path / "again.png")
     with (tmp_path / "again.csv").open() as file:
-        assert [row for row in csv.DictReader(file) if row["run"] == "b"] == [
-            r for r in rows if r["run"] == "b"
-        ]
+        assert [row for row in csv.DictReader(file) if row["run"] == "b"] == [r for r in rows if r["run"] == "b"]
     with pytest.raises(ConfigError, match="Unknown run of .*curve.csv 'd'; valid: a, b, c"):
         draw_curves([curves / "curve.csv:d"], tmp_path / "again.png")
 
@@ -120,8 +101,7 @@ def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(
 ) -> None:
     first = train(small(tmp_path / "first"))
     weights = [
-        load_actor(train(small(tmp_path / f"{seed}", seed, updates=3, start=first))).net[0].weight
-        for seed in (1, 2)
+        load_actor(train(small(tmp_path / f"{seed}", seed, updates=3, start=first))).net[0].weight for seed in (1, 2)
     ]
     assert not torch.equal(*weights)
     network, _ = export(first, tmp_path)
@@ -130,13 +110,9 @@ def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(
     config = small(tmp_path / "anew", updates=2700, start=network)
     run = _Run(config)
     run.begin_with(network)
-    for mine, exported in zip(
-        run.legs.actor.net.parameters(), load_actor(network).net.parameters(), strict=True
-    ):
+    for mine, exported in zip(run.legs.actor.net.parameters(), load_actor(network).net.parameters(), strict=True):
         assert torch.equal(mine, exported)
-    assert run.steps == 0 and float(run.legs.actor.log_std.exp().detach().mean()) == pytest.approx(
-        EXPORTED_NOISE
-    )
+    assert run.steps == 0 and float(run.legs.actor.log_std.exp().detach().mean()) == pytest.approx(EXPORTED_NOISE)
     assert run.env.difficulty.strictness == run.env.difficulty.amplitude == 1.0
     assert run.env.difficulty.push == EXPORTED_PUSH
     before = [w.detach().clone() for w in run.legs.critic.parameters()]
@@ -154,11 +130,7 @@ def test_a_run_that_begins_with_anothers_networks_draws_its_own_noise(
 def test_files_that_are_no_checkpoint_network_or_curve_are_named(tmp_path: Path) -> None:
     (tmp_path / "notes.pt").write_text("hello")
     torch.save({"model": 1}, tmp_path / "other.pt")
-    for name, words in (
-        ("nope.pt", "No such file"),
-        ("notes.pt", "is no checkpoint"),
-        ("other.pt", "older GOLEM"),
-    ):
+    for name, words in (("nope.pt", "No such file"), ("notes.pt", "is no checkpoint"), ("other.pt", "older GOLEM")):
         with pytest.raises(ConfigError, match=words):
             export(tmp_path / name, tmp_path)
         with pytest.raises(ConfigError, match=words):

@@ -56,9 +56,7 @@ class UpperBody(Protocol):
         """
         ...
 
-    def step(
-        self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float
-    ) -> ArmCommand:
+    def step(self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float) -> ArmCommand:
         """Advance the command state by one tick.
 
         Args:
@@ -93,18 +91,10 @@ def check_pose(name: str, pose: Array) -> Array:
     if T.shape != (4, 4):
         raise TargetError(f"{name} must be a 4x4 homogeneous matrix, not an array of shape {T.shape}.")
     if not np.isfinite(T).all():
-        raise TargetError(
-            f"{name} contains NaN or infinity; give a finite pose, or None to keep the arm still."
-        )
+        raise TargetError(f"{name} contains NaN or infinity; give a finite pose, or None to keep the arm still.")
     R = T[:3, :3]
-    if (
-        np.abs(R @ R.T - np.eye(3)).max() > 1e-4
-        or np.linalg.det(R) < 0
-        or np.abs(T[3] - (0, 0, 0, 1)).max() > 1e-9
-    ):
-        raise TargetError(
-            f"{name} is not a rigid transform; its upper left 3x3 block must be a rotation matrix."
-        )
+    if np.abs(R @ R.T - np.eye(3)).max() > 1e-4 or np.linalg.det(R) < 0 or np.abs(T[3] - (0, 0, 0, 1)).max() > 1e-9:
+        raise TargetError(f"{name} is not a rigid transform; its upper left 3x3 block must be a rotation matrix.")
     return T
 
 

@@ -74,8 +74,7 @@ class GoalPostures:
         self.nearest = np.inf
         starts = [q, *(self._mixed(q, POSTURES[name], T_left, T_right) for name in ("ready", "home"))]
         starts += [
-            self._mixed(q, rng.uniform(self._ik.lower, self._ik.upper), T_left, T_right)
-            for _ in range(random_starts)
+            self._mixed(q, rng.uniform(self._ik.lower, self._ik.upper), T_left, T_right) for _ in range(random_starts)
         ]
         for ik in (self._ik, self._around):
             for i, start in enumerate(starts):

@@ -58,9 +58,7 @@ class PinkIK(TaskSpaceController):
     def solve(self, dt: float) -> Array | None:
         """Set Pink's targets and let it solve; see `TaskSpaceController.solve`."""
         k, task = self.kinematics, self.task
-        configuration = self._pink.Configuration(
-            k.model, k.data, self.q, copy_data=False, forward_kinematics=False
-        )
+        configuration = self._pink.Configuration(k.model, k.data, self.q, copy_data=False, forward_kinematics=False)
         moving = (task.above > task.below)[: len(self.q)]
         speed = self._pink.limits.VelocityLimit(k.model, np.where(moving, self.speed, _STILL))
         wanted = [i for i in range(2) if task.wanted[i]]

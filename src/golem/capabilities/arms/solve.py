@@ -59,8 +59,7 @@ def solve_posture(
     ik = DiffIK(replace(_OFFLINE, torso_range=torso_range))
     # Comfort counts from the stops, so the search may go near them; `ready` and `home` are inside the gate's range.
     ik.lower[1:], ik.upper[1:] = (
-        stop[1:] + sign * _OFFLINE.limit_margin
-        for stop, sign in zip(ik.kinematics.stops, (1, -1), strict=True)
+        stop[1:] + sign * _OFFLINE.limit_margin for stop, sign in zip(ik.kinematics.stops, (1, -1), strict=True)
     )
     sides: list[Side] = [side for side, T in zip(SIDES, (T_left, T_right), strict=True) if T is not None]
     best: tuple[float, Array] | None = None

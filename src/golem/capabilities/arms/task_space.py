@@ -94,9 +94,7 @@ class TaskSpaceConfig:
         )  # fmt: skip
         for name in positive:
             if not getattr(self, name) > 0.0:
-                raise ConfigError(
-                    f"The arm controller's option {name} must be positive, not {getattr(self, name)}."
-                )
+                raise ConfigError(f"The arm controller's option {name} must be positive, not {getattr(self, name)}.")
         for name in (
             "latency",
             "posture_weight",
@@ -113,9 +111,7 @@ class TaskSpaceConfig:
                 raise ConfigError(f"The arm controller's option {name} must not be negative.")
         for name in ("palm_gain", "collision_gain"):
             if not 0.0 < getattr(self, name) <= 1.0:
-                raise ConfigError(
-                    f"The arm controller's option {name} must lie in (0, 1], not {getattr(self, name)}."
-                )
+                raise ConfigError(f"The arm controller's option {name} must lie in (0, 1], not {getattr(self, name)}.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,9 +217,7 @@ class TaskSpaceController(ABC):
         # Not into the range of the waist: a robot that was turned further while it was limp would swing back at once.
         self._move(np.clip(check_joints("The posture to start from", q)[UPPER], *self._kinematics.stops))
 
-    def step(
-        self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float
-    ) -> ArmCommand:
+    def step(self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float) -> ArmCommand:
         """Solve once and integrate; see `UpperBody.step`."""
         task = self.task
         check_joints("q_measured", q_measured)

@@ -91,13 +91,9 @@ def check_trajectory(trajectory: JointTrajectory, q: Array) -> None:
     n = len(times)
     for name, array in (("q", points), ("dq", velocities)):
         if array is not None and array.shape != (n, NUM_UPPER):
-            raise TargetError(
-                f"{name} of a trajectory of {n} points has shape {array.shape}, not ({n}, {NUM_UPPER})."
-            )
+            raise TargetError(f"{name} of a trajectory of {n} points has shape {array.shape}, not ({n}, {NUM_UPPER}).")
     if n == 0 or times.shape != (n,) or times[0] < 0.0 or not (np.diff(times) > 0.0).all():
-        raise TargetError(
-            "A trajectory has at least one point, and its times increase from zero or a positive one."
-        )
+        raise TargetError("A trajectory has at least one point, and its times increase from zero or a positive one.")
     finite = [np.isfinite(array).all() for array in (times, points, velocities) if array is not None]
     if not all(finite):
         raise TargetError("A trajectory contains NaN or infinity.")

@@ -45,10 +45,7 @@ def fit_hand(views: Sequence[TagView], camera: Side, info: CameraInfo, zero: flo
     x, covariance, residual = solve(problem)
     name = f"{camera}_hand"
     return Calibration(
-        cameras={name: pose(x[:6])},
-        covariances={name: covariance[:6, :6]},
-        residual=residual,
-        views=problem.count,
+        cameras={name: pose(x[:6])}, covariances={name: covariance[:6, :6]}, residual=residual, views=problem.count
     )
 
 

@@ -196,11 +196,7 @@ class _Problem(ViewProblem):
             self._kinematics.update(q)
             T_base_torso = self._kinematics.pose("torso_link")
             T_base_hand = self._kinematics.pose(hand_name(view.side))
-            T = (
-                T_optical_torso
-                @ np.linalg.solve(T_base_torso, T_base_hand)
-                @ pose(x[20 + 6 * k : 26 + 6 * k])
-            )
+            T = T_optical_torso @ np.linalg.solve(T_base_torso, T_base_hand) @ pose(x[20 + 6 * k : 26 + 6 * k])
             for number, seen in view.corners.items():
                 points = (T @ self._tags[view.side][number] @ self._corners.T).T[:, :3]
                 errors.append((project(self._info, points) - seen).ravel())

@@ -77,9 +77,7 @@ class LidarFit:
     points: int
 
 
-def fit_lidar(
-    views: Sequence[SurfaceView], info: CameraInfo, head: Array, head_covariance: Array
-) -> LidarFit:
+def fit_lidar(views: Sequence[SurfaceView], info: CameraInfo, head: Array, head_covariance: Array) -> LidarFit:
     """Return the mount that brings the points of the scans onto the surfaces.
 
     Args:
@@ -93,9 +91,7 @@ def fit_lidar(
     """
     planes = [planes_of(view.depth, info) for view in views]
     points = [_usable(view.points) for view in views]
-    T_optical_lidar: Array = np.asarray(
-        np.linalg.solve(T_TORSO_HEAD_OPTICAL @ head, T_TORSO_LIDAR), np.float64
-    )
+    T_optical_lidar: Array = np.asarray(np.linalg.solve(T_TORSO_HEAD_OPTICAL @ head, T_TORSO_LIDAR), np.float64)
     x, prior = np.zeros(6), np.diag(np.repeat(MOUNT, 3) ** -2.0)
     told, residual, count = np.zeros((6, 6)), 0.0, 0
     for gate in GATES:
@@ -113,10 +109,7 @@ def fit_lidar(
         x -= np.linalg.solve(told + prior, weighed.T @ r + prior @ x)
         residual = float(np.sqrt(np.mean(r**2)))
     own = np.linalg.inv(told / OVERCONFIDENCE + prior)
-    for what, part, unit, most in (
-        ("turn", own[:3, :3], "rad", SURE[0]),
-        ("place", own[3:, 3:], "m", SURE[1]),
-    ):
+    for what, part, unit, most in (("turn", own[:3, :3], "rad", SURE[0]), ("place", own[3:, 3:], "m", SURE[1])):
         sigma = float(np.sqrt(np.linalg.eigvalsh(part).max()))
         if sigma > most:
             raise ConfigError(

@@ -20,9 +20,7 @@ class TagDetector:
         options = cv2.aruco.DetectorParameters()
         options.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         options.cornerRefinementWinSize = 3
-        options.relativeCornerRefinmentWinSize = (
-            1.0  # of a cell; by default tags below 40 px get a window of 1 px
-        )
+        options.relativeCornerRefinmentWinSize = 1.0  # of a cell; by default tags below 40 px get a window of 1 px
         options.cornerRefinementMaxIterations = 50
         options.cornerRefinementMinAccuracy = 0.01
         family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)

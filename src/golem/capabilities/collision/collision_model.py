@@ -48,10 +48,7 @@ class CollisionModel:
     """
 
     def __init__(
-        self,
-        robot: SphereRobot,
-        joints: Sequence[str] | None = None,
-        held: Mapping[str, float] | None = None,
+        self, robot: SphereRobot, joints: Sequence[str] | None = None, held: Mapping[str, float] | None = None
     ) -> None:
         """Lay out the tables; a few milliseconds.
 
@@ -125,9 +122,7 @@ class CollisionModel:
         """Return the spheres (m, 4) at `q` (n,): centre in the base and radius [m]."""
         n = len(self.joints)
         out = np.empty((int(self.ints[3]), 4))
-        sphere_kernel.place_spheres(
-            q, self.ints, self.floats, np.empty((n + 1, 9)), np.empty((n + 1, 3)), out
-        )
+        sphere_kernel.place_spheres(q, self.ints, self.floats, np.empty((n + 1, 9)), np.empty((n + 1, 3)), out)
         return out
 
     def _build(self, held: Mapping[str, float]) -> None:

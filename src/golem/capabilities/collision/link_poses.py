@@ -55,9 +55,7 @@ def hold_joints(links: Sequence[LinkGeometry], held: Mapping[str, float]) -> tup
         if name not in names:
             raise unknown_name("joint", name, names)
     return tuple(
-        replace(
-            link, kind="fixed", joint="", leader="", T_parent_link=joint_pose(link, joint_value(link, held))
-        )
+        replace(link, kind="fixed", joint="", leader="", T_parent_link=joint_pose(link, joint_value(link, held)))
         if (link.leader or link.joint) in held and link.kind != "fixed"
         else link
         for link in links

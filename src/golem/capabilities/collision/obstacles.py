@@ -40,9 +40,7 @@ class Obstacle:
         if self.kind not in OBSTACLE_KINDS:
             raise unknown_name("kind of obstacle", self.kind, OBSTACLE_KINDS)
         if len(self.size) != SIZES[self.kind] or not all(0.0 < x < np.inf for x in self.size):
-            raise ConfigError(
-                f"A {self.kind} has {SIZES[self.kind]} positive sizes in metres, not {list(self.size)}."
-            )
+            raise ConfigError(f"A {self.kind} has {SIZES[self.kind]} positive sizes in metres, not {list(self.size)}.")
         if np.shape(self.T_base_obstacle) != (4, 4) or not np.isfinite(self.T_base_obstacle).all():
             raise ConfigError(f"The pose of a {self.kind} is a finite 4x4 matrix.")
 
@@ -75,11 +73,7 @@ NOTHING: Array = np.zeros((0, 4))
 
 
 def cloud_grid(
-    points: Points,
-    cell: float = 0.02,
-    bounds: Array = REACH,
-    spheres: Array = NOTHING,
-    margin: float = 0.0,
+    points: Points, cell: float = 0.02, bounds: Array = REACH, spheres: Array = NOTHING, margin: float = 0.0
 ) -> CloudGrid:
     """Return the grid of a cloud; 10 million points take about half a second.
 
@@ -185,9 +179,5 @@ class World:
 
 
 _NO_CLOUD = CloudGrid(
-    np.zeros((0, 4)),
-    np.zeros((0, 0, 0), np.int32),
-    np.zeros((0, 0, 0), np.int32),
-    np.array([0.0, 0.0, 0.0, 1.0]),
-    0,
+    np.zeros((0, 4)), np.zeros((0, 0, 0), np.int32), np.zeros((0, 0, 0), np.int32), np.array([0.0, 0.0, 0.0, 1.0]), 0
 )

@@ -22,26 +22,11 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from golem.capabilities.collision.link_poses import (
-    free_links,
-    hold_joints,
-    joint_names,
-    link_poses,
-    neighbours,
-)
+from golem.capabilities.collision.link_poses import free_links, hold_joints, joint_names, link_poses, neighbours
 from golem.capabilities.collision.mesh_oracle import MeshOracle
-from golem.capabilities.collision.packing_report import (
-    CollisionScore,
-    LinkCoverage,
-    coverage,
-    score_collisions,
-)
+from golem.capabilities.collision.packing_report import CollisionScore, LinkCoverage, coverage, score_collisions
 from golem.capabilities.collision.sphere_packer import Packing, SphereKind, pack
-from golem.capabilities.collision.sphere_robot import (
-    SphereRobot,
-    save_spheres,
-    without_surfaces,
-)
+from golem.capabilities.collision.sphere_robot import SphereRobot, save_spheres, without_surfaces
 from golem.capabilities.collision.surface import link_surface, open_edges
 from golem.errors import ConfigError
 from golem.robots.model.link_geometry import LinkGeometry, h12_geometry, read_geometry
@@ -131,9 +116,7 @@ def find_pairs(links: Sequence[LinkGeometry], packings: Sequence[Packing], postu
         kept.append((int(a), int(b)))
         allowed.append(depth)
         ignored.append(np.argwhere(bad) + np.array([first[a], first[b]], np.int64))
-    return PairTable(
-        np.array(kept, np.int64).reshape(-1, 2), np.array(allowed), np.concatenate(ignored), tuple(always)
-    )
+    return PairTable(np.array(kept, np.int64).reshape(-1, 2), np.array(allowed), np.concatenate(ignored), tuple(always))
 
 
 def _tuned(gaps: NDArray[np.float32], touch: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], float]:
@@ -272,9 +255,7 @@ def pack_robot(name: str, links: tuple[LinkGeometry, ...], config: SpheresConfig
         for i in solid
     ]
     judged = sample_postures(links, config.postures, config.seed + 1, config.still)
-    return PackedRobot(
-        robot, tuple(report), score_collisions(robot, links, table.pairs, judged), table.always
-    )
+    return PackedRobot(robot, tuple(report), score_collisions(robot, links, table.pairs, judged), table.always)
 
 
 def _bar(what: str, things: Collection[T]) -> Iterable[T]:

@@ -103,9 +103,7 @@ def score_collisions(
     oracle = MeshOracle(links, oracle_pairs)
     truth = np.array([oracle.collides(q) for q in postures])
     found = np.array([spheres_collide(robot, q) for q in postures])
-    return CollisionScore(
-        len(postures), int(truth.sum()), int((truth & ~found).sum()), int((found & ~truth).sum())
-    )
+    return CollisionScore(len(postures), int(truth.sum()), int((truth & ~found).sum()), int((found & ~truth).sum()))
 
 
 def spheres_collide(robot: SphereRobot, q: Array) -> bool:

@@ -92,15 +92,7 @@ def bodies_collide(R: Array, p: Array, ints: Ints, floats: Array, margin: float)
                 c = int(np.int64(ints[pair + side]))
                 if not done[clusters + c]:
                     done[clusters + c] = 1
-                    put(
-                        R,
-                        p,
-                        ints[ints[CLUSTER_BODY] + c],
-                        floats,
-                        ints[CLUSTER_BALLS] + 4 * c,
-                        placed,
-                        links + c,
-                    )
+                    put(R, p, ints[ints[CLUSTER_BODY] + c], floats, ints[CLUSTER_BALLS] + 4 * c, placed, links + c)
             if not _near(placed, links + ints[pair], links + ints[pair + 1], reach):
                 continue
             for side in range(2):

@@ -73,9 +73,7 @@ def save_spheres(robot: SphereRobot, file: Path) -> None:
         )
     head = {"format": FORMAT, "robot": robot.name, "kind": robot.kind}
     lines = [json.dumps(head)[:-1], ' "links": [\n  ' + ",\n  ".join(json.dumps(row) for row in rows) + "]"]
-    lines += [
-        f' "{key}": {json.dumps(getattr(robot, key).tolist())}' for key in ("pairs", "allowed", "ignored")
-    ]
+    lines += [f' "{key}": {json.dumps(getattr(robot, key).tolist())}' for key in ("pairs", "allowed", "ignored")]
     try:
         file.write_text(",\n".join(lines) + "}\n", encoding="utf-8")
     except OSError as error:

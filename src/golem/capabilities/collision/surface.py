@@ -150,6 +150,4 @@ def _capped(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     number, hole = np.unique(hole, return_inverse=True)
     middles = np.array([mesh.vertices[np.unique(rim[hole == k])].mean(axis=0) for k in range(len(number))])
     caps = np.column_stack([rim, len(mesh.vertices) + hole])
-    return trimesh.Trimesh(
-        np.concatenate([mesh.vertices, middles]), np.concatenate([mesh.faces, caps]), process=False
-    )
+    return trimesh.Trimesh(np.concatenate([mesh.vertices, middles]), np.concatenate([mesh.faces, caps]), process=False)

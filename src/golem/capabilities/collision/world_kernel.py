@@ -132,15 +132,7 @@ def _to_shape(x: float, y: float, z: float, shapes: Array, i: int, out: Array) -
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _to_cloud(
-    x: float,
-    y: float,
-    z: float,
-    reach: float,
-    balls: Array,
-    cells: Cells,
-    steps: Cells,
-    frame: Array,
-    out: Array,
+    x: float, y: float, z: float, reach: float, balls: Array, cells: Cells, steps: Cells, frame: Array, out: Array
 ) -> float:
     """Return the distance of a point from the nearest ball of a cloud, or `reach` if none is nearer."""
     size, h = cells.shape, frame[3]

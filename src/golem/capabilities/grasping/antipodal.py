@@ -198,9 +198,7 @@ class Antipodal(OpenLoop):
         middle, way, width, quality = (np.concatenate(pair) for pair in zip(drawn, rim, strict=True))
         return middle, way, width, quality, len(rim[0])
 
-    def _outline_pairs(
-        self, cloud: Array, gripper: Gripper, cone: float
-    ) -> tuple[Array, Array, Array, Array]:
+    def _outline_pairs(self, cloud: Array, gripper: Gripper, cone: float) -> tuple[Array, Array, Array, Array]:
         """Return the same of the outline that `cloud` has along the approach, whose walls are taken to be along it.
 
         Seen across it is more likely round: there they are half of the width behind what is seen.
@@ -220,9 +218,7 @@ class Antipodal(OpenLoop):
         held = np.flatnonzero(cosine > cone)
         depth = float(np.quantile(cloud @ gripper.approach, 0.3))
         flat = 0.5 * (spots[a[held]] + spots[b[held]])
-        behind = (
-            np.minimum(0.5 * width[held], ROUND) if gripper.approach[2] > -ACROSS else np.zeros(len(held))
-        )
+        behind = np.minimum(0.5 * width[held], ROUND) if gripper.approach[2] > -ACROSS else np.zeros(len(held))
         middle = flat[:, :1] * u + flat[:, 1:] * v + (depth + behind)[:, None] * gripper.approach
         axes = way[held, :1] * u + way[held, 1:] * v
         quality = (cosine[held] - cone) / (1.0 - cone) * 0.4 + 0.5
@@ -267,9 +263,7 @@ class Antipodal(OpenLoop):
         hands = upright(np.concatenate(rows), gripper.yaw)
         return hands, np.concatenate(leans), np.concatenate(pairs), np.concatenate(worth)
 
-    def _fit(
-        self, T: Array, widths: Array, cloud: Array, rims: NDArray[np.bool_]
-    ) -> tuple[Array, Array, Array]:
+    def _fit(self, T: Array, widths: Array, cloud: Array, rims: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
         """Return poses centred on what lies between their pads, the openings it takes, and how many points it is.
 
         A pad is 16 mm wide: one beside the middle of a round thing turns it out. So a thing that is no wider than a
@@ -314,10 +308,7 @@ class Antipodal(OpenLoop):
         return kept
 
     def _copies(
-        self,
-        T: Array,
-        some: Sequence[int] | NDArray[np.intp],
-        others: Sequence[int] | NDArray[np.intp],
+        self, T: Array, some: Sequence[int] | NDArray[np.intp], others: Sequence[int] | NDArray[np.intp]
     ) -> NDArray[np.bool_]:
         """Return (n, m) whether each of `some` (n,) poses is much the same as each of `others` (m,)."""
         c, one, two = self.config, T[some], T[np.asarray(others, np.intp)]

@@ -59,15 +59,11 @@ def load_net(path: Path) -> GraspNet:
             weights = tuple(file[f"w{k}"].astype(np.float32) for k in range(count))
             biases = tuple(file[f"b{k}"].astype(np.float32) for k in range(count))
     except OSError as error:
-        raise ConfigError(
-            f"The scorer's weights {path} cannot be read: {error.strerror or error}."
-        ) from error
+        raise ConfigError(f"The scorer's weights {path} cannot be read: {error.strerror or error}.") from error
     except Exception as error:  # a broken archive raises one of several
         raise ConfigError(f"{path} holds no grasp scorer; `golem train grasps` writes one.") from error
     sizes = [SEEN + FACTS, *(len(bias) for bias in biases)]
     shapes = [w.shape for w in weights]
     if not weights or shapes != list(zip(sizes[:-1], sizes[1:], strict=True)) or sizes[-1] != 1:
-        raise ConfigError(
-            f"{path} is a scorer of another architecture; train it again with `golem train grasps`."
-        )
+        raise ConfigError(f"{path} is a scorer of another architecture; train it again with `golem train grasps`.")
     return GraspNet(weights, biases)

@@ -152,9 +152,7 @@ class GraspGen(OpenLoop):
         except (KeyError, TypeError, ValueError) as error:
             raise ServiceUnavailable(f"{where} no grasps: {shorten(str(error))}.") from error
         if poses.shape[1:] != (4, 4) or scores.shape != poses.shape[:1]:
-            raise ServiceUnavailable(
-                f"{where} grasps of shape {poses.shape} with {scores.shape} confidences."
-            )
+            raise ServiceUnavailable(f"{where} grasps of shape {poses.shape} with {scores.shape} confidences.")
         if not (np.isfinite(poses).all() and np.isfinite(scores).all()):
             raise ServiceUnavailable(f"{where} grasps that are not finite.")
         R = poses[:, :3, :3]

@@ -185,9 +185,7 @@ class Reranking:
                 return found[1]
         return None
 
-    def _comfort_at(
-        self, side: Side, grasp: Grasp, posture: Array, balanced: Array, space: JointSpace
-    ) -> float:
+    def _comfort_at(self, side: Side, grasp: Grasp, posture: Array, balanced: Array, space: JointSpace) -> float:
         c, kinematics = self.config, self._ik.kinematics
         shift = float(np.linalg.norm((space.centre_of_mass(posture) - balanced)[:2]))
         margin = max(kinematics.margin(side, posture), 0.0) / COMFORT[0]

@@ -26,10 +26,7 @@ def outline(flat: Array) -> tuple[Array, Array]:
 def borders(flat: Array) -> tuple[Array, Array]:
     """Return the same of all borders of all pieces of a cloud, those of holes, too."""
     found = _borders(flat, cv2.RETR_CCOMP, 3) if len(flat) else []
-    spots, normals = (
-        [np.zeros((0, 2)), *(one[0] for one in found)],
-        [np.zeros((0, 2)), *(one[1] for one in found)],
-    )
+    spots, normals = ([np.zeros((0, 2)), *(one[0] for one in found)], [np.zeros((0, 2)), *(one[1] for one in found)])
     return np.concatenate(spots), np.concatenate(normals)
 
 

@@ -60,9 +60,7 @@ class Scorer(OpenLoop):
         """
         self.config = config or ScorerConfig()
         self._proposer = Antipodal(self.config.proposer)
-        self._net = load_net(
-            SHIPPED if self.config.weights is None else Path(self.config.weights).expanduser()
-        )
+        self._net = load_net(SHIPPED if self.config.weights is None else Path(self.config.weights).expanduser())
         self.latency = self._proposer.latency + self.config.latency
 
     def propose(self, target: LocalizedObject, scene: Array, gripper: Gripper) -> list[Grasp]:

@@ -3,7 +3,7 @@
 Phases run from 0 to 1 per period, the right leg half a period behind the left. A leg is in stance while its phase is
 below `stance`, so both are in double support for a moment after phase 0 and after phase 0.5.
 
-While the robot stands the clock rests. It starts when a twist is commanded or, with `start: recovery` or `gate_balance`,
+While the robot stands the clock rests. It starts when a twist is commanded or, with `start: recovery` or `balance`,
 when the standing robot cannot keep its balance with its feet where they are: the capture point (CoM position plus
 velocity over the pendulum's frequency; Pratt et al., Humanoids 2006) has left the middle of the feet, or the feet are
 misplaced. It stops at a double support at which the twist is zero and both errors are small again, so that nobody
@@ -35,7 +35,7 @@ class GaitConfig:
     Attributes:
         period: time of one step of each foot [s].
         stance: share of the period for which a foot stays on the ground, more than a half.
-        start: when the clock runs: `never`, at a `command` other than zero, where `gate_balance` asks for it, both
+        start: when the clock runs: `never`, at a `command` other than zero, where `balance` asks for it, both
             (`recovery`), or `always`.
         capture_start: half axes, ahead and sideways, of the ellipse about the middle of the feet out of which the
             capture point of a robot that stands must come for it to step [m]: well inside the soles, because a push

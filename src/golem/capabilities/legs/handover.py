@@ -126,12 +126,7 @@ class Handover:
             self._coming = self._stand if self.walking else self._walk
             self._coming.reset(state)
         command = None if self._coming is None else self._coming.step(state, base, motion, dt)
-        if (
-            self._coming is not None
-            and command is not None
-            and may_change
-            and _is_ready(self._coming.controller)
-        ):
+        if self._coming is not None and command is not None and may_change and _is_ready(self._coming.controller):
             self._leaving = self._active
             self._take_over(self._coming)
             self._blend.begin(self._last)

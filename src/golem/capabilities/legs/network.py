@@ -158,9 +158,7 @@ def _check_joints(path: Path, said: str) -> None:
 
 
 def _wrong_input(path: Path, size: int, found: str) -> ConfigError:
-    return ConfigError(
-        f"The network {path} does not take the {size} values of the described observation: {found}."
-    )
+    return ConfigError(f"The network {path} does not take the {size} values of the described observation: {found}.")
 
 
 def _reason(error: RuntimeError) -> str:

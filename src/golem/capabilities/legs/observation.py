@@ -145,9 +145,7 @@ class ObservationLayout:
         self._columns = np.array([column[key] for key in self.components])
         default = {("joint_position", name): q for name, q in zip(JOINT_NAMES, posture, strict=True)}
         self._offset = np.array([default.get(key, 0.0) for key in self.components])
-        self._scale = np.concatenate(
-            [vector(f"scale of {t.term}", t.scale, len(_components(t))) for t in terms]
-        )
+        self._scale = np.concatenate([vector(f"scale of {t.term}", t.scale, len(_components(t))) for t in terms])
         memory = new_record(MEASURED)
         self._measured, self._address = memory[0], address(memory)
         self._memory = memory

@@ -108,11 +108,7 @@ class Policy:
         )
         if not finite:
             culprit = np.flatnonzero(~np.isfinite(observation))
-            cause = (
-                f"; it was shown {self._layout.components[culprit[0]]} that is not finite"
-                if len(culprit)
-                else ""
-            )
+            cause = f"; it was shown {self._layout.components[culprit[0]]} that is not finite" if len(culprit) else ""
             raise BadAction(f"The network's action is not finite{cause}.")
         self._action = action
         return LegCommand(q, self._kp.copy(), self._kd.copy(), np.zeros(JOINTS))

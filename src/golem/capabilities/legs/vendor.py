@@ -190,9 +190,7 @@ class Vendor:
         try:
             return decode_int(data)
         except ValueError as error:
-            raise VendorFault(
-                f"The robot's '{self._api.service}' service answered nonsense: {error}."
-            ) from error
+            raise VendorFault(f"The robot's '{self._api.service}' service answered nonsense: {error}.") from error
 
     def _set_state(self, state: int) -> Wait:
         yield from self._call(self._api.set_fsm_id, encode({"data": state}))

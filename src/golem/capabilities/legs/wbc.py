@@ -22,14 +22,7 @@ import pinocchio as pin
 from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.capabilities.legs.hold import STANCES
-from golem.capabilities.legs.wbc_qp import (
-    NUM_LEGS,
-    QpWeights,
-    Solution,
-    StanceDynamics,
-    StanceProgram,
-    Tasks,
-)
+from golem.capabilities.legs.wbc_qp import NUM_LEGS, QpWeights, Solution, StanceDynamics, StanceProgram, Tasks
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.interfaces.payloads import LegCommand
 from golem.robots.model.imu_mount import sensed_base_rate
@@ -155,9 +148,7 @@ class Wbc:
         if c.stance not in STANCES:
             raise unknown_name("stance", c.stance, STANCES)
         if len(c.kp) != NUM_LEGS // 2 or len(c.kd) != NUM_LEGS // 2:
-            raise ConfigError(
-                "Wbc needs six values of kp and of kd: hip yaw, pitch, roll, knee, ankle pitch, roll."
-            )
+            raise ConfigError("Wbc needs six values of kp and of kd: hip yaw, pitch, roll, knee, ankle pitch, roll.")
         self.rate = c.rate
         self.latency = 0.0
         self.envelope = Envelope()

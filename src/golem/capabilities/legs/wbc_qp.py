@@ -68,9 +68,7 @@ class StanceDynamics:
         self._frames: list[int] = []
         for side in SIDES:
             ankle = model.frames[model.getFrameId(f"{side}_ankle_roll_link")]
-            sole = pin.Frame(
-                f"{side}_sole", ankle.parentJoint, ankle.placement * center, pin.FrameType.OP_FRAME
-            )
+            sole = pin.Frame(f"{side}_sole", ankle.parentJoint, ankle.placement * center, pin.FrameType.OP_FRAME)
             self._frames.append(model.addFrame(sole, False))
         self._model, self._data = model, model.createData()
         self._q = pin.neutral(model)
@@ -231,9 +229,7 @@ class StanceProgram:
         b[12:15] = root[1] * (tasks.turn - t[3:6])
         half = _RAYS // 2
         for i in range(2):
-            A[15:18, i * half : i * half + half] = (
-                root[2] / dynamics.mass * (dynamics.soles_R[i] @ self._force)
-            )
+            A[15:18, i * half : i * half + half] = root[2] / dynamics.mass * (dynamics.soles_R[i] @ self._force)
         b[15:18] = root[2] * (tasks.com - _DOWN)
         b[18:] = root[3] * tasks.legs
         H = A.T @ A

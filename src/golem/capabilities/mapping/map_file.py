@@ -76,9 +76,7 @@ def save_map(path: Path, stored: StoredMap) -> None:
         base.parent.mkdir(parents=True, exist_ok=True)
         header = f"P5\n{columns} {rows}\n255\n".encode()
         base.with_name(f"{base.name}.pgm").write_bytes(header + image[::-1].tobytes())
-        base.with_name(f"{base.name}.yaml").write_text(
-            yaml.safe_dump(facts, sort_keys=False), encoding="utf-8"
-        )
+        base.with_name(f"{base.name}.yaml").write_text(yaml.safe_dump(facts, sort_keys=False), encoding="utf-8")
         with base.with_name(f"{base.name}{CLOUD}").open("wb") as file:
             np.savez_compressed(file, cloud=stored.cloud.astype(np.float32), walls=stored.walls)
     except OSError as error:
@@ -95,18 +93,12 @@ def load_map(path: Path) -> StoredMap:
     try:
         facts = read_yaml(file.read_text(encoding="utf-8"), f"The map '{file}'")
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(
-            f"The map '{file}' cannot be read: {getattr(error, 'strerror', 'it is no text')}."
-        ) from error
+        raise ConfigError(f"The map '{file}' cannot be read: {getattr(error, 'strerror', 'it is no text')}.") from error
     if not isinstance(facts, dict) or not isinstance(facts.get("image"), str):
-        raise ConfigError(
-            f"'{file}' is no map: a YAML file of map_server names an image, resolution and origin."
-        )
+        raise ConfigError(f"'{file}' is no map: a YAML file of map_server names an image, resolution and origin.")
     resolution = _number(file, facts, "resolution", None)
     if not resolution > 0.0:
-        raise ConfigError(
-            f"The map '{file}' has the resolution {resolution:g}; it is a positive number of metres."
-        )
+        raise ConfigError(f"The map '{file}' has the resolution {resolution:g}; it is a positive number of metres.")
     origin = facts.get("origin")
     if not (isinstance(origin, list) and len(origin) == 3 and all(_finite(v) for v in origin)):
         raise ConfigError(f"The map '{file}' has the origin {origin}; it is [x, y, yaw].")
@@ -154,15 +146,11 @@ def _image(file: Path) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
                 return grey.astype(np.uint8), np.ones(grey.shape, bool)
             pixels = np.asarray(image.convert("RGBA"))
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise ConfigError(
-            f"The image of the map, '{file}', cannot be read; it is a PGM, PNG or BMP file."
-        ) from error
+        raise ConfigError(f"The image of the map, '{file}', cannot be read; it is a PGM, PNG or BMP file.") from error
     return np.round(pixels[..., :3] @ _LUMA).astype(np.uint8), pixels[..., 3] == 255
 
 
-def _cells(
-    image: NDArray[np.uint8], negate: bool, occupied: float, free: float, mode: str
-) -> NDArray[np.int8]:
+def _cells(image: NDArray[np.uint8], negate: bool, occupied: float, free: float, mode: str) -> NDArray[np.int8]:
     """Return the cells of an opaque image, in single precision as Nav2 has it."""
     value = image[::-1].astype(np.float32)
     if mode == "raw":

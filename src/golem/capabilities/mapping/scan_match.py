@@ -78,9 +78,7 @@ class Landmarks:
             i = int(cost.argmin())
             if cost[i] < best:
                 best = float(cost[i])
-                found = PlanarPose(
-                    guess.x + float(dx[i]), guess.y + float(dy[i]), wrap(guess.yaw + float(turn))
-                )
+                found = PlanarPose(guess.x + float(dx[i]), guess.y + float(dy[i]), wrap(guess.yaw + float(turn)))
         return found
 
     def refine(self, points: Array, pose: PlanarPose) -> Match:

@@ -71,12 +71,7 @@ class GridConfig:
             ("reach", self.reach, 0.5 <= self.reach <= 100.0, "from 0.5 to 100 m"),
             ("band", high, 0.0 < low < high <= 2.2, "two heights, the lower first, of at most 2.2 m"),
             ("rays", self.rays, self.rays >= 1, "at least 1"),
-            (
-                "around",
-                max(self.around),
-                0.0 <= min(self.around) and max(self.around) <= 5.0,
-                "at most 5 m and rad",
-            ),
+            ("around", max(self.around), 0.0 <= min(self.around) and max(self.around) <= 5.0, "at most 5 m and rad"),
             ("follow", self.follow, self.follow > 0.0, "a positive time in seconds"),
             ("gain", self.gain, 0.0 <= self.gain <= 1.0, "a share from 0 to 1"),
             ("guess", sum(self.guess), all(map(math.isfinite, self.guess)), "three finite numbers"),

@@ -52,9 +52,7 @@ def span(points: Array, origin: Array) -> tuple[Array, Array]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def mark(
-    voxels: Voxels, stamps: Stamps, points: Array, corner: Array, resolution: float, number: int
-) -> None:
+def mark(voxels: Voxels, stamps: Stamps, points: Array, corner: Array, resolution: float, number: int) -> None:
     """Count each voxel that a point (n, 3) lies in as hit; `corner` (3,) is that of voxel [0, 0, 0]."""
     rows, columns, layers = voxels.shape
     for i in range(len(points)):
@@ -68,13 +66,7 @@ def mark(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def clear(
-    voxels: Voxels,
-    stamps: Stamps,
-    points: Array,
-    origin: Array,
-    corner: Array,
-    resolution: float,
-    number: int,
+    voxels: Voxels, stamps: Stamps, points: Array, origin: Array, corner: Array, resolution: float, number: int
 ) -> None:
     """Count each voxel as free that a ray from `origin` (3,) to a point (n, 3) passes (Amanatides and Woo, 1987).
 
@@ -104,9 +96,7 @@ def clear(
         last_r = int(math.floor((points[i, 1] - corner[1]) / resolution))
         last_k = int(math.floor((points[i, 2] - corner[2]) / resolution))
         inside = 0 < min(r, last_r) and max(r, last_r) < rows - 1 and 0 < min(c, last_c)
-        inside = (
-            inside and max(c, last_c) < columns - 1 and 0 < min(k, last_k) and max(k, last_k) < layers - 1
-        )
+        inside = inside and max(c, last_c) < columns - 1 and 0 < min(k, last_k) and max(k, last_k) < layers - 1
         if inside:
             at, jump_r, jump_c = (r * columns + c) * layers + k, step_r * columns * layers, step_c * layers
             while t < end:

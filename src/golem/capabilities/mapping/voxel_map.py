@@ -58,25 +58,15 @@ class VoxelMap:
         box = self._box(low, high)
         arguments = self.corner, self.resolution, self._number
         voxel_kernel.mark(self.voxels, self._stamps, points, *arguments)
-        voxel_kernel.clear(
-            self.voxels, self._stamps, points[self._number % every :: every], origin, *arguments
-        )
+        voxel_kernel.clear(self.voxels, self._stamps, points[self._number % every :: every], origin, *arguments)
         old = box if self._changed is None else self._changed
-        self._changed = np.array(
-            [min(box[0], old[0]), max(box[1], old[1]), min(box[2], old[2]), max(box[3], old[3])]
-        )
+        self._changed = np.array([min(box[0], old[0]), max(box[1], old[1]), min(box[2], old[2]), max(box[3], old[3])])
 
     def flatten(self, floor: Array) -> NDArray[np.int8]:
         """Bring `cells` up to date, by the plane of the floor (3,), and return them."""
         if self._changed is not None:
             voxel_kernel.flatten(
-                self.voxels,
-                self.cells,
-                self._changed,
-                self.corner,
-                self.resolution,
-                floor,
-                np.array(self.band),
+                self.voxels, self.cells, self._changed, self.corner, self.resolution, floor, np.array(self.band)
             )
             self._changed = None
         return self.cells
@@ -91,9 +81,7 @@ class VoxelMap:
         first = np.floor((low - self.corner[:2]) / self.resolution).astype(np.int64)
         last = np.floor((high - self.corner[:2]) / self.resolution).astype(np.int64) + 1
         rows, columns, _ = self.voxels.shape
-        return np.array(
-            [max(0, first[1]), min(rows, last[1]), max(0, first[0]), min(columns, last[0])], np.int64
-        )
+        return np.array([max(0, first[1]), min(rows, last[1]), max(0, first[0]), min(columns, last[0])], np.int64)
 
     def _reach(self, low: Array, high: Array, floor: float) -> bool:
         """Grow until everything from `low` to `high` (2,) is inside; return whether it is."""
@@ -105,17 +93,12 @@ class VoxelMap:
             if size.max() * self.resolution > LARGEST:
                 return False
             shape = (int(size[1]), int(size[0]))
-            self.voxels, self._stamps = (
-                np.zeros((*shape, layers), np.int8),
-                np.zeros((*shape, layers), np.uint16),
-            )
+            self.voxels, self._stamps = (np.zeros((*shape, layers), np.int8), np.zeros((*shape, layers), np.uint16))
             self.cells = np.full(shape, voxel_kernel.UNKNOWN, np.int8)
             return True
         rows, columns, _ = self.voxels.shape
         top = self.corner[:2] + self.resolution * np.array([columns, rows])
-        before = np.where(
-            low < self.corner[:2], np.ceil((self.corner[:2] - low + MARGIN) / self.resolution), 0
-        )
+        before = np.where(low < self.corner[:2], np.ceil((self.corner[:2] - low + MARGIN) / self.resolution), 0)
         after = np.where(high >= top, np.ceil((high - top + MARGIN) / self.resolution), 0)
         (c0, r0), (c1, r1) = before.astype(int), after.astype(int)
         if not (r0 or r1 or c0 or c1):

@@ -148,9 +148,7 @@ class FrameIndexConfig:
 
     def __post_init__(self) -> None:
         if not (self.spread >= 0.0 and 0.0 <= self.least <= 1.0 and self.most > 0):
-            raise ConfigError(
-                "Of frame_index, spread is at least 0, least is from 0 to 1, and most is above 0."
-            )
+            raise ConfigError("Of frame_index, spread is at least 0, least is from 0 to 1, and most is above 0.")
         if self.encoder not in ("labels", *NETWORKS):
             raise unknown_name("encoder", self.encoder, ("labels", *NETWORKS))
         if (self.encoder == "labels") != (self.weights is None):
@@ -232,9 +230,7 @@ def looked_at(observation: Observation) -> Array:
     """Return the (3,) point at which the middle of a frame looks; the eye itself where there is no depth."""
     frame = observation.frame
     height, width = frame.depth.shape
-    rows, columns = (
-        slice(round(n * (0.5 - WINDOW / 2)), round(n * (0.5 + WINDOW / 2))) for n in (height, width)
-    )
+    rows, columns = (slice(round(n * (0.5 - WINDOW / 2)), round(n * (0.5 + WINDOW / 2))) for n in (height, width))
     window = frame.depth[rows, columns]
     valid = window[window > 0.0]
     depth = float(np.median(valid)) if len(valid) else 0.0

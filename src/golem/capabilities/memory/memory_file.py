@@ -46,9 +46,7 @@ class MemoryFile:
             raise MemoryFault(f"{self.path} is no memory of this version of golem; name another file.")
         values = ", ".join(f"{name} REAL NOT NULL" for name in COLUMNS)
         base.execute("BEGIN EXCLUSIVE")
-        base.execute(
-            f"CREATE TABLE IF NOT EXISTS objects (number INTEGER PRIMARY KEY, label TEXT NOT NULL, {values})"
-        )
+        base.execute(f"CREATE TABLE IF NOT EXISTS objects (number INTEGER PRIMARY KEY, label TEXT NOT NULL, {values})")
         base.execute("CREATE TABLE IF NOT EXISTS clock (one INTEGER PRIMARY KEY, last REAL NOT NULL)")
         base.execute(f"PRAGMA user_version={VERSION}")
         base.execute("COMMIT")
@@ -73,9 +71,7 @@ class MemoryFile:
         with self._faults():
             rows = self._base.execute("SELECT * FROM objects ORDER BY number").fetchall()
             last = self._base.execute("SELECT last FROM clock").fetchone()
-        objects = [
-            ObjectRow(int(number), str(label), np.array(values, float)) for number, label, *values in rows
-        ]
+        objects = [ObjectRow(int(number), str(label), np.array(values, float)) for number, label, *values in rows]
         return objects, -np.inf if last is None else float(last[0])
 
     def write(self, changed: Iterable[ObjectRow], removed: Iterable[int], last: float) -> None:

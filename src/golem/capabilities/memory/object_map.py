@@ -12,14 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from golem.capabilities.memory.base import (
-    Evidence,
-    Observation,
-    Place,
-    When,
-    check_observation,
-    check_query,
-)
+from golem.capabilities.memory.base import Evidence, Observation, Place, When, check_observation, check_query
 from golem.capabilities.memory.look import Look, look_at
 from golem.capabilities.memory.memory_file import MemoryFile
 from golem.capabilities.memory.object_records import (
@@ -152,12 +145,8 @@ class ObjectMapConfig:
     most: int = 10_000
 
     def __post_init__(self) -> None:
-        if not (
-            self.gate > 0 and self.depth_noise > 0 and self.found > 0 and self.ceiling > 0 and self.most > 0
-        ):
-            raise ConfigError(
-                "The options gate, depth_noise, found, ceiling and most of object_map are above 0."
-            )
+        if not (self.gate > 0 and self.depth_noise > 0 and self.found > 0 and self.ceiling > 0 and self.most > 0):
+            raise ConfigError("The options gate, depth_noise, found, ceiling and most of object_map are above 0.")
         if not (self.missed <= 0 and self.through < 0):
             raise ConfigError("The options missed and through of object_map are log odds below 0.")
 
@@ -220,9 +209,7 @@ class ObjectMap:
             known = records.values[rows]
             distance = np.linalg.norm(places[:, None] - known[None, :, PLACE], axis=2)
             reach = known[:, SIZE] + config.gate * np.sqrt(variances[:, None] + known[None, :, VARIANCE])
-            pairs = np.full(
-                (len(seen), len(seen)), FORBIDDEN / 2
-            )  # to each detection a new object of its own
+            pairs = np.full((len(seen), len(seen)), FORBIDDEN / 2)  # to each detection a new object of its own
             cost = np.hstack([np.where(distance <= reach, distance, FORBIDDEN), pairs])
             for k, column in zip(*linear_sum_assignment(cost), strict=True):
                 gain = gain_of(seen[k].detection.score, config.found)
@@ -232,17 +219,7 @@ class ObjectMap:
                     changed.add(int(records.numbers[row]))
                 else:
                     values = np.array(
-                        [
-                            *places[k],
-                            variances[k],
-                            size_of(seen[k]),
-                            gain,
-                            frame.t,
-                            frame.t,
-                            math.inf,
-                            1.0,
-                            gain,
-                        ]
+                        [*places[k], variances[k], size_of(seen[k]), gain, frame.t, frame.t, math.inf, 1.0, gain]
                     )
                     changed.add(records.add(label, values))
         return changed
@@ -256,9 +233,7 @@ class ObjectMap:
         rows = rows[np.isinf(values[rows, GONE]) & (values[rows, LAST] < frame.t)]
         sigmas = np.sqrt(values[rows, VARIANCE] + observation.pose_sigma**2)
         changed: set[int] = set()
-        for row, look in zip(
-            rows, look_at(frame, values[rows, PLACE], values[rows, SIZE], sigmas), strict=True
-        ):
+        for row, look in zip(rows, look_at(frame, values[rows, PLACE], values[rows, SIZE], sigmas), strict=True):
             if look in (Look.THROUGH, Look.EMPTY):
                 values[row, BELIEF] += config.through if look is Look.THROUGH else config.missed
                 values[row, EVIDENCE] += 0.0 if look is Look.THROUGH else config.missed
@@ -304,11 +279,7 @@ class ObjectMap:
 
     def places(self, limit: int) -> list[Place]:
         """See `HasPlaces`."""
-        found = [
-            place
-            for label in self._records.labels
-            for place in self._places(label, 1.0, "anywhere", None, limit)
-        ]
+        found = [place for label in self._records.labels for place in self._places(label, 1.0, "anywhere", None, limit)]
         return sorted(found, key=lambda p: -p.last_seen)[:limit]
 
     def _places(self, label: str, score: float, when: When, at: float | None, limit: int) -> list[Place]:
@@ -341,9 +312,7 @@ class ObjectMap:
         """Return those that were not misnamed, the one seen last first; at most `limit`."""
         order = np.argsort(-self._records.values[rows, LAST], kind="stable")
         config = self._config
-        kept = (
-            int(row) for row in rows[order] if not outvoted(self._records, row, config.gate, -config.missed)
-        )
+        kept = (int(row) for row in rows[order] if not outvoted(self._records, row, config.gate, -config.missed))
         return list(islice(kept, limit))
 
     def forget(self, text: str) -> int:

@@ -17,15 +17,7 @@ from typing import Any, Literal, Protocol, cast, get_args
 import cv2
 import numpy as np
 
-from golem.capabilities.memory.base import (
-    Evidence,
-    Memory,
-    Observation,
-    Place,
-    When,
-    check_observation,
-    check_query,
-)
+from golem.capabilities.memory.base import Evidence, Memory, Observation, Place, When, check_observation, check_query
 from golem.capabilities.memory.frame_index import FrameIndex, FrameIndexConfig, looked_at
 from golem.capabilities.memory.object_map import ObjectMap, ObjectMapConfig
 from golem.capabilities.memory.top_down_map import TopDownMap
@@ -60,9 +52,7 @@ class PictureJudgeConfig(GeminiServiceConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not (self.pictures >= 1 and 32 <= self.width <= 4096 and 1 <= self.places <= 50):
-            raise ConfigError(
-                "Of gemini, pictures is at least 1, width from 32 to 4096, and places from 1 to 50."
-            )
+            raise ConfigError("Of gemini, pictures is at least 1, width from 32 to 4096, and places from 1 to 50.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +67,7 @@ class _Picture:
 class PictureJudge:
     """Has Gemini look at the pictures of places."""
 
-    def __init__(
-        self, config: PictureJudgeConfig, near: float, sleep: Callable[[float], None] = time.sleep
-    ) -> None:
+    def __init__(self, config: PictureJudgeConfig, near: float, sleep: Callable[[float], None] = time.sleep) -> None:
         """Take the key from the environment; looks at points up to `near` [m] apart are of one place.
 
         Raises:
@@ -100,9 +88,7 @@ class PictureJudge:
         self._pictures.append(_Picture(frame.t, looked_at(observation), jpeg))
         self.last = frame.t
 
-    def order(
-        self, text: str, when: When, at: float | None, proposed: Sequence[Place], limit: int
-    ) -> list[Place]:
+    def order(self, text: str, when: When, at: float | None, proposed: Sequence[Place], limit: int) -> list[Place]:
         """Return those of the proposed places that answer by what the model sees.
 
         Raises:
@@ -224,9 +210,7 @@ class PlaceJudge(Protocol):
         """Take a look in; see `Memory.observe`."""
         ...
 
-    def order(
-        self, text: str, when: When, at: float | None, proposed: Sequence[Place], limit: int
-    ) -> list[Place]:
+    def order(self, text: str, when: When, at: float | None, proposed: Sequence[Place], limit: int) -> list[Place]:
         """Return those of the proposed places that answer, with what is known of their times, best first."""
         ...
 
@@ -260,9 +244,7 @@ class ObjectJudge:
         """See `PlaceJudge`."""
         self._objects.observe(observation)
 
-    def order(
-        self, text: str, when: When, at: float | None, proposed: Sequence[Place], limit: int
-    ) -> list[Place]:
+    def order(self, text: str, when: When, at: float | None, proposed: Sequence[Place], limit: int) -> list[Place]:
         """Return the objects that fit `when` and are at a proposed place."""
         fitting = self._objects.query(text, when, at, self._config.candidates)
         places: list[Place] = []
@@ -294,9 +276,7 @@ class Reranked:
             ConfigError, MissingExtra: see `FrameIndex` and `PictureJudge`.
         """
         self._config = c = config or RerankedConfig()
-        make: Callable[[], Memory] = (
-            TopDownMap if c.proposer == "top_down_map" else lambda: FrameIndex(c.frames)
-        )
+        make: Callable[[], Memory] = TopDownMap if c.proposer == "top_down_map" else lambda: FrameIndex(c.frames)
         self._proposer = make()
         self._judge: PlaceJudge = ObjectJudge(c) if c.judge == "objects" else PictureJudge(c.gemini, c.near)
         self.last = self._judge.last

@@ -97,9 +97,7 @@ class TopDownMap:
                 if share > 0.0:
                     middle = self._config.cell * (np.array([x, y]) + 0.5)
                     place = np.append(middle, cell.heights[label])
-                    found.append(
-                        Place(label, place, score * min(share, 1.0), cell.first, cell.last, "similar")
-                    )
+                    found.append(Place(label, place, score * min(share, 1.0), cell.first, cell.last, "similar"))
         return apart(sorted(found, key=lambda p: -p.score), self._config.spread, limit)
 
     def forget(self, text: str) -> int:

@@ -20,9 +20,7 @@ Cell = tuple[int, int]
 """Row and column."""
 
 
-def astar(
-    cost: Array, start: Cell, goal: Cell, beta: float, closed: float
-) -> tuple[NDArray[np.int64], float] | None:
+def astar(cost: Array, start: Cell, goal: Cell, beta: float, closed: float) -> tuple[NDArray[np.int64], float] | None:
     """Return the cheapest way.
 
     Args:
@@ -55,9 +53,7 @@ def astar(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _search(
-    cost: Array, start: int, goal: int, beta: float, closed: float, parents: NDArray[np.int32]
-) -> float:
+def _search(cost: Array, start: int, goal: int, beta: float, closed: float, parents: NDArray[np.int32]) -> float:
     """Fill in the parent of every cell on the way (-1 for the start), and return the sum; infinite without a way."""
     rows, columns = cost.shape
     goal_row, goal_column = goal // columns, goal % columns

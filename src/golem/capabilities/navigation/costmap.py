@@ -62,9 +62,7 @@ class Costmap:
         clearance: (rows, columns) d, at most 10 m.
     """
 
-    def __init__(
-        self, grid: OccupancyGrid, points: Array, radius: float, config: CostmapConfig | None = None
-    ) -> None:
+    def __init__(self, grid: OccupancyGrid, points: Array, radius: float, config: CostmapConfig | None = None) -> None:
         """Inflate the obstacles of a map and of a scan.
 
         Args:

@@ -162,9 +162,7 @@ class CostmapAstar:
             self._approach.start(self._goal)
             return self._finish(inputs, dt)
         s = self._surroundings
-        twist = self._local.follow(
-            pose, self._way, self._goal, self._footprint, s.clearance, s.frame, self._people
-        )
+        twist = self._local.follow(pose, self._way, self._goal, self._footprint, s.clearance, s.frame, self._people)
         if twist is None:
             return self._stand(left, dt, "The way is blocked.")
         if self._is_stuck(dt):

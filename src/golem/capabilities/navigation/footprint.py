@@ -62,7 +62,5 @@ class Footprint:
         return self.samples @ np.array([[c, s], [-s, c]]) + (pose.x, pose.y)
 
 
-HOME = Footprint.of(
-    np.array([[-0.12, -0.40], [0.40, -0.52], [0.53, -0.47], [0.53, 0.47], [0.40, 0.52], [-0.12, 0.40]])
-)
+HOME = Footprint.of(np.array([[-0.12, -0.40], [0.40, -0.52], [0.53, -0.47], [0.53, 0.47], [0.40, 0.52], [-0.12, 0.40]]))
 """The robot with its arms at home, 2 cm wider all around: where nobody says how it holds them."""

@@ -77,8 +77,7 @@ class MapPicture:
             left = column + 7 if column + 7 + wide < width else column - 7 - wide
             rows = [row + 4 + step * (high + 4) for step in STEPS]
             bottom = next(
-                (r for r in rows if high <= r < height and _free((left, r - high, left + wide, r), taken)),
-                rows[0],
+                (r for r in rows if high <= r < height and _free((left, r - high, left + wide, r), taken)), rows[0]
             )
             taken.append((left, bottom - high, left + wide, bottom))
             cv2.rectangle(picture, (left - 1, bottom - high - 1), (left + wide, bottom + 2), HALO, -1)

@@ -74,12 +74,7 @@ class Nav2Config:
             ("patience", self.patience, 0.0 < self.patience < math.inf, "a positive time in seconds"),
             ("timeout", self.timeout, 0.0 < self.timeout < math.inf, "a positive time in seconds"),
             ("near", self.near, 0.0 <= self.near < math.inf, "a distance, not negative"),
-            (
-                "speed",
-                min(self.speed),
-                0.0 < min(self.speed) <= max(self.speed) < math.inf,
-                "positive numbers",
-            ),
+            ("speed", min(self.speed), 0.0 < min(self.speed) <= max(self.speed) < math.inf, "positive numbers"),
         )
 
 
@@ -121,11 +116,7 @@ class Nav2:
         check_finite("the pose", np.array([pose.x, pose.y, pose.yaw]))
         left = pose.to(self._goal)
         if self._arrived:
-            return (
-                self._rest.step(inputs, dt)
-                if self.config.near > 0.0
-                else NavStep(ZERO, not inputs.moving, left)
-            )
+            return self._rest.step(inputs, dt) if self.config.near > 0.0 else NavStep(ZERO, not inputs.moving, left)
         reply = self._nav2.reply()
         state = "absent" if reply is None else reply.state
         if state in FAILED:

@@ -27,9 +27,7 @@ class NoWay:
     final: bool = False
 
 
-def find_way(
-    costmap: Costmap, start: PlanarPose, goal: PlanarPose, footprint: Footprint, beta: float
-) -> Way | NoWay:
+def find_way(costmap: Costmap, start: PlanarPose, goal: PlanarPose, footprint: Footprint, beta: float) -> Way | NoWay:
     """Return the cheapest way, or why there is none.
 
     Near the start and the goal the footprint decides, not the distance at which ways keep from obstacles: the robot

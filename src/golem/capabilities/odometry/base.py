@@ -114,9 +114,7 @@ def lidar_in_base(waist: float) -> Array:
     return transform((0.0, 0.0, 0.0), np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])) @ T_TORSO_LIDAR
 
 
-def of_the_world(
-    points: Array, T_base_lidar: Array, blind: float = BLIND, body: tuple[float, ...] = BODY
-) -> Array:
+def of_the_world(points: Array, T_base_lidar: Array, blind: float = BLIND, body: tuple[float, ...] = BODY) -> Array:
     """Return which points are finite and not the robot's own.
 
     Args:

@@ -70,10 +70,7 @@ class ErrorState:
         self.t, self.R, self.noise = t, begin.R.copy(), noise
         self.x: Array = np.concatenate([begin.p, begin.velocity, begin.gyro_bias, np.zeros(5), [yaw]])
         tilt, bias = begin.tilt or noise.acc_bias, begin.bias or noise.gyro_bias
-        deviations = np.repeat(
-            [1e-4, 1e-4, begin.speed, bias, noise.acc_bias, tilt, noise.yaw],
-            (3, 3, 3, 3, 3, 2, 1),
-        )
+        deviations = np.repeat([1e-4, 1e-4, begin.speed, bias, noise.acc_bias, tilt, noise.yaw], (3, 3, 3, 3, 3, 2, 1))
         # The start's frame has no error; how far it is from level is gravity's error.
         self.P: Array = np.diag(deviations**2)
         self.last_gyro: Array = begin.gyro_bias.copy()
@@ -98,9 +95,7 @@ class ErrorState:
     def predict(self, t: float, gyro: Array, acc: Array) -> None:
         """Advance to time `t` [s] with the mean `gyro` [rad/s] and `acc` [m/s^2] (3,) since then."""
         n = self.noise
-        _predict(
-            self.R, self.x, self.P, gyro, acc, t - self.t, np.array([n.gyro, n.acc, n.gyro_walk, n.acc_walk])
-        )
+        _predict(self.R, self.x, self.P, gyro, acc, t - self.t, np.array([n.gyro, n.acc, n.gyro_walk, n.acc_walk]))
         self.t, self.last_gyro = t, gyro
 
     def rate(self) -> Array:

@@ -7,14 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from golem.capabilities.odometry.base import (
-    NO_COVARIANCE,
-    Ignores,
-    OdometryEstimate,
-    OdomOrigin,
-    Source,
-    lidar_in_base,
-)
+from golem.capabilities.odometry.base import NO_COVARIANCE, Ignores, OdometryEstimate, OdomOrigin, Source, lidar_in_base
 from golem.errors import ConfigError
 from golem.interfaces.lidar import ExternalOdometry, LegOdometry
 from golem.robots.model.spatial import transform

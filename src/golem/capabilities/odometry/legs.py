@@ -4,14 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.odometry.base import (
-    NO_COVARIANCE,
-    Ignores,
-    OdometryEstimate,
-    OdomOrigin,
-    Source,
-    lidar_in_base,
-)
+from golem.capabilities.odometry.base import NO_COVARIANCE, Ignores, OdometryEstimate, OdomOrigin, Source, lidar_in_base
 from golem.interfaces.lidar import LegOdometry
 
 

@@ -14,25 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from golem.capabilities.odometry import plane_map
-from golem.capabilities.odometry.base import (
-    BLIND,
-    BODY,
-    Ignores,
-    OdometryEstimate,
-    Source,
-    lidar_in_base,
-    of_the_world,
-)
-from golem.capabilities.odometry.error_state import (
-    GRAVITY_XY,
-    SIZE,
-    YAW,
-    ErrorState,
-    ImuNoise,
-    about_z,
-    cross,
-    deskew,
-)
+from golem.capabilities.odometry.base import BLIND, BODY, Ignores, OdometryEstimate, Source, lidar_in_base, of_the_world
+from golem.capabilities.odometry.error_state import GRAVITY_XY, SIZE, YAW, ErrorState, ImuNoise, about_z, cross, deskew
 from golem.capabilities.odometry.moving_start import MovingStart
 from golem.capabilities.odometry.plane_map import PlaneMap
 from golem.capabilities.odometry.sensor_agreement import SensorAgreement, up_in_base
@@ -149,12 +132,8 @@ class Lio(Ignores):
         if self._ahead is None:
             legs = self._legs if self.config.legs else None
             walks = legs is not None and np.linalg.norm(legs.velocity) > WALKING
-            begin = (None if walks else self._start.add(sample, self._waist)) or self._moving.add(
-                sample, legs
-            )
-            if begin is not None and self._agree.stands(
-                up_in_base(begin.R, self._waist), begin.force, sample.t
-            ):
+            begin = (None if walks else self._start.add(sample, self._waist)) or self._moving.add(sample, legs)
+            if begin is not None and self._agree.stands(up_in_base(begin.R, self._waist), begin.force, sample.t):
                 self._filter = ErrorState(sample.t, begin, self.config.yaw, self.config.imu)
                 self._ahead = self._filter.copy()
                 self._last_scan = self._fitted_at = sample.t
@@ -277,9 +256,7 @@ class Lio(Ignores):
         arm = -(R_base_imu.T @ T_base_lidar[:3, 3] + P_LIDAR_IMU)
         return state.update_velocity(legs.velocity, R_base_imu, arm, self.config.leg_noise)
 
-    def _advance(
-        self, state: ErrorState, end: float, start: float
-    ) -> list[tuple[float, Array, Array, Array, Array]]:
+    def _advance(self, state: ErrorState, end: float, start: float) -> list[tuple[float, Array, Array, Array, Array]]:
         """Move `state` to the time `end` of a scan, and return its motion since `start`: t, R, p, v, rate."""
         track = [(state.t, state.R.copy(), state.p.copy(), state.v.copy(), state.rate())]
         while self._buffer and self._buffer[0].t <= end + 1e-6:
@@ -293,9 +270,7 @@ class Lio(Ignores):
             track.append((state.t, state.R.copy(), state.p.copy(), state.v.copy(), state.rate()))
         return track
 
-    def _points(
-        self, scan: LidarScan, start: float, track: list[tuple[float, Array, Array, Array, Array]]
-    ) -> Array:
+    def _points(self, scan: LidarScan, start: float, track: list[tuple[float, Array, Array, Array, Array]]) -> Array:
         """Return (n, 3) the points of a scan that are not the robot's, in the frame of the IMU at its end [m]."""
         if len(track) < 2:
             return np.zeros((0, 3))
@@ -355,9 +330,7 @@ class Lio(Ignores):
             _learn_nothing(state.P, prior.P, blind)
         self._birth = float(told[2] / told[1])
         if self._fits >= config.found_after:
-            self.map.insert(
-                local @ state.R.T + state.p, self._birth + float(np.trace(state.P[3:6, 3:6])) / 3.0
-            )
+            self.map.insert(local @ state.R.T + state.p, self._birth + float(np.trace(state.P[3:6, 3:6])) / 3.0)
 
     def _judge(self, state: ErrorState) -> None:
         """Say whether the odometry is lost."""

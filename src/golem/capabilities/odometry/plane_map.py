@@ -141,9 +141,7 @@ def _fit(cell: Array, point: Array, size: float) -> None:  # pragma: no cover - 
     f = cell[_PRODUCTS + 5] / n - mz * mz
     # Closed form of the eigenvalues of a symmetric matrix (Smith, CACM 1961).
     q = (a + d + f) / 3.0
-    p = math.sqrt(
-        max(((a - q) ** 2 + (d - q) ** 2 + (f - q) ** 2 + 2.0 * (b * b + c * c + e * e)) / 6.0, 1e-30)
-    )
+    p = math.sqrt(max(((a - q) ** 2 + (d - q) ** 2 + (f - q) ** 2 + 2.0 * (b * b + c * c + e * e)) / 6.0, 1e-30))
     det = (a - q) * ((d - q) * (f - q) - e * e) - b * (b * (f - q) - e * c) + c * (b * e - (d - q) * c)
     angle = math.acos(min(max(det / (2.0 * p**3), -1.0), 1.0)) / 3.0
     high = q + 2.0 * p * math.cos(angle)

@@ -52,9 +52,7 @@ class Gemini:
         latency: declared time per frame [s].
     """
 
-    def __init__(
-        self, config: GeminiConfig | None = None, sleep: Callable[[float], None] = time.sleep
-    ) -> None:
+    def __init__(self, config: GeminiConfig | None = None, sleep: Callable[[float], None] = time.sleep) -> None:
         """Take the key from the environment.
 
         Raises:

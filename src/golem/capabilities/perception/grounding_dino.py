@@ -35,9 +35,7 @@ class GroundingDino(OpenWords):
 
         rows: list[tuple[int, float, Any]] = []
         for number, word in enumerate(words):
-            given = self._processor(
-                images=image, text=f"a {word.lower()}.", return_tensors="pt", truncation=True
-            )
+            given = self._processor(images=image, text=f"a {word.lower()}.", return_tensors="pt", truncation=True)
             with torch.inference_mode():
                 answer = self._network(**given)
             (found,) = self._processor.post_process_grounded_object_detection(

@@ -34,9 +34,7 @@ def load_model(folder: Path, kind: str, model: str, processor: str) -> tuple[Any
             f"{folder} holds no model: it has no config.json. Give the folder that save_pretrained wrote."
         )
     try:
-        found = transformers.PretrainedConfig.get_config_dict(folder, local_files_only=True)[0].get(
-            "model_type"
-        )
+        found = transformers.PretrainedConfig.get_config_dict(folder, local_files_only=True)[0].get("model_type")
     except (OSError, ValueError) as error:
         raise ConfigError(f"{folder / 'config.json'} cannot be read as a model's configuration.") from error
     if found != kind:
@@ -46,7 +44,5 @@ def load_model(folder: Path, kind: str, model: str, processor: str) -> tuple[Any
         feeder = getattr(transformers, processor).from_pretrained(folder, local_files_only=True)
     except Exception as error:  # the library's errors have no common base
         text = str(error).strip().partition("\n")[0]
-        raise ConfigError(
-            f"The model in {folder} cannot be loaded: {type(error).__name__}: {text}"
-        ) from error
+        raise ConfigError(f"The model in {folder} cannot be loaded: {type(error).__name__}: {text}") from error
     return network.eval(), feeder

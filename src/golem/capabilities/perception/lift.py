@@ -109,9 +109,9 @@ def lift(frame: RgbdImage, detection: Detection, config: LiftConfig) -> Localize
     rows, columns = cloud
     inside = frame.depth[cloud]
     mask = Mask(np.isfinite(inside) & (inside > 0), columns.start, rows.start)
-    if detection.label in config.standing and depth > np.median(
-        inside[mask.pixels]
-    ) + config.sunk + config.width(depth):
+    if detection.label in config.standing and depth > np.median(inside[mask.pixels]) + config.sunk + config.width(
+        depth
+    ):
         return None
     return LocalizedObject(detection, frame.t, position, unproject(frame, mask), mask)
 

@@ -51,9 +51,7 @@ class OnnxDetector:
         self.config = config or OnnxDetectorConfig()
         self.latency = self.config.latency
         if not 0.0 < self.config.threshold < 1.0:
-            raise ConfigError(
-                f"The detector's threshold must be between 0 and 1, not {self.config.threshold}."
-            )
+            raise ConfigError(f"The detector's threshold must be between 0 and 1, not {self.config.threshold}.")
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
@@ -61,9 +59,7 @@ class OnnxDetector:
         try:
             self._session = onnxruntime.InferenceSession(weights, options, providers=["CPUExecutionProvider"])
         except Exception as error:  # onnxruntime's errors have no common base
-            raise ConfigError(
-                f"The detector's weights {self.config.weights} are not an ONNX network."
-            ) from error
+            raise ConfigError(f"The detector's weights {self.config.weights} are not an ONNX network.") from error
         facts = self._session.get_modelmeta().custom_metadata_map
         try:
             self.classes: tuple[str, ...] = tuple(json.loads(facts["classes"]))

@@ -109,9 +109,7 @@ def fit_open_box(sighting: LocalizedObject) -> OpenBox | None:
     _, labels = cv2.connectedComponents(joined, connectivity=8)
     here = labels[index[:, 0], index[:, 1]]
     candidates = [walls[here == label, :2] for label in range(1, int(labels.max()) + 1)]
-    around = [
-        p for p in candidates if (p.min(axis=0) < middle[:2]).all() and (p.max(axis=0) > middle[:2]).all()
-    ]
+    around = [p for p in candidates if (p.min(axis=0) < middle[:2]).all() and (p.max(axis=0) > middle[:2]).all()]
     if not around:
         return None
     own = max(around, key=lambda p: float(np.ptp(p, axis=0).prod()))

@@ -140,14 +140,11 @@ class OpenWords(ABC):
         found = [(k, s, np.asarray(c, np.float64) - 0.5) for k, s, c in self.answer(image, words)]
         kept: list[Box] = []
         for number, label in enumerate(asked):
-            own = [
-                (score, corners) for k, score, corners in found if k == number and np.isfinite(corners).all()
-            ]
+            own = [(score, corners) for k, score, corners in found if k == number and np.isfinite(corners).all()]
             if own:
                 scores, corners = np.array([s for s, _ in own]), np.array([c for _, c in own])
                 kept += [
-                    Box(label, float(scores[i]), corners[i])
-                    for i in distinct(corners, scores, self.config.overlap)
+                    Box(label, float(scores[i]), corners[i]) for i in distinct(corners, scores, self.config.overlap)
                 ]
         return sorted(kept, key=lambda box: -box.score)
 

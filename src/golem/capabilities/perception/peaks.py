@@ -38,11 +38,7 @@ def normalise(image: NDArray[np.uint8], mean: Array, std: Array, multiple: int) 
 
 
 def find_peaks(
-    maps: NDArray[np.float32],
-    labels: tuple[str, ...],
-    wanted: set[str],
-    threshold: float,
-    size: tuple[int, int],
+    maps: NDArray[np.float32], labels: tuple[str, ...], wanted: set[str], threshold: float, size: tuple[int, int]
 ) -> list[Detection]:
     """Return the detections in one image's maps, best first.
 

@@ -115,13 +115,9 @@ class PlaneClusters:
         off[valid] = free
         index = np.full(valid.shape, -1)
         index[valid] = np.arange(len(points))
-        found = [
-            self._told(frame, pixels, points[index[pixels]], planes)
-            for pixels in _pieces(off, depth, c.least)
-        ]
+        found = [self._told(frame, pixels, points[index[pixels]], planes) for pixels in _pieces(off, depth, c.least)]
         return sorted(
-            (one for one in found if one is not None and one.label in labels),
-            key=lambda one: -one.detection.score,
+            (one for one in found if one is not None and one.label in labels), key=lambda one: -one.detection.score
         )
 
     def _planes(
@@ -142,9 +138,7 @@ class PlaneClusters:
             some = rng.choice(pool, min(3000, len(pool)), replace=False)
             first = rng.choice(some, c.hypotheses)
             # Three points near each other in the image lie on one surface more often than any three.
-            others = np.clip(
-                first[:, None] + rng.integers(-4000, 4000, (c.hypotheses, 2)), 0, len(points) - 1
-            )
+            others = np.clip(first[:, None] + rng.integers(-4000, 4000, (c.hypotheses, 2)), 0, len(points) - 1)
             a, b, d = points[first], points[others[:, 0]], points[others[:, 1]]
             normals = np.cross(b - a, d - a)
             size = np.linalg.norm(normals, axis=1)
@@ -188,11 +182,7 @@ class PlaneClusters:
         return kept[number]
 
     def _told(
-        self,
-        frame: RgbdImage,
-        pixels: tuple[NDArray[np.intp], NDArray[np.intp]],
-        points: Array,
-        planes: list[_Plane],
+        self, frame: RgbdImage, pixels: tuple[NDArray[np.intp], NDArray[np.intp]], points: Array, planes: list[_Plane]
     ) -> LocalizedObject | None:
         """Return what a piece is, if it is anything."""
         length = self._bar(points, planes)
@@ -259,9 +249,7 @@ def _pieces(
     flat = np.where(off > 0, depth, 0.0)
     jump[:, 1:] |= (np.abs(np.diff(flat, axis=1)) > 0.03) & (off[:, 1:] > 0) & (off[:, :-1] > 0)
     jump[1:] |= (np.abs(np.diff(flat, axis=0)) > 0.03) & (off[1:] > 0) & (off[:-1] > 0)
-    count, numbers, stats, _ = cv2.connectedComponentsWithStats(
-        (off * ~jump).astype(np.uint8), connectivity=8
-    )
+    count, numbers, stats, _ = cv2.connectedComponentsWithStats((off * ~jump).astype(np.uint8), connectivity=8)
     found = []
     for k in range(1, count):
         if stats[k, cv2.CC_STAT_AREA] >= least:

@@ -97,9 +97,7 @@ class YoloWorld:
         self.classes = tuple(config.rename.get(name, name.lower().replace(" ", "_")) for name in names)
         self._name, self._outputs = inputs[0].name, [outputs[0].name]
         self._size = (_side(shape[2]), _side(shape[3]))
-        self.boxes(
-            np.full((*self._size, 3), GREY, np.uint8)
-        )  # what cannot run, or answers otherwise, is found now
+        self.boxes(np.full((*self._size, 3), GREY, np.uint8))  # what cannot run, or answers otherwise, is found now
 
     def boxes(self, image: NDArray[np.uint8]) -> list[Box]:
         """Return all boxes in an image, (height, width, 3) RGB, best first.
@@ -183,9 +181,7 @@ def letterbox(image: NDArray[np.uint8], size: tuple[int, int]) -> tuple[NDArray[
     rows, columns = round(height * scale), round(width * scale)
     top, left = (size[0] - rows) // 2, (size[1] - columns) // 2
     canvas = np.full((*size, 3), GREY, np.uint8)
-    canvas[top : top + rows, left : left + columns] = cv2.resize(
-        image, (columns, rows), interpolation=cv2.INTER_LINEAR
-    )
+    canvas[top : top + rows, left : left + columns] = cv2.resize(image, (columns, rows), interpolation=cv2.INTER_LINEAR)
     x = np.ascontiguousarray(canvas.transpose(2, 0, 1)[None], np.float32) / np.float32(255.0)
     return x, scale, np.array([left, top], float)
 

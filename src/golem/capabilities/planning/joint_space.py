@@ -73,9 +73,7 @@ class PlanningRobot:
 
     def model(self, held: Sequence[Held] = ()) -> CollisionModel:
         """Return the spheres of the robot, holding what it holds; those of what was held last are kept."""
-        key: tuple[tuple[Side, bytes], ...] = tuple(
-            (one.side, np.asarray(one.balls, float).tobytes()) for one in held
-        )
+        key: tuple[tuple[Side, bytes], ...] = tuple((one.side, np.asarray(one.balls, float).tobytes()) for one in held)
         if key not in self._models:
             robot = self._robot
             for one in held:
@@ -163,14 +161,8 @@ class JointSpace:
         if verdict == RANGE:
             over = np.maximum(self.space.lower - q, q - self.space.upper)
             j = int(over.argmax())
-            return (
-                f"{JOINT_NAMES[UPPER][j]} is {over[j]:.3f} rad beyond the range that the safety gate allows"
-            )
-        words = {
-            FREE: "nothing is in the way",
-            ITSELF: "the robot touches itself",
-            WORLD: "something is in the way",
-        }
+            return f"{JOINT_NAMES[UPPER][j]} is {over[j]:.3f} rad beyond the range that the safety gate allows"
+        words = {FREE: "nothing is in the way", ITSELF: "the robot touches itself", WORLD: "something is in the way"}
         return words[verdict] if verdict < RULE else f"it breaks a rule: {self.rules[verdict - RULE]}"
 
     def centre_of_mass(self, q: Array) -> Array:

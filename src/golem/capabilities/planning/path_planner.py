@@ -15,14 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.capabilities.planning import plan_kernel
-from golem.capabilities.planning.base import (
-    NUM_JOINTS,
-    Plan,
-    PlanRefused,
-    PlanRequest,
-    Refusal,
-    check_request,
-)
+from golem.capabilities.planning.base import NUM_JOINTS, Plan, PlanRefused, PlanRequest, Refusal, check_request
 from golem.capabilities.planning.hermite import interpolate
 from golem.capabilities.planning.joint_space import JointSpace, PlanningRobot
 from golem.errors import ConfigError
@@ -107,9 +100,7 @@ def time_path(points: Array, limits: MotionLimits, hands: Array) -> tuple[Array,
     middle = 0.5 * (lengths[1:] + lengths[:-1])
     curvature = np.zeros_like(points)
     curvature[1:-1] = np.diff(tangents, axis=0) / middle[:, None]
-    both = np.maximum(
-        np.abs(tangents[np.r_[0, : len(tangents)]]), np.abs(tangents[np.r_[: len(tangents), -1]])
-    )
+    both = np.maximum(np.abs(tangents[np.r_[0, : len(tangents)]]), np.abs(tangents[np.r_[: len(tangents), -1]]))
     with np.errstate(divide="ignore"):
         cap = (SLACK * limits.speed / both).min(axis=1)
         cap = np.minimum(cap, np.sqrt((CURVED * limits.accel / np.abs(curvature)).min(axis=1)))
@@ -214,13 +205,7 @@ class PathPlanner(ABC):
 
     @abstractmethod
     def find(
-        self,
-        space: JointSpace,
-        q: Array,
-        goals: Array,
-        rng: np.random.Generator,
-        effort: Effort,
-        attempt: int,
+        self, space: JointSpace, q: Array, goals: Array, rng: np.random.Generator, effort: Effort, attempt: int
     ) -> Array:
         """Return the corners (k, 15), k >= 2, of a free path from `q` (15,) to one of `goals` (m, 15).
 
@@ -240,9 +225,7 @@ class PathPlanner(ABC):
         effort.spend(1)
         start = space.verdict(q)
         if start:
-            raise PlanRefused(
-                Refusal.START, f"The arms cannot set out from where they are: {space.reason(start, q)}."
-            )
+            raise PlanRefused(Refusal.START, f"The arms cannot set out from where they are: {space.reason(start, q)}.")
         still = np.abs(goals - q).max(axis=1) <= STILL
         if still.any():
             points = np.array([q, goals[int(still.argmax())]])
@@ -251,11 +234,7 @@ class PathPlanner(ABC):
         effort.spend(len(goals))
         if verdicts.all():
             reason = space.reason(int(verdicts[0]), goals[0])
-            text = (
-                "The goal may not be gone to"
-                if len(goals) == 1
-                else f"None of {len(goals)} goals may be gone to"
-            )
+            text = "The goal may not be gone to" if len(goals) == 1 else f"None of {len(goals)} goals may be gone to"
             raise PlanRefused(Refusal.GOAL, f"{text}: {reason}.")
         goals = goals[verdicts == 0]
         rng = np.random.default_rng(request.seed)
@@ -295,7 +274,6 @@ def fine_points(times: Array, q: Array, dq: Array) -> Array:
     # A cubic that sets off from rest is up to twice as fast as its mean.
     parts = np.maximum(1, np.ceil(2.0 * gaps / FINE)).astype(int)
     s = np.concatenate(
-        [t0 + (t1 - t0) * np.arange(k) / k for t0, t1, k in zip(times, times[1:], parts, strict=False)]
-        + [times[-1:]]
+        [t0 + (t1 - t0) * np.arange(k) / k for t0, t1, k in zip(times, times[1:], parts, strict=False)] + [times[-1:]]
     )
     return interpolate(times, q, dq, s)

@@ -45,13 +45,7 @@ class RrtConnect(PathPlanner):
         super().__init__(self._options.path)
 
     def find(
-        self,
-        space: JointSpace,
-        q: Array,
-        goals: Array,
-        rng: np.random.Generator,
-        effort: Effort,
-        attempt: int,
+        self, space: JointSpace, q: Array, goals: Array, rng: np.random.Generator, effort: Effort, attempt: int
     ) -> Array:
         """Return the corners of a path; see `PathPlanner`."""
         # A path that just touches a rule may slip through between two checks: the next one is checked more finely.
@@ -100,10 +94,7 @@ class RrtConnect(PathPlanner):
             i, j = (min(int(np.searchsorted(at, x, side="right")) - 1, len(path) - 2) for x in (s, t))
             if i == j:
                 continue
-            a, b = (
-                path[k] + (path[k + 1] - path[k]) * (x - at[k]) / (at[k + 1] - at[k])
-                for k, x in ((i, s), (j, t))
-            )
+            a, b = (path[k] + (path[k + 1] - path[k]) * (x - at[k]) / (at[k + 1] - at[k]) for k, x in ((i, s), (j, t)))
             effort.spend(int(np.abs(b - a).max() / step) + 1)
             if space.free_line(a, b, step):
                 path = _without_repeats(np.concatenate([path[: i + 1], [a, b], path[j + 1 :]]))

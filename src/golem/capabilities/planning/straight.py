@@ -14,13 +14,7 @@ class Straight(PathPlanner):
     """Goes straight to the first goal that it can go straight to."""
 
     def find(
-        self,
-        space: JointSpace,
-        q: Array,
-        goals: Array,
-        rng: np.random.Generator,
-        effort: Effort,
-        attempt: int,
+        self, space: JointSpace, q: Array, goals: Array, rng: np.random.Generator, effort: Effort, attempt: int
     ) -> Array:
         """Return start and goal; see `PathPlanner`."""
         line = straight_line(space, q, goals, effort, FINE)

@@ -32,9 +32,7 @@ class GeminiEstimate:
         latency: declared time of an answer [s].
     """
 
-    def __init__(
-        self, config: GeminiEstimateConfig | None = None, sleep: Callable[[float], None] = time.sleep
-    ) -> None:
+    def __init__(self, config: GeminiEstimateConfig | None = None, sleep: Callable[[float], None] = time.sleep) -> None:
         """Take the key from the environment.
 
         Raises:
@@ -82,9 +80,7 @@ def read_properties(text: str, label: str) -> Properties:
     fields = cast("Mapping[str, Any]", said) if isinstance(said, Mapping) else {}
     values = [fields.get(name) for name in BOUNDS]
     if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
-        raise ServiceUnavailable(
-            f"Gemini gave no {', '.join(BOUNDS)} of the {label}: '{shorten(text.strip(), 60)}'."
-        )
+        raise ServiceUnavailable(f"Gemini gave no {', '.join(BOUNDS)} of the {label}: '{shorten(text.strip(), 60)}'.")
     try:
         return Properties(*(float(cast("float", value)) for value in values))
     except ValueError as error:

@@ -30,9 +30,7 @@ class PropertyTableConfig:
         things: mass [kg], friction, stiffness [N/m] by label; they replace and extend what it knows.
     """
 
-    things: dict[str, tuple[float, float, float]] = field(
-        default_factory=dict[str, tuple[float, float, float]]
-    )
+    things: dict[str, tuple[float, float, float]] = field(default_factory=dict[str, tuple[float, float, float]])
 
 
 class PropertyTable:

@@ -76,15 +76,11 @@ class ArmSuite(Suite):
             "a target out of reach": self._to(3.0, 0.0, 0.0),
             "a target behind the robot": self._to(-1.2, 0.0, 0.2),
             "a target at the robot's middle": self._to(*(-self._palms[1][:3, 3])),
-            "both palms in one place": [
-                one._replace(left=self._palms[1].copy()) for one in self._to(0.0, 0.2, 0.0)
-            ],
+            "both palms in one place": [one._replace(left=self._palms[1].copy()) for one in self._to(0.0, 0.2, 0.0)],
             "no target": [ArmInput(None, None, samples.posture(), self._dt)] * 10,
         }
         for name, q in wide.items():
-            cases[f"joints at their {name} limits"] = [
-                one._replace(q=q.copy()) for one in self._to(0.0, 0.0, WAY, 20)
-            ]
+            cases[f"joints at their {name} limits"] = [one._replace(q=q.copy()) for one in self._to(0.0, 0.0, WAY, 20)]
         return cases
 
     def spoiled(self) -> Mapping[str, ArmInput]:

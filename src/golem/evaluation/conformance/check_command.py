@@ -168,9 +168,7 @@ def _print(console: Console, report: Report, whole: bool) -> None:
     if report.lacks is not None:
         heading.append(f"  not checked: {report.lacks}", style="yellow")
     elif report.failed:
-        heading.append(
-            f"  {len(report.failed)} of {passed + len(report.failed)} promises broken", style="red"
-        )
+        heading.append(f"  {len(report.failed)} of {passed + len(report.failed)} promises broken", style="red")
     else:
         heading.append(f"  keeps all {passed} promises", style="green")
     console.print(heading, soft_wrap=True)
@@ -186,9 +184,7 @@ def _table(findings: list[Finding]) -> Table:
     for finding in findings:
         mark, style = _MARKS.get(finding.status, ("-", "dim"))
         said = finding.promise if finding.status == PASSED else finding.reason
-        numbers = [
-            f"{name} {value:.3g}" for name, value in finding.figures.items() if isinstance(value, float)
-        ]
+        numbers = [f"{name} {value:.3g}" for name, value in finding.figures.items() if isinstance(value, float)]
         said += f" {'; '.join(numbers)}." if numbers else ""
         table.add_row(Text(mark, style=style), Text(finding.check.replace("_", " ")), Text(said, style=style))
     return table
@@ -213,9 +209,7 @@ def _write(page: Path, table: str, begin: str, end: str) -> None:
     except OSError as error:
         raise ConfigError(f"The page {page} cannot be read: {error.strerror}.") from error
     if begin not in text or end not in text.partition(begin)[2]:
-        raise ConfigError(
-            f"The page {page} lacks the lines '{begin}' and '{end}', between which the table goes."
-        )
+        raise ConfigError(f"The page {page} lacks the lines '{begin}' and '{end}', between which the table goes.")
     before, _, rest = text.partition(begin)
     _, _, after = rest.partition(end)
     try:

@@ -117,9 +117,7 @@ class DomainStops:
 
         def loose() -> bool:
             nonlocal limp
-            limp = next(
-                (s.t - died for _, s in link.states if s.t > died and np.abs(s.tau).max() < LIMP), math.inf
-            )
+            limp = next((s.t - died for _, s in link.states if s.t > died and np.abs(s.tau).max() < LIMP), math.inf)
             return limp < math.inf
 
         link.spin(20.0 * LIMP_TIME, loose)
@@ -222,9 +220,7 @@ class DomainListening:
         """Its state comes at 500 Hz with sound checksums, says what can be true, and its stamps rise by 2 ms."""
         link = self.bench.link
         link.states.clear()
-        link.spin(
-            DISCOVERY, lambda: len(link.states) > 100
-        )  # a simulation stands still while its cameras start
+        link.spin(DISCOVERY, lambda: len(link.states) > 100)  # a simulation stands still while its cameras start
         judge(candidate, check_state(self.bench))
         steps = np.diff([state.t for _, state in link.states])
         candidate.figures["longest step of the stamps [s]"] = float(steps.max())
@@ -325,9 +321,7 @@ def run_domain_check(config: DomainCheckConfig) -> bool:
         DdsError: the domain cannot be joined.
     """
     if config.slot != "robot":
-        raise ConfigError(
-            f"On a domain a robot is checked, not '{config.slot}': golem check robot --domain N."
-        )
+        raise ConfigError(f"On a domain a robot is checked, not '{config.slot}': golem check robot --domain N.")
     bringup = BringupConfig(without=config.without, estop=config.estop, dds=config.dds)
     with member("check", config.dds) as (participant, node):
         link = RobotLink(participant, node, config.dds)

@@ -140,9 +140,7 @@ PATIENCE = 20.0
 class DomainRig:
     """See `RobotRig`. Every motion goes through the safety gate, which this starts after a confirmation."""
 
-    def __init__(
-        self, bench: Workbench, participant: CycloneParticipant, strict_gate: Callable[[], Process]
-    ) -> None:
+    def __init__(self, bench: Workbench, participant: CycloneParticipant, strict_gate: Callable[[], Process]) -> None:
         """Listen with the link of `bench`; its person confirms that the robot hangs.
 
         `strict_gate` starts a gate that stops a simulated robot as early as a real one.
@@ -310,9 +308,7 @@ class DomainRig:
         subscription = self.bench.link.node.subscription(row.name, row.type, heard.append, row.qos)
         try:
             if not self.spin(PATIENCE, lambda: len(heard) > skip):
-                raise ModuleFault(
-                    "robot", str(self.bench.config.dds), f"{topic} is silent for {PATIENCE:g} s"
-                )
+                raise ModuleFault("robot", str(self.bench.config.dds), f"{topic} is silent for {PATIENCE:g} s")
         finally:
             subscription.close()
         return heard[-1]

@@ -77,13 +77,8 @@ def _cell(finding: dict[str, Any] | None) -> str:
 def _figures(check: str, reports: dict[str, Findings]) -> list[str]:
     """Return a row for each number that a check measured in any report."""
     measured = [(report.get(check) or {}).get("figures") or {} for report in reports.values()]
-    names = dict.fromkeys(
-        n for figures in measured for n, value in figures.items() if isinstance(value, float)
-    )
-    return [
-        f"| {name} | {' | '.join(f'{f[name]:.3g}' if name in f else '-' for f in measured)} |"
-        for name in names
-    ]
+    names = dict.fromkeys(n for figures in measured for n, value in figures.items() if isinstance(value, float))
+    return [f"| {name} | {' | '.join(f'{f[name]:.3g}' if name in f else '-' for f in measured)} |" for name in names]
 
 
 def _apart(course: list[float], finding: dict[str, Any] | None, name: str) -> str:

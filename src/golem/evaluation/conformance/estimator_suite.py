@@ -74,9 +74,7 @@ class EstimatorSuite(Suite):
         T = self.answers_of(candidate)[0].T_odom_base
         heading = float(np.arctan2(T[1, 0], T[0, 0]))
         if float(np.hypot(T[0, 3], T[1, 3])) > 0.01 or abs(heading) > 0.01:
-            raise candidate.fault(
-                f"it starts at x {T[0, 3]:.3g} m, y {T[1, 3]:.3g} m, heading {heading:.3g} rad"
-            )
+            raise candidate.fault(f"it starts at x {T[0, 3]:.3g} m, y {T[1, 3]:.3g} m, heading {heading:.3g} rad")
 
     @check
     def contact_is_a_probability(self, candidate: Candidate) -> None:

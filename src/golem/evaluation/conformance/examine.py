@@ -53,10 +53,7 @@ OPTIONS: dict[tuple[str, str], Mapping[str, object]] = {
 """What shipped modules without default options are checked with."""
 UNCHECKED: dict[tuple[str, str], str] = {
     ("localizer", "gemini"): "it asks a service: golem check localizer gemini, with your key",
-    (
-        "localizer",
-        "grounding_dino",
-    ): "it needs weights: golem check localizer '{use: grounding_dino, weights: FILE}'",
+    ("localizer", "grounding_dino"): "it needs weights: golem check localizer '{use: grounding_dino, weights: FILE}'",
     ("localizer", "owlv2"): "it needs weights: golem check localizer '{use: owlv2, weights: FILE}'",
     ("localizer", "yolo_world"): "it needs weights: golem check localizer '{use: yolo_world, weights: FILE}'",
     ("properties", "gemini"): "it asks a service: golem check properties gemini, with your key",

@@ -73,10 +73,7 @@ class GraspSuite(Suite):
     def inputs(self) -> Sequence[GraspInput]:
         """Return objects within reach."""
         offsets = [(0.05 * i - 0.1, 0.06 * i - 0.1, 0.01 * i) for i in range(5)]
-        return [
-            above(samples.seen_object(0.1 * i, PLACE + offset), 0.4 * i - 0.8)
-            for i, offset in enumerate(offsets)
-        ]
+        return [above(samples.seen_object(0.1 * i, PLACE + offset), 0.4 * i - 0.8) for i, offset in enumerate(offsets)]
 
     def edges(self) -> Mapping[str, Sequence[GraspInput]]:
         """Return objects and scenes with hardly a cloud, objects far away, and headings that wrap."""
@@ -85,9 +82,7 @@ class GraspSuite(Suite):
             "an object of one point": [above(samples.seen_object(0.1, PLACE, 1))],
             "an object out of reach": [above(samples.seen_object(0.1, 10.0 * PLACE))],
             "a heading that wraps": [above(samples.seen_object(0.1, PLACE), yaw) for yaw in (math.pi, -4.0)],
-            "a scene without points": [
-                above(samples.seen_object(0.1, PLACE))._replace(scene=np.zeros((0, 3)))
-            ],
+            "a scene without points": [above(samples.seen_object(0.1, PLACE))._replace(scene=np.zeros((0, 3)))],
         }
 
     def spoiled(self) -> Mapping[str, GraspInput]:

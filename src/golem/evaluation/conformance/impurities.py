@@ -38,15 +38,10 @@ _WATCHED: dict[str, dict[str, set[str]]] = {
     RANDOM: {"posix": {"urandom"}},
 }
 _FUNCTIONS = {
-    (module, name): kind
-    for kind, modules in _WATCHED.items()
-    for module, names in modules.items()
-    for name in names
+    (module, name): kind for kind, modules in _WATCHED.items() for module, names in modules.items() for name in names
 }
 _PACKAGES = tuple({f"{sysconfig.get_path(name)}/" for name in ("purelib", "platlib")})
-_METHODS = {(datetime.datetime, name): CLOCK for name in ("now", "utcnow")} | {
-    (datetime.date, "today"): CLOCK
-}
+_METHODS = {(datetime.datetime, name): CLOCK for name in ("now", "utcnow")} | {(datetime.date, "today"): CLOCK}
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +74,7 @@ def impurities() -> Iterator[list[Impurity]]:
         where = None if kind is None or measures_itself else caller(frame)
         if kind is not None and where is not None:
             name = getattr(function, "__name__", "?")
-            found.append(
-                Impurity(kind, f"{getattr(function, '__module__', None) or 'datetime'}.{name}", where)
-            )
+            found.append(Impurity(kind, f"{getattr(function, '__module__', None) or 'datetime'}.{name}", where))
 
     before = sys.getprofile()
     states = random.getstate(), _legacy_state()

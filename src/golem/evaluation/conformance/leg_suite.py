@@ -130,9 +130,7 @@ class LegSuite(Suite):
         for answer in self.answers_of(candidate):
             outside = np.maximum(limits.lower[LEGS] - answer.q, answer.q - limits.upper[LEGS])
             if outside.max() > BEYOND:
-                raise candidate.fault(
-                    f"a target is {outside.max():.3g} rad outside of its joint's position limits"
-                )
+                raise candidate.fault(f"a target is {outside.max():.3g} rad outside of its joint's position limits")
 
     @check
     def gains_are_possible(self, candidate: Candidate) -> None:

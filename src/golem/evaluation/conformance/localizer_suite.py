@@ -99,9 +99,7 @@ class LocalizerSuite(Suite):
                 contract.kind("its mask", found.mask, Mask)
                 pixels = int(np.count_nonzero(found.mask.pixels))
                 if pixels != len(found.points):
-                    raise contract.fault(
-                        f"its mask has {pixels} pixels, its cloud {len(found.points)} points"
-                    )
+                    raise contract.fault(f"its mask has {pixels} pixels, its cloud {len(found.points)} points")
 
     def _seen(self, candidate: Candidate) -> list[tuple[LocalizerInput, list[LocalizedObject]]]:
         """Return what it saw in frames in which it saw anything."""
@@ -116,9 +114,7 @@ class LocalizerSuite(Suite):
         """The same frame and labels give the same objects, whatever it saw before."""
         module = candidate.make()
         self.run(candidate, self.inputs(), module)
-        self._compare(
-            candidate, self.run(candidate, self.inputs(), module), "a second look answers otherwise"
-        )
+        self._compare(candidate, self.run(candidate, self.inputs(), module), "a second look answers otherwise")
 
     @check
     def finds_what_it_is_asked_for(self, candidate: Candidate) -> None:
@@ -159,9 +155,7 @@ class LocalizerSuite(Suite):
             (answer,) = self.run(candidate, [given])
         except ModuleFault as fault:
             if not isinstance(fault.__cause__, ConfigError):
-                raise candidate.fault(
-                    f"an unknown label ends in {fault.reason}, not in a ConfigError"
-                ) from fault
+                raise candidate.fault(f"an unknown label ends in {fault.reason}, not in a ConfigError") from fault
             return
         if answer:
             raise candidate.fault(f"it finds {len(answer)} objects called '{UNKNOWN_LABEL}'")

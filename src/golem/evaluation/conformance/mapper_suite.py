@@ -158,7 +158,5 @@ def _near(grid: OccupancyGrid, x: float, y: float, around: float) -> int:
     n = round(around / grid.resolution)
     row, column = int(at.y // grid.resolution), int(at.x // grid.resolution)
     rows, columns = grid.cells.shape
-    part = grid.cells[
-        max(0, row - n) : min(rows, row + n + 1), max(0, column - n) : min(columns, column + n + 1)
-    ]
+    part = grid.cells[max(0, row - n) : min(rows, row + n + 1), max(0, column - n) : min(columns, column + n + 1)]
     return int(part.max(initial=-1))

@@ -80,9 +80,7 @@ class MemorySuite(Suite):
         thing = one.objects[0]
         return {
             "the pose": replace(one, frame=replace(one.frame, T_odom_optical=T)),
-            "an object's place": replace(
-                one, objects=[replace(thing, position=samples.with_nan(thing.position, 0))]
-            ),
+            "an object's place": replace(one, objects=[replace(thing, position=samples.with_nan(thing.position, 0))]),
             "the time": replace(one, frame=replace(one.frame, t=samples.NAN)),
         }
 
@@ -151,9 +149,7 @@ class MemorySuite(Suite):
         else:
             raise candidate.fault("it takes a look that is older than the last one")
         if module.last != before or module.last != self.inputs()[-1].frame.t:
-            raise candidate.fault(
-                f"last is {module.last}, the newest look is of {self.inputs()[-1].frame.t} s"
-            )
+            raise candidate.fault(f"last is {module.last}, the newest look is of {self.inputs()[-1].frame.t} s")
 
     @check
     def forgets_what_it_is_told_to(self, candidate: Candidate) -> None:

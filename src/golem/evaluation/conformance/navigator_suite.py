@@ -74,9 +74,7 @@ def _hall() -> tuple[OccupancyGrid, Scan]:
     cells = np.zeros((160, 160), dtype=np.int8)
     cells[120] = 100
     wall = np.stack((np.linspace(-2.0, 2.0, 80), np.full(80, 2.0), np.full(80, 0.5)), axis=1)
-    return OccupancyGrid(t, PlanarPose(-4.0, -4.0, 0.0), 0.05, cells), Scan(
-        t, wall, np.array([0.0, 0.0, 0.7]), FLOOR
-    )
+    return OccupancyGrid(t, PlanarPose(-4.0, -4.0, 0.0), 0.05, cells), Scan(t, wall, np.array([0.0, 0.0, 0.7]), FLOOR)
 
 
 class NavigatorSuite(Suite):
@@ -122,9 +120,7 @@ class NavigatorSuite(Suite):
             at(PlanarPose(0.0, 0.0, math.pi * (1 if i % 2 else -1)), True) for i in range(20)
         ]
         grid, scan = surroundings(0.1)
-        cases["a wall next to the way"] = [
-            NavigatorInput(NavInputs(here, i > 2, grid, scan)) for i in range(20)
-        ]
+        cases["a wall next to the way"] = [NavigatorInput(NavInputs(here, i > 2, grid, scan)) for i in range(20)]
         cases["neither map nor scan"] = [NavigatorInput(NavInputs(here, i > 2)) for i in range(20)]
         cases["a scan without points"] = [
             NavigatorInput(NavInputs(here, False, None, Scan(0.1, np.zeros((0, 3)), np.zeros(3), FLOOR)))

@@ -54,9 +54,7 @@ class OdometrySuite(Suite):
         """Return a gap, scans without points, without end, of another clock, frozen ones, and none."""
         walk = self.inputs()
         return {
-            "no scan for half a second": [
-                _scans(x, lambda s: None) if 18 <= i < 23 else x for i, x in enumerate(walk)
-            ],
+            "no scan for half a second": [_scans(x, lambda s: None) if 18 <= i < 23 else x for i, x in enumerate(walk)],
             "no scan at all": [_scans(x, lambda s: None) for x in walk],
             "scans without points": [_scans(x, _empty) for x in walk],
             "a scan of another clock": [_scans(x, lambda s: replace(s, t=s.t + 1e6)) for x in walk],
@@ -131,9 +129,7 @@ class OdometrySuite(Suite):
         answers = self.answers_of(candidate)[:STANDING]
         for answer in answers:
             if answer is not None and np.linalg.norm(answer.T_odom_base[:3, 3]) > OFF:
-                raise candidate.fault(
-                    f"it is at {answer.T_odom_base[:3, 3].round(3)} m while the robot stands"
-                )
+                raise candidate.fault(f"it is at {answer.T_odom_base[:3, 3].round(3)} m while the robot stands")
             if answer is not None and answer.T_odom_base[2, 2] < np.cos(LEVEL):
                 raise candidate.fault("its odom is not level")
 

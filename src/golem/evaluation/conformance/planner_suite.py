@@ -91,14 +91,9 @@ class PlannerSuite(Suite):
         """A trajectory begins where the arms are and ends at a goal, at rest at both ends."""
         for given, plan in self._plans(candidate):
             goals = np.atleast_2d(given.goals)
-            off = (
-                float(np.abs(plan.q[0] - given.q).max()),
-                float(np.abs(goals - plan.q[-1]).max(axis=1).min()),
-            )
+            off = (float(np.abs(plan.q[0] - given.q).max()), float(np.abs(goals - plan.q[-1]).max(axis=1).min()))
             if max(off) > MEETS or float(np.abs(plan.dq[[0, -1]]).max()) > MEETS:
-                raise candidate.fault(
-                    f"it begins {off[0]:.2g} rad off and ends {off[1]:.2g} rad off, or moves there"
-                )
+                raise candidate.fault(f"it begins {off[0]:.2g} rad off and ends {off[1]:.2g} rad off, or moves there")
 
     @check
     def can_be_followed(self, candidate: Candidate) -> None:
@@ -120,9 +115,7 @@ class PlannerSuite(Suite):
             hands = JointSpace(robot, slow.q, None).hands(interpolate(plan.times, plan.q, plan.dq, s))
             fastest = float(np.linalg.norm(np.diff(hands, axis=0), axis=2).max(initial=0.0)) / INSTANT
             if fastest > 1.05 * SLOW:
-                raise candidate.fault(
-                    f"a hand moves at {fastest:.2f} m/s where hand_speed asks for {SLOW} m/s"
-                )
+                raise candidate.fault(f"a hand moves at {fastest:.2f} m/s where hand_speed asks for {SLOW} m/s")
 
     @check
     def accelerates_gently(self, candidate: Candidate) -> None:
@@ -144,9 +137,7 @@ class PlannerSuite(Suite):
             Q = fine_points(plan.times, plan.q, plan.dq)
             hit = model.collides_each(Q, 0.0, given.world)
             if hit.any():
-                raise candidate.fault(
-                    f"{int(hit.sum())} of {len(Q)} postures of a trajectory touch something"
-                )
+                raise candidate.fault(f"{int(hit.sum())} of {len(Q)} postures of a trajectory touch something")
 
     @check
     def gives_up_when_told(self, candidate: Candidate) -> None:

@@ -128,9 +128,7 @@ GRIP_TIME = 2.5
 """Time in which a hand gets anywhere [s]: all the way takes 1.8 s."""
 PRESSED = 5.0
 """Force with which the fingers press each other [N]."""
-IN_VIEW: dict[int, float] = dict(
-    zip(range(20, 27), (-2.03, -0.15, -0.60, 2.70, -1.85, -0.39, 1.08), strict=True)
-)
+IN_VIEW: dict[int, float] = dict(zip(range(20, 27), (-2.03, -0.15, -0.60, 2.70, -1.85, -0.39, 1.08), strict=True))
 """The right arm with its hand before the head camera: joint -> angle [rad]."""
 NEARER = -0.03, 0.09
 """How much nearer than the arm's axis its surface may be measured [m]: half its thickness, and the camera's error."""
@@ -208,9 +206,7 @@ class RobotMeasures:
                 rig.follow(between(home, away, 0.3), 0.3 + SETTLE)
                 reached += rig.follow(between(away, home, 0.3), 0.3 + 1.5 * SETTLE)[-50:]
         arms = slice(UPPER.start + 1, UPPER.stop)
-        tau, q, quat = (
-            np.mean(v, axis=0) for v in zip(*((s.tau, s.q, s.imu.quat) for s in reached), strict=True)
-        )
+        tau, q, quat = (np.mean(v, axis=0) for v in zip(*((s.tau, s.q, s.imu.quat) for s in reached), strict=True))
         asked = Gravity().torque(q, quat)
         error = float(np.linalg.norm((tau - asked)[arms]) / np.linalg.norm(asked[arms]))
         candidate.figures |= {"relative error [1]": error, "torques of the arms [N m]": tau[arms].tolist()}
@@ -301,9 +297,7 @@ class RobotMeasures:
                 rig.grip(side, OPEN, PRESSED, 1.0)
                 candidate.figures[f"{side}: force of {PRESSED:g} N [N]"] = force
                 if abs(force - PRESSED) > GRIP_ERROR * PRESSED:
-                    raise candidate.fault(
-                        f"the {side} fingers were to press with {PRESSED} N and report {force:.2f}"
-                    )
+                    raise candidate.fault(f"the {side} fingers were to press with {PRESSED} N and report {force:.2f}")
 
     def _opening(self, candidate: Candidate, rig: RobotRig, side: Side, gap: float) -> None:
         found = rig.grip(side, gap, PRESSED, GRIP_TIME).gap

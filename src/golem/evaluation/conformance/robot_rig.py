@@ -11,18 +11,7 @@ from numpy.typing import NDArray
 from golem.evaluation.conformance.base import Inapplicable
 from golem.hardware.servo.gains import default_gains
 from golem.robots.base import HasLidar, Robot, Unmoved
-from golem.types import (
-    NUM_JOINTS,
-    SIDES,
-    TICK,
-    Array,
-    CameraInfo,
-    HandCommand,
-    HandState,
-    LowCommand,
-    LowState,
-    Side,
-)
+from golem.types import NUM_JOINTS, SIDES, TICK, Array, CameraInfo, HandCommand, HandState, LowCommand, LowState, Side
 
 OPEN, GRIP = 0.08, 6.0
 """Opening of a hand that nobody asks about [m], and the ceiling on its force [N]."""

@@ -55,9 +55,7 @@ class MadeWalk:
     def T_base_lidar(self) -> Array:
         """(4, 4) true pose of lidar_link in base_link."""
         c, s = np.cos(self.yaw), np.sin(self.yaw)
-        return transform(np.zeros(3), np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])) @ lidar_in_base(
-            0.0
-        )
+        return transform(np.zeros(3), np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])) @ lidar_in_base(0.0)
 
     def scan(self, t: float, rng: np.random.Generator) -> LidarScan:
         """Return the scan that ends at `t` [s]."""

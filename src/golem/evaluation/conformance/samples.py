@@ -50,9 +50,7 @@ def state(t: float, q: Array | None = None, **changes: Array) -> LowState:
         arrays.pop("gyro", np.array([0.0, 0.04 * np.cos(4.0 * t), 0.0])),
         arrays.pop("acc", np.array([0.1, 0.0, 9.81])),
     )
-    return LowState(
-        t, posture() + 0.005 * np.sin(phase) if q is None else q, arrays["dq"], arrays["tau"], imu
-    )
+    return LowState(t, posture() + 0.005 * np.sin(phase) if q is None else q, arrays["dq"], arrays["tau"], imu)
 
 
 def tilt(pitch: float) -> Array:

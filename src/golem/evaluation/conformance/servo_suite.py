@@ -89,9 +89,7 @@ class ServoSuite(Suite):
         answers = self.run(candidate, [self.inputs()[0]] * 500)
         first, later = float(answers[0].kp.max()), float(answers[-1].kp.max())
         if first > SOFT * later:
-            raise candidate.fault(
-                f"its first stiffness is {first:.3g} N m/rad, {later:.3g} N m/rad a second later"
-            )
+            raise candidate.fault(f"its first stiffness is {first:.3g} N m/rad, {later:.3g} N m/rad a second later")
 
     @check
     def obeys_the_gains_of_the_legs(self, candidate: Candidate) -> None:

@@ -38,9 +38,7 @@ class StandingOne:
 class CounterWatch(ErrandWatch):
     """Call it after every tick of an errand. Its picture is of when a thing was let go, or a stage failed."""
 
-    def __init__(
-        self, running: LockstepRunner, robot: MujocoRobot, oracle: Oracle, kind: str, balances: bool
-    ) -> None:
+    def __init__(self, running: LockstepRunner, robot: MujocoRobot, oracle: Oracle, kind: str, balances: bool) -> None:
         """Look at the things as they stand now; one of `kind` is to be taken."""
         assert robot.scene.kitchen is not None
         super().__init__(running, oracle, BalanceRecorder(robot) if balances else None)

@@ -54,10 +54,7 @@ def with_legs(stack: Stack, method: str) -> Stack:
 
 
 def legs_stack(
-    method: str,
-    profile: str,
-    overrides: Mapping[str, str] | None = None,
-    robot: Mapping[str, object] | None = None,
+    method: str, profile: str, overrides: Mapping[str, str] | None = None, robot: Mapping[str, object] | None = None
 ) -> Stack:
     """Return the standing stack with the lower body `method`.
 
@@ -200,10 +197,7 @@ class Episode:
         self.run(seconds)
 
     def run(
-        self,
-        seconds: float,
-        until: Callable[[], bool] | None = None,
-        due: Callable[[], float] | None = None,
+        self, seconds: float, until: Callable[[], bool] | None = None, due: Callable[[], float] | None = None
     ) -> None:
         """Let up to `seconds` of robot time pass; a fall, a stop or `until()` ends it early.
 

@@ -67,9 +67,7 @@ class FilmStrip:
 def project(shot: Shot, size: tuple[int, int], point: Array) -> tuple[float, float]:
     """Return where the (3,) world `point` is in a picture of `size` (width, height) that `shot` takes [px]."""
     azimuth, elevation = np.radians(shot.azimuth), np.radians(shot.elevation)
-    ahead = np.array(
-        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
-    )
+    ahead = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
     right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
     offset = np.asarray(point) - (np.array(shot.look_at) - shot.distance * ahead)
     focal = 0.5 * size[1] / np.tan(0.5 * np.radians(shot.fovy))
@@ -90,9 +88,7 @@ def _annotate(frame: Image.Image, shot: Shot, t: float, pelvis: Array, force: Ar
         along = (head - tail) / max(float(np.linalg.norm(head - tail)), 1e-9)
         across = np.array([-along[1], along[0]])
         draw.line([*tail, *(head - 6 * along)], fill=ACCENT, width=4)
-        draw.polygon(
-            [*head, *(head - 14 * along + 7 * across), *(head - 14 * along - 7 * across)], fill=ACCENT
-        )
+        draw.polygon([*head, *(head - 14 * along + 7 * across), *(head - 14 * along - 7 * across)], fill=ACCENT)
     return frame
 
 

@@ -112,9 +112,7 @@ class LastSeconds:
                 picture = Image.fromarray(rig.render(data, ONLOOKER.name)[0])
                 image = Image.new("RGB", (picture.width, picture.height + LINES * LINE + 6), PANEL)
                 image.paste(picture)
-                said = textwrap.wrap(
-                    f"{moment.t:.1f} s  {moment.words}", WIDE, max_lines=LINES - 1, placeholder=" ..."
-                )
+                said = textwrap.wrap(f"{moment.t:.1f} s  {moment.words}", WIDE, max_lines=LINES - 1, placeholder=" ...")
                 ImageDraw.Draw(image).multiline_text(
                     (6, picture.height + 2), "\n".join((title, *said)), fill=INK, font=font, spacing=2
                 )

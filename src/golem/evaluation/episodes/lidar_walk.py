@@ -86,9 +86,7 @@ class LidarWalk:
         self, *, mount: Array | None = None, dropout: float | None = None
     ) -> Iterator[LidarImu | LegOdometry | LidarScan]:
         """Yield what LiDAR and legs said in the order of arrival; for the arguments see `LidarSensor`."""
-        with closing(
-            LidarSensor(self.scene, self.profile, self.seed, mount=mount, dropout=dropout)
-        ) as sensor:
+        with closing(LidarSensor(self.scene, self.profile, self.seed, mount=mount, dropout=dropout)) as sensor:
             for t, qpos, qvel, legs in zip(self.t.tolist(), self.qpos, self.qvel, self.legs, strict=True):
                 sensor.observe(LidarMoment(t, qpos, qvel))
                 yield from sensor.read_imu()
@@ -191,7 +189,5 @@ def record_walk(
         episode.close()
     t, qpos, qvel, T = (np.array([row[i] for row in rows]) for i in (0, 1, 2, 4))
     commands = [row[3] for row in rows]
-    lost = (
-        loss.detail if loss is not None else "" if pilot.done else "It did not get to the end of its route."
-    )
+    lost = loss.detail if loss is not None else "" if pilot.done else "It did not get to the end of its route."
     return LidarWalk(own, profile, episode.robot.scene, t, qpos, qvel, commands, T, lost)

@@ -52,9 +52,7 @@ def timeline(memory: Memory, episode: Relocation) -> list[ObjectTimeline]:
         ObjectTimeline(f"{episode.target}, old place", episode.before[0], old),
         ObjectTimeline(f"{episode.target}, new place", episode.after[0], tuple(not there for there in old)),
         *(
-            ObjectTimeline(
-                f"{thing.kind}{', another' if thing.kind == episode.target else ''}", thing, always
-            )
+            ObjectTimeline(f"{thing.kind}{', another' if thing.kind == episode.target else ''}", thing, always)
             for thing in episode.before[1:]
         ),
     ]

@@ -88,9 +88,7 @@ class Oracle:
         for slot in layout.reachable(0.5 * layout.size_y):
             if slot not in layout.empty_holes or slot in loose:
                 world = layout.pose() @ (*spots[slot], 0.0, 1.0)
-                found.append(
-                    Fastener((self._T_odom_world @ world)[:3], (T_base_world @ world)[:3], slot in loose)
-                )
+                found.append(Fastener((self._T_odom_world @ world)[:3], (T_base_world @ world)[:3], slot in loose))
         return found
 
     def taken(self, fasteners: Sequence[Fastener]) -> set[int]:
@@ -136,11 +134,7 @@ class Oracle:
         """Return how far from the true `point` (3,) in odom [m] the calibration of `camera` has what is there."""
         seen_by = self._robot.data.camera(camera)
         T = np.eye(4)
-        T[:3, :3] = seen_by.xmat.reshape(3, 3) * (
-            1.0,
-            -1.0,
-            -1.0,
-        )  # MuJoCo looks along -z, optical frames along z
+        T[:3, :3] = seen_by.xmat.reshape(3, 3) * (1.0, -1.0, -1.0)  # MuJoCo looks along -z, optical frames along z
         T[:3, 3] = seen_by.xpos
         T = self._T_odom_world @ T
         believed = T @ self._robot.calibration[camera] @ np.linalg.inv(T) @ (*point, 1.0)

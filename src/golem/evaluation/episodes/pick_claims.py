@@ -47,11 +47,7 @@ REFUSALS = (
 
 
 def claims(
-    report: PickReport,
-    fasteners: Sequence[Fastener],
-    taken: set[int],
-    in_tray: bool,
-    looked_at: Mapping[int, Array],
+    report: PickReport, fasteners: Sequence[Fastener], taken: set[int], in_tray: bool, looked_at: Mapping[int, Array]
 ) -> dict[str, float]:
     """Return for each outcome that was claimed, as `claim_NAME`, which share of its claims is right.
 

@@ -81,8 +81,4 @@ class PickTouches:
 
     def series(self) -> dict[str, float]:
         """Return the figures of the trial."""
-        return {
-            "self_contacts": float(len(self.itself)),
-            "touches": float(len(self.world)),
-            "touch_force": self.force,
-        }
+        return {"self_contacts": float(len(self.itself)), "touches": float(len(self.world)), "touch_force": self.force}

@@ -32,11 +32,7 @@ class PickWatch(ErrandWatch):
     """
 
     def __init__(
-        self,
-        running: LockstepRunner,
-        oracle: Oracle,
-        recorder: BalanceRecorder | None,
-        touches: PickTouches,
+        self, running: LockstepRunner, oracle: Oracle, recorder: BalanceRecorder | None, touches: PickTouches
     ) -> None:
         """Look at what `running` does, through `oracle`."""
         super().__init__(running, oracle, recorder)
@@ -76,11 +72,7 @@ class PickWatch(ErrandWatch):
         self._servoed = self._servoed or feedback.stage == "servo"
         if feedback.stage in LOOKING:
             # What it looks at is as far from the true hand as it believes it to be from the hand.
-            looked = (
-                np.subtract(feedback.data["target"], feedback.data["hand"])
-                if "hand" in feedback.data
-                else 0.0
-            )
+            looked = np.subtract(feedback.data["target"], feedback.data["hand"]) if "hand" in feedback.data else 0.0
             if self._attempt not in self.looked_at or "hand" in feedback.data:
                 self.looked_at[self._attempt] = self._oracle.gripper(self._side)[:3, 3] + looked
         if feedback.stage == "grasp" and not feedback.data.get("failed"):

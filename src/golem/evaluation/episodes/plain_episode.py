@@ -34,11 +34,7 @@ from golem.types import LEGS, NUM_JOINTS, TICK, UPPER, Array, LowCommand, LowSta
 START_NOISE = 0.02
 """Bound of what each joint is off its posture by when a trial begins [rad] [own: trials of a robot that stands would
 otherwise be one trial many times]."""
-BARE = LocomotionConfig(
-    acceleration=(math.inf, math.inf, math.inf),
-    trim=None,
-    foot_separation=None,
-)
+BARE = LocomotionConfig(acceleration=(math.inf, math.inf, math.inf), trim=None, foot_separation=None)
 """The base layer of a policy from outside: its gait clock and its dead band, as its authors deploy it, and no more."""
 
 

@@ -151,11 +151,7 @@ def _elsewhere(rng: np.random.Generator, count: int, labels: Sequence[str]) -> l
     for k in range(0, count, PER_LOOK):
         far = rng.uniform(8.0, 40.0)
         frame = RgbdImage(
-            EVERY * len(looks),
-            info,
-            np.zeros((24, 32, 3), np.uint8),
-            np.zeros((24, 32), np.float32),
-            np.eye(4),
+            EVERY * len(looks), info, np.zeros((24, 32, 3), np.uint8), np.zeros((24, 32), np.float32), np.eye(4)
         )
         found: list[LocalizedObject] = []
         for _ in range(min(PER_LOOK, count - k)):
@@ -184,9 +180,7 @@ def _before(place: Array, heading: float) -> Array:
     return place - 0.16 * np.array([np.cos(heading), np.sin(heading), 0.0])
 
 
-def _walk(
-    rng: np.random.Generator, room: RelocationRoom, setting: Setting, start: float
-) -> list[Observation]:
+def _walk(rng: np.random.Generator, room: RelocationRoom, setting: Setting, start: float) -> list[Observation]:
     """Render the eight views of one walk, two of each counter."""
     rates = setting.rates
     model, owners = compile_room(room)

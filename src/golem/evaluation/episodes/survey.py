@@ -41,9 +41,7 @@ def survey(robot: MujocoRobot, seed: int, path: Path) -> None:
         seed: of the episode.
         path: of the map, see `save_map`.
     """
-    scene = build_scene(
-        replace(robot.config, obstacles=0, people=0), robot.scene.nominal, robot.profile, seed
-    )
+    scene = build_scene(replace(robot.config, obstacles=0, people=0), robot.scene.nominal, robot.profile, seed)
     mapper, floor, t = VoxelGridMapper(), FloorPlane(), 0.0
     joint = int(scene.model.joint("base").qposadr[0])
     start: Array = robot.data.qpos.copy()

@@ -107,9 +107,7 @@ class TrueMasks:
                 holes.append((mouth, draw.bore_radius))
         return holes
 
-    def _hole(
-        self, frame: RgbdImage, geoms: NDArray[np.int32], mouth: Array, radius: float
-    ) -> LocalizedObject | None:
+    def _hole(self, frame: RgbdImage, geoms: NDArray[np.int32], mouth: Array, radius: float) -> LocalizedObject | None:
         """Return a bore whose place in the image the pack itself shows."""
         at = _pixel(self._data, frame.info, mouth)
         if at is None:

@@ -56,9 +56,7 @@ def by_state(edit: Edit) -> Callable[[FaultMoment, bytes], Frames]:
     return lambda m, payload: [edited_state(payload, lambda image: edit(m, image))]
 
 
-def scaled(
-    fields: tuple[str, ...], where: slice, share: Callable[[FaultMoment], float], kd: float | None
-) -> Edit:
+def scaled(fields: tuple[str, ...], where: slice, share: Callable[[FaultMoment], float], kd: float | None) -> Edit:
     """Return an edit that scales gains or torques."""
 
     def edit(m: FaultMoment, image: Any) -> None:
@@ -148,13 +146,7 @@ def _senders() -> Iterator[Injection]:
     }
     for name, edit in edits.items():
         yield Injection(
-            name,
-            FaultSource.COMMAND,
-            Expect.SAFE,
-            BALANCE,
-            lasting=6.0,
-            stands=True,
-            command=by_command(edit),
+            name, FaultSource.COMMAND, Expect.SAFE, BALANCE, lasting=6.0, stands=True, command=by_command(edit)
         )
 
 
@@ -171,9 +163,7 @@ def turned(axis: int, angle: float, quat: Array) -> Array:
 
 def _lies() -> Iterator[Injection]:
     def lie(name: str, senses: Senses, seconds: float = 4.0) -> Injection:
-        return Injection(
-            f"state: {name}", FaultSource.DATA, Expect.SAFE, LYING, lasting=seconds, senses=senses
-        )
+        return Injection(f"state: {name}", FaultSource.DATA, Expect.SAFE, LYING, lasting=seconds, senses=senses)
 
     def alive(m: FaultMoment, s: LowState, imu: bool, joints: bool) -> LowState:
         kept, r = m.kept.setdefault("state", s), m.rng.standard_normal
@@ -197,16 +187,11 @@ def _lies() -> Iterator[Injection]:
             )
         for gain in (-1.0, 0.5):
             scale = np.where(np.arange(3) == axis, gain, 1.0)
-            yield lie(
-                f"gyro's {word} rate times {gain:g}",
-                by_imu(lambda m, u, k=scale: replace(u, gyro=u.gyro * k)),
-            )
+            yield lie(f"gyro's {word} rate times {gain:g}", by_imu(lambda m, u, k=scale: replace(u, gyro=u.gyro * k)))
     for joint in JOINTS:
         i = JOINT_INDEX[joint]
 
-        def changed(
-            m: FaultMoment, s: LowState, i: int = i, rate: float = 0.0, stuck: bool = False
-        ) -> LowState:
+        def changed(m: FaultMoment, s: LowState, i: int = i, rate: float = 0.0, stuck: bool = False) -> LowState:
             q, dq = s.q.copy(), s.dq.copy()
             q[i] += rate * m.t
             if stuck:
@@ -214,9 +199,7 @@ def _lies() -> Iterator[Injection]:
             return replace(s, q=q, dq=dq)
 
         for rate in (0.03, -0.05):
-            yield lie(
-                f"{joint} drifts by {rate:g} rad/s", lambda m, s, c=changed, r=rate: c(m, s, rate=r), 6.0
-            )
+            yield lie(f"{joint} drifts by {rate:g} rad/s", lambda m, s, c=changed, r=rate: c(m, s, rate=r), 6.0)
         yield lie(f"{joint} stuck", lambda m, s, c=changed: c(m, s, stuck=True))
 
 
@@ -259,12 +242,7 @@ def _gate() -> Iterator[Injection]:
 
     for ticks in (2, 5):
         yield Injection(
-            f"gate at {500 // ticks} Hz",
-            FaultSource.DEVICE,
-            Expect.BEAR,
-            lasting=4.0,
-            stands=True,
-            gate=slow(ticks),
+            f"gate at {500 // ticks} Hz", FaultSource.DEVICE, Expect.BEAR, lasting=4.0, stands=True, gate=slow(ticks)
         )
         yield Injection(
             f"state: 1 of {ticks} arrives",
@@ -275,12 +253,7 @@ def _gate() -> Iterator[Injection]:
             state=lambda m, p, n=ticks: [] if m.k % n else [p],
         )
     yield Injection(
-        "no base estimate",
-        FaultSource.DEVICE,
-        Expect.SAFE,
-        (Reason.BASE_STALE,),
-        stands=True,
-        gate=no_estimate,
+        "no base estimate", FaultSource.DEVICE, Expect.SAFE, (Reason.BASE_STALE,), stands=True, gate=no_estimate
     )
 
     def weak(share: float) -> Callable[[FaultMoment, LowCommand], LowCommand]:

@@ -67,9 +67,7 @@ SOFT: dict[str, dict[str, Any]] = {
 def _two_at_once() -> Iterator[Injection]:
     for hard, (reasons, one) in HARD.items():
         for soft, other in SOFT.items():
-            yield Injection(
-                f"{hard} and {soft}", FaultSource.DEVICE, Expect.STOP1, reasons, 0.25, **one, **other
-            )
+            yield Injection(f"{hard} and {soft}", FaultSource.DEVICE, Expect.STOP1, reasons, 0.25, **one, **other)
 
 
 def _while_stopped() -> Iterator[Injection]:
@@ -82,13 +80,7 @@ def _while_stopped() -> Iterator[Injection]:
         sound: dict[str, Any] = {"state": lambda m, p: [p], "senses": lambda m, s: s}
         late: dict[str, Any] = {key: later(spoil, sound[key]) for key, spoil in one.items()}
         yield Injection(
-            f"{hard} while stopped",
-            FaultSource.DEVICE,
-            Expect.STOP1,
-            reasons,
-            1.25,
-            command=lambda m, p: [],
-            **late,
+            f"{hard} while stopped", FaultSource.DEVICE, Expect.STOP1, reasons, 1.25, command=lambda m, p: [], **late
         )
 
     def dead(m: FaultMoment, c: LowCommand) -> LowCommand:
@@ -103,12 +95,7 @@ def _while_stopped() -> Iterator[Injection]:
     silent: dict[str, Any] = {"command": lambda m, p: [], "lasting": 3.0}
     stale = (Reason.COMMAND_STALE,)
     yield Injection(
-        "a knee without torque while stopped",
-        FaultSource.DEVICE,
-        Expect.SAFE,
-        (*stale, *LYING),
-        motors=dead,
-        **silent,
+        "a knee without torque while stopped", FaultSource.DEVICE, Expect.SAFE, (*stale, *LYING), motors=dead, **silent
     )
     yield Injection(
         "a knee jumps in 1 of 60 states while stopped",

@@ -7,14 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from golem.evaluation.faults.injection import (
-    Expect,
-    FaultMoment,
-    FaultSource,
-    Frames,
-    Injection,
-    edited_command,
-)
+from golem.evaluation.faults.injection import Expect, FaultMoment, FaultSource, Frames, Injection, edited_command
 from golem.interfaces.payloads import Reason
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_INDEX
@@ -30,24 +23,12 @@ JOINTS = (
     "left_wrist_pitch_joint",
 )
 """One of each kind."""
-PARTS = {
-    "all": slice(0, NUM_JOINTS),
-    "legs": LEGS,
-    "arms": UPPER,
-    "knee": slice(3, 4),
-    "elbow": slice(16, 17),
-}
+PARTS = {"all": slice(0, NUM_JOINTS), "legs": LEGS, "arms": UPPER, "knee": slice(3, 4), "elbow": slice(16, 17)}
 _VENDOR = load_limits("urdf")
 TORQUE, SPEED, UPPERMOST = _VENDOR.torque, _VENDOR.velocity, _VENDOR.upper
 """Maxima of the joints that a command may well ask for [N m, rad/s, rad]."""
 DAMAGED, INVALID = (Reason.COMMAND_DAMAGED,), (Reason.COMMAND_DAMAGED, Reason.COMMAND_INVALID)
-LIMITS = (
-    Reason.POSITION,
-    Reason.VELOCITY,
-    Reason.TORQUE,
-    Reason.BRAKING,
-    Reason.TILT,
-)
+LIMITS = (Reason.POSITION, Reason.VELOCITY, Reason.TORQUE, Reason.BRAKING, Reason.TILT)
 """Reasons of a robot that was moved beyond what it may do."""
 SENDER = (Reason.COMMAND_GAINS, Reason.COMMAND_JOLTS, Reason.COMMAND_BEYOND)
 
@@ -66,9 +47,7 @@ def _edit(edit: Edit) -> Callable[[FaultMoment, bytes], Frames]:
     return lambda m, payload: [edited_command(payload, lambda image: edit(m, image))]
 
 
-def _set(
-    field: str, part: slice, value: Callable[[FaultMoment], Any]
-) -> Callable[[FaultMoment, bytes], Frames]:
+def _set(field: str, part: slice, value: Callable[[FaultMoment], Any]) -> Callable[[FaultMoment, bytes], Frames]:
     def edit(m: FaultMoment, image: Any) -> None:
         image["motor"][field][part] = value(m)
 
@@ -104,9 +83,7 @@ def _damaged() -> Iterator[Injection]:
 
     yield _bear("checksum wrong once", command=lambda m, p: [flipped(m, p) if m.k == 0 else p])
     yield _bear("checksum wrong in 1 of 100", command=lambda m, p: [flipped(m, p) if m.k % 100 == 0 else p])
-    yield _stop(
-        "checksum wrong in 1 of 5", DAMAGED, 0.05, command=lambda m, p: [p if m.k % 5 else flipped(m, p)]
-    )
+    yield _stop("checksum wrong in 1 of 5", DAMAGED, 0.05, command=lambda m, p: [p if m.k % 5 else flipped(m, p)])
     yield _stop("checksum always wrong", DAMAGED, command=lambda m, p: [flipped(m, p)])
     yield _bear("truncated once", command=lambda m, p: [p[:-8] if m.k == 0 else p])
     yield _stop("truncated", DAMAGED, command=lambda m, p: [p[:-8]])
@@ -145,9 +122,7 @@ def _gains() -> Iterator[Injection]:
         yield _stop(f"kd 0 of {part}", limp, command=_set("kd", where, lambda m: 0.0))
         yield _safe(f"kp 1e5 of {part}", command=_set("kp", where, lambda m: 1e5))
         yield _safe(f"kd 1e5 of {part}", command=_set("kd", where, lambda m: 1e5))
-    yield _bear(
-        "one command without gains", command=lambda m, p: [edited_command(p, _limp) if m.k == 0 else p]
-    )
+    yield _bear("one command without gains", command=lambda m, p: [edited_command(p, _limp) if m.k == 0 else p])
 
 
 def _limp(image: Any) -> None:
@@ -165,9 +140,7 @@ def _motion() -> Iterator[Injection]:
             0.02,
             command=_set("tau", where, lambda m: 1e3 * (-1) ** m.k),
         )
-        yield _safe(
-            f"tau +-1000 at 10 Hz of {part}", command=_set("tau", where, lambda m: 1e3 * (-1) ** (m.k // 25))
-        )
+        yield _safe(f"tau +-1000 at 10 Hz of {part}", command=_set("tau", where, lambda m: 1e3 * (-1) ** (m.k // 25)))
         full = TORQUE[where]
         yield _safe(f"tau at its limit of {part}", command=_set("tau", where, lambda m, tau=full: tau))
         yield _safe(
@@ -175,8 +148,7 @@ def _motion() -> Iterator[Injection]:
             command=_set("tau", where, lambda m, tau=full: tau * (-1) ** (m.k // 25)),
         )
         yield _safe(
-            f"q 1 rad beyond its range of {part}",
-            command=_set("q", where, lambda m, q=UPPERMOST[where] + 1.0: q),
+            f"q 1 rad beyond its range of {part}", command=_set("q", where, lambda m, q=UPPERMOST[where] + 1.0: q)
         )
         yield _safe(f"dq at its limit of {part}", command=_set("dq", where, lambda m, dq=SPEED[where]: dq))
         yield _safe(f"q 10 rad of {part}", command=_set("q", where, lambda m: 10.0))
@@ -184,9 +156,7 @@ def _motion() -> Iterator[Injection]:
         yield _safe(f"dq 100 of {part}", command=_set("dq", where, lambda m: 100.0))
         for size, period in ((0.5, 1), (0.02, 1), (0.5, 50)):
 
-            def shake(
-                m: FaultMoment, image: Any, where: slice = where, size: float = size, n: int = period
-            ) -> None:
+            def shake(m: FaultMoment, image: Any, where: slice = where, size: float = size, n: int = period) -> None:
                 image["motor"]["q"][where] += size * (-1) ** (m.k // n)
 
             yield _safe(f"q +-{size} every {2 * period} ms of {part}", command=_edit(shake))
@@ -205,9 +175,7 @@ def _times() -> Iterator[Injection]:
         command=lambda m, p: _answering(lambda tick: 0)(m, _first(m, p)[0]),
     )
     yield _stop("answers a state to come", stale, 0.104, command=_answering(lambda tick: tick + 500))
-    yield _stop(
-        "answers a state long past", stale, 0.104, command=_answering(lambda tick: max(1, tick - 1000))
-    )
+    yield _stop("answers a state long past", stale, 0.104, command=_answering(lambda tick: max(1, tick - 1000)))
     for late in (10, 30, 90):
         yield Injection(f"{late} ms late", FaultSource.COMMAND, Expect.SAFE, stale, command=_late(late // 2))
     yield _stop("150 ms late", stale, 0.106, command=_late(75))

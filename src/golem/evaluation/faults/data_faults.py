@@ -9,14 +9,7 @@ from typing import Any
 import numpy as np
 
 from golem.evaluation.faults.command_faults import JOINTS, LIMITS
-from golem.evaluation.faults.injection import (
-    Expect,
-    FaultMoment,
-    FaultSource,
-    Frames,
-    Injection,
-    edited_state,
-)
+from golem.evaluation.faults.injection import Expect, FaultMoment, FaultSource, Frames, Injection, edited_state
 from golem.interfaces.payloads import Reason
 from golem.robots.model.table import JOINT_INDEX
 from golem.types import Array, Imu, LowState
@@ -129,12 +122,7 @@ def _frozen() -> Iterator[Injection]:
 
         reasons = (*FROZEN, *ODD, Reason.MOTOR_DEAD)
         yield _stop(f"{limb} frozen", reasons, LOST, senses=freeze, stands="arm" in limb)
-    yield _stop(
-        "everything frozen",
-        FROZEN,
-        LOST,
-        senses=lambda m, s: replace(keep(m, s), t=s.t),
-    )
+    yield _stop("everything frozen", FROZEN, LOST, senses=lambda m, s: replace(keep(m, s), t=s.t))
     yield _stop("IMU frozen", (*FROZEN, *IMU), LOST, senses=lambda m, s: replace(s, imu=keep(m, s).imu))
 
     def speeds(m: FaultMoment, state: LowState) -> LowState:
@@ -160,9 +148,7 @@ def _joints() -> Iterator[Injection]:
             return spoil
 
         yield _bear(f"{joint} +0.5 rad once", senses=add(lambda m: 0.5 if m.k == 0 else 0.0))
-        yield _stop(
-            f"{joint} +0.5 rad for ever", (*ODD, *LIMITS), 0.006, senses=add(lambda m: 0.5), stands=not leg
-        )
+        yield _stop(f"{joint} +0.5 rad for ever", (*ODD, *LIMITS), 0.006, senses=add(lambda m: 0.5), stands=not leg)
         yield _stop(
             f"{joint} drifts by 0.1 rad/s",
             (*ODD, *LIMITS, Reason.MOTOR_DEAD),
@@ -171,16 +157,8 @@ def _joints() -> Iterator[Injection]:
             senses=add(lambda m: 0.1 * m.t),
             stands=False,
         )
-        yield _stop(
-            f"{joint} drifts by 1 rad/s", (*ODD, *LIMITS), 0.15, senses=add(lambda m: m.t), stands=False
-        )
-        yield _stop(
-            f"{joint} dq +20 rad/s",
-            (*ODD, *LIMITS),
-            0.052,
-            senses=add(lambda m: 20.0, "dq"),
-            stands=not leg,
-        )
+        yield _stop(f"{joint} drifts by 1 rad/s", (*ODD, *LIMITS), 0.15, senses=add(lambda m: m.t), stands=False)
+        yield _stop(f"{joint} dq +20 rad/s", (*ODD, *LIMITS), 0.052, senses=add(lambda m: 20.0, "dq"), stands=not leg)
 
     def swapped(m: FaultMoment, state: LowState) -> LowState:
         order = np.arange(27)
@@ -206,15 +184,10 @@ def _imu() -> Iterator[Injection]:
         return np.array([c * w - s * x, c * x + s * w, c * y - s * z, c * z + s * y])
 
     tilted = (*IMU, Reason.TILT)
-    yield _stop(
-        "IMU upside down", tilted, 0.006, senses=imu(lambda m, u: replace(u, quat=rolled(np.pi, u.quat)))
-    )
-    yield _stop(
-        "IMU 60 degrees off", tilted, 0.006, senses=imu(lambda m, u: replace(u, quat=rolled(1.05, u.quat)))
-    )
+    yield _stop("IMU upside down", tilted, 0.006, senses=imu(lambda m, u: replace(u, quat=rolled(np.pi, u.quat))))
+    yield _stop("IMU 60 degrees off", tilted, 0.006, senses=imu(lambda m, u: replace(u, quat=rolled(1.05, u.quat))))
     yield _bear(
-        "IMU 60 degrees off once",
-        senses=imu(lambda m, u: replace(u, quat=rolled(1.05, u.quat)) if m.k == 0 else u),
+        "IMU 60 degrees off once", senses=imu(lambda m, u: replace(u, quat=rolled(1.05, u.quat)) if m.k == 0 else u)
     )
     for rate in (1.0, 0.2):
         yield _stop(
@@ -224,16 +197,10 @@ def _imu() -> Iterator[Injection]:
             lasting=2.0,
             senses=imu(lambda m, u, r=rate: replace(u, gyro=u.gyro + r)),
         )
-    yield _stop(
-        "gyro 100 rad/s", (*IMU, *LIMITS), 0.1, senses=imu(lambda m, u: replace(u, gyro=u.gyro + 100.0))
-    )
+    yield _stop("gyro 100 rad/s", (*IMU, *LIMITS), 0.1, senses=imu(lambda m, u: replace(u, gyro=u.gyro + 100.0)))
     yield _safe("gyro zero", IMU, senses=imu(lambda m, u: replace(u, gyro=np.zeros(3))))
-    yield _stop(
-        "no specific force", IMU, 1.2, lasting=2.0, senses=imu(lambda m, u: replace(u, acc=0.0 * u.acc))
-    )
-    yield _stop(
-        "specific force inverted", IMU, 1.5, lasting=2.0, senses=imu(lambda m, u: replace(u, acc=-u.acc))
-    )
+    yield _stop("no specific force", IMU, 1.2, lasting=2.0, senses=imu(lambda m, u: replace(u, acc=0.0 * u.acc)))
+    yield _stop("specific force inverted", IMU, 1.5, lasting=2.0, senses=imu(lambda m, u: replace(u, acc=-u.acc)))
     yield _safe(
         "roll drifts by 0.05 rad/s",
         IMU,
@@ -261,15 +228,10 @@ def _motors() -> Iterator[Injection]:
         yield _stop(f"{joint} says it is off", (Reason.MOTOR_MODE,), 0.062, state=motor("mode", 0, i))
         for degrees in (200, -300):
             yield _stop(
-                f"{joint} at {degrees} degrees",
-                (Reason.MOTOR_HOT,),
-                0.062,
-                state=motor("temperature", degrees, i),
+                f"{joint} at {degrees} degrees", (Reason.MOTOR_HOT,), 0.062, state=motor("temperature", degrees, i)
             )
         for volts in (0.0, 1e6, np.nan):
-            yield _stop(
-                f"{joint} at {volts:g} V", (Reason.MOTOR_VOLTAGE,), 0.062, state=motor("vol", volts, i)
-            )
+            yield _stop(f"{joint} at {volts:g} V", (Reason.MOTOR_VOLTAGE,), 0.062, state=motor("vol", volts, i))
 
     def brief(m: FaultMoment, image: Any) -> None:
         image["motor"]["motorstate"][3] = 1 if m.k < 10 else 0

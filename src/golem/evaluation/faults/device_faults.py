@@ -111,16 +111,10 @@ def _gate() -> Iterator[Injection]:
 
     for seconds in (0.02, 0.06):
         yield Injection(
-            f"gate held up for {1e3 * seconds:g} ms",
-            FaultSource.DEVICE,
-            Expect.BEAR,
-            gate=held(seconds),
-            stands=True,
+            f"gate held up for {1e3 * seconds:g} ms", FaultSource.DEVICE, Expect.BEAR, gate=held(seconds), stands=True
         )
     for seconds in (0.3, 1.0):
-        yield _stop(
-            f"gate held up for {1e3 * seconds:g} ms", (Reason.STALLED,), seconds + 0.004, gate=held(seconds)
-        )
+        yield _stop(f"gate held up for {1e3 * seconds:g} ms", (Reason.STALLED,), seconds + 0.004, gate=held(seconds))
     for seconds in (-1.0, -0.01):
         yield _stop(f"gate's clock {seconds:+g} s", (Reason.CLOCK,), gate=shifted(seconds))
     for seconds in (0.2, 10.0):

@@ -134,9 +134,7 @@ class Judge:
             return "a stop that does not damp"
         measured = self._rig.bus.latest(topics.LOW_STATE)
         if measured is not None and np.isfinite(measured.q).all() and np.isfinite(measured.dq).all():
-            torque = (
-                command.kp * (command.q - measured.q) + command.kd * (command.dq - measured.dq) + command.tau
-            )
+            torque = command.kp * (command.q - measured.q) + command.kd * (command.dq - measured.dq) + command.tau
             effort = float(np.max(np.abs(torque) / self._torque))
             if state is not GateState.STOP1:
                 self.finding.effort = max(self.finding.effort, effort)

@@ -144,12 +144,7 @@ _RNG = np.random.default_rng(0)
 WRITERS = frozenset({Reason.WRITERS, Reason.NOT_IN_CONTROL})
 FAULTS: tuple[LiveFault, ...] = (
     LiveFault("operator asks for a stop", lambda r: _ask(r, "stop"), frozenset({Reason.REQUESTED})),
-    LiveFault(
-        "e-stop pressed",
-        lambda r: r.press(True),
-        frozenset({Reason.ESTOP_PRESSED}),
-        lambda r: r.press(False),
-    ),
+    LiveFault("e-stop pressed", lambda r: r.press(True), frozenset({Reason.ESTOP_PRESSED}), lambda r: r.press(False)),
     LiveFault("a stranger writes /lowcmd", lambda r: r.write("/lowcmd", _damping), WRITERS),
     LiveFault(
         "a stranger writes /safety/lowcmd_in",
@@ -227,9 +222,7 @@ def _try(robot: LiveRobot, fault: LiveFault) -> bool:
     gate = robot.link.gate
     right = gate is not None and gate.reason in fault.reasons
     after = "never" if heard is None else f"after {heard - began:.2f} s"
-    log_line(
-        f"{fault.name}: {'right' if right else 'WRONG'}: {gate.why if gate is not None else ''}, {after}"
-    )
+    log_line(f"{fault.name}: {'right' if right else 'WRONG'}: {gate.why if gate is not None else ''}, {after}")
     fault.restore(robot)
     return right
 

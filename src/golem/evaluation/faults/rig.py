@@ -104,9 +104,7 @@ class FaultRig:
         )
         self.states, self.commands = (self.writer(name) for name in ("/lowstate", "/safety/lowcmd_in"))
         row = public.topic("/lowcmd")
-        self._motors = self._member.reader(
-            names.topic(row.name), dds_name(row.type), Qos(reliable=False, depth=64)
-        )
+        self._motors = self._member.reader(names.topic(row.name), dds_name(row.type), Qos(reliable=False, depth=64))
         node, base = RosNode(self._member, "others"), public.topic("/base_estimate")
         self._base = node.publisher(base.name, base.type, base.qos)
         self._activate = node.client("/safety/activate", public.TRIGGER)

@@ -53,9 +53,7 @@ def _range(name: str, values: str) -> list[Value]:
     low, high = (check_condition(name, _value(name, word)) for word in (first, last))
     count = _value(name, counted) if counted else COUNT
     if not isinstance(count, int) or not 2 <= count <= 100:
-        raise ConfigError(
-            f"--sweep {name}: the count of a range is a whole number from 2 to 100, not '{counted}'."
-        )
+        raise ConfigError(f"--sweep {name}: the count of a range is a whole number from 2 to 100, not '{counted}'.")
     assert isinstance(low, float) and isinstance(high, float)
     steps = [k / (count - 1) for k in range(count)]
     if 0.0 < low < high and high / low > RATIO:

@@ -185,9 +185,7 @@ def run_table(config: TableConfig) -> GraspTable:
         methods: list[str] = []
         for column in columns:
             if line.task not in column.tasks:
-                absent.append(
-                    f"{column.head} on the {line.task}: `open` follows no servo law, as in the paper."
-                )
+                absent.append(f"{column.head} on the {line.task}: `open` follows no servo law, as in the paper.")
             elif empty[column.method] is None:
                 methods.append(column.method)
         rows.append((line, _ladder(config, line, tuple(methods)) if methods else None))

@@ -169,11 +169,7 @@ def run_ladder(config: LadderConfig) -> LadderResult:
         from golem.evaluation.speed.compile_ahead import compile_if_cold
 
         compile_if_cold()
-    with (
-        _terminable(),
-        closing(make_executor(config.executor, config.j)) as executor,
-        RunFolder(config.out) as folder,
-    ):
+    with _terminable(), closing(make_executor(config.executor, config.j)) as executor, RunFolder(config.out) as folder:
         held = folder.resume(request.example, provenance)
         runner = Runner(request, provenance, folder, executor, command)
         try:
@@ -199,14 +195,10 @@ def run_ladder(config: LadderConfig) -> LadderResult:
     return replace(result, report=report)
 
 
-def summed_up(
-    config: LadderConfig, out: Path, records: tuple[TrialRecord, ...], rung: Rung[Any]
-) -> LadderResult:
+def summed_up(config: LadderConfig, out: Path, records: tuple[TrialRecord, ...], rung: Rung[Any]) -> LadderResult:
     """Return the figures of the `records` in the run folder `out`."""
     summary = summarise(records, config.method, read_costs(out), compared=not rung.adaptive)
-    by_method = {
-        method: [(r.spec, r.outcome) for r in records if r.method == method] for method in config.method
-    }
+    by_method = {method: [(r.spec, r.outcome) for r in records if r.method == method] for method in config.method}
     return LadderResult(config, out, records, summary, tuple(rung.tables(by_method)), None)
 
 
@@ -256,9 +248,7 @@ def find_trial(config: LadderConfig, request: Request) -> tuple[TrialSpec, Trial
         if config.show in names or (not method and index == str(spec.index)):
             return spec, records.get(spec.key)
     if index.isdigit() and (not method or method in config.method):
-        return request.spec(
-            method or config.method[0], int(index), request.rung.cases(lambda case: None)[0]
-        ), None
+        return request.spec(method or config.method[0], int(index), request.rung.cases(lambda case: None)[0]), None
     shown = ", ".join(trial_name(spec) for spec in specs[:3])
     raise unknown_name("trial", config.show, [f"0 to {(config.n or 1) - 1}", shown, "..."])
 

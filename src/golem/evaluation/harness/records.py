@@ -69,14 +69,7 @@ class TrialRecord:
     def spec(self) -> TrialSpec:
         """The trial it is of."""
         return TrialSpec(
-            self.rung,
-            self.method,
-            self.profile,
-            self.seed,
-            self.index,
-            self.overrides,
-            self.options,
-            self.case,
+            self.rung, self.method, self.profile, self.seed, self.index, self.overrides, self.options, self.case
         )
 
     @property

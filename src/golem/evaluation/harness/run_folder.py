@@ -75,9 +75,7 @@ class RunFolder:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             os.close(self._lock)
-            raise OutputError(
-                f"Another run is writing to {path}; wait for it or choose another --out."
-            ) from error
+            raise OutputError(f"Another run is writing to {path}; wait for it or choose another --out.") from error
         if not os.access(path, os.W_OK | os.X_OK):
             os.close(self._lock)
             raise OutputError(f"Cannot write to --out {path}: Permission denied; choose another.")

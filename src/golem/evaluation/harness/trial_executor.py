@@ -153,6 +153,4 @@ def make_executor(where: str, processes: int) -> TrialExecutor:
         return LocalExecutor(processes)
     if kind == "dask" and address:
         return DaskExecutor(address)
-    raise ConfigError(
-        f"--executor is 'local' or 'dask:ADDRESS', e.g. dask:tcp://10.0.0.1:8786; not '{where}'."
-    )
+    raise ConfigError(f"--executor is 'local' or 'dask:ADDRESS', e.g. dask:tcp://10.0.0.1:8786; not '{where}'.")

@@ -106,9 +106,7 @@ class Request:
         e = self.example
         return TrialSpec(e.rung, method, e.profile, e.seed, index, e.overrides, e.options, case)
 
-    def results(
-        self, method: str, case: Case, found: Mapping[Key, TrialOutcome]
-    ) -> list[TrialOutcome] | None:
+    def results(self, method: str, case: Case, found: Mapping[Key, TrialOutcome]) -> list[TrialOutcome] | None:
         """Return the outcomes of one case in the order of indices; None until all are among `found`."""
         keys = [(method, case_name(case), index) for index in range(self.n)]
         return [found[key] for key in keys] if all(key in found for key in keys) else None
@@ -140,12 +138,7 @@ class Runner:
     """
 
     def __init__(
-        self,
-        request: Request,
-        provenance: Provenance,
-        folder: RunFolder,
-        executor: TrialExecutor,
-        command: str,
+        self, request: Request, provenance: Provenance, folder: RunFolder, executor: TrialExecutor, command: str
     ) -> None:
         """Prepare; nothing is run and nothing written before `run`. `command` is the one that continues the run."""
         self._request, self._provenance, self._folder = request, provenance, folder
@@ -195,9 +188,7 @@ class Runner:
                 groups.setdefault(self._request.rung.together(spec), []).append(spec)
         p, request = self._provenance, self._request
         for specs in groups.values():
-            self._executor.submit(
-                Batch(request.target, tuple(specs), request.limit, p.configs, p.code, p.versions)
-            )
+            self._executor.submit(Batch(request.target, tuple(specs), request.limit, p.configs, p.code, p.versions))
 
     def _settled(self, batch: Batch, ending: Ending) -> Iterable[tuple[TrialSpec, Finished]]:
         """Return the trials of a batch that came to an outcome; what did not is run again, each by itself."""
@@ -238,6 +229,4 @@ class Runner:
 def _refusal(ending: Refused) -> Exception:
     if ending.trace is None:
         return GolemError(ending.message)
-    return RuntimeError(
-        f"The rung itself failed, which is a fault of its code, not of a module.\n{ending.trace}"
-    )
+    return RuntimeError(f"The rung itself failed, which is a fault of its code, not of a module.\n{ending.trace}")

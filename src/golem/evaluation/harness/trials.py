@@ -232,10 +232,7 @@ LEAVING = (SystemExit, KeyboardInterrupt)
 
 
 def run_trial(
-    rung: Rung[Any],
-    spec: TrialSpec,
-    artefacts: Path | None = None,
-    leaving: tuple[type[BaseException], ...] = LEAVING,
+    rung: Rung[Any], spec: TrialSpec, artefacts: Path | None = None, leaving: tuple[type[BaseException], ...] = LEAVING
 ) -> TrialOutcome:
     """Run one trial; a module that breaks its contract, or raises one of `leaving`, loses it."""
     try:

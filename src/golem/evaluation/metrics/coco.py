@@ -94,11 +94,7 @@ def score_label(
     count = 0
     for k, image in enumerate(images):
         own = np.array([name == label for name in image.labels], bool)
-        boxes, counted, crowd = (
-            image.boxes[own],
-            image.counted[own],
-            np.isin(np.flatnonzero(own), image.crowds),
-        )
+        boxes, counted, crowd = (image.boxes[own], image.counted[own], np.isin(np.flatnonzero(own), image.crowds))
         count += int(counted.sum())
         free = np.ones(len(boxes), bool)
         for detection in sorted((d for d in found[k] if d.label == label), key=lambda d: -d.score):

@@ -112,16 +112,12 @@ def _is_coco(path: Path) -> bool:
 def _read(file: Path, folder: Path) -> list[LabelledImage]:
     try:
         data = cast("dict[str, Any]", _load(file))
-        absent = [
-            key for key in ("images", "annotations", "categories") if not isinstance(data.get(key), list)
-        ]
+        absent = [key for key in ("images", "annotations", "categories") if not isinstance(data.get(key), list)]
     except (OSError, ValueError, AttributeError, RecursionError) as error:
         raise ConfigError(f"{file} is not in COCO format: it is no JSON object.") from error
     if absent:
         raise ConfigError(f"{file} is not in COCO format: it has no list `{absent[0]}`.")
-    names = {
-        _id(c): label_of(str(_get(file, c, "category", "name"))) for c in _entries(file, data, "categories")
-    }
+    names = {_id(c): label_of(str(_get(file, c, "category", "name"))) for c in _entries(file, data, "categories")}
     images = {_id(image): image for image in _entries(file, data, "images")}
     rows: dict[str, list[_Row]] = {key: [] for key in images}
     for one in _entries(file, data, "annotations"):
@@ -190,14 +186,7 @@ def _key(value: object) -> str:
 
 
 def _image(file: Path, folder: Path, split: str, name: str) -> Path:
-    places = (
-        file.parent,
-        file.parent / "images",
-        folder,
-        folder / "images",
-        folder / split,
-        folder / "images" / split,
-    )
+    places = (file.parent, file.parent / "images", folder, folder / "images", folder / split, folder / "images" / split)
     for path in (place / one for one in (name, Path(name).name) for place in places):
         if path.is_file():
             return path

@@ -39,11 +39,7 @@ def run_compare(config: CompareConfig) -> Summary:
     if config.first.resolve() == config.second.resolve():
         raise ConfigError(f"Both are {config.first}; name two run folders.")
     a, b = (_read(folder) for folder in (config.first, config.second))
-    rungs = (
-        f"The runs are of two rungs, {a[0].rung} and {b[0].rung}, and"
-        if a[0].rung != b[0].rung
-        else "The runs"
-    )
+    rungs = f"The runs are of two rungs, {a[0].rung} and {b[0].rung}, and" if a[0].rung != b[0].rung else "The runs"
     for name in ("seed", "profile"):
         one, other = getattr(a[0], name), getattr(b[0], name)
         if one != other:

@@ -117,8 +117,7 @@ def run_results(config: ResultsConfig) -> str:
 def trials_csv(records: Sequence[TrialRecord]) -> str:
     """Return a row per trial: what it is of, how it ended, and its scalars [SI units], empty where it has none."""
     cases, times, series = (
-        dict.fromkeys(name for r in records for name in getattr(r, kind))
-        for kind in ("case", "timings", "series")
+        dict.fromkeys(name for r in records for name in getattr(r, kind)) for kind in ("case", "timings", "series")
     )
     fixed = ("rung", "method", "profile", "seed", "index", "success", "stage", "module", "detail", "commit")
     stream = io.StringIO()
@@ -126,9 +125,7 @@ def trials_csv(records: Sequence[TrialRecord]) -> str:
     rows.writerow([*fixed, *cases, *(f"time_{name}" for name in times), *series])
     for r in records:
         own = [(r.case, cases), (r.timings, times), (r.series, series)]
-        rows.writerow(
-            [*(getattr(r, name) for name in fixed), *(held.get(n, "") for held, names in own for n in names)]
-        )
+        rows.writerow([*(getattr(r, name) for name in fixed), *(held.get(n, "") for held, names in own for n in names)])
     return stream.getvalue()
 
 
@@ -148,9 +145,7 @@ def section(folder: Path, latex: bool = False) -> str:
     records = _records(folder)
     commits = list(dict.fromkeys(record.commit for record in records))
     if len(commits) > 1:
-        raise ConfigError(
-            f"{folder} holds trials of {len(commits)} commits, {', '.join(commits)}; measure again."
-        )
+        raise ConfigError(f"{folder} holds trials of {len(commits)} commits, {', '.join(commits)}; measure again.")
     first = records[0]
     rung = make_rung(RUNGS[first.rung], first.options)
     methods = tuple(dict.fromkeys(record.method for record in records))
@@ -167,17 +162,9 @@ def section(folder: Path, latex: bool = False) -> str:
     hours = gate_hours(folder)
     gates = hours.sentence() if hours.trials else ""
     if latex:
-        parts = [
-            *(f"% {line}" for line in (head, command, gates) if line),
-            *(table.latex() for table in tables),
-        ]
+        parts = [*(f"% {line}" for line in (head, command, gates) if line), *(table.latex() for table in tables)]
     else:
-        parts = [
-            head,
-            f"```sh\n{command}\n```" if command else "",
-            *(table.markdown() for table in tables),
-            gates,
-        ]
+        parts = [head, f"```sh\n{command}\n```" if command else "", *(table.markdown() for table in tables), gates]
     return "\n\n".join(part for part in parts if part)
 
 

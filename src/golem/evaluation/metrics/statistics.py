@@ -66,9 +66,7 @@ class PairedTable:
     def count(cls, a: Sequence[bool], b: Sequence[bool]) -> PairedTable:
         """Count the successes `a` and `b` of the same trials, in the same order."""
         pairs = list(zip(a, b, strict=True))
-        return cls(
-            *(pairs.count(cell) for cell in ((True, True), (True, False), (False, True), (False, False)))
-        )
+        return cls(*(pairs.count(cell) for cell in ((True, True), (True, False), (False, True), (False, False))))
 
     @property
     def n(self) -> int:
@@ -153,9 +151,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return adjusted
 
 
-def distribution(
-    values: Sequence[float], low: float = -math.inf, high: float = math.inf
-) -> Distribution | None:
+def distribution(values: Sequence[float], low: float = -math.inf, high: float = math.inf) -> Distribution | None:
     """Return what is quoted of `values`, which must lie between `low` and `high`; None for no values."""
     if not len(values):
         return None

@@ -178,16 +178,12 @@ def pooled(method: str, records: Sequence[TrialRecord]) -> Pooled | None:
     return Pooled(method, n, sum(won), len(scenes), clustered(list(scenes.values())))
 
 
-def comparisons_of(
-    pairs: Sequence[tuple[Sequence[TrialRecord], Sequence[TrialRecord]]],
-) -> tuple[Comparison, ...]:
+def comparisons_of(pairs: Sequence[tuple[Sequence[TrialRecord], Sequence[TrialRecord]]]) -> tuple[Comparison, ...]:
     """Return the paired tests of records, each pair of the same case and the same indices in the same order."""
     tables = [PairedTable.count([r.success for r in a], [r.success for r in b]) for a, b in pairs]
     ps = [mcnemar(table) for table in tables]
     return tuple(
-        Comparison(
-            a[0].method, b[0].method, a[0].case, table, paired_difference(table), p, adjusted, _paired(a, b)
-        )
+        Comparison(a[0].method, b[0].method, a[0].case, table, paired_difference(table), p, adjusted, _paired(a, b))
         for (a, b), table, p, adjusted in zip(pairs, tables, ps, holm(ps), strict=True)
     )
 
@@ -222,17 +218,14 @@ def row(records: Sequence[TrialRecord], costs: Sequence[Mapping[str, Any]] = ())
 
 def _distributions(rows: Sequence[Mapping[str, float]]) -> dict[str, Distribution]:
     names = sorted({name for row in rows for name in row})
-    found = {
-        name: distribution([row[name] for row in rows if name in row], *metric(name).bounds) for name in names
-    }
+    found = {name: distribution([row[name] for row in rows if name in row], *metric(name).bounds) for name in names}
     return {name: d for name, d in found.items() if d is not None}
 
 
 def _paired(a: Sequence[TrialRecord], b: Sequence[TrialRecord]) -> dict[str, PairedMean]:
     found: dict[str, PairedMean] = {}
     sides = [
-        ({**one.series, **one.timings}, {**other.series, **other.timings})
-        for one, other in zip(a, b, strict=True)
+        ({**one.series, **one.timings}, {**other.series, **other.timings}) for one, other in zip(a, b, strict=True)
     ]
     for name in sorted({name for one, _ in sides for name in one}):
         pairs = [(one[name], other[name]) for one, other in sides if name in one and name in other]
@@ -242,9 +235,7 @@ def _paired(a: Sequence[TrialRecord], b: Sequence[TrialRecord]) -> dict[str, Pai
         share = metric(name).share
         if share and {value for pair in pairs for value in pair} <= {0.0, 1.0}:
             first, second = zip(*pairs, strict=True)
-            interval = paired_difference(
-                PairedTable.count(*([x == 1.0 for x in side] for side in (first, second)))
-            )
+            interval = paired_difference(PairedTable.count(*([x == 1.0 for x in side] for side in (first, second))))
         else:
             interval = mean_interval(differences, *((-1.0, 1.0) if share else ()))
         found[name] = PairedMean(len(pairs), sum(differences) / len(pairs), interval)

@@ -22,26 +22,14 @@ MINUS = "\N{MINUS SIGN}"
 
 def run_tables(summary: Summary) -> list[TextTable]:
     """Return the tables that say all of a summary: rates, comparisons, metrics, and their paired differences."""
-    tables = [
-        rates(summary),
-        all_cases(summary),
-        comparisons(summary),
-        metrics(summary),
-        metric_differences(summary),
-    ]
+    tables = [rates(summary), all_cases(summary), comparisons(summary), metrics(summary), metric_differences(summary)]
     return [table for table in tables if table is not None]
 
 
 def rates(summary: Summary) -> TextTable:
     """Return success rates with intervals, times, and where the rest was lost."""
     times = list(dict.fromkeys(name for row in summary.rows for name in row.times))
-    columns = [
-        "success",
-        "rate",
-        "95 % interval",
-        *(f"{name.replace('_', ' ')} [s]" for name in times),
-        "lost in",
-    ]
+    columns = ["success", "rate", "95 % interval", *(f"{name.replace('_', ' ')} [s]" for name in times), "lost in"]
     short = short_names(summary.methods)
     rows = [
         (
@@ -97,15 +85,7 @@ def comparisons(summary: Summary) -> TextTable | None:
     """Return the paired tests of success; None where nothing is compared."""
     if not summary.comparisons:
         return None
-    columns = (
-        "both",
-        "only first",
-        "only second",
-        "neither",
-        "difference [points]",
-        "McNemar p",
-        "Holm-adjusted p",
-    )
+    columns = ("both", "only first", "only second", "neither", "difference [points]", "McNemar p", "Holm-adjusted p")
     short = short_names(summary.methods)
     rows = [
         (
@@ -126,9 +106,7 @@ def comparisons(summary: Summary) -> TextTable | None:
         if least > 0.05
         else ""
     )
-    return TextTable(
-        "Paired comparison of success", ("pair", *_names(summary)[1:], *columns), tuple(rows), note
-    )
+    return TextTable("Paired comparison of success", ("pair", *_names(summary)[1:], *columns), tuple(rows), note)
 
 
 def metrics(summary: Summary, brief: bool = False) -> TextTable | None:

@@ -10,11 +10,7 @@ from dataclasses import dataclass
 
 NARROW = 10
 """No column of a terminal is made narrower [characters]."""
-_LATEX = {c: rf"\{c}" for c in "&%$#_{}"} | {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\^{}",
-}
+_LATEX = {c: rf"\{c}" for c in "&%$#_{}"} | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\^{}"}
 _LATEX |= {"<": r"$<$", ">": r"$>$", "\N{MINUS SIGN}": "$-$"}
 _FIGURE = re.compile(r"-|([<>=]+ )?[\[+-]*\d.*")
 
@@ -40,9 +36,7 @@ class TextTable:
         """Whether each column is of figures only, which are set flush right; without rows none is."""
         if not self.rows:
             return (False,) * len(self.columns)
-        return tuple(
-            all(_FIGURE.fullmatch(cell) for cell in column) for column in zip(*self.rows, strict=True)
-        )
+        return tuple(all(_FIGURE.fullmatch(cell) for cell in column) for column in zip(*self.rows, strict=True))
 
     def markdown(self) -> str:
         """Return the table in Markdown, padded so that it can be read as it is."""
@@ -50,8 +44,7 @@ class TextTable:
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         figures = self.figures
         rule = tuple(
-            "-" * (width + 1) + (":" if figure else "-")
-            for width, figure in zip(widths, figures, strict=True)
+            "-" * (width + 1) + (":" if figure else "-") for width, figure in zip(widths, figures, strict=True)
         )
         padded = [
             " | ".join(
@@ -100,9 +93,7 @@ class TextTable:
 def short_names(methods: Iterable[str]) -> dict[str, str]:
     """Return methods by short names: files without their folders, where that tells them apart."""
     short = {
-        method: method
-        if method.startswith("{")
-        else ":".join(part.rpartition("/")[2] for part in method.split(":"))
+        method: method if method.startswith("{") else ":".join(part.rpartition("/")[2] for part in method.split(":"))
         for method in methods
     }
     taken = list(short.values())

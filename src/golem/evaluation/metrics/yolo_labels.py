@@ -71,10 +71,7 @@ def _classes(folder: Path) -> _Classes:
     file, data = next(iter(said.items()), (folder, cast("Mapping[str, Any]", {})))
     shape: Any = data.get("kpt_shape")
     if shape is not None and not (
-        isinstance(shape, list)
-        and len(shape) == 2
-        and all(isinstance(n, int) for n in shape)
-        and shape[1] in (2, 3)
+        isinstance(shape, list) and len(shape) == 2 and all(isinstance(n, int) for n in shape) and shape[1] in (2, 3)
     ):
         raise ConfigError(f"{file} has the kpt_shape {shape}; it is [points, 2] or [points, 3].")
     points = (0, 0) if shape is None else (shape[0], shape[1])
@@ -136,11 +133,7 @@ def _box(numbers: Array, points: tuple[int, int], where: str) -> Array:
             f"{len(numbers)}."
         )
     numbers = numbers[:4] if count else numbers
-    if (
-        not np.isfinite(numbers).all()
-        or numbers.min(initial=0.0) < -EDGE
-        or numbers.max(initial=0.0) > 1 + EDGE
-    ):
+    if not np.isfinite(numbers).all() or numbers.min(initial=0.0) < -EDGE or numbers.max(initial=0.0) > 1 + EDGE:
         raise ConfigError(
             f"{where}: a box is given in shares of the image, from 0 to 1; key points after it need a `kpt_shape` in "
             "the YAML file."

@@ -57,9 +57,7 @@ class MovingHand:
         gains = default_gains()
         row, out = public.topic("/lowstate"), public.topic("/lowcmd")
         with member("hand", self._dds) as (participant, _):
-            reader = participant.reader(
-                names.topic(row.name), dds_name(row.type), Qos(reliable=False, depth=8)
-            )
+            reader = participant.reader(names.topic(row.name), dds_name(row.type), Qos(reliable=False, depth=8))
             writer = participant.writer(names.topic(out.name), dds_name(out.type), out.qos)
             hold = at = None
             t = 0.0

@@ -103,11 +103,7 @@ def balance_figures(trace: BalanceTrace, pushed_at: float | None) -> dict[str, f
         SI units: minimum CoM margin, horizontal range of the base and steps; with the prefix `push_` after the push.
     """
     work = trace.window(-math.inf, math.inf if pushed_at is None else pushed_at)
-    figures = {
-        "margin_min": float(work.margin.min()),
-        "base_range": work.base_range,
-        "steps": work.steps,
-    }
+    figures = {"margin_min": float(work.margin.min()), "base_range": work.base_range, "steps": work.steps}
     if pushed_at is not None:
         after = trace.window(pushed_at)
         figures |= {

@@ -13,15 +13,7 @@ from golem.evaluation.metrics.published import PAPER
 from golem.evaluation.metrics.statistics import Interval, wilson
 from golem.evaluation.metrics.summary import MethodSummary, Summary, summarise
 from golem.evaluation.metrics.text_table import short_names
-from golem.evaluation.report.svg_figure import (
-    COLOUR,
-    cause_colour,
-    method_colour,
-    page_figure,
-    standalone,
-    styled,
-    svg,
-)
+from golem.evaluation.report.svg_figure import COLOUR, cause_colour, method_colour, page_figure, standalone, styled, svg
 
 ROW = 34.0
 """Height of one row of a figure [px]."""
@@ -43,13 +35,7 @@ def rate_plot(rung: str, summary: Summary) -> str:
         for p in PAPER.get((rung, row.method), ()):
             interval = wilson(p.successes, p.n)
             lines.append(
-                (
-                    f"paper, {p.label}: {p.successes}/{p.n}",
-                    p.successes / p.n,
-                    interval,
-                    COLOUR["muted"],
-                    False,
-                )
+                (f"paper, {p.label}: {p.successes}/{p.n}", p.successes / p.n, interval, COLOUR["muted"], False)
             )
     figure = page_figure(FRAME + 0.8 * ROW * len(lines))
     axes = figure.subplots()
@@ -81,12 +67,8 @@ def failure_plot(summary: Summary, kind: str) -> str:
     left = np.zeros(len(causes))
     for i, name in enumerate(names):
         counts = np.array([row.get(name, 0) for row in causes])
-        bars = axes.barh(
-            y, counts, left=left, color=cause_colour(i), height=0.62, label=f"{name} ({totals[name]})"
-        )
-        axes.bar_label(
-            bars, [str(n) if n else "" for n in counts], label_type="center", color="white", fontsize=9
-        )
+        bars = axes.barh(y, counts, left=left, color=cause_colour(i), height=0.62, label=f"{name} ({totals[name]})")
+        axes.bar_label(bars, [str(n) if n else "" for n in counts], label_type="center", color="white", fontsize=9)
         left += counts
     axes.set(ylim=(len(causes) - 0.4, -0.6), xlabel="trials")
     short = short_names(summary.methods)

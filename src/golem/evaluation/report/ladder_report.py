@@ -61,9 +61,7 @@ def render(result: LadderResult) -> str:
             failure_plots=_failures(summary) if failed else [],
             adaptive=rung.adaptive,
             time_plots=[(name.replace("_", " "), time_plot(name, grouped)) for name in times],
-            metrics=[]
-            if rung.adaptive
-            else [t for t in (metrics(summary), metric_differences(summary)) if t],
+            metrics=[] if rung.adaptive else [t for t in (metrics(summary), metric_differences(summary)) if t],
             margin_boxes=boxes,
             margin_plots=plots,
             max_curves=MAX_CURVES,
@@ -149,9 +147,7 @@ def _pictures(grouped: Mapping[str, Sequence[TrialRecord]], folder: Path) -> lis
             # Width and height stand at a fixed place in a PNG; a strip of pictures takes the whole line.
             width, height = struct.unpack(">II", png[16:24])
             data = base64.b64encode(png).decode()
-            found.append(
-                {"method": chosen.method, "says": _says(chosen), "data": data, "wide": width > 2 * height}
-            )
+            found.append({"method": chosen.method, "says": _says(chosen), "data": data, "wide": width > 2 * height})
     return found
 
 

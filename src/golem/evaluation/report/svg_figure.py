@@ -12,16 +12,7 @@ from golem.figures import blank_figure
 
 WIDTH = 900.0
 """Width of a figure over the whole page [px]; the page scales it."""
-_NAMES = (
-    "ink",
-    "muted",
-    "line",
-    "track",
-    "won",
-    "lost",
-    *(f"m{i}" for i in range(6)),
-    *(f"s{i}" for i in range(8)),
-)
+_NAMES = ("ink", "muted", "line", "track", "won", "lost", *(f"m{i}" for i in range(6)), *(f"s{i}" for i in range(8)))
 COLOUR = {name: f"#0000{i + 1:02x}" for i, name in enumerate(_NAMES)}
 """Variable of the style sheet -> the colour that stands for it in a figure."""
 _VARIABLE = {code: f"var(--{name})" for name, code in COLOUR.items()}
@@ -97,9 +88,7 @@ def svg(figure: Any, label: str) -> str:
 def standalone(picture: str) -> str:
     """Return a figure of the page as the text of an SVG file, in the colours of the page by day."""
     css = resources.files("golem.evaluation.report").joinpath("report.css").read_text(encoding="utf-8")
-    colours = dict(
-        reversed(re.findall(r"--(\w+):\s*(#[0-9a-fA-F]+)", css))
-    )  # the first of each name is by day
+    colours = dict(reversed(re.findall(r"--(\w+):\s*(#[0-9a-fA-F]+)", css)))  # the first of each name is by day
     picture = re.sub(r"var\(--(\w+)\)", lambda match: colours[match[1]], picture)
     names = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
     picture = picture.replace("font-family: inherit", "font-family: sans-serif")

@@ -196,11 +196,7 @@ def slipping(walk: RecordedWalk, rng: np.random.Generator) -> list[LowState]:
     return out
 
 
-SPOILS: dict[str, Spoil] = {
-    "nominal": nothing,
-    "wrong contacts": wrong_contacts,
-    "10 % slip": slipping,
-}
+SPOILS: dict[str, Spoil] = {"nominal": nothing, "wrong contacts": wrong_contacts, "10 % slip": slipping}
 """How the recorded sensors are spoilt, by name."""
 
 
@@ -242,10 +238,7 @@ class BaseEstimation(Rung[BaseEstimationOptions]):
         """Return what determines a trial besides its seed; see `Rung`."""
         walking = legs_stack(self.options.legs, profile, overrides)
         registry.load(SLOT, _choice(method).use)
-        return {
-            **stack_facts(walking),
-            "method": stack_facts(walking.with_choice(SLOT, method))["user_files"],
-        }
+        return {**stack_facts(walking), "method": stack_facts(walking.with_choice(SLOT, method))["user_files"]}
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return what the sensors suffer."""
@@ -264,9 +257,7 @@ class BaseEstimation(Rung[BaseEstimationOptions]):
         spec = specs[0]
         walk = self._record(spec)
         if not walk.judged.any():
-            raise GolemError(
-                f"{self.options.legs} did not stand for a second: {walk.lost or 'it hung in its band'}"
-            )
+            raise GolemError(f"{self.options.legs} did not stand for a second: {walk.lost or 'it hung in its band'}")
         return [follow(spec, walk) for spec in specs]
 
     def _record(self, spec: TrialSpec) -> RecordedWalk:
@@ -303,9 +294,7 @@ def follow(spec: TrialSpec, walk: RecordedWalk) -> TrialOutcome:
     error = series.get("velocity_walking", series.get("velocity_standing", 0.0))
     lost = f"; the walk ended early: {walk.lost}" if walk.lost else ""
     if error <= TOLERANCE:
-        return TrialOutcome(
-            True, DONE, detail=f"velocity off by {error:.3f} m/s{lost}", series=series, costs=costs
-        )
+        return TrialOutcome(True, DONE, detail=f"velocity off by {error:.3f} m/s{lost}", series=series, costs=costs)
     detail = f"The velocity is off by {error:.3f} m/s, more than {TOLERANCE:g}{lost}."
     return TrialOutcome(False, "velocity", f"{SLOT}: {spec.method}", detail, series=series, costs=costs)
 

@@ -107,12 +107,7 @@ class CounterRung(KitchenRung[CounterOptions]):
         )
 
     def errand(
-        self,
-        spec: TrialSpec,
-        running: LockstepRunner,
-        robot: MujocoRobot,
-        kitchen: KitchenLayout,
-        oracle: Oracle,
+        self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle
     ) -> Errand:
         """Have one thing taken, and set down at another place; see `KitchenRung`."""
         kind, hand, place = draw_errand(spec, kitchen)
@@ -167,9 +162,7 @@ def counter_verdict(watch: CounterWatch, place: tuple[float, float]) -> Verdict:
     return Verdict(problem is None, problem or "", watch.series(place))
 
 
-def draw_errand(
-    spec: TrialSpec, kitchen: KitchenLayout
-) -> tuple[str, Literal["left", "right"], tuple[float, float]]:
+def draw_errand(spec: TrialSpec, kitchen: KitchenLayout) -> tuple[str, Literal["left", "right"], tuple[float, float]]:
     """Return the kind of a thing, the hand, and x, y of a free place for it in the world [m].
 
     The case names thing and hand where there is one. Else a thing and the hand on its side are drawn. Of the things

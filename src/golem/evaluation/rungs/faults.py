@@ -67,9 +67,7 @@ class FaultsRung(Rung[FaultOptions]):
                 raise unknown_name("posture", posture, POSTURES)
         self.faults = [name for name in FAULTS if self.options.only in name]
         if not self.faults:
-            raise ConfigError(
-                f"No fault has '{self.options.only}' in its name; golem faults --help lists none."
-            )
+            raise ConfigError(f"No fault has '{self.options.only}' in its name; golem faults --help lists none.")
 
     def methods(self) -> tuple[str, ...]:
         """Return the one there is."""
@@ -89,9 +87,7 @@ class FaultsRung(Rung[FaultOptions]):
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return every fault in every posture."""
-        return [
-            {"posture": posture, "fault": name} for posture in self.options.posture for name in self.faults
-        ]
+        return [{"posture": posture, "fault": name} for posture in self.options.posture for name in self.faults]
 
     def together(self, spec: TrialSpec) -> Hashable:
         """Return what trials share that have one past."""
@@ -138,13 +134,9 @@ class FaultsRung(Rung[FaultOptions]):
                 rows.append((posture, source, f"{won} of {len(mine)}", ends))
         for spec, outcome in trials:
             if not outcome.success:
-                lost.append(
-                    (str(spec.case["posture"]), str(spec.case["fault"]), outcome.stage, outcome.detail)
-                )
+                lost.append((str(spec.case["posture"]), str(spec.case["fault"]), outcome.stage, outcome.detail))
         return (
-            TextTable(
-                "Faults the safety layer dealt with", ("robot", "source", "right", "others"), tuple(rows)
-            ),
+            TextTable("Faults the safety layer dealt with", ("robot", "source", "right", "others"), tuple(rows)),
             TextTable("The others", ("robot", "fault", "stage", "what happened"), tuple(lost)),
         )
 
@@ -165,6 +157,4 @@ def _try(rig: FaultRig, spec: TrialSpec) -> TrialOutcome:
     stage, detail = verdict(fault, found, posture)
     series = {"speed_share": found.speed, "effort_share": found.effort, "moved": found.moved}
     timings = {} if found.stopped_at is None else {"reaction": found.stopped_at}
-    return TrialOutcome(
-        stage == DONE, stage, None if stage == DONE else "safety: gate", detail, timings, series
-    )
+    return TrialOutcome(stage == DONE, stage, None if stage == DONE else "safety: gate", detail, timings, series)

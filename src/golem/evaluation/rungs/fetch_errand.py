@@ -55,12 +55,7 @@ class FetchRung(KitchenRung[FetchOptions]):
         return [{"moved": moved} for moved in self.options.moved]
 
     def errand(
-        self,
-        spec: TrialSpec,
-        running: LockstepRunner,
-        robot: MujocoRobot,
-        kitchen: KitchenLayout,
-        oracle: Oracle,
+        self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle
     ) -> Errand:
         """Have one thing fetched; see `KitchenRung`."""
         kind, _, (x, y) = draw_errand(spec, kitchen)

@@ -93,12 +93,7 @@ class KitchenRung(Rung[O]):
 
     @abstractmethod
     def errand(
-        self,
-        spec: TrialSpec,
-        running: LockstepRunner,
-        robot: MujocoRobot,
-        kitchen: KitchenLayout,
-        oracle: Oracle,
+        self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle
     ) -> Errand:
         """Have the errand of a trial done by a robot that stands or hangs ready."""
 

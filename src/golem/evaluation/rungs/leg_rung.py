@@ -66,11 +66,7 @@ class LegRung(Rung[O]):
         raise NotImplementedError
 
     def stack(
-        self,
-        method: str,
-        profile: str,
-        overrides: Mapping[str, str],
-        twin: Mapping[str, object] | None = None,
+        self, method: str, profile: str, overrides: Mapping[str, str], twin: Mapping[str, object] | None = None
     ) -> Stack:
         """Return the standing stack with a lower body on the plant; `twin` stands for the rung's own options of it."""
         own = self.twin if twin is None else twin

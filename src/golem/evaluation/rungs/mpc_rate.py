@@ -53,19 +53,14 @@ class MpcRate(LegRung[PlantOptions]):
         stack = self.stack(spec.method, spec.profile, spec.overrides)
         legs = stack.choice("lower_body")
         if legs.use != "mpc":
-            raise ConfigError(
-                'Rung mpc-rate is of the MPC: give --method mpc, or "{use: mpc, option: value}".'
-            )
+            raise ConfigError('Rung mpc-rate is of the MPC: give --method mpc, or "{use: mpc, option: value}".')
         options = dict(legs.options)
         options["planner"] = {**options.get("planner", {}), "samples": spec.case["samples"]}
         config: MPCConfig = fill("option of lower_body: mpc", MPCConfig, options)
         allowed = min(config.latency, 1.0 / config.plan_rate)
         stack = stack.with_choice("lower_body", Choice("mpc", options))
         with closing(Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker)) as episode:
-            with (
-                stopwatch(MPC, "plan", time.perf_counter) as wall,
-                stopwatch(MPC, "plan", time.process_time) as cpu,
-            ):
+            with stopwatch(MPC, "plan", time.perf_counter) as wall, stopwatch(MPC, "plan", time.process_time) as cpu:
                 episode.stand(SETTLE)
                 episode.run(PLANNED)
             outcome = judged(spec.method, episode.loss, {})

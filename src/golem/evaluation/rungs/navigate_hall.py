@@ -151,11 +151,7 @@ class NavigateRung(Rung[NavigateOptions]):
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
-        return {
-            **stack_facts(self._stack(method, profile, overrides)),
-            "distance": DISTANCE,
-            "spread": SPREAD,
-        }
+        return {**stack_facts(self._stack(method, profile, overrides)), "distance": DISTANCE, "spread": SPREAD}
 
     def cases(self, results: Results) -> Sequence[Case]:
         """Return the maps the robot has."""
@@ -232,9 +228,7 @@ def judge(
     if walked.stopped is not None:
         shift = walked.stopped.to(true)
         series["stop_shift"] = math.hypot(shift.x, shift.y)
-    modules = {
-        key: f"{key}: {episode.running.stack.choice(key).use}" for key in ("lower_body", "odometry", "mapper")
-    }
+    modules = {key: f"{key}: {episode.running.stack.choice(key).use}" for key in ("lower_body", "odometry", "mapper")}
     # With a map the mapper answers for the place, which corrects the odometry by it.
     lost = modules["mapper" if spec.case["map"] == "survey" else "odometry"]
     module = navigator = f"{SLOT}: {spec.method}"
@@ -254,9 +248,7 @@ def judge(
         module = lost if drift > 0.5 * radial else navigator
     picture = _picture(episode, track, goal) if loss is not None or spec.index == 0 else None
     if loss is not None:
-        return TrialOutcome(
-            False, loss.stage, module, loss.detail, series=series, picture=picture, trace=loss.trace
-        )
+        return TrialOutcome(False, loss.stage, module, loss.detail, series=series, picture=picture, trace=loss.trace)
     detail = f"stands {1e3 * radial:.0f} mm and {math.degrees(turned):.1f} deg from the goal"
     return TrialOutcome(True, DONE, None, detail, result.timings if result else {}, series, picture)
 

@@ -64,9 +64,7 @@ class NavigateLine(LegRung[LineOptions]):
             if episode.running.envelope.vx[1] <= 0.0:
                 why = "It does not walk: the greatest forward speed in its envelope is zero."
                 return TrialOutcome(False, NO_WALKER, f"lower_body: {spec.method}", why)
-            odometry = SimulatedOdometry(
-                episode.running.bus, episode.robot, "estimator", spec.rng("odometry")
-            )
+            odometry = SimulatedOdometry(episode.running.bus, episode.robot, "estimator", spec.rng("odometry"))
             episode.locate(odometry)
             strip = FilmStrip(episode.robot, 0.0)
             episode.stand(SETTLE)
@@ -75,9 +73,7 @@ class NavigateLine(LegRung[LineOptions]):
                 episode.start("walk", goal)
             for _ in range(PICTURES - 1):
                 strip.keep(episode.t, np.zeros(3))
-                episode.run(
-                    DISTANCE / PICTURES / 0.4, until=lambda: episode.result is not None, due=when_stepped
-                )
+                episode.run(DISTANCE / PICTURES / 0.4, until=lambda: episode.result is not None, due=when_stepped)
             episode.run(TIMEOUT, until=lambda: episode.result is not None, due=when_stepped)
             strip.keep(episode.t, np.zeros(3))
             if artefacts is not None:

@@ -48,9 +48,7 @@ class WalkBag:
             OutputError: the folder exists, or cannot be written.
         """
         kinds = {name: public.topic(name).type for name in public.LIDAR}
-        self._topics = {
-            name: topic(name, kind) for name, kind in {**kinds, "/odom": ODOMETRY, TRUTH: ODOMETRY}.items()
-        }
+        self._topics = {name: topic(name, kind) for name, kind in {**kinds, "/odom": ODOMETRY, TRUTH: ODOMETRY}.items()}
         self._walk, self._legs = walk, 0
         about = {"seed": str(walk.seed), "profile": walk.profile, "lost": walk.lost}
         self._writer = BagWriter(folder, BagConfig(compression="zstd"), about)
@@ -78,9 +76,7 @@ class WalkBag:
         self._writer.close()
 
     def _odometry(self, name: str, t: float, T: Array, velocity: Array, rate: Array) -> None:
-        message = lidar_convert.odometry(
-            ExternalOdometry(t, T, velocity, rate, NO_COVARIANCE, public.BASE_FRAME)
-        )
+        message = lidar_convert.odometry(ExternalOdometry(t, T, velocity, rate, NO_COVARIANCE, public.BASE_FRAME))
         message.header.frame_id = "odom"
         self._write(name, message, t)
 

@@ -51,12 +51,7 @@ class FridgeRung(KitchenRung[FridgeOptions]):
         return {**super().config(method, profile, overrides), "goal": asdict(OpenGoal())}
 
     def errand(
-        self,
-        spec: TrialSpec,
-        running: LockstepRunner,
-        robot: MujocoRobot,
-        kitchen: KitchenLayout,
-        oracle: Oracle,
+        self, spec: TrialSpec, running: LockstepRunner, robot: MujocoRobot, kitchen: KitchenLayout, oracle: Oracle
     ) -> Errand:
         """Have the door opened; see `KitchenRung`."""
         side: Side = "left" if kitchen.fridge.handle_y > 0.0 else "right"
@@ -89,9 +84,7 @@ class FridgeStand(FridgeRung):
 class _FridgeWatch(ErrandWatch):
     """Looks on after every tick: how far the door is open, where the hand was when it closed."""
 
-    def __init__(
-        self, running: LockstepRunner, robot: MujocoRobot, oracle: Oracle, side: Side, balances: bool
-    ) -> None:
+    def __init__(self, running: LockstepRunner, robot: MujocoRobot, oracle: Oracle, side: Side, balances: bool) -> None:
         assert robot.scene.seal is not None
         super().__init__(running, oracle, BalanceRecorder(robot) if balances else None)
         self._robot = robot

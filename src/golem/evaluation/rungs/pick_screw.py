@@ -248,10 +248,7 @@ class PickRung(Rung[PickOptions]):
                 "twin, 'mujoco'."
             )
         shared_context()
-        return {
-            **stack_facts(stack),
-            "goal": asdict(self._goal),
-        }
+        return {**stack_facts(stack), "goal": asdict(self._goal)}
 
     def run(self, spec: TrialSpec, artefacts: Path | None) -> TrialOutcome:
         """Run one trial; see `Rung`."""
@@ -335,9 +332,7 @@ class StandRung(PickRung):
     name = STANDING
 
 
-def judge_pick(
-    stack: Stack, result: SkillResult, oracle: Oracle, watch: PickWatch, loss: Loss | None
-) -> TrialOutcome:
+def judge_pick(stack: Stack, result: SkillResult, oracle: Oracle, watch: PickWatch, loss: Loss | None) -> TrialOutcome:
     """Say whether a screw is in the tray and the robot still there, and if not, which module lost it."""
     truth = watch.grasp
     series = {} if truth is None else {f"grasp_{name}": getattr(truth, name) for name in MEASURED}
@@ -351,18 +346,14 @@ def judge_pick(
     if loss is not None and result.stage not in ABORTED:
         module = f"lower_body: {stack.choice('lower_body').use}" if stack.on_ground else None
         detail = f"{loss.detail} The errand itself: {result.reason}"
-        return TrialOutcome(
-            False, loss.stage, module, detail, result.timings, series, oracle.picture(), loss.trace
-        )
+        return TrialOutcome(False, loss.stage, module, detail, result.timings, series, oracle.picture(), loss.trace)
     if oracle.screws_in_tray() and result.stage not in ABORTED:
         return TrialOutcome(True, DONE, None, result.reason, result.timings, series, watch.picture)
     # The skill may believe it succeeded: then the screw was lost between the pull and the tray.
     stage = result.stage if result.stage != DONE else "place"
     slot = blame(stage, result.slot, truth)
     module = None if slot is None else f"{slot}: {stack.choice(slot).use}" if slot in KEYS else slot
-    detail = (
-        result.reason if result.stage != DONE else "The skill reports success, but no screw is in the tray."
-    )
+    detail = result.reason if result.stage != DONE else "The skill reports success, but no screw is in the tray."
     picture = watch.last_picture()
     return TrialOutcome(False, stage, module, detail, result.timings, series, picture, result.trace)
 

@@ -107,9 +107,7 @@ def measures(trace: BalanceTrace, start: float) -> dict[str, float]:
     }
 
 
-def judge(
-    trace: BalanceTrace, start: float, push: Push, loss: Loss | None, rests: bool, method: str
-) -> TrialOutcome:
+def judge(trace: BalanceTrace, start: float, push: Push, loss: Loss | None, rests: bool, method: str) -> TrialOutcome:
     """Say whether the robot stands again after `push`, which began at `start` [s], and if not, how it failed."""
     series = measures(trace, start)
     pushed = f"pushed with {series['peak_force']:.0f} N to the {push.direction.replace('_', ' ')}"
@@ -119,9 +117,7 @@ def judge(
         loss = Loss("unrest", "It is on its feet, but does not come to rest.")
     if loss is not None:
         detail = f"{loss.detail} It was {pushed} at {start:.1f} s."
-        return TrialOutcome(
-            False, loss.stage, f"lower_body: {method}", detail, series=series, trace=loss.trace
-        )
+        return TrialOutcome(False, loss.stage, f"lower_body: {method}", detail, series=series, trace=loss.trace)
     recovery = trace.recovery_time(start)
     # A robot that never lost its balance has none to recover.
     timings = {"recovery": recovery} if recovery > 0.0 else {}

@@ -84,13 +84,7 @@ class PushLimit(PushedRung[PushLimitOptions]):
     def _levels(self, results: Results, terms: str, gait: Gait, direction: str) -> Iterator[Case]:
         level: float | None = self.options.first
         while level is not None:
-            case: Case = {
-                "terms": terms,
-                "phase": gait[0],
-                "walk": gait[1],
-                "direction": direction,
-                "level": level,
-            }
+            case: Case = {"terms": terms, "phase": gait[0], "walk": gait[1], "direction": direction, "level": level}
             yield case
             found = results(case)
             if found is None:
@@ -135,11 +129,7 @@ class PushLimit(PushedRung[PushLimitOptions]):
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:
         """Return the largest push survived, a row per method, terms and gait; and what the gate costs of it."""
         o, unit = self.options, "N s" if self.options.kind == "shove" else "N"
-        what = (
-            "shove of 0.2 s on the torso [N s]"
-            if o.kind == "shove"
-            else "half-sine push of 1 s at the pelvis [N]"
-        )
+        what = "shove of 0.2 s on the torso [N s]" if o.kind == "shove" else "half-sine push of 1 s at the pelvis [N]"
         n = len({spec.index for trials in outcomes.values() for spec, _ in trials})
         rows, costs, short = list[tuple[str, ...]](), list[tuple[str, ...]](), short_names(outcomes)
         for method, trials in outcomes.items():
@@ -164,14 +154,7 @@ class PushLimit(PushedRung[PushLimitOptions]):
             return (found,)
         cost = TextTable(
             f"What the gate and the rest of the stack cost of it, mean of {len(o.direction)} directions [{unit}]",
-            (
-                "lower body",
-                "phase",
-                "the gate stops",
-                "the gate clips",
-                "gate, both",
-                "the rest of the stack",
-            ),
+            ("lower body", "phase", "the gate stops", "the gate clips", "gate, both", "the rest of the stack"),
             tuple(costs),
             "stops: unstopped - stack; clips: ungated - unstopped; rest (hands, arms, estimator, latency, profile): "
             "own - ungated. Empty where one of the two terms was not asked for.",
@@ -192,11 +175,7 @@ class PushLimit(PushedRung[PushLimitOptions]):
                 best = [limit(_of(trials, terms, gait, d))[0] for d in o.direction]
                 closed = np.append(angles, angles[:1]), [*best, best[0]]
                 axes.plot(
-                    *closed,
-                    "o-",
-                    color=method_colour(i),
-                    ms=4,
-                    label=short[method] if axes is plots[0] else None,
+                    *closed, "o-", color=method_colour(i), ms=4, label=short[method] if axes is plots[0] else None
                 )
                 axes.fill(*closed, color=method_colour(i), alpha=0.12)
             axes.set(theta_offset=np.pi / 2, title=f"{gait_name(gait)}, {terms}")

@@ -236,11 +236,7 @@ class PushedRung(LegRung[O]):
         return Moment.of(spec, phase, twist)
 
     def from_moment(
-        self,
-        specs: Sequence[TrialSpec],
-        episode: PushedEpisode,
-        walks: bool,
-        reach: Callable[..., Loss | None],
+        self, specs: Sequence[TrialSpec], episode: PushedEpisode, walks: bool, reach: Callable[..., Loss | None]
     ) -> Sequence[TrialOutcome]:
         """Bring a robot to the moment by `reach`, and push it from there."""
         if specs[0].case["phase"] != "standing" and not walks:

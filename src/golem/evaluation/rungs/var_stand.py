@@ -233,8 +233,7 @@ class _Trial:
         T_base_odom = np.linalg.inv(robot.truth.base().T_world_base) @ oracle.T_world_odom
         T = np.linalg.inv(T_base_odom) if estimate is None else estimate.T_odom_base
         fasteners = [
-            replace(f, position=_at(T @ T_base_odom, f.position), in_base=_at(T_base_odom, f.position))
-            for f in before
+            replace(f, position=_at(T @ T_base_odom, f.position), in_base=_at(T_base_odom, f.position)) for f in before
         ]
         looked_at = {i: _at(T @ T_base_odom, place) for i, place in watch.looked_at.items()}
         served = sum(load_map().serves(side, f.in_base) for f in fasteners if f.loose for side in SIDES)
@@ -264,10 +263,7 @@ class _Trial:
             return "skill: dock"
         if self._spec.case["start"] == "placed":
             return None  # nobody: the robot was put there
-        drift, off = (
-            place_error(self._episode.running.bus, self._episode.robot),
-            self._series["before_radial"],
-        )
+        drift, off = (place_error(self._episode.running.bus, self._episode.robot), self._series["before_radial"])
         return self._name("mapper" if drift > 0.5 * off else "navigator")
 
     def _placed(self, when: str) -> dict[str, float]:

@@ -54,6 +54,4 @@ class WalkStop(LegRung[PlantOptions]):
 def draw(rng: np.random.Generator) -> PlanarPose:
     """Return the goal of a trial."""
     bearing, distance = rng.uniform(-math.pi, math.pi), rng.uniform(*GOAL_DISTANCE)
-    return PlanarPose(
-        distance * math.cos(bearing), distance * math.sin(bearing), rng.uniform(-GOAL_TURN, GOAL_TURN)
-    )
+    return PlanarPose(distance * math.cos(bearing), distance * math.sin(bearing), rng.uniform(-GOAL_TURN, GOAL_TURN))

@@ -91,9 +91,7 @@ def run_arms_bench(config: ArmsBenchConfig) -> list[Figure]:
     try:
         from golem.capabilities.arms.pink_ik import PinkIK
 
-        figures.append(
-            ik_figure("IK tick, pink_ik", PinkIK(), config.ticks, "137 us: prototype of Pink + daqp")
-        )
+        figures.append(ik_figure("IK tick, pink_ik", PinkIK(), config.ticks, "137 us: prototype of Pink + daqp"))
     except MissingExtra as error:
         Console().print(f"pink_ik left out: {error}")
     missed, false = int((truth & ~found).sum()), int((found & ~truth).sum())
@@ -146,24 +144,17 @@ class _CoalRobot:
             j = body[i]
             while robot.links[j].joint not in JOINT_NAMES[UPPER] and robot.links[j].parent >= 0:
                 j = body[robot.links[j].parent]
-            joint = (
-                self._model.getJointId(robot.links[j].joint)
-                if robot.links[j].joint in JOINT_NAMES[UPPER]
-                else 0
-            )
+            joint = self._model.getJointId(robot.links[j].joint) if robot.links[j].joint in JOINT_NAMES[UPPER] else 0
             T = data.oMi[joint].inverse() * pin.SE3(poses[i])
             shapes = [(pin.SE3.Identity(), link_tree(link))] if meshes and link.parts else []
             if not meshes:
                 p = robot.packings[i]
                 shapes = [
-                    (pin.SE3(np.eye(3), c), coal.Sphere(float(r)))
-                    for c, r in zip(p.centres, p.radii, strict=True)
+                    (pin.SE3(np.eye(3), c), coal.Sphere(float(r))) for c, r in zip(p.centres, p.radii, strict=True)
                 ]
             objects.append(
                 [
-                    self._geometry.addGeometryObject(
-                        pin.GeometryObject(f"{i}.{k}", joint, 0, T * placed, shape)
-                    )
+                    self._geometry.addGeometryObject(pin.GeometryObject(f"{i}.{k}", joint, 0, T * placed, shape))
                     for k, (placed, shape) in enumerate(shapes)
                 ]
             )

@@ -74,13 +74,7 @@ def run_bench(config: BenchConfig) -> list[Figure]:
     """
     if config.seed < 0:
         raise ConfigError(f"--seed is {config.seed}; it must be 0 or more.")
-    figures = [
-        *_control(config),
-        *_physics(config),
-        *_perception(config),
-        *_navigation(config),
-        *_robot(config),
-    ]
+    figures = [*_control(config), *_physics(config), *_perception(config), *_navigation(config), *_robot(config)]
     print_figures(figures)
     if config.json:
         print(json.dumps([asdict(f) for f in figures]))
@@ -109,9 +103,7 @@ def timed(step: Callable[[int], object], n: int) -> Array:
 
 def figure(name: str, times: Array, scale: float, unit: str, reference: str) -> Figure:
     """Return median and 99th percentile of times [s] in `unit`s of 1 / `scale` seconds."""
-    return Figure(
-        name, float(np.median(times)) * scale, float(np.quantile(times, 0.99)) * scale, unit, reference
-    )
+    return Figure(name, float(np.median(times)) * scale, float(np.quantile(times, 0.99)) * scale, unit, reference)
 
 
 def _control(config: BenchConfig) -> list[Figure]:
@@ -120,9 +112,7 @@ def _control(config: BenchConfig) -> list[Figure]:
     try:
         from golem.capabilities.arms.pink_ik import PinkIK
 
-        figures.append(
-            ik_figure("IK tick, pink_ik", PinkIK(), min(n, 4000), "137 us: prototype of Pink + daqp")
-        )
+        figures.append(ik_figure("IK tick, pink_ik", PinkIK(), min(n, 4000), "137 us: prototype of Pink + daqp"))
     except MissingExtra as error:
         Console().print(f"pink_ik left out: {error}")
     servo, limits, memory = Servo(), SafetyLimits.from_profile(), GateMemory()
@@ -137,9 +127,7 @@ def _control(config: BenchConfig) -> list[Figure]:
         state = LowState(t, q[i], np.zeros(27), np.zeros(27), imu)
         command = servo.step(state, q[0], TICK)
         request = OperatorRequest.ACTIVATE if i == 1 else OperatorRequest.NONE
-        memory = check(
-            GateInputs(t, state, command, EstopMessage(t, i % 256, False), request), limits, memory
-        ).memory
+        memory = check(GateInputs(t, state, command, EstopMessage(t, i % 256, False), request), limits, memory).memory
 
     figures.append(figure("safety gate tick", check_ticks(n), 1e6, "us", "25 us wanted"))
     figures.append(figure("servo + safety tick", timed(tick, n), 1e6, "us", "2000 us available at 500 Hz"))
@@ -161,9 +149,7 @@ def ik_figure(name: str, ik: UpperBody, n: int, reference: str) -> Figure:
         for T in pair:
             T[:3, 3] += offset
         targets.append(pair)
-    return figure(
-        name, timed(lambda i: ik.step(targets[i][0], targets[i][1], q, 0.01), n), 1e6, "us", reference
-    )
+    return figure(name, timed(lambda i: ik.step(targets[i][0], targets[i][1], q, 0.01), n), 1e6, "us", reference)
 
 
 def _physics(config: BenchConfig) -> list[Figure]:
@@ -201,9 +187,7 @@ def _perception(config: BenchConfig) -> list[Figure]:
             rgb, depth = robot.capture(camera)
             frame = RgbdImage(0.0, info, rgb, depth, np.eye(4))
             times = timed(lambda i, frame=frame: detector.locate(frame, detector.classes), n)
-            figures.append(
-                figure(f"detector {camera} {size}", times, 1e3, "ms", "14.3 ms: 640x480, prototype")
-            )
+            figures.append(figure(f"detector {camera} {size}", times, 1e3, "ms", "14.3 ms: 640x480, prototype"))
     finally:
         robot.close()
     return figures

@@ -58,10 +58,7 @@ def compile_kernels() -> None:
 
 def compile_if_cold() -> float | None:
     """Compile in a process of its own what is older than its source; return the CPU time [s], None: nothing was."""
-    kept = (
-        Path(str(plan_kernel.verdict.stats.cache_path))
-        / f"compiled-{sys.version_info[0]}.{sys.version_info[1]}"
-    )
+    kept = Path(str(plan_kernel.verdict.stats.cache_path)) / f"compiled-{sys.version_info[0]}.{sys.version_info[1]}"
     now = stamp_of_all()
     if kept.is_file() and kept.read_text(encoding="utf-8") == now:
         return None

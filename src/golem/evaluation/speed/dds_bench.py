@@ -125,11 +125,7 @@ def _awake() -> Iterator[None]:
 
 
 def _loop(
-    config: DdsBenchConfig,
-    name: str,
-    robot: tuple[str, ...],
-    controller: tuple[str, ...],
-    cameras: bool = False,
+    config: DdsBenchConfig, name: str, robot: tuple[str, ...], controller: tuple[str, ...], cameras: bool = False
 ) -> Loop:
     """Run one loop: the controller (and the viewer) first, then the robot's side until it ends."""
     listeners = {"controller": _Side(config, controller, "controller")}
@@ -213,9 +209,7 @@ class _Side:
             said, _ = self._process.communicate(timeout=patience)
         except subprocess.TimeoutExpired:
             self.kill()
-            raise BenchFailed(
-                f"The {self._side}'s process of the bench did not end in {patience:g} s."
-            ) from None
+            raise BenchFailed(f"The {self._side}'s process of the bench did not end in {patience:g} s.") from None
         if self._process.returncode != 0:
             raise self._failed()
         return json.loads(said.splitlines()[-1])

@@ -79,9 +79,7 @@ def robot(participant: CycloneParticipant, seconds: float, cameras: bool) -> dic
             answered.append(round(convert.answered(sample.payload) * 1e3))
     spent, wall = time.process_time() - cpu, (time.monotonic_ns() - start) * 1e-9
     time.sleep(0.5)
-    answered += [
-        round(convert.answered(sample.payload) * 1e3) for sample in reader.take(1 << 20) if sample.alive
-    ]
+    answered += [round(convert.answered(sample.payload) * 1e3) for sample in reader.take(1 << 20) if sample.alive]
     images = side.stop() if side is not None else {}
     return {"began": began.tolist(), "answered": answered, "cpu": spent, "wall": wall, "images": images}
 

@@ -177,9 +177,7 @@ def _ratios(found: dict[str, dict[str, dict[str, Any]]]) -> Table:
 
 def _nodes(name: str, by_tree: dict[str, dict[str, Any]]) -> Table:
     """Return the table of thread CPU time by node, in place; what no node's `step` took is the last row."""
-    table = Table(
-        "node", *(f"us a tick, {tree}" for tree in by_tree), title=f"{name}: by node, with the timers"
-    )
+    table = Table("node", *(f"us a tick, {tree}" for tree in by_tree), title=f"{name}: by node, with the timers")
     rows = {tree: dict(f["by_node"]["nodes"]) for tree, f in by_tree.items()}
     for tree, f in by_tree.items():
         whole = 1e6 * loop_measure.TICK * f["by_node"]["cpu"] / f["by_node"]["seconds"]
@@ -209,6 +207,4 @@ def _mjlab(source: Path) -> str:
         return f"mjlab's physics is left out: {missing[0]} is not installed."
     with Worker(source, "mjlab") as worker:
         warp = worker.ask("warp", WARP_STEPS)
-    return (
-        f"mjlab's physics, one robot, on {warp['device']}: {warp['rate']:.3g} robot s / s of the wall clock."
-    )
+    return f"mjlab's physics, one robot, on {warp['device']}: {warp['rate']:.3g} robot s / s of the wall clock."

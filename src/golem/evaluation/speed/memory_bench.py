@@ -93,10 +93,7 @@ def run_memory_bench(config: MemoryBenchConfig) -> list[Figure]:
 
 
 def _scale(config: MemoryBenchConfig, path: Path) -> list[Figure]:
-    room, options = (
-        Room(config.objects, config.seed),
-        ObjectMapConfig(file=str(path), most=config.objects * 2),
-    )
+    room, options = (Room(config.objects, config.seed), ObjectMapConfig(file=str(path), most=config.objects * 2))
     memory = ObjectMap(options)
     looks = timed(lambda i: memory.observe(room.look(0.1 * i, i * NEAR)), max(config.observations, 1))
     made = timed(lambda i: room.look(0.1 * i, i * NEAR), min(1000, max(config.observations, 1)))
@@ -114,9 +111,7 @@ def _scale(config: MemoryBenchConfig, path: Path) -> list[Figure]:
     of = f"{config.observations} looks, {count} objects"
     size = path.stat().st_size / 1e6
     return [
-        figure(
-            f"one look, {of} (making it takes {1e3 * np.median(made):.2g} ms of it)", looks, 1e3, "ms", "5"
-        ),
+        figure(f"one look, {of} (making it takes {1e3 * np.median(made):.2g} ms of it)", looks, 1e3, "ms", "5"),
         figure("a question for the present", asked, 1e3, "ms", "5 (p99), 1 (median)"),
         figure("a question for 100 places of any time", history, 1e3, "ms", "5 (p99)"),
         Figure("the file", size, size, "MB", ""),

@@ -37,11 +37,7 @@ def navigation_times(timed: Timed, n: int) -> list[tuple[str, Array, str]]:
     def search(i: int) -> object:
         return astar(costmap.cost, (2, 2), (SIDE - 3, SIDE - 3), 0.02, INSCRIBED)
 
-    local, pose, goal = (
-        LocalController(LocalControllerConfig()),
-        PlanarPose(1.0, 1.0, 0.8),
-        PlanarPose(4.0, 4.0, 0.0),
-    )
+    local, pose, goal = (LocalController(LocalControllerConfig()), PlanarPose(1.0, 1.0, 0.8), PlanarPose(4.0, 4.0, 0.0))
     way, frame = Way(np.linspace((1.0, 1.0), (4.0, 4.0), 80)), np.array([0.0, 0.0, 1.0, 0.0, 0.05])
 
     def follow(i: int) -> object:
@@ -50,11 +46,7 @@ def navigation_times(timed: Timed, n: int) -> list[tuple[str, Array, str]]:
     search(0)
     follow(0)
     return [
-        (
-            "map: one scan of 20,000 points",
-            timed(lambda i: mapper.add_scan(scans[i + 3]), n),
-            "100 ms: 10 Hz",
-        ),
+        ("map: one scan of 20,000 points", timed(lambda i: mapper.add_scan(scans[i + 3]), n), "100 ms: 10 Hz"),
         ("costmap of 400 x 400", timed(lambda i: Costmap(grid, np.zeros((0, 2)), 0.3), n), "100 ms: 10 Hz"),
         ("A* over 400 x 400, corner to corner", timed(search, n), "20 ms (issue 28)"),
         ("local controller: one twist", timed(follow, n), "50 ms: 20 Hz"),

@@ -125,9 +125,7 @@ def declared(reach: ReachMap) -> NDArray[np.bool_]:
 
 def _old_arm() -> DiffIK:
     ik = DiffIK(
-        replace(
-            TaskSpaceConfig(), arm_speed=0.5, torso_speed=0.2, palm_speed=0.2, palm_turn=1.0, collision_rows=0
-        )
+        replace(TaskSpaceConfig(), arm_speed=0.5, torso_speed=0.2, palm_speed=0.2, palm_turn=1.0, collision_rows=0)
     )
     lower, upper = ik.kinematics.stops
     ik.lower[1:], ik.upper[1:] = lower[1:] + OLD_MARGIN, upper[1:] - OLD_MARGIN
@@ -194,8 +192,6 @@ def picture(found: dict[Side, Reached]) -> NDArray[np.uint8]:
             ax.set_aspect("equal")
             if row == column == 0:
                 ax.invert_xaxis()
-    figure.supxlabel(
-        "y in base_link [m]; blue: left hand, orange: right hand, darker: more margin, x: touches itself"
-    )
+    figure.supxlabel("y in base_link [m]; blue: left hand, orange: right hand, darker: more margin, x: touches itself")
     figure.supylabel("x in base_link [m]")
     return pixels(figure)

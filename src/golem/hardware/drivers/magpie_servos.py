@@ -26,13 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from golem.errors import ConfigError, GolemError
-from golem.hardware.drivers.dynamixel import (
-    CHECKSUM_ERROR,
-    StatusPacket,
-    StatusParser,
-    read_packet,
-    sync_write_packet,
-)
+from golem.hardware.drivers.dynamixel import CHECKSUM_ERROR, StatusPacket, StatusParser, read_packet, sync_write_packet
 from golem.hardware.drivers.serial_port import PortError, SerialPort
 from golem.robots.model import magpie_model
 from golem.robots.model.magpie_model import MAX_FORCE
@@ -262,9 +256,7 @@ class MagpieServos:
         strays: answers to no question, among them those that came too late.
     """
 
-    def __init__(
-        self, config: MagpieServoConfig, connect: Callable[[str, int], SerialPort] = SerialPort
-    ) -> None:
+    def __init__(self, config: MagpieServoConfig, connect: Callable[[str, int], SerialPort] = SerialPort) -> None:
         """Open the bus; nothing moves before the first command.
 
         Args:

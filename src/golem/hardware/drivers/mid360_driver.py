@@ -37,9 +37,7 @@ HEADER = struct.Struct("<BHHHHBBB12xIQ")
 CHECKED = 28
 """From where on the checksum counts."""
 IMU_DATA, POINT_DATA = 0, 1
-POINT = np.dtype(
-    {"names": ["xyz", "reflectivity", "tag"], "formats": ["(3,)<i4", "u1", "u1"], "itemsize": 14}
-)
+POINT = np.dtype({"names": ["xyz", "reflectivity", "tag"], "formats": ["(3,)<i4", "u1", "u1"], "itemsize": 14})
 SAMPLE_SIZE = 24
 MAX_POINTS = 100
 """Points of a datagram at most; the device sends 96."""
@@ -166,9 +164,7 @@ class ScanAssembler:
         points = np.concatenate([part.points for part in parts])
         offsets = np.concatenate([part.offsets + np.float32(1e-9 * (part.t - self._begin)) for part in parts])
         order = np.argsort(offsets, kind="stable")
-        return LidarScan(
-            1e-9 * (self._begin + SCAN_NS), points[order], np.minimum(offsets[order], SCAN), SCAN
-        )
+        return LidarScan(1e-9 * (self._begin + SCAN_NS), points[order], np.minimum(offsets[order], SCAN), SCAN)
 
 
 class Mid360:
@@ -266,7 +262,5 @@ def _listen(host: str, port: int) -> socket.socket:
         listening.bind((host, port))
     except OSError as error:
         listening.close()
-        raise LidarError(
-            f"Nobody can listen to the LiDAR at {host}, port {port}: {error.strerror}."
-        ) from error
+        raise LidarError(f"Nobody can listen to the LiDAR at {host}, port {port}: {error.strerror}.") from error
     return listening

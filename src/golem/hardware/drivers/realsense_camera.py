@@ -180,13 +180,7 @@ class RealSense:
             return
         self._profile, lens = profile, profile.intrinsics
         self._camera = replace(
-            self._camera,
-            width=lens.width,
-            height=lens.height,
-            fx=lens.fx,
-            fy=lens.fy,
-            cx=lens.ppx,
-            cy=lens.ppy,
+            self._camera, width=lens.width, height=lens.height, fx=lens.fx, fy=lens.fy, cx=lens.ppx, cy=lens.ppy
         )
         self._maps = None if not any(lens.coeffs) else self._straight(lens)
 

@@ -67,11 +67,6 @@ class Contact:
         """
         rows = force.reshape(-1, 2)
         probability, weight = feet_kernel.contacts(
-            rows,
-            self.planted.reshape(-1, 2),
-            self.age.reshape(-1, 2),
-            self._new.reshape(-1),
-            self._numbers,
-            dt,
+            rows, self.planted.reshape(-1, 2), self.age.reshape(-1, 2), self._new.reshape(-1), self._numbers, dt
         )
         return probability.reshape(force.shape), weight.reshape(force.shape)

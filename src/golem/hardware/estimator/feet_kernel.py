@@ -43,12 +43,7 @@ def wrenches(jacobians: Array, external: Array, floor: Array) -> Array:
 
 @njit(cache=True, nogil=True)
 def contacts(
-    force: Array,
-    planted: NDArray[np.bool_],
-    age: Array,
-    new: NDArray[np.bool_],
-    config: Array,
-    dt: float,
+    force: Array, planted: NDArray[np.bool_], age: Array, new: NDArray[np.bool_], config: Array, dt: float
 ) -> tuple[Array, Array]:
     """Take the next forces (n, 2) and return probability and weight, (n, 2) each; see `Contact.step`.
 
@@ -74,14 +69,7 @@ def contact(
     weight: Array,
 ) -> None:
     """Do what `contacts` does for one robot; all arrays are (2,), the last two are filled."""
-    touch, leave, middle, width, settle, ramp = (
-        config[0],
-        config[1],
-        config[2],
-        config[3],
-        config[4],
-        config[5],
-    )
+    touch, leave, middle, width, settle, ramp = (config[0], config[1], config[2], config[3], config[4], config[5])
     for k in range(2):
         was = planted[k] != 0
         probability[k] = weight[k] = 0.0

@@ -43,13 +43,7 @@ class FootForceConfig:
 
 
 FOOT_FORCE = np.dtype(
-    [
-        ("lag", "f8"),
-        ("floor", "f8", (6,)),
-        ("torque", "f8", (2, LEG)),
-        ("momentum", "f8", (2, LEG)),
-        ("begun", "i8"),
-    ]
+    [("lag", "f8"), ("floor", "f8", (6,)), ("torque", "f8", (2, LEG)), ("momentum", "f8", (2, LEG)), ("begun", "i8")]
 )
 """Options and memory of `foot_wrenches`; not `begun`, the next sample is taken as if nothing had moved before."""
 

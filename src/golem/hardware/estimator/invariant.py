@@ -91,13 +91,9 @@ def predict(m: Record, gyro: Array, acc: Array, weight: Array, dt: float) -> Non
 
 
 @njit(cache=True, nogil=True)
-def update(
-    m: Record, points: Array, weight: Array, shift: Array, heading: float, hanging: bool
-) -> NDArray[np.bool_]:
+def update(m: Record, points: Array, weight: Array, shift: Array, heading: float, hanging: bool) -> NDArray[np.bool_]:
     """Fuse where the feet are seen into the `INVARIANT` `m`; see `InvariantFilter.update`."""
-    return invariant_kernel.update(
-        m.R, m.x, m.bias, m.P, m.planted, points, weight, shift, heading, hanging, m.numbers
-    )
+    return invariant_kernel.update(m.R, m.x, m.bias, m.P, m.planted, points, weight, shift, heading, hanging, m.numbers)
 
 
 class InvariantFilter:
@@ -155,9 +151,7 @@ class InvariantFilter:
         """
         predict(self.memory[0], gyro, acc, weight, dt)
 
-    def update(
-        self, points: Array, weight: Array, shift: Array, heading: float, hanging: bool
-    ) -> NDArray[np.bool_]:
+    def update(self, points: Array, weight: Array, shift: Array, heading: float, hanging: bool) -> NDArray[np.bool_]:
         """Fuse where the feet are seen, and the heading.
 
         Args:

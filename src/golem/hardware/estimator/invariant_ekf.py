@@ -12,23 +12,9 @@ import numpy as np
 from golem.finite import finite_state
 from golem.hardware.estimator.attitude import Attitude, base_rotation
 from golem.hardware.estimator.compiled import CompiledEstimator
-from golem.hardware.estimator.feet import (
-    FEET,
-    FLOOR,
-    FeetConfig,
-    forget_feet,
-    level_floor,
-    put_feet,
-    sense_feet,
-)
+from golem.hardware.estimator.feet import FEET, FLOOR, FeetConfig, forget_feet, level_floor, put_feet, sense_feet
 from golem.hardware.estimator.feet_kernel import in_torso
-from golem.hardware.estimator.invariant import (
-    INVARIANT,
-    InvariantConfig,
-    InvariantFilter,
-    predict,
-    update,
-)
+from golem.hardware.estimator.invariant import INVARIANT, InvariantConfig, InvariantFilter, predict, update
 from golem.kernels import cfunc, njit
 from golem.native import ORDINARY, STAGE, UNUSUAL, CompiledStage, Record, new_record, shared, view
 from golem.robots.model.imu_mount import TORSO, turn_to_base

@@ -61,9 +61,7 @@ def base_velocity(R: Array, omega: Array, soles: Array, rates: Array) -> Array:
     return -(turning + rates) @ R.swapaxes(-1, -2)
 
 
-FILTER = np.dtype(
-    [("options", "f8", (5,)), ("velocity", "f8", (3,)), ("variance", "f8"), ("unmeasured", "f8")]
-)
+FILTER = np.dtype([("options", "f8", (5,)), ("velocity", "f8", (3,)), ("variance", "f8"), ("unmeasured", "f8")])
 """Options, see `filter_options`, and memory of `fuse`, of one robot."""
 
 

@@ -11,15 +11,7 @@ import numpy as np
 from golem.finite import finite_state
 from golem.hardware.estimator.attitude import GYRO_BIAS, Attitude, base_rotation, track_bias
 from golem.hardware.estimator.compiled import CompiledEstimator
-from golem.hardware.estimator.feet import (
-    FEET,
-    FLOOR,
-    FeetConfig,
-    forget_feet,
-    level_floor,
-    put_feet,
-    sense_feet,
-)
+from golem.hardware.estimator.feet import FEET, FLOOR, FeetConfig, forget_feet, level_floor, put_feet, sense_feet
 from golem.hardware.estimator.random_walk import FILTER, RandomWalkConfig, filter_options, fuse
 from golem.kernels import cfunc, njit
 from golem.native import ORDINARY, STAGE, UNUSUAL, CompiledStage, Record, new_record, shared, view

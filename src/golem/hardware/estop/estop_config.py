@@ -32,9 +32,7 @@ class EstopConfig:
                 "estop: {use: serial, port: /dev/ttyACM0}."
             )
         if not 0.010 <= self.oldest <= 0.050:
-            raise ConfigError(
-                f"A frame of the emergency stop is fresh for 0.01 to 0.05 s, not {self.oldest:g}."
-            )
+            raise ConfigError(f"A frame of the emergency stop is fresh for 0.01 to 0.05 s, not {self.oldest:g}.")
 
     def words(self) -> list[str]:
         """Return what a command line says of it; nothing where it is the default."""

@@ -55,9 +55,7 @@ class SerialEstop:
         self._name, self._oldest, self._connect = port, oldest, connect
         self._open: SerialPort | None = connect(port, BAUD)
         self._parser = FrameParser()
-        self._random = random.Random(
-            0
-        )  # of a byte that merely counted up, a delay of 256 would look like none
+        self._random = random.Random(0)  # of a byte that merely counted up, a delay of 256 would look like none
         self._sent: deque[tuple[float, int]] = deque()
         self._last: BoardFrame | None = None
         self._now = self._retry = self._bytes = self._frames = self._counted = -math.inf

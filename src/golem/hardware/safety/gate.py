@@ -228,9 +228,7 @@ def _opens(command: LowCommand | None, state: LowState, limits: SafetyLimits) ->
         return Fault(Reason.COMMAND_MISSING)
     free, away = ungrasped(command, limits)[0], np.abs(command.q - state.q)
     away[command.kp < limits.least_kp] = 0.0
-    asked = (
-        command.kp * (command.q - state.q) + command.kd * (command.dq - state.dq) + command.tau - state.tau
-    )
+    asked = command.kp * (command.q - state.q) + command.kd * (command.dq - state.dq) + command.tau - state.tau
     asked[LEGS] = 0.0  # their targets are torques: what they need depends on who carries the robot until now
     thrown = np.abs(asked) / limits.torque
     far, much = limits.opening

@@ -196,9 +196,7 @@ def _outside(m: Record, up: Array, height: float) -> float:  # pragma: no cover 
         x, y = x + at * e[a], y + at * f[a]
         for i in range(8):
             k, along, across = i // 4, (1 - 2 * (i % 2)) * half[0], (1 - (i // 2) % 2 * 2) * half[1]
-            corner = (
-                motion.soles[k, a] + motion.rotations[k, a, 0] * along + motion.rotations[k, a, 1] * across
-            )
+            corner = motion.soles[k, a] + motion.rotations[k, a, 0] * along + motion.rotations[k, a, 1] * across
             corners[i, 0] += corner * e[a]
             corners[i, 1] += corner * f[a]
     worst = 0.0

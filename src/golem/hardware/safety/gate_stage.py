@@ -23,18 +23,7 @@ from golem.hardware.safety.senses import CALM, EVERY, FORGET, GRAVITY_TIME, LOOK
 from golem.hardware.safety.senses_kernel import ASKED, GROUPS, SCALARS, looked
 from golem.interfaces.payloads import EstopMessage, GateState
 from golem.kernels import cfunc, njit
-from golem.native import (
-    COMMAND,
-    ORDINARY,
-    STAGE,
-    STATE,
-    UNUSUAL,
-    CompiledStage,
-    Record,
-    new_record,
-    shared,
-    view,
-)
+from golem.native import COMMAND, ORDINARY, STAGE, STATE, UNUSUAL, CompiledStage, Record, new_record, shared, view
 from golem.native_messages import command_of, put_command, state_of
 from golem.types import LEGS, NUM_JOINTS, TICK
 
@@ -149,9 +138,7 @@ def pass_command(r: Record, m: Record) -> bool:
     for i in range(_N):
         drift[i] = m.drift_now[i]
         if 0.0 < apart <= STEADY:
-            drift[i] = (
-                (1.0 - apart / FORGET) * drift[i] + (r.q[i] - m.q[i]) - (0.5 * apart) * (r.dq[i] + m.dq[i])
-            )
+            drift[i] = (1.0 - apart / FORGET) * drift[i] + (r.q[i] - m.q[i]) - (0.5 * apart) * (r.dq[i] + m.dq[i])
     looks = not 0.0 <= r.state_t - m.looked_at < LOOK
     if looks:
         out = look(r, m, drift)
@@ -217,15 +204,7 @@ def look(r: Record, m: Record, drift_now: np.ndarray[Any, Any]) -> np.ndarray[An
         numbers[asked + ASKED + COMMAND + i] = m.turn[i]
         numbers[asked + ASKED + COMMAND + 3 + i] = m.force[i]
     return looked(
-        numbers,
-        m.table,
-        dt,
-        1.0 - dt / FORGET,
-        dt / GRAVITY_TIME,
-        m.drift_lag,
-        m.dead_load,
-        m.dead_share,
-        True,
+        numbers, m.table, dt, 1.0 - dt / FORGET, dt / GRAVITY_TIME, m.drift_lag, m.dead_load, m.dead_share, True
     )
 
 
@@ -313,11 +292,7 @@ class GateStage:
         before, counters = senses.looked, gate.counters
         if gate.mode is not GateState.ACTIVE or gate.reason is not None or sender.refused:
             return False
-        if (
-            counters not in (Counters(), Counters(strained=True))
-            or sender.held is not True
-            or not sender.firm
-        ):
+        if counters not in (Counters(), Counters(strained=True)) or sender.held is not True or not sender.firm:
             return False
         if outgoing is None or outgoing.tau is None or state is None or command is None or estop is None:
             return False
@@ -381,9 +356,7 @@ class GateStage:
             request=gate.request,
             grounded=None if grounded == -math.inf else grounded,
             senses=senses,
-            sender=SenderMemory(
-                command, True, 0, float(row["jolts"]), True, float(row["moved"]), int(row["moves"])
-            ),
+            sender=SenderMemory(command, True, 0, float(row["jolts"]), True, float(row["moved"]), int(row["moves"])),
             prompt=float(row["prompt"]),
             sent=command_of(row["sent"], t),
             stopped=gate.stopped,

@@ -98,9 +98,7 @@ def limited(
 
 
 @njit(cache=True)
-def rate_state(
-    numbers: Array, table: Array, jump: float, upright: float
-) -> int:  # pragma: no cover - compiled
+def rate_state(numbers: Array, table: Array, jump: float, upright: float) -> int:  # pragma: no cover - compiled
     """Return what is known of a sample: `UNKNOWN`, `STRAINED` or `ORDINARY`.
 
     Args:
@@ -162,9 +160,7 @@ def ordinary_command(
         kp, kd = numbers[3 * _N + i], numbers[4 * _N + i]
         if not (kd >= table[rows.LEAST_KD, i] and kp >= 0.0):
             return False
-        soft = (
-            kp < table[rows.LEAST_KP, i] and abs(numbers[2 * _N + i]) <= SLACK * table[rows.TORQUE_LIMIT, i]
-        )
+        soft = kp < table[rows.LEAST_KP, i] and abs(numbers[2 * _N + i]) <= SLACK * table[rows.TORQUE_LIMIT, i]
         if soft and i < _UPPER:
             return False
         jump = numbers[2 * _N + i] - numbers[COMMAND + 2 * _N + i]

@@ -49,19 +49,7 @@ def limit_command(
     """
     tau = command.tau if last.tau is None else last.tau
     numbers = np.concatenate(
-        (
-            command.q,
-            command.dq,
-            command.tau,
-            command.kp,
-            command.kd,
-            state.q,
-            state.dq,
-            last.q,
-            last.kp,
-            last.kd,
-            tau,
-        ),
+        (command.q, command.dq, command.tau, command.kp, command.kd, state.q, state.dq, last.q, last.kp, last.kd, tau),
         dtype=np.float64,
     )
     rows = limited(numbers, limits.table, float(dt), last.tau is not None, strained)

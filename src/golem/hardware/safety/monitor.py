@@ -132,13 +132,9 @@ def examine(state: LowState, limits: SafetyLimits, counters: Counters) -> tuple[
     if fast and (new.velocity >= n or new.leg_velocity >= legs or ratio.max() > limits.gross):
         return new, Fault(Reason.VELOCITY, _worst(ratio, lambda i: f"at {dq[i]:.2f} rad/s"), stands)
     if new.braking >= n or new.leg_braking >= legs:
-        return new, Fault(
-            Reason.BRAKING, _worst(beyond, lambda i: f"at {q[i]:.3f} rad with {dq[i]:.2f} rad/s"), stands
-        )
+        return new, Fault(Reason.BRAKING, _worst(beyond, lambda i: f"at {q[i]:.3f} rad with {dq[i]:.2f} rad/s"), stands)
     if new.torque >= limits.torque_samples:
-        return new, Fault(
-            Reason.TORQUE, _worst(load / limits.torque, lambda i: f"at {state.tau[i]:.1f} N m"), stands
-        )
+        return new, Fault(Reason.TORQUE, _worst(load / limits.torque, lambda i: f"at {state.tau[i]:.1f} N m"), stands)
     if new.tilt >= n:
         return new, Fault(Reason.TILT, f"torso at {math.degrees(angle):.0f} degrees")
     return new, None

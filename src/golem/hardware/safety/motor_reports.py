@@ -86,9 +86,7 @@ class MotorWatch:
         low, high = self._limits.voltage
         wrong = self._powered & ~((reports.voltage >= low) & (reports.voltage <= high))
         if wrong.any():
-            return Fault(
-                Reason.MOTOR_VOLTAGE, f"{_first(wrong)} at {reports.voltage[int(np.argmax(wrong))]:g} V"
-            )
+            return Fault(Reason.MOTOR_VOLTAGE, f"{_first(wrong)} at {reports.voltage[int(np.argmax(wrong))]:g} V")
         return None
 
 

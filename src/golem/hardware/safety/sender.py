@@ -100,9 +100,7 @@ def examine_command(
         jump = np.abs(new.tau - last.tau)
         # Legs that recover from a push ask for targets that jump by nearly all of a motor's torque; arms never do.
         asked = np.abs(_asked_of_legs(new, last)[1])
-        jump[LEGS] = np.maximum(
-            jump[LEGS], np.where(asked > limits.throw[0] * limits.torque[LEGS], asked, 0.0)
-        )
+        jump[LEGS] = np.maximum(jump[LEGS], np.where(asked > limits.throw[0] * limits.torque[LEGS], asked, 0.0))
         arms = new.kp[UPPER] * (new.q[UPPER] - last.q[UPPER]) + (new.tau[UPPER] - last.tau[UPPER])
         jump[UPPER] = np.abs(arms)
         if count(jump > limits.jolt):

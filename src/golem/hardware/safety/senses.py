@@ -33,9 +33,7 @@ STEADY = 0.012
 """Time between two samples beyond which their speeds do not tell how far a joint has gone [s] [own]."""
 LIMBS = {
     name: slice(*ends)
-    for name, ends in zip(
-        ("left leg", "right leg", "torso", "left arm", "right arm"), pairwise(FIRST), strict=True
-    )
+    for name, ends in zip(("left leg", "right leg", "torso", "left arm", "right arm"), pairwise(FIRST), strict=True)
 }
 """Joints that share a bus, and so a fate."""
 GROUPS = (*LIMBS, "IMU")
@@ -223,9 +221,7 @@ def _look(
 
 def _asked(sent: LowCommand) -> Array:
     """Return (486,) `sent` as all of the commands of late."""
-    return np.repeat(
-        (sent.kp * sent.q + sent.kd * sent.dq + sent.tau, sent.kp, sent.kd), DELAYS, axis=0
-    ).ravel()
+    return np.repeat((sent.kp * sent.q + sent.kd * sent.dq + sent.tau, sent.kp, sent.kd), DELAYS, axis=0).ravel()
 
 
 def _frozen(m: SensesMemory, limits: SafetyLimits) -> Fault | None:
@@ -246,9 +242,7 @@ def _drifts(m: SensesMemory, speed: Array, limits: SafetyLimits) -> Fault:
     i = int(beyond.argmax())
     stands = i >= STANDING.stop and bool(beyond[STANDING].max() <= limits.drift)
     return Fault(
-        Reason.STATE_IMPLAUSIBLE,
-        f"{JOINT_NAMES[i]} is {m.drift[i]:.2f} rad from its speed's integral",
-        stands,
+        Reason.STATE_IMPLAUSIBLE, f"{JOINT_NAMES[i]} is {m.drift[i]:.2f} rad from its speed's integral", stands
     )
 
 

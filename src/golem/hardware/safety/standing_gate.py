@@ -60,9 +60,7 @@ class StandingGate:
         standing = None
         if before.mode is GateState.STOP2 and self._legs is not None and before.state is not None:
             # By the state that was believed last: the newest may be an outlier.
-            with contextlib.suppress(
-                Exception
-            ):  # what a process that guards must outlive; the gate then damps
+            with contextlib.suppress(Exception):  # what a process that guards must outlive; the gate then damps
                 standing = self._legs.step(_believed(before.state), self.gate.limits.damping)
         if self._make is not None:
             # `replace` would take a fifth of the tick.

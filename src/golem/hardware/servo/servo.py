@@ -26,18 +26,7 @@ from golem.hardware.safety.base import SafetyLimits
 from golem.hardware.servo.gains import Gains, default_gains
 from golem.hardware.servo.gravity import body_tree, gravity_in_base
 from golem.kernels import cfunc, njit
-from golem.native import (
-    ORDINARY,
-    STAGE,
-    UNUSUAL,
-    CompiledStage,
-    Record,
-    new_record,
-    new_shared,
-    own,
-    shared,
-    view,
-)
+from golem.native import ORDINARY, STAGE, UNUSUAL, CompiledStage, Record, new_record, new_shared, own, shared, view
 from golem.native_messages import command_of, put_legs, put_state
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.leg_kernel import tree_dtype, tree_gravity

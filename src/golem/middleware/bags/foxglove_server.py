@@ -138,9 +138,7 @@ class FoxgloveServer:
         channel = self._channels.get(topic.name)
         if channel is None:
             schema = foxglove.Schema(name=topic.kind, encoding="ros2msg", data=topic.definition.encode())
-            channel = foxglove.Channel(
-                topic.name, schema=schema, message_encoding="cdr", context=self._context
-            )
+            channel = foxglove.Channel(topic.name, schema=schema, message_encoding="cdr", context=self._context)
             self._channels[topic.name] = channel
         return channel
 

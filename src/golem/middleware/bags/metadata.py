@@ -120,8 +120,7 @@ def information(files: Mapping[str, Contents], custom: Mapping[str, str]) -> dic
         "compression_mode": "",
         "relative_file_paths": list(files),
         "files": [
-            {"path": name, **_span(contents), "message_count": contents.messages}
-            for name, contents in files.items()
+            {"path": name, **_span(contents), "message_count": contents.messages} for name, contents in files.items()
         ],
         "custom_data": dict(custom),
         "ros_distro": "",

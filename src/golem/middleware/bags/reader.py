@@ -38,16 +38,7 @@ OTHERS = {
 """What a file that begins so is."""
 FRAME = struct.Struct("<BQ")
 """What precedes a record's content: opcode and length."""
-DAMAGE = (
-    McapError,
-    ZstdError,
-    struct.error,
-    ValueError,
-    LookupError,
-    OverflowError,
-    RuntimeError,
-    MemoryError,
-)
+DAMAGE = (McapError, ZstdError, struct.error, ValueError, LookupError, OverflowError, RuntimeError, MemoryError)
 """What the libraries raise on bytes that are no MCAP."""
 
 

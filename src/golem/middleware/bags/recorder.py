@@ -63,9 +63,7 @@ class Recorder:
         """Record from the domain of `participant` to `sink`; `wall` tells the time [s since 1970]."""
         self._participant, self._sink, self._wall = participant, sink, wall
         self._subscriptions: dict[str, _Subscription] = {}
-        qos = Qos(
-            reliable=False, depth=MANY
-        )  # whatever the writer offers: it tells the time, recorded or not
+        qos = Qos(reliable=False, depth=MANY)  # whatever the writer offers: it tells the time, recorded or not
         self._ticks = participant.reader(names.topic(CLOCK), dds_name(CLOCK_KIND), qos)
         self._clock: int | None = None
         self._held_since: float | None = None
@@ -122,9 +120,7 @@ class Recorder:
             if len(samples) >= subscription.depth:
                 self.overruns[topic.name] = self.overruns.get(topic.name, 0) + 1
             batch += [(self._written(sample, now), topic, sample.payload) for sample in samples]
-        batch.sort(
-            key=lambda entry: (entry[0], entry[1] is not None)
-        )  # what happens at a time, happens after it
+        batch.sort(key=lambda entry: (entry[0], entry[1] is not None))  # what happens at a time, happens after it
         clock = self._subscriptions.get(CLOCK)
         passed = 0
         for written, topic, payload in batch:

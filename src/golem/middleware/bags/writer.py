@@ -57,9 +57,7 @@ class BagConfig:
 class BagWriter:
     """Writes one bag; see `Sink`."""
 
-    def __init__(
-        self, folder: Path, config: BagConfig | None = None, custom: Mapping[str, str] | None = None
-    ) -> None:
+    def __init__(self, folder: Path, config: BagConfig | None = None, custom: Mapping[str, str] | None = None) -> None:
         """Create `folder`, with what `custom` says about the bag in its metadata.
 
         Raises:

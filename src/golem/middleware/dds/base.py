@@ -196,12 +196,7 @@ class Participant(Protocol):
         ...
 
     def reader(
-        self,
-        topic: str,
-        type_name: str,
-        qos: Qos,
-        user_data: str = "",
-        on_data: Callable[[], None] | None = None,
+        self, topic: str, type_name: str, qos: Qos, user_data: str = "", on_data: Callable[[], None] | None = None
     ) -> Reader:
         """Create a reader.
 

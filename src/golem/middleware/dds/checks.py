@@ -68,9 +68,7 @@ def wait_for_peer(
     end = time.monotonic() + timeout
     while not endpoint.matched():
         if time.monotonic() > end:
-            raise DdsError(
-                f"{_reason(participant, endpoint)} ({participant.where}, {timeout:g} s); {remedy}."
-            )
+            raise DdsError(f"{_reason(participant, endpoint)} ({participant.where}, {timeout:g} s); {remedy}.")
         time.sleep(0.01)
 
 
@@ -88,9 +86,7 @@ def _reason(participant: CycloneParticipant, endpoint: CycloneWriter | CycloneRe
     for other in there:
         if other.type_name == endpoint.type_name:
             offered, requested = (endpoint.qos, other.qos) if writing else (other.qos, endpoint.qos)
-            return (
-                f"The writer of '{topic}' offers {_words(offered)}, its reader requests {_words(requested)}"
-            )
+            return f"The writer of '{topic}' offers {_words(offered)}, its reader requests {_words(requested)}"
     return f"Somebody {does} '{topic}' as '{there[0].type_name}', not as '{endpoint.type_name}'"
 
 

@@ -57,9 +57,7 @@ class DdsConfig:
                 f"--robot is the real robot, which is on domain {ROBOT_DOMAIN}: add --domain {ROBOT_DOMAIN}."
             )
         if self.robot and self.interface == "lo":
-            raise ConfigError(
-                "The real robot is not on this machine: add --interface with the one its cable is in."
-            )
+            raise ConfigError("The real robot is not on this machine: add --interface with the one its cable is in.")
 
     def words(self) -> list[str]:
         """Return what a command line says of it; nothing where it is the default."""

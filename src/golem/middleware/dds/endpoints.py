@@ -111,10 +111,7 @@ class CycloneWriter(_Endpoint):
         self._pieces = (BytesIovec * 2)()
         self._pieces[1].base = bytes(3)
         quick, blocking = owner.library.quick, owner.library.blocking
-        self._from_small, self._from_large = (
-            quick.ddsi_serdata_from_ser_iov,
-            blocking.ddsi_serdata_from_ser_iov,
-        )
+        self._from_small, self._from_large = (quick.ddsi_serdata_from_ser_iov, blocking.ddsi_serdata_from_ser_iov)
         self._write = blocking.dds_writecdr
 
     def write(self, payload: Payload) -> None:
@@ -159,13 +156,7 @@ class CycloneReader(_Endpoint):
     kind = "reader"
 
     def __init__(
-        self,
-        owner: Owner,
-        topic: str,
-        type_name: str,
-        qos: Qos,
-        entity: int,
-        on_data: Callable[[], None] | None,
+        self, owner: Owner, topic: str, type_name: str, qos: Qos, entity: int, on_data: Callable[[], None] | None
     ) -> None:
         """Take over `entity`, a reader."""
         super().__init__(owner, topic, type_name, qos, entity)

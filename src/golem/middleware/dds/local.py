@@ -147,19 +147,12 @@ class LocalParticipant:
         return writer
 
     def reader(
-        self,
-        topic: str,
-        type_name: str,
-        qos: Qos,
-        user_data: str = "",
-        on_data: Callable[[], None] | None = None,
+        self, topic: str, type_name: str, qos: Qos, user_data: str = "", on_data: Callable[[], None] | None = None
     ) -> Reader:
         """Create a reader; see `base.Participant`. Nobody sees `user_data` here."""
         self._check(topic, type_name)
         handle = self._domain.number()
-        reader = LocalReader(
-            self._domain, topic, type_name, qos, handle, _guid(self._number, handle), on_data
-        )
+        reader = LocalReader(self._domain, topic, type_name, qos, handle, _guid(self._number, handle), on_data)
         self._entities.append(reader)
         return reader
 
@@ -175,9 +168,7 @@ class LocalParticipant:
             raise DdsError("The participant is closed; create another one.")
         known = self._types.setdefault(topic, type_name)
         if known != type_name:
-            raise DdsError(
-                f"Topic '{topic}' already carries '{known}' here; it cannot carry '{type_name}' too."
-            )
+            raise DdsError(f"Topic '{topic}' already carries '{known}' here; it cannot carry '{type_name}' too.")
 
 
 class LocalWriter:
@@ -185,9 +176,7 @@ class LocalWriter:
 
     dropped = 0
 
-    def __init__(
-        self, domain: LocalDomain, topic: str, type_name: str, qos: Qos, handle: int, guid: bytes
-    ) -> None:
+    def __init__(self, domain: LocalDomain, topic: str, type_name: str, qos: Qos, handle: int, guid: bytes) -> None:
         """Join `domain`; `LocalParticipant.writer` calls it."""
         self.topic, self.type_name, self.qos = topic, type_name, qos
         self.handle, self.guid = handle, guid

@@ -46,9 +46,7 @@ def create_topic(library: Cyclone, participant: int, name: str, type_name: str) 
         ops=program,
         data_representation=_XCDR1,
     )
-    topic = library.blocking.dds_create_topic(
-        participant, ctypes.byref(descriptor), name.encode(), None, None
-    )
+    topic = library.blocking.dds_create_topic(participant, ctypes.byref(descriptor), name.encode(), None, None)
     return library.check(topic, f"Topic '{name}' cannot be created; check its name")
 
 
@@ -84,9 +82,7 @@ class Dispatcher:
         self._readers: dict[int, Watched] = {}
         calls = library.blocking
         self._entity = library.check(calls.dds_create_waitset(participant), "A waitset cannot be created")
-        self._stop = library.check(
-            calls.dds_create_guardcondition(participant), "A waitset cannot be stopped"
-        )
+        self._stop = library.check(calls.dds_create_guardcondition(participant), "A waitset cannot be stopped")
         self._attach(self._stop, _STOP)
         self._thread = threading.Thread(target=self._run, name="dds-waitset", daemon=True)
         self._thread.start()
@@ -186,12 +182,7 @@ class CycloneParticipant:
             return writer
 
     def reader(
-        self,
-        topic: str,
-        type_name: str,
-        qos: Qos,
-        user_data: str = "",
-        on_data: Callable[[], None] | None = None,
+        self, topic: str, type_name: str, qos: Qos, user_data: str = "", on_data: Callable[[], None] | None = None
     ) -> CycloneReader:
         """Create a reader; `on_data` may be called before this returns."""
         with self._lock:
@@ -234,7 +225,5 @@ class CycloneParticipant:
             self._topics[name] = create_topic(self.library, self.entity, name, type_name), type_name
         entity, known = self._topics[name]
         if known != type_name:
-            raise DdsError(
-                f"Topic '{name}' already carries '{known}' here; it cannot carry '{type_name}' too."
-            )
+            raise DdsError(f"Topic '{name}' already carries '{known}' here; it cannot carry '{type_name}' too.")
         return entity

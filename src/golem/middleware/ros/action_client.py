@@ -108,9 +108,7 @@ class ActionClient:
         check(f"Action '{self.name}'", goal, self._type.Goal)
         id = uuid.uuid4().bytes if id is None else id
         if len(id) != 16 or id == NO_ID or id in self._goals:
-            raise RosError(
-                f"A goal needs an id of its own, 16 bytes and not all zero; {id.hex()} cannot be it."
-            )
+            raise RosError(f"A goal needs an id of its own, 16 bytes and not all zero; {id.hex()} cannot be it.")
         proposed = ClientGoal(self, id, feedback)
         answer = self._goal.call(self._type.SendGoal.Request(to_uuid(id), goal))
         self._goals[id] = proposed

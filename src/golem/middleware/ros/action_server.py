@@ -215,9 +215,7 @@ class ActionServer:
         """
         check(f"Action '{self.name}'", feedback, self._type.Feedback)
         if not goal.status.active:
-            raise RosError(
-                f"Goal {goal.id.hex()} is {goal.status.name.lower()}: there is no feedback on it any more."
-            )
+            raise RosError(f"Goal {goal.id.hex()} is {goal.status.name.lower()}: there is no feedback on it any more.")
         self._feedback.write(codec.serialize(self._type.FeedbackMessage(to_uuid(goal.id), feedback)))
 
     def _stamp(self) -> int:

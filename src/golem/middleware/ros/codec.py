@@ -128,9 +128,7 @@ class Codec:
                 if name not in self._classes:
                     definition = self._types[name]
                     kept = name in msgs.DEFINITIONS
-                    made = (
-                        msgs.held(name) if kept else message_class(name, definition, self.message, __name__)
-                    )
+                    made = msgs.held(name) if kept else message_class(name, definition, self.message, __name__)
                     self._store.types[name] = cast(Any, made)
                     self._classes[name] = made
         return self._classes[name]

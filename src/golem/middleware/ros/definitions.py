@@ -129,10 +129,7 @@ def action(name: str) -> dict[str, Definition]:
             [("accepted", (BASE, ("bool", 0))), ("stamp", (NAME, "builtin_interfaces/msg/Time"))],
         ),
         f"{get_result}_Request": ([], [goal_id]),
-        f"{get_result}_Response": (
-            [],
-            [("status", (BASE, ("int8", 0))), ("result", (NAME, f"{name}_Result"))],
-        ),
+        f"{get_result}_Response": ([], [("status", (BASE, ("int8", 0))), ("result", (NAME, f"{name}_Result"))]),
         feedback: ([], [goal_id, ("feedback", (NAME, f"{name}_Feedback"))]),
         **service(send_goal),
         **service(get_result),

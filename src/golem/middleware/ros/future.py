@@ -39,9 +39,7 @@ class Future(Generic[T]):
         if self._error is not None:
             raise self._error
         if not self.done:
-            raise RosError(
-                "The answer is not there yet; spin the node until it is: node.wait(future, timeout)."
-            )
+            raise RosError("The answer is not there yet; spin the node until it is: node.wait(future, timeout).")
         return self._value
 
     def then(self, callback: Callable[[Future[T]], None]) -> None:

@@ -21,9 +21,7 @@ NOT_ZERO = {("geometry_msgs/msg/Quaternion", "w"): 1.0}
 """Fields whose default in the standard definitions is not zero; rosbags' store does not tell."""
 
 
-def message_class(
-    name: str, definition: Definition, of: Callable[[str], type[Any]], module: str
-) -> type[Any]:
+def message_class(name: str, definition: Definition, of: Callable[[str], type[Any]], module: str) -> type[Any]:
     """Return a class for messages of type `name`.
 
     Args:

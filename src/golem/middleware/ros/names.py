@@ -74,9 +74,7 @@ def resolve(name: str, node: str, namespace: str) -> str:
 
 def _check(kind: str, name: str, maximum: int) -> str:
     if not name.startswith("/") or not all(map(_TOKEN.fullmatch, name[1:].split("/"))):
-        raise ConfigError(
-            f"'{name}' cannot be the name of a {kind}: {_RULE}, each after one '/', e.g. '/arm/left'."
-        )
+        raise ConfigError(f"'{name}' cannot be the name of a {kind}: {_RULE}, each after one '/', e.g. '/arm/left'.")
     if len(name) > maximum:
         raise ConfigError(f"'{name[:40]}...' cannot be the name of a {kind}: it is longer than {maximum}.")
     return name

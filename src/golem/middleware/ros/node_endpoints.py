@@ -85,9 +85,7 @@ class NodeEndpoints:
         self._add(writer)
         return writer
 
-    def inbox(
-        self, topic: str, type: str, qos: Qos, handle: Callable[[Sample], None], owner: str = ""
-    ) -> Inbox:
+    def inbox(self, topic: str, type: str, qos: Qos, handle: Callable[[Sample], None], owner: str = "") -> Inbox:
         """Create a reader whose samples go to `handle` when the node is spun; see `writer` for the rest."""
         self._check()
         inbox = self._inbox(topic, handle, qos)
@@ -119,10 +117,7 @@ class NodeEndpoints:
         inbox.open(self._link, request, codec.dds_name(taken), qos, _hash(taken))
         second = self._link.second_reader(request, codec.dds_name(taken), _hash(taken))
         return Linked(
-            writer,
-            inbox,
-            second,
-            self._participant.writer(reply, codec.dds_name(sent), qos, owner + _hash(sent)),
+            writer, inbox, second, self._participant.writer(reply, codec.dds_name(sent), qos, owner + _hash(sent))
         )
 
     def close(self, *endpoints: Inbox | Writer) -> None:

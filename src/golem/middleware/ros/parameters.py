@@ -30,13 +30,7 @@ SERVICES: dict[str, tuple[str, Callable[[Any], Any]]] = {
         "DescribeParameters",
         lambda asked: rcl.DescribeParameters_Response([rcl.ParameterDescriptor(n) for n in asked.names]),
     ),
-    "set_parameters": (
-        "SetParameters",
-        lambda asked: rcl.SetParameters_Response([REFUSED for _ in asked.parameters]),
-    ),
-    "set_parameters_atomically": (
-        "SetParametersAtomically",
-        lambda _: rcl.SetParametersAtomically_Response(REFUSED),
-    ),
+    "set_parameters": ("SetParameters", lambda asked: rcl.SetParameters_Response([REFUSED for _ in asked.parameters])),
+    "set_parameters_atomically": ("SetParametersAtomically", lambda _: rcl.SetParametersAtomically_Response(REFUSED)),
 }
 """Name within the node, short type name, and what answers."""

@@ -90,9 +90,7 @@ class Client:
             future.fail(RosError(_alien(self.name) if servers else f"No server of '{self.name}' is there."))
             return future
         if len(self._pending) >= MAX_PENDING:
-            next(iter(self._pending.values())).cancel(
-                f"'{self.name}' left {MAX_PENDING} newer requests unanswered."
-            )
+            next(iter(self._pending.values())).cancel(f"'{self.name}' left {MAX_PENDING} newer requests unanswered.")
         self._pending[number], self._servers[number] = future, servers
         self._writer.write(pack(Header(self._writer.handle, number), body))
         return future
@@ -140,9 +138,7 @@ class Responder:
         malformed: requests that could not be read.
     """
 
-    def __init__(
-        self, endpoints: NodeEndpoints, name: str, type: str, handle: Callable[[Origin, Any], None]
-    ) -> None:
+    def __init__(self, endpoints: NodeEndpoints, name: str, type: str, handle: Callable[[Origin, Any], None]) -> None:
         """Give requests for the service with absolute `name` to `handle`, which shall `reply` some time."""
         self.name, self.malformed = name, 0
         self._endpoints, self._handle = endpoints, handle
@@ -233,9 +229,7 @@ class Service:
     A callback that raises is answered for, by a response of zeros that says why where its type has a `message`.
     """
 
-    def __init__(
-        self, endpoints: NodeEndpoints, name: str, type: str, callback: Callable[[Any], Any]
-    ) -> None:
+    def __init__(self, endpoints: NodeEndpoints, name: str, type: str, callback: Callable[[Any], Any]) -> None:
         """Answer requests for the service with absolute `name` by what `callback` returns."""
         self._response = codec.service(type).Response
         self._callback, self._guard = callback, endpoints.guard

@@ -17,9 +17,7 @@ BATCH = 64
 class Source(Protocol):
     """Where a reader can be had: a participant, or what stands beside it."""
 
-    def reader(
-        self, topic: str, type_name: str, qos: Qos, user_data: str, on_data: Callable[[], None]
-    ) -> Reader:
+    def reader(self, topic: str, type_name: str, qos: Qos, user_data: str, on_data: Callable[[], None]) -> Reader:
         """Create a reader; see `dds.base.Participant.reader`."""
         ...
 

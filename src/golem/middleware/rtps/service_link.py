@@ -203,9 +203,7 @@ class ServiceLink:
             else:
                 peer.learn(*announcements.endpoint(part))
 
-    def _request(
-        self, peer: FastDdsPeer, part: Data | Heartbeat | Gap, calls: list[Callable[[], None]]
-    ) -> None:
+    def _request(self, peer: FastDdsPeer, part: Data | Heartbeat | Gap, calls: list[Callable[[], None]]) -> None:
         reader = self._readers.get(peer.topics.get(part.writer, ""))
         if reader is None:
             return
@@ -287,9 +285,7 @@ class ServiceReader(ServiceEndpoint):
 
     handle = 0
 
-    def __init__(
-        self, link: ServiceLink, topic: str, guid: bytes, qos: Qos, on_data: Callable[[], None]
-    ) -> None:
+    def __init__(self, link: ServiceLink, topic: str, guid: bytes, qos: Qos, on_data: Callable[[], None]) -> None:
         """Belong to `link`."""
         super().__init__(link, guid)
         self.on_data, self._topic, self._depth = on_data, topic, qos.depth

@@ -159,9 +159,7 @@ def answered(payload: Payload) -> float:
 
 def _check_ankles(mode_pr: int, what: str) -> None:
     if mode_pr != hg.PR:
-        raise WireError(
-            f"The {what} has mode_pr {mode_pr}; only {hg.PR} (ankle pitch and roll) is supported."
-        )
+        raise WireError(f"The {what} has mode_pr {mode_pr}; only {hg.PR} (ankle pitch and roll) is supported.")
 
 
 def rpy(quat: Array) -> tuple[float, float, float]:

@@ -122,9 +122,7 @@ def command_motors(payload: Payload) -> NDArray[np.float32]:
 
 def command_modes(payload: Payload) -> bytes:
     """Return the mode bytes of the 27 motors of a `LowCmd_` of the right length."""
-    return bytes(payload[_HEADER + 2 : _HEADER + 3]) + bytes(
-        payload[_HEADER + 28 : _HEADER + 28 * NUM_JOINTS : 28]
-    )
+    return bytes(payload[_HEADER + 2 : _HEADER + 3]) + bytes(payload[_HEADER + 28 : _HEADER + 28 * NUM_JOINTS : 28])
 
 
 def all_on() -> bytearray:

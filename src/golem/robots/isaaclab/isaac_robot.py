@@ -305,9 +305,7 @@ class IsaacLabRobot(OtherEngineRobot):
         data, dt, joints = self.data, float(self._model.opt.timestep), self._joint_map
         targets = np.zeros(len(joints.q))
         targets[self._fingers_at] = -data.qpos[joints.q[self._cranks_at]]
-        reply = self._worker.ask(
-            q=targets, effort=joints.torques(data), wrench=data.xfrc_applied[self._links]
-        )
+        reply = self._worker.ask(q=targets, effort=joints.torques(data), wrench=data.xfrc_applied[self._links])
         data.time += dt
         root, base, torso = reply["root"], reply["base"], reply["torso"]
         self._follow(Motion(root[:3], root[3:], (base[:3], base[3:]), (torso[:3], torso[3:]), reply["q"]), dt)

@@ -105,16 +105,12 @@ class Simulation:
         config = sim_utils.SimulationCfg(device="cpu", dt=scene["dt"], physics=_physics(scene["backend"]))
         self._sim, self._dt = sim_utils.SimulationContext(config), scene["dt"]
         cfg = scenes.InteractiveSceneCfg(num_envs=1, env_spacing=1.0)
-        cfg.world = assets.AssetBaseCfg(
-            prim_path="/World/Hall", spawn=sim_utils.UsdFileCfg(usd_path=scene["world"])
-        )
+        cfg.world = assets.AssetBaseCfg(prim_path="/World/Hall", spawn=sim_utils.UsdFileCfg(usd_path=scene["world"]))
         cfg.robot = assets.ArticulationCfg(
             prim_path="{ENV_REGEX_NS}/Robot",
             spawn=sim_utils.UsdFileCfg(usd_path=scene["robot"], activate_contact_sensors=True),
             init_state=assets.ArticulationCfg.InitialStateCfg(pos=(0.0, 0.0, 2.0)),
-            actuators={
-                "all": actuators.ImplicitActuatorCfg(joint_names_expr=[".*"], stiffness=None, damping=None)
-            },
+            actuators={"all": actuators.ImplicitActuatorCfg(joint_names_expr=[".*"], stiffness=None, damping=None)},
         )
         cfg.contact = sensors.ContactSensorCfg(prim_path="{ENV_REGEX_NS}/Robot/.*", update_period=0.0)
         self._scene = scenes.InteractiveScene(cfg)
@@ -200,9 +196,7 @@ def _order(wanted: list[str], present: list[str], what: str) -> list[int]:
         ValueError: they are not the same names.
     """
     if sorted(wanted) != sorted(present):
-        raise ValueError(
-            f"Isaac Lab found other {what} than the scene has: {sorted(set(wanted) ^ set(present))}."
-        )
+        raise ValueError(f"Isaac Lab found other {what} than the scene has: {sorted(set(wanted) ^ set(present))}.")
     return [present.index(name) for name in wanted]
 
 

@@ -104,9 +104,7 @@ def robot_layer(model: mujoco.MjModel) -> str:
     root = model.body(BASE_LINK).id
     mine = model.body_rootid == model.body_rootid[root]
     if not mine[model.jnt_bodyid].all() or (model.body_mocapid >= 0).any():
-        raise ConfigError(
-            "In Isaac Lab only the robot moves: its worlds are those without a pack, kitchen or people."
-        )
+        raise ConfigError("In Isaac Lab only the robot moves: its worlds are those without a pack, kitchen or people.")
     prim = Prim(
         "Xform",
         ROBOT,
@@ -122,16 +120,11 @@ def robot_layer(model: mujoco.MjModel) -> str:
     place = mujoco.MjData(model)
     mujoco.mj_kinematics(model, place)
     origin = place.xpos[root]
-    sliding = {
-        float(model.geom_friction[g, 0]) for body in np.flatnonzero(mine) for g in touchable(model, body)
-    }
+    sliding = {float(model.geom_friction[g, 0]) for body in np.flatnonzero(mine) for g in touchable(model, body)}
     joints = Prim("Scope", "joints")  # apart, since a finger's link and its hinge have one name
     for body in np.flatnonzero(mine):
         name = model.body(body).name
-        shapes = [
-            _shape(model, g, _material(ROBOT, float(model.geom_friction[g, 0])))
-            for g in touchable(model, body)
-        ]
+        shapes = [_shape(model, g, _material(ROBOT, float(model.geom_friction[g, 0]))) for g in touchable(model, body)]
         prim.children.append(
             Prim(
                 "Xform",
@@ -172,9 +165,7 @@ def world_layer(model: mujoco.MjModel, friction: float) -> str:
     for body in np.flatnonzero(model.body_rootid != model.body_rootid[root]):
         shapes = [_shape(model, g, _material(HALL, friction)) for g in touchable(model, body)]
         if shapes:
-            hall.children.append(
-                Prim("Xform", f"body_{body}", (), placed(place.xpos[body], place.xquat[body]), shapes)
-            )
+            hall.children.append(Prim("Xform", f"body_{body}", (), placed(place.xpos[body], place.xquat[body]), shapes))
     return layer(hall)
 
 
@@ -246,9 +237,7 @@ def _joint(model: mujoco.MjModel, body: int) -> Prim:
     name = model.joint(j).name
     turn, inside = quat_to_axis(model.jnt_axis[j]), np.empty(4)
     mujoco.mju_mulQuat(inside, quat, turn)
-    stiffness, damping = (
-        FINGER_DRIVE if name in follower_names() else (0.0, float(model.dof_damping[v].sum()))
-    )
+    stiffness, damping = FINGER_DRIVE if name in follower_names() else (0.0, float(model.dof_damping[v].sum()))
     limits = {}
     if model.jnt_limited[j]:
         low, high = (repr(float(angle)) for angle in np.degrees(model.jnt_range[j]))

@@ -106,24 +106,11 @@ def body_shapes(feet: Feet = "spheres") -> list[Shape]:
             _shape(f"{side}_knee_link", _CAPSULE, [0.046, 0.15], [0, 0, -0.18], name=f"{side}_shin"),
             _shape(f"{side}_shoulder_pitch_link", _CAPSULE, [0.04, 0.03], [0, s * 0.055, -0.006], "y"),
             _shape(f"{side}_shoulder_roll_link", _CAPSULE, [0.045, 0.05], [-0.034, 0, -0.05]),
+            _shape(f"{side}_shoulder_yaw_link", _CAPSULE, [0.04, 0.08], [0.003, 0, -0.1], name=f"{side}_upper_arm"),
             _shape(
-                f"{side}_shoulder_yaw_link",
-                _CAPSULE,
-                [0.04, 0.08],
-                [0.003, 0, -0.1],
-                name=f"{side}_upper_arm",
+                f"{side}_elbow_link", _CAPSULE, [0.042, 0.055], [0.03, s * -0.03, -0.003], "x", name=f"{side}_forearm"
             ),
-            _shape(
-                f"{side}_elbow_link",
-                _CAPSULE,
-                [0.042, 0.055],
-                [0.03, s * -0.03, -0.003],
-                "x",
-                name=f"{side}_forearm",
-            ),
-            _shape(
-                f"{side}_wrist_roll_link", _CAPSULE, [0.035, 0.02], [0.05, 0, 0], "x", name=f"{side}_wrist"
-            ),
+            _shape(f"{side}_wrist_roll_link", _CAPSULE, [0.035, 0.02], [0.05, 0, 0], "x", name=f"{side}_wrist"),
             _shape(f"{side}_wrist_yaw_link", _CYLINDER, [0.042, 0.028], [0.026, 0, 0], "x"),
             # The adapter disc between wrist and hand (correlllab/h1_mujoco).
             _shape(f"{side}_wrist_yaw_link", _CYLINDER, [0.032, 0.0125], [0.0665, 0, 0], "x"),
@@ -134,9 +121,7 @@ def body_shapes(feet: Feet = "spheres") -> list[Shape]:
         for x in SOLE.x:
             for y in SOLE.y:
                 center = [x, y, SOLE.z + FOOT_SPHERE]
-                shapes.append(
-                    _shape(f"{side}_ankle_roll_link", _SPHERE, [FOOT_SPHERE], center, friction=FOOT_FRICTION)
-                )
+                shapes.append(_shape(f"{side}_ankle_roll_link", _SPHERE, [FOOT_SPHERE], center, friction=FOOT_FRICTION))
     return shapes
 
 
@@ -180,9 +165,7 @@ def self_pairs(hands: bool) -> list[tuple[str, str]]:
     arm = _ARM if hands else _ARM[:-1]
     pairs += [(f"{side}_{part}", other) for side in SIDES for part in arm for other in _ARM_MEETS[part]]
     # An upper arm is out of the other upper arm's reach.
-    pairs += [
-        (f"left_{a}", f"right_{b}") for a, b in product(arm, arm) if (a, b) != ("upper_arm", "upper_arm")
-    ]
+    pairs += [(f"left_{a}", f"right_{b}") for a, b in product(arm, arm) if (a, b) != ("upper_arm", "upper_arm")]
     return pairs
 
 
@@ -194,8 +177,5 @@ def housing_shape(link: str) -> Shape:
 def blade_shape(link: str, finger: magpie_model.Finger) -> Shape:
     """Return a finger without its pad, in the finger frame."""
     return _shape(
-        link,
-        _BOX,
-        [0.008, 0.006, 0.04],
-        magpie_model.mirror(finger, np.array([0.003, -0.0147, 0.0413])).tolist(),
+        link, _BOX, [0.008, 0.006, 0.04], magpie_model.mirror(finger, np.array([0.003, -0.0147, 0.0413])).tolist()
     )

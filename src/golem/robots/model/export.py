@@ -117,16 +117,11 @@ def export_urdf(hands: bool) -> str:
 _FORMATS: dict[str, Callable[[bool], str]] = {"mjcf": export_mjcf, "urdf": export_urdf}
 
 
-def _finger(
-    robot: ElementTree.Element, hand: str, crank: str, blade: str, finger: magpie_model.Finger
-) -> None:
+def _finger(robot: ElementTree.Element, hand: str, crank: str, blade: str, finger: magpie_model.Finger) -> None:
     mirrored = finger == "b"
     inertials = [i.mirrored() if mirrored else i for i in (magpie_model.CRANK, magpie_model.FINGER)]
     pad = Shape(
-        blade,
-        mjtGeom.mjGEOM_BOX,
-        magpie_model.PAD_HALF_SIZE,
-        magpie_model.mirror(finger, magpie_model.PAD_CENTER),
+        blade, mjtGeom.mjGEOM_BOX, magpie_model.PAD_HALF_SIZE, magpie_model.mirror(finger, magpie_model.PAD_CENTER)
     )
     _link(robot, crank, inertials[0], [])
     _link(robot, blade, inertials[1], [contact_shapes.blade_shape(blade, finger), pad])
@@ -182,9 +177,7 @@ def _geometry(link: ElementTree.Element, tag: str, shape: Shape) -> None:
                 add("sphere", end, level, radius=repr(radius))
 
 
-def _joint(
-    robot: ElementTree.Element, name: str, kind: str, parent: str, child: str, T: Array
-) -> ElementTree.Element:
+def _joint(robot: ElementTree.Element, name: str, kind: str, parent: str, child: str, T: Array) -> ElementTree.Element:
     joint = ElementTree.SubElement(robot, "joint", name=name, type=kind)
     _origin(joint, T)
     ElementTree.SubElement(joint, "parent", link=parent)
@@ -192,9 +185,7 @@ def _joint(
     return joint
 
 
-def _hinge(
-    joint: ElementTree.Element, axis: Array, lower: float, upper: float, effort: float, velocity: float
-) -> None:
+def _hinge(joint: ElementTree.Element, axis: Array, lower: float, upper: float, effort: float, velocity: float) -> None:
     ElementTree.SubElement(joint, "axis", xyz=_numbers(axis))
     values = {"lower": lower, "upper": upper, "effort": effort, "velocity": velocity}
     ElementTree.SubElement(joint, "limit", {key: repr(float(value)) for key, value in values.items()})

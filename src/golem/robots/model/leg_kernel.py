@@ -202,9 +202,7 @@ def _backward(
         mass, m0, m1, m2 = mass + m, m0 + m * c0, m1 + m * c1, m2 + m * c2
         u, v, w = m0 - mass * x, m1 - mass * y, m2 - mass * z
         out.gravity[leg, i] = -(
-            a0 * (v * field[2] - w * field[1])
-            + a1 * (w * field[0] - u * field[2])
-            + a2 * (u * field[1] - v * field[0])
+            a0 * (v * field[2] - w * field[1]) + a1 * (w * field[0] - u * field[2]) + a2 * (u * field[1] - v * field[0])
         )
         u, v, w = out.soles[leg, 0] - x, out.soles[leg, 1] - y, out.soles[leg, 2] - z
         out.jacobians[leg, 0, i] = a1 * w - a2 * v
@@ -262,11 +260,7 @@ def tree_gravity(tree: Record, q: Array, field: Array, out: Array) -> None:
                 at += R[i, a, c] * tree.com[i, c]
             moment[i, a] = mass[i] * at
     for i in range(n - 1, -1, -1):
-        x, y, z = (
-            moment[i, 0] - mass[i] * p[i, 0],
-            moment[i, 1] - mass[i] * p[i, 1],
-            moment[i, 2] - mass[i] * p[i, 2],
-        )
+        x, y, z = (moment[i, 0] - mass[i] * p[i, 0], moment[i, 1] - mass[i] * p[i, 1], moment[i, 2] - mass[i] * p[i, 2])
         out[i] = -(
             axes[i, 0] * (y * field[2] - z * field[1])
             + axes[i, 1] * (z * field[0] - x * field[2])

@@ -22,10 +22,7 @@ GeometryChoice = Literal["visual", "collision"]
 GEOMETRY_CHOICES: tuple[GeometryChoice, ...] = ("visual", "collision")
 """Which surfaces of a link count: what is seen, or what touches. A link without the chosen ones gives the others."""
 JointKind = Literal["fixed", "hinge", "slide"]
-_KINDS: dict[int, JointKind] = {
-    int(mujoco.mjtJoint.mjJNT_HINGE): "hinge",
-    int(mujoco.mjtJoint.mjJNT_SLIDE): "slide",
-}
+_KINDS: dict[int, JointKind] = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
 _UNBOUNDED = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD, mujoco.mjtGeom.mjGEOM_SDF)
 _WORLD = "world"
 _PREFIX = re.compile(rb"(</?|\s)([A-Za-z_][\w.-]*):(?=[A-Za-z_][\w.-]*[\s=/>])")
@@ -105,9 +102,7 @@ def read_geometry(
         text = file.read_bytes()
         try:
             root = ET.fromstring(text)
-        except (
-            ET.ParseError
-        ):  # names of a space that the file does not declare, which readers of URDF let pass
+        except ET.ParseError:  # names of a space that the file does not declare, which readers of URDF let pass
             root = ET.fromstring(_PREFIX.sub(rb"\1\2_", text))
     except (OSError, ET.ParseError, ValueError, LookupError) as error:
         why = getattr(error, "strerror", None) or f"it is no XML ({error})"
@@ -166,9 +161,7 @@ def geometry_of(model: mujoco.MjModel, name: str, choice: GeometryChoice) -> Rob
             links.append(_link(own, parent, T, parts))
         for j in moving:
             outermost = j == moving[-1]
-            links.append(
-                _moved(model, j, own if outermost else f"{own}:{j}", parent, T, parts if outermost else ())
-            )
+            links.append(_moved(model, j, own if outermost else f"{own}:{j}", parent, T, parts if outermost else ()))
             parent, T = len(links) - 1, np.eye(4)
         last[body] = len(links) - 1
     links, wrong = led(links)
@@ -187,9 +180,7 @@ def led(links: Sequence[LinkGeometry]) -> tuple[list[LinkGeometry], list[str]]:
         while own.leader:
             above = by_joint.get(own.leader)
             if above is None or above.joint in seen:
-                wrong.append(
-                    f"joint '{link.joint}' follows '{own.leader}', which is no joint that moves by itself"
-                )
+                wrong.append(f"joint '{link.joint}' follows '{own.leader}', which is no joint that moves by itself")
                 break
             if not above.leader:
                 break
@@ -229,9 +220,7 @@ def _moved(
         upper = float(np.pi) if kind == "hinge" else 1.0
         lower = -upper
     axis, anchor = model.jnt_axis[joint].copy(), model.jnt_pos[joint].copy()
-    link = LinkGeometry(
-        name, parent, T, title, kind, axis, anchor, lower, upper, parts, *_leader(model, joint)
-    )
+    link = LinkGeometry(name, parent, T, title, kind, axis, anchor, lower, upper, parts, *_leader(model, joint))
     # The file's pose is that at the joint's `ref`.
     return replace(link, T_parent_link=joint_pose(link, -float(model.qpos0[model.jnt_qposadr[joint]])))
 
@@ -243,22 +232,14 @@ def _leader(model: mujoco.MjModel, joint: int) -> tuple[str, float, float]:
         ConfigError: it follows by a polynomial that is no line.
     """
     for k in range(model.neq):
-        if (
-            model.eq_type[k] != mujoco.mjtEq.mjEQ_JOINT
-            or not model.eq_active0[k]
-            or model.eq_obj1id[k] != joint
-        ):
+        if model.eq_type[k] != mujoco.mjtEq.mjEQ_JOINT or not model.eq_active0[k] or model.eq_obj1id[k] != joint:
             continue
         other, line = int(model.eq_obj2id[k]), model.eq_data[k, :5]
         if other < 0 or line[2:].any():
             raise ConfigError(f"Joint '{model.joint(joint).name}' follows no other by a straight line.")
         own, lead = (float(model.qpos0[model.jnt_qposadr[j]]) for j in (joint, other))
         # MuJoCo's line is between the ways from `ref`.
-        return (
-            model.joint(other).name or f"joint_{other}",
-            float(line[1]),
-            float(own + line[0] - line[1] * lead),
-        )
+        return (model.joint(other).name or f"joint_{other}", float(line[1]), float(own + line[0] - line[1] * lead))
     return "", 1.0, 0.0
 
 
@@ -288,8 +269,6 @@ def _parts(model: mujoco.MjModel, body: int, choice: GeometryChoice) -> tuple[Su
     chosen, others = (seen, touching) if choice == "visual" else (touching, seen)
     parts: list[SurfacePart] = []
     for geom in chosen or others:
-        mesh = geom_mesh(model, geom).apply_transform(
-            pose_matrix(model.geom_pos[geom], model.geom_quat[geom])
-        )
+        mesh = geom_mesh(model, geom).apply_transform(pose_matrix(model.geom_pos[geom], model.geom_quat[geom]))
         parts.append(SurfacePart(np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)))
     return tuple(parts)

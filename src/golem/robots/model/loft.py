@@ -48,10 +48,7 @@ class Loft:
         angle = (np.arange(n) + 0.5) * 2.0 * np.pi / n
         circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
         unit = np.sign(circle) * np.abs(circle) ** (2.0 / self.power)
-        rings = [
-            np.column_stack([np.full(n, s), unit * (ru, rv) + (cu, cv)])
-            for s, cu, cv, ru, rv in self.sections
-        ]
+        rings = [np.column_stack([np.full(n, s), unit * (ru, rv) + (cu, cv)]) for s, cu, cv, ru, rv in self.sections]
         here = np.arange(n)
         following = (here + 1) % n
         faces: list[NDArray[np.int64]] = []
@@ -73,9 +70,7 @@ class Loft:
         return np.ascontiguousarray(swu[:, order]), np.concatenate(faces).astype(np.int32)
 
 
-def ring(
-    half_width: float, half_height: float, tube: float, segments: int = 28
-) -> tuple[Array, NDArray[np.int32]]:
+def ring(half_width: float, half_height: float, tube: float, segments: int = 28) -> tuple[Array, NDArray[np.int32]]:
     """Return the mesh of an oval ring in the yz plane: half axes to the middle of the tube, and its radius [m]."""
     sides = 8
     t = np.arange(segments) * 2.0 * np.pi / segments

@@ -296,9 +296,7 @@ def add_looks(spec: mujoco.MjSpec, hands: bool) -> None:
         else:
             size = [*part.shape.size, 0.0, 0.0][:3]
             quat = quat_of(_turned(part.shape.along))
-            _add_geom(
-                body, part.material, kind=_KINDS[part.shape.kind], size=size, pos=part.shape.pos, quat=quat
-            )
+            _add_geom(body, part.material, kind=_KINDS[part.shape.kind], size=size, pos=part.shape.pos, quat=quat)
 
 
 def _turned(along: Sequence[float]) -> Array:

@@ -74,9 +74,7 @@ def package_folders(options: tuple[str, ...]) -> dict[str, Path]:
     for option in options:
         name, sign, folder = option.partition("=")
         if not (name and sign and Path(folder).expanduser().is_dir()):
-            raise ConfigError(
-                f"--package takes NAME=FOLDER, the folder of a package that exists, not '{option}'."
-            )
+            raise ConfigError(f"--package takes NAME=FOLDER, the folder of a package that exists, not '{option}'.")
         found[name] = Path(folder).expanduser()
     return found
 

@@ -118,9 +118,7 @@ def _add_motor(spec: mujoco.MjSpec, joint: str, limit: float) -> None:
     motor.set_to_motor()
 
 
-def _add_shape(
-    body: mujoco.MjsBody, shape: Shape, contype: int, conaffinity: int = contact_shapes.WORLD
-) -> None:
+def _add_shape(body: mujoco.MjsBody, shape: Shape, contype: int, conaffinity: int = contact_shapes.WORLD) -> None:
     body.add_geom(
         name=shape.name,
         type=shape.kind,
@@ -179,9 +177,7 @@ def _add_finger(spec: mujoco.MjSpec, hand: mujoco.MjsBody, side: Side, finger: m
     if finger == "b":
         inertials = magpie_model.CRANK.mirrored(), magpie_model.FINGER.mirrored()
     crank = _add_body(hand, crank_name, inertials[0], magpie_model.mirror(finger, magpie_model.CRANK_PIVOT))
-    blade = _add_body(
-        crank, finger_name, inertials[1], magpie_model.mirror(finger, magpie_model.FINGER_PIVOT)
-    )
+    blade = _add_body(crank, finger_name, inertials[1], magpie_model.mirror(finger, magpie_model.FINGER_PIVOT))
     crank.add_joint(
         name=crank_name,
         type=mujoco.mjtJoint.mjJNT_HINGE,

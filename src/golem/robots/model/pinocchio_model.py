@@ -40,9 +40,7 @@ def build(hands: bool = True, free_base: bool = False) -> pin.Model:
     for joint in JOINTS:
         limits = [np.array([x]) for x in (joint.torque["urdf"], joint.velocity, joint.lower, joint.upper)]
         hinge = _HINGES[int(np.argmax(joint.axis))]()
-        index = model.addJoint(
-            placed[joint.parent], hinge, pin.SE3(joint.T_parent_joint), joint.name, *limits
-        )
+        index = model.addJoint(placed[joint.parent], hinge, pin.SE3(joint.T_parent_joint), joint.name, *limits)
         model.addJointFrame(index)
         model.appendBodyToJoint(index, _inertia(LINKS[joint.child]), pin.SE3.Identity())
         placed[joint.child] = index
@@ -65,7 +63,5 @@ def _inertia(body: Inertial) -> pin.Inertia:
     return pin.Inertia(body.mass, body.com, body.inertia)
 
 
-def _add_frame(
-    model: pin.Model, name: str, joint: int, T: Array, kind: pin.FrameType = pin.FrameType.OP_FRAME
-) -> None:
+def _add_frame(model: pin.Model, name: str, joint: int, T: Array, kind: pin.FrameType = pin.FrameType.OP_FRAME) -> None:
     model.addFrame(pin.Frame(name, joint, pin.SE3(T), kind), False)

@@ -86,9 +86,7 @@ def _joint(row: dict[str, Any]) -> Joint:
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """The same in C, where PyYAML has it: every process reads the table."""
-_DATA: dict[str, Any] = yaml.load(
-    (files(__package__ or "") / "h12.yaml").read_text(encoding="utf-8"), _LOADER
-)
+_DATA: dict[str, Any] = yaml.load((files(__package__ or "") / "h12.yaml").read_text(encoding="utf-8"), _LOADER)
 
 JOINTS: tuple[Joint, ...] = tuple(_joint(row) for row in _DATA["joints"])
 """The 27 joints in the motor order of the vendor's SDK."""

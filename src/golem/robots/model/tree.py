@@ -49,18 +49,13 @@ def _fingers() -> list[Hinge]:
         for finger in magpie_model.FINGERS:
             crank, blade, _ = magpie_model.finger_names(side, finger)
             axis = np.array([1.0 if finger == "a" else -1.0, 0.0, 0.0])
-            pivot, tip = (
-                magpie_model.mirror(finger, p) for p in (magpie_model.CRANK_PIVOT, magpie_model.FINGER_PIVOT)
-            )
+            pivot, tip = (magpie_model.mirror(finger, p) for p in (magpie_model.CRANK_PIVOT, magpie_model.FINGER_PIVOT))
             out.append(Hinge(magpie_model.hand_name(side), crank, transform(pivot), crank + "_joint", axis))
             out.append(Hinge(crank, blade, transform(tip), blade + "_joint", axis))
     return out
 
 
-HINGES: tuple[Hinge, ...] = (
-    *(Hinge(j.parent, j.child, j.T_parent_joint, j.name, j.axis) for j in JOINTS),
-    *_fingers(),
-)
+HINGES: tuple[Hinge, ...] = (*(Hinge(j.parent, j.child, j.T_parent_joint, j.name, j.axis) for j in JOINTS), *_fingers())
 """Every hinge: the 27 joints in motor order, then the fingers."""
 FIXED: tuple[Edge, ...] = (
     Edge("base_link", BASE_LINK, np.eye(4)),

@@ -30,12 +30,7 @@ from golem.robots.model.mesh_file import find_mesh, read_mesh
 from golem.robots.model.spatial import rotation_rpy, transform
 from golem.types import Array
 
-KINDS: dict[str, JointKind] = {
-    "fixed": "fixed",
-    "revolute": "hinge",
-    "continuous": "hinge",
-    "prismatic": "slide",
-}
+KINDS: dict[str, JointKind] = {"fixed": "fixed", "revolute": "hinge", "continuous": "hinge", "prismatic": "slide"}
 NAMED = 12
 """How many findings a message names."""
 UNLIMITED: dict[JointKind, float] = {"fixed": 0.0, "hinge": math.pi, "slide": 1.0}
@@ -79,11 +74,7 @@ class _Reader:
             shapes = [
                 (element, shape)
                 for element in link.findall(kind)
-                if (
-                    shape := next(
-                        (s for n in _SHAPES if (s := element.find(f"geometry/{n}")) is not None), None
-                    )
-                )
+                if (shape := next((s for n in _SHAPES if (s := element.find(f"geometry/{n}")) is not None), None))
                 is not None
             ]
             if shapes:
@@ -125,9 +116,7 @@ class _Reader:
         name, kind = element.get("name", ""), element.get("type", "")
         where = f"joint '{name}'"
         if kind not in KINDS and kind != "planar":
-            self.findings.append(
-                f"{where} is {kind or 'of no kind'}; links hang on planar, {', '.join(KINDS)}"
-            )
+            self.findings.append(f"{where} is {kind or 'of no kind'}; links hang on planar, {', '.join(KINDS)}")
             return []
         T, axis = self.pose(element, where), self.numbers(element.find("axis"), "xyz", "1 0 0", where)
         length = float(np.linalg.norm(axis))
@@ -148,9 +137,7 @@ class _Reader:
         bound = UNLIMITED[KINDS[kind]]
         lower, upper = -bound, bound
         if kind in ("revolute", "prismatic") and limit is not None:
-            lower, upper = (
-                _bound(limit.get(key, "0"), s * bound) for key, s in (("lower", -1), ("upper", 1))
-            )
+            lower, upper = (_bound(limit.get(key, "0"), s * bound) for key, s in (("lower", -1), ("upper", 1)))
         if lower > upper:
             self.findings.append(f"{where}: its lower limit {lower:g} is above its upper limit {upper:g}")
         mimic = element.find("mimic")
@@ -161,14 +148,10 @@ class _Reader:
             offset = float(self.numbers(mimic, "offset", "0", where)[0])
         title = "" if kind == "fixed" else name
         turns = KINDS[kind]
-        return [
-            LinkGeometry("", -1, T, title, turns, axis, np.zeros(3), lower, upper, (), leader, ratio, offset)
-        ]
+        return [LinkGeometry("", -1, T, title, turns, axis, np.zeros(3), lower, upper, (), leader, ratio, offset)]
 
 
-def read_urdf(
-    root: ET.Element, file: Path, choice: GeometryChoice, packages: Mapping[str, Path]
-) -> RobotGeometry:
+def read_urdf(root: ET.Element, file: Path, choice: GeometryChoice, packages: Mapping[str, Path]) -> RobotGeometry:
     """Return the links of a URDF; see `read_geometry`.
 
     A joint whose limits are equal stays where they are.
@@ -194,9 +177,7 @@ def read_urdf(
         ("link", [link.get("name", "") for link in root.findall("link")]),
         ("joint", [joint.get("name", "") for joint in joints]),
     ):
-        findings += [
-            f"{what} '{name}' occurs twice" for name in sorted({n for n in names if names.count(n) > 1})
-        ]
+        findings += [f"{what} '{name}' occurs twice" for name in sorted({n for n in names if names.count(n) > 1})]
     below: dict[str, list[tuple[str, ET.Element]]] = {name: [] for name in elements}
     above: dict[str, str] = {}
     for joint in joints:

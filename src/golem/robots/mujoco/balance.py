@@ -159,8 +159,7 @@ class BalanceTrace:
         """Write the trace as a compressed npz with one float32 array per attribute; the folder is made."""
         path.parent.mkdir(parents=True, exist_ok=True)
         arrays = {
-            f.name: a if (a := getattr(self, f.name)).dtype == bool else a.astype(np.float32)
-            for f in fields(self)
+            f.name: a if (a := getattr(self, f.name)).dtype == bool else a.astype(np.float32) for f in fields(self)
         }
         part = path.with_suffix(".part")
         with part.open("wb") as file:
@@ -172,10 +171,7 @@ class BalanceTrace:
         """Return the trace that `save` wrote."""
         with np.load(path) as stored:
             return cls(
-                *(
-                    stored[f.name] if f.name == "contact" else stored[f.name].astype(np.float64)
-                    for f in fields(cls)
-                )
+                *(stored[f.name] if f.name == "contact" else stored[f.name].astype(np.float64) for f in fields(cls))
             )
 
 

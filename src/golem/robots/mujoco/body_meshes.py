@@ -87,11 +87,7 @@ def _surface(surface: Look, pieces: list[trimesh.Trimesh]) -> trimesh.Trimesh:
         alphaMode="OPAQUE" if rgba[3] >= 1.0 else "BLEND",
     )
     return trimesh.Trimesh(
-        joined.vertices,
-        joined.faces,
-        vertex_normals=normals,
-        visual=TextureVisuals(material=material),
-        process=False,
+        joined.vertices, joined.faces, vertex_normals=normals, visual=TextureVisuals(material=material), process=False
     )
 
 

@@ -13,9 +13,7 @@ from golem.robots.mujoco.hoist import HoistConfig
 from golem.robots.worlds.conditions import LayoutKind, check_condition
 
 Support = Literal["hoist", "ground"]
-World = Literal[
-    "pack", "plant", "open", "slope", "step", "rubble", "furnished", "corridor", "kitchen", "counter"
-]
+World = Literal["pack", "plant", "open", "slope", "step", "rubble", "furnished", "corridor", "kitchen", "counter"]
 WITH_PACK = ("pack", "plant")
 """Worlds with a pack to work on."""
 KITCHENS = ("kitchen", "counter")
@@ -123,17 +121,13 @@ class MujocoConfig:
             check_condition(name, value)
         varied = self.layout != "nominal" and self.world not in KITCHENS
         if self.world not in WITH_PACK and (self.conditions or varied):
-            raise ConfigError(
-                f"The world '{self.world}' has no pack whose layout or conditions could differ."
-            )
+            raise ConfigError(f"The world '{self.world}' has no pack whose layout or conditions could differ.")
         if (self.mirrored or self.sizes) and self.world != "counter":
             raise ConfigError(
                 f"Only a counter's things are mirrored or of other sizes, not those of the world '{self.world}'."
             )
         if self.world in KITCHENS and self.stance[2] != 0.0:
-            raise ConfigError(
-                f"The twin's stance before a {self.world} has the yaw 0, not {self.stance[2]:g}."
-            )
+            raise ConfigError(f"The twin's stance before a {self.world} has the yaw 0, not {self.stance[2]:g}.")
         own = (self.feet, self.torque_profile, self.self_collision)
         if self.mjcf is not None and own != ("spheres", "urdf", None):
             raise ConfigError(

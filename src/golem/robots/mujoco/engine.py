@@ -91,12 +91,10 @@ class MujocoRobot:
         self._errors = sample_episode(self.profile, stream(seed, "episode"))
         # The cameras are where the model has them; it is the calibration that is wrong.
         self.calibration: dict[str, Array] = {
-            name: np.asarray(np.linalg.inv(T), dtype=np.float64)
-            for name, T in self._errors.T_nominal_actual.items()
+            name: np.asarray(np.linalg.inv(T), dtype=np.float64) for name, T in self._errors.T_nominal_actual.items()
         }
         self._depth = {
-            name: StereoDepth(info, self.profile.depth, stream(seed, f"depth/{name}"))
-            for name, info in CAMERAS.items()
+            name: StereoDepth(info, self.profile.depth, stream(seed, f"depth/{name}")) for name, info in CAMERAS.items()
         }
         conditions = self.scene.conditions
         self._exposure = {

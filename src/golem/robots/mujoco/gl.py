@@ -71,9 +71,7 @@ def shared_context() -> GlContext:
         backend = choose_backend()
         try:
             _shared = importlib.import_module(f"mujoco.{backend}").GLContext(1, 1)
-        except (
-            Exception
-        ) as error:  # PyOpenGL reports absent libraries as AttributeError, ImportError or GLError
+        except Exception as error:  # PyOpenGL reports absent libraries as AttributeError, ImportError or GLError
             raise _missing(backend, f"no context ({type(error).__name__})") from error
     assert _shared is not None
     _shared.make_current()

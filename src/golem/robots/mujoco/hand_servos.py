@@ -108,9 +108,7 @@ class HandServos:
             row["gap"] = command.gap
             closes = command.gap <= 0.0
             row["goal"] = (
-                magpie_model.CLOSED + OVERTRAVEL
-                if closes
-                else float(magpie_model.crank_from_gap(command.gap))
+                magpie_model.CLOSED + OVERTRAVEL if closes else float(magpie_model.crank_from_gap(command.gap))
             )
         row["force"] = min(max(command.force, magpie_model.MIN_FORCE), magpie_model.MAX_FORCE)
         row["commanded"] = 1

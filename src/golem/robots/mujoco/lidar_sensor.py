@@ -64,13 +64,7 @@ class LidarSensor:
     """
 
     def __init__(
-        self,
-        scene: Scene,
-        profile: str,
-        seed: int,
-        *,
-        mount: Array | None = None,
-        dropout: float | None = None,
+        self, scene: Scene, profile: str, seed: int, *, mount: Array | None = None, dropout: float | None = None
     ) -> None:
         """Hang the sensor on the torso of the robot in `scene`.
 
@@ -159,10 +153,7 @@ class LidarSensor:
         """Return orientation (4,) and angular rate (3,) of the torso [rad/s], and velocity (3,) of base_link [m/s]."""
         q, v = moment.qpos, moment.qvel
         torso, rate = torso_motion(
-            q[self._q + 3 : self._q + 7],
-            v[self._v + 3 : self._v + 6],
-            float(q[self._waist]),
-            float(v[self._waist_v]),
+            q[self._q + 3 : self._q + 7], v[self._v + 3 : self._v + 6], float(q[self._waist]), float(v[self._waist_v])
         )
         return torso, rate, v[self._v : self._v + 3]
 
@@ -182,10 +173,7 @@ class LidarSensor:
         else:
             rays_true = rays
         distance = np.empty(n)
-        azimuth, slack = (
-            2.0 * np.pi * np.mod(TURNS * (start + offsets), 1.0),
-            SLACK + 6.0 * errors.direction_noise,
-        )
+        azimuth, slack = (2.0 * np.pi * np.mod(TURNS * (start + offsets), 1.0), SLACK + 6.0 * errors.direction_noise)
         times = np.array([m.t for m in track]) - start
         edges = np.searchsorted(offsets, 0.5 * (times[1:] + times[:-1]))
         edges = np.concatenate([[0], edges, [n]])
@@ -211,9 +199,7 @@ class LidarSensor:
             if self._others:
                 self._cast_others(origin, world, distance[part])
         ranges = distance + errors.range_noise * noise[:, 0]
-        kept = (
-            (distance >= 0.0) & (distance > errors.near) & (distance < errors.far) & (lost >= errors.dropout)
-        )
+        kept = (distance >= 0.0) & (distance > errors.near) & (distance < errors.far) & (lost >= errors.dropout)
         points = (rays[kept] * ranges[kept, None]).astype(np.float32)
         return LidarScan(start + SCAN, points, offsets[kept].astype(np.float32), SCAN)
 
@@ -222,18 +208,7 @@ class LidarSensor:
         n = len(rays)
         other, hit = np.empty(n), np.empty(n, dtype=np.int32)
         mujoco.mj_multiRay(
-            self._model,
-            self._data,
-            origin,
-            rays.ravel(),
-            _GROUPS,
-            True,
-            -1,
-            hit,
-            other,
-            None,
-            n,
-            self.errors.far,
+            self._model, self._data, origin, rays.ravel(), _GROUPS, True, -1, hit, other, None, n, self.errors.far
         )
         nearer = (hit >= 0) & ((distance < 0.0) | (other < distance))
         distance[nearer] = other[nearer]

@@ -18,14 +18,7 @@ from golem.robots.sensors.profiles import RealismProfile
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds import furnished, terrain
 from golem.robots.worlds.clutter import add_clutter
-from golem.robots.worlds.conditions import (
-    REACH_Y,
-    Conditions,
-    arranged,
-    draw_conditions,
-    draw_fasteners,
-    world_stream,
-)
+from golem.robots.worlds.conditions import REACH_Y, Conditions, arranged, draw_conditions, draw_fasteners, world_stream
 from golem.robots.worlds.dressing import dress
 from golem.robots.worlds.fridge import Seal, seal_of
 from golem.robots.worlds.furnished import Person
@@ -44,9 +37,7 @@ STICTION = 100.0
 apart under the legs' side load, 25 mm in 20 s of standing, which no odometry from planted feet can see; at 100 it is
 a millimetre."""
 
-ONLOOKER = CameraInfo(
-    "onlooker", 640, 480, fx=700.0, fy=700.0, cx=319.5, cy=239.5, near=0.0, far=60.0, rate=15.0
-)
+ONLOOKER = CameraInfo("onlooker", 640, 480, fx=700.0, fy=700.0, cx=319.5, cy=239.5, near=0.0, far=60.0, rate=15.0)
 """A camera beside the pack, for pictures of what happened; in a world without a pack it goes along with the robot."""
 
 
@@ -100,14 +91,10 @@ def build_scene(config: MujocoConfig, layout: PackLayout, profile: RealismProfil
         if config.mjcf is None:
             raise
         why = " ".join(str(error).split())
-        raise ConfigError(
-            f"The robot '{config.mjcf}' does not fit into the world '{config.world}': {why}."
-        ) from error
+        raise ConfigError(f"The robot '{config.mjcf}' does not fit into the world '{config.world}': {why}.") from error
 
 
-def _build(
-    spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profile: RealismProfile, seed: int
-) -> Scene:
+def _build(spec: mujoco.MjSpec, config: MujocoConfig, layout: PackLayout, profile: RealismProfile, seed: int) -> Scene:
     draws: list[ScrewDraw] = []
     people: tuple[Person, ...] = ()
     kitchen: KitchenLayout | None = None
@@ -162,9 +149,7 @@ def _robot(config: MujocoConfig) -> mujoco.MjSpec:
         spec = foreign_robot(config.mjcf)
     else:
         spec = mjcf.robot_spec(
-            torque=config.torque_profile,
-            self_collision=config.self_collision is not False,
-            feet=config.feet,
+            torque=config.torque_profile, self_collision=config.self_collision is not False, feet=config.feet
         )
     for side in SIDES:
         for geom in spec.body(f"{side}_ankle_roll_link").geoms:

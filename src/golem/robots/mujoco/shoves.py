@@ -49,9 +49,7 @@ class Push:
         if not 0.0 <= elapsed < self.duration:
             return np.zeros(3)
         share = elapsed / self.duration
-        size = (
-            self.peak * {"constant": 1.0, "half_sine": math.sin(math.pi * share), "ramp": share}[self.shape]
-        )
+        size = self.peak * {"constant": 1.0, "half_sine": math.sin(math.pi * share), "ramp": share}[self.shape]
         angle = yaw + self.bearing
         return size * np.array([math.cos(angle), math.sin(angle), 0.0])
 
@@ -63,9 +61,7 @@ class Push:
     @property
     def impulse(self) -> float:
         """Its impulse [N s]."""
-        return (
-            self.peak * self.duration * {"constant": 1.0, "half_sine": 2.0 / math.pi, "ramp": 0.5}[self.shape]
-        )
+        return self.peak * self.duration * {"constant": 1.0, "half_sine": 2.0 / math.pi, "ramp": 0.5}[self.shape]
 
 
 def rod(direction: str, peak: float) -> Push:

@@ -58,9 +58,7 @@ class Shot:
         """Return the intrinsics of the shot for a picture of `size` (width, height) [px]."""
         width, height = size
         focal = 0.5 * height / np.tan(0.5 * np.radians(self.fovy))
-        return CameraInfo(
-            name, width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1), 0.0, 60.0, 0.0
-        )
+        return CameraInfo(name, width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1), 0.0, 60.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,4 @@ def add_tag_cuffs(spec: mujoco.MjSpec) -> None:
                     # Centred on the plate's face, so that half of it stands out.
                     place = (T[:3, :3] @ (x, y, 0.0) + T[:3, 3]).tolist()
                     size = (0.5 * (end - begin) * cell, 0.5 * cell, PROUD)
-                    parts.visual(
-                        hand, mujoco.mjtGeom.mjGEOM_BOX, size, place, material="", quat=quat, rgba=BLACK
-                    )
+                    parts.visual(hand, mujoco.mjtGeom.mjGEOM_BOX, size, place, material="", quat=quat, rgba=BLACK)

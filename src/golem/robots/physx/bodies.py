@@ -13,12 +13,7 @@ import numpy as np
 from golem.errors import ConfigError, MissingExtra
 from golem.robots.model.spatial import quat_to_axis
 from golem.robots.model.table import BASE_LINK
-from golem.robots.mujoco.other_engine import (
-    CONTACT_OFFSET,
-    POSITION_ITERATIONS,
-    VELOCITY_ITERATIONS,
-    touchable,
-)
+from golem.robots.mujoco.other_engine import CONTACT_OFFSET, POSITION_ITERATIONS, VELOCITY_ITERATIONS, touchable
 from golem.types import Array
 
 _ALONG_X = np.array([np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0])
@@ -89,9 +84,7 @@ def build_bodies(model: mujoco.MjModel, friction: float) -> PhysxBodies:
     system = physx.PhysxCpuSystem()
     scene = sapien.Scene([system])
     links: dict[int, Any] = {}
-    robot: list[
-        Any
-    ] = []  # an entity lives as long as somebody holds it; it joins the scene once the robot is whole
+    robot: list[Any] = []  # an entity lives as long as somebody holds it; it joins the scene once the robot is whole
     kinematic: dict[int, Any] = {}
     for i in range(model.nbody):
         if mine[i] and i >= root:

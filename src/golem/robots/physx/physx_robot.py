@@ -8,13 +8,7 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 
-from golem.robots.mujoco.other_engine import (
-    FINGER_DRIVE,
-    Motion,
-    OtherEngineConfig,
-    OtherEngineRobot,
-    follower_names,
-)
+from golem.robots.mujoco.other_engine import FINGER_DRIVE, Motion, OtherEngineConfig, OtherEngineRobot, follower_names
 from golem.robots.mujoco.truth import Truth
 from golem.robots.physx.bodies import PhysxBodies, build_bodies
 from golem.types import SIDES, Array
@@ -29,8 +23,7 @@ class PhysxTruth(Truth):
         self._bodies = bodies
         feet = [model.body(f"{side}_ankle_roll_link").name for side in SIDES]
         self._part_of = {
-            link.name: feet.index(link.name) if link.name in feet else len(SIDES)
-            for link in bodies.links.values()
+            link.name: feet.index(link.name) if link.name in feet else len(SIDES) for link in bodies.links.values()
         }
 
     def _touching(self) -> list[tuple[str, Array]]:

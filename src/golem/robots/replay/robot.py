@@ -103,9 +103,7 @@ class Log:
             self._take[public.image(name, public.DEPTH)] = partial(_image, pairing.depth)
         first = next(bag.messages([STATE]), None)
         if first is None:
-            raise BagError(
-                f"Nothing was published on {STATE} in the bag {path}: it cannot stand in for a robot."
-            )
+            raise BagError(f"Nothing was published on {STATE} in the bag {path}: it cannot stand in for a robot.")
         self._origin = first.log_time
         self._messages = bag.messages(self._take)
         self._read = self._newest = -math.inf
@@ -228,9 +226,7 @@ class ReplayRobot:
         if picture is not None:
             return picture
         info = self.cameras[camera]
-        return np.zeros((info.height, info.width, 3), np.uint8), np.zeros(
-            (info.height, info.width), np.float32
-        )
+        return np.zeros((info.height, info.width, 3), np.uint8), np.zeros((info.height, info.width), np.float32)
 
     def close(self) -> None:
         """Do nothing: the bag is closed with the robot."""

@@ -155,13 +155,9 @@ def read_calibration(path: Path) -> Calibration:
         lidar = None
         if row is not None:
             lidar = LidarMount(np.array(row["pose"], float), np.array(row["covariance"], float))
-        found = Calibration(
-            cameras, covariances, offset, sigma, float(rows["residual"]), int(rows["views"]), lidar
-        )
+        found = Calibration(cameras, covariances, offset, sigma, float(rows["residual"]), int(rows["views"]), lidar)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ConfigError(
-            f"'{path}' is no calibration: {error!r}; golem calibrate head writes one."
-        ) from error
+        raise ConfigError(f"'{path}' is no calibration: {error!r}; golem calibrate head writes one.") from error
     unknown = [name for name in cameras if name not in OPTICAL_FRAMES]
     if unknown:
         raise ConfigError(

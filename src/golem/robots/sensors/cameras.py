@@ -11,13 +11,9 @@ from golem.types import Array, CameraInfo
 
 HEAD = CameraInfo("head", 640, 480, fx=615.0, fy=615.0, cx=319.5, cy=239.5, near=0.28, far=3.0, rate=15.0)
 """RealSense D435i, depth aligned to colour. 615 px: the usual factory value of the colour imager at 640 x 480."""
-LEFT_HAND = CameraInfo(
-    "left_hand", 480, 270, fx=243.5, fy=243.5, cx=239.5, cy=134.5, near=0.07, far=0.50, rate=15.0
-)
+LEFT_HAND = CameraInfo("left_hand", 480, 270, fx=243.5, fy=243.5, cx=239.5, cy=134.5, near=0.07, far=0.50, rate=15.0)
 """RealSense D405 in the palm: vertical field of view 58 deg (the lab's model of it), depth from 7 to 50 cm (paper)."""
-RIGHT_HAND = CameraInfo(
-    "right_hand", 480, 270, fx=243.5, fy=243.5, cx=239.5, cy=134.5, near=0.07, far=0.50, rate=15.0
-)
+RIGHT_HAND = CameraInfo("right_hand", 480, 270, fx=243.5, fy=243.5, cx=239.5, cy=134.5, near=0.07, far=0.50, rate=15.0)
 
 CAMERAS: dict[str, CameraInfo] = {info.name: info for info in (HEAD, LEFT_HAND, RIGHT_HAND)}
 """Every camera by its name, which is also the name of the camera in the MuJoCo model."""

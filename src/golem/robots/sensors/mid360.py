@@ -143,9 +143,5 @@ def directions(t: Array) -> Array:
         nod = (NODS * t[i] + beam / BEAMS) % 1.0
         elevation = low + (high - low) * (1.0 - abs(2.0 * nod - 1.0))
         flat = math.cos(elevation)
-        out[i, 0], out[i, 1], out[i, 2] = (
-            flat * math.cos(azimuth),
-            flat * math.sin(azimuth),
-            math.sin(elevation),
-        )
+        out[i, 0], out[i, 1], out[i, 2] = (flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation))
     return out

@@ -98,9 +98,7 @@ class LocoService:
             return True
         if state == api.stand_up:
             return self.state in (api.damp, api.stand_up) and not self.failure
-        return state == api.start and (
-            self.state == api.start or (self.state == api.stand_up and self.standing)
-        )
+        return state == api.start and (self.state == api.start or (self.state == api.stand_up and self.standing))
 
     def _enter(self, state: int) -> None:
         if state != self.state:

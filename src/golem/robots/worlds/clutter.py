@@ -38,9 +38,7 @@ def add_clutter(spec: mujoco.MjSpec, layout: PackLayout, count: int, rng: np.ran
         else:
             continue
         placed.append((x, y))
-        body = pack.add_body(
-            name=f"clutter_{k}", pos=[x, y, 0.0], quat=yaw_quat(float(rng.uniform(-np.pi, np.pi)))
-        )
+        body = pack.add_body(name=f"clutter_{k}", pos=[x, y, 0.0], quat=yaw_quat(float(rng.uniform(-np.pi, np.pi))))
         _THINGS[int(rng.integers(len(_THINGS)))](body)
     return len(placed)
 
@@ -62,10 +60,7 @@ def _washer(body: mujoco.MjsBody) -> None:
 
 
 def _spanner(body: mujoco.MjsBody) -> None:
-    for size, pos in (
-        ((0.055, 0.008, 0.003), (0.0, 0.0, 0.003)),
-        ((0.012, 0.014, 0.004), (0.06, 0.0, 0.004)),
-    ):
+    for size, pos in (((0.055, 0.008, 0.003), (0.0, 0.0, 0.003)), ((0.012, 0.014, 0.004), (0.06, 0.0, 0.004))):
         parts.visual(body, _BOX, size, pos, material="steel")
         parts.collider(body, _BOX, size, pos)
 
@@ -86,12 +81,7 @@ def _tape(body: mujoco.MjsBody) -> None:
 def _plug(body: mujoco.MjsBody) -> None:
     parts.visual(body, _BOX, (0.018, 0.012, 0.010), (0.0, 0.0, 0.010), material="module_cap")
     parts.visual(
-        body,
-        _CYLINDER,
-        (0.006, 0.012),
-        (0.026, 0.0, 0.010),
-        material="hv_orange",
-        quat=(0.7071, 0.0, 0.7071, 0.0),
+        body, _CYLINDER, (0.006, 0.012), (0.026, 0.0, 0.010), material="hv_orange", quat=(0.7071, 0.0, 0.7071, 0.0)
     )
     parts.collider(body, _BOX, (0.018, 0.012, 0.010), (0.0, 0.0, 0.010))
 

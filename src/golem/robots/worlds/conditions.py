@@ -213,9 +213,7 @@ class Fasteners:
     missing: tuple[int, ...]
 
 
-def draw_fasteners(
-    layout: PackLayout, conditions: Conditions, reach_y: float, rng: np.random.Generator
-) -> Fasteners:
+def draw_fasteners(layout: PackLayout, conditions: Conditions, reach_y: float, rng: np.random.Generator) -> Fasteners:
     """Return which of the near-edge fasteners are loose and which are gone; the others are tight.
 
     At least one is loose where any could be, and of those, where there are such, one on the tray's side of the robot:
@@ -227,9 +225,7 @@ def draw_fasteners(
         reach_y: fasteners with |y| up to this take part [m].
         rng: the same state draws the same.
     """
-    spots = [
-        s for s in layout.reachable(reach_y) if s not in layout.empty_holes and not _under_tray(layout, s)
-    ]
+    spots = [s for s in layout.reachable(reach_y) if s not in layout.empty_holes and not _under_tray(layout, s)]
     luck = rng.random((len(spots), 2))
     order = np.argsort(luck[:, 0])
     count = max(1, round(conditions.loose * len(spots))) if spots else 0

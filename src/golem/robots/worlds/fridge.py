@@ -127,12 +127,7 @@ def add_fridge(spec: mujoco.MjSpec, layout: FridgeLayout) -> None:
 
 
 def _add_door(
-    body: mujoco.MjsBody,
-    layout: FridgeLayout,
-    side: float,
-    middle: float,
-    heights: tuple[float, float],
-    thick: float,
+    body: mujoco.MjsBody, layout: FridgeLayout, side: float, middle: float, heights: tuple[float, float], thick: float
 ) -> None:
     """Add the door on its hinge, with the bar."""
     low, high = heights
@@ -147,9 +142,7 @@ def _add_door(
     size, pos = (thick / 2, half_w - 0.002, half_h), (-thick / 2, y, low + half_h)
     parts.collider(door, _BOX, size, pos, mass=layout.mass)
     parts.visual(door, _BOX, size, pos, material="fridge_steel")
-    parts.visual(
-        door, _BOX, (0.004, half_w - 0.015, half_h - 0.015), (0.003, y, low + half_h), material="rubber"
-    )
+    parts.visual(door, _BOX, (0.004, half_w - 0.015, half_h - 0.015), (0.003, y, low + half_h), material="rubber")
     at_y = -side * layout.arm
     x, z = -thick - layout.standoff, layout.handle_z
     bar = (layout.radius, layout.length / 2)

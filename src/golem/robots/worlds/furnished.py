@@ -249,9 +249,7 @@ def _along_lane(
             yield float(x), float(y)
 
 
-def _shelf(
-    body: mujoco.MjsBody, at: tuple[float, float], size: tuple[float, float], rng: np.random.Generator
-) -> None:
+def _shelf(body: mujoco.MjsBody, at: tuple[float, float], size: tuple[float, float], rng: np.random.Generator) -> None:
     """Add a shelf of four boards with boxes on them, its long side along x."""
     (x, y), (length, deep) = at, size
     for side in (-1, 1):
@@ -272,9 +270,7 @@ def _pack(body: mujoco.MjsBody, at: tuple[float, float], across: bool = False) -
         at: x, y [m].
         across: the robot comes along y instead of x.
     """
-    frame = body.add_frame(
-        pos=[*at, 0.0], quat=[0.70710678, 0.0, 0.0, 0.70710678] if across else [1.0, 0.0, 0.0, 0.0]
-    )
+    frame = body.add_frame(pos=[*at, 0.0], quat=[0.70710678, 0.0, 0.0, 0.70710678] if across else [1.0, 0.0, 0.0, 0.0])
     blocks = [((0.6, 1.0, 0.075), (0.6, 0.0, 0.975)), ((0.25, 0.34, 0.02), (0.38, 0.0, 1.07))]
     blocks += [((0.03, 0.03, 0.45), (x, y, 0.45)) for x in (0.12, 1.08) for y in (-0.7, 0.7)]
     for size, pos in blocks:

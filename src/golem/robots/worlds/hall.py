@@ -42,14 +42,10 @@ _BOX = mujoco.mjtGeom.mjGEOM_BOX
 def add_materials(spec: mujoco.MjSpec) -> None:
     """Add the materials that the builders in this folder name."""
     for name, (rgba, specular, shininess, reflectance) in MATERIALS.items():
-        spec.add_material(
-            name=name, rgba=list(rgba), specular=specular, shininess=shininess, reflectance=reflectance
-        )
+        spec.add_material(name=name, rgba=list(rgba), specular=specular, shininess=shininess, reflectance=reflectance)
 
 
-def add_hall(
-    spec: mujoco.MjSpec, half: float = 6.0, *, marks: bool = True, stance: PlanarPose = HERE
-) -> None:
+def add_hall(spec: mujoco.MjSpec, half: float = 6.0, *, marks: bool = True, stance: PlanarPose = HERE) -> None:
     """Add the floor (collides), walls and sky (seen only) and the lamps.
 
     Args:

@@ -97,9 +97,7 @@ def draw_kitchen(rng: np.random.Generator, raised: float = 0.0, varied: bool = T
     left = bool(rng.random() < 0.5) if varied else False
     sign = -1.0 if left else 1.0
     draws: list[float] = rng.uniform(-1.0, 1.0, 9).tolist()
-    fridge = replace(
-        nominal, hinge_left=left, handle_y=sign * nominal.handle_y, handle_z=nominal.handle_z + raised
-    )
+    fridge = replace(nominal, hinge_left=left, handle_y=sign * nominal.handle_y, handle_z=nominal.handle_z + raised)
     if varied:
         fridge = replace(
             fridge,
@@ -167,10 +165,7 @@ def _draw_things(
         for _ in range(60):
             x, y = rng.uniform((area.x[0], area.y[0]), (area.x[1], area.y[1]))
             others = ((t, KINDS[t.kind][0]) for t in things)
-            if all(
-                np.hypot(x - t.position[0], sign * y - t.position[1]) > radius + r + area.apart
-                for t, r in others
-            ):
+            if all(np.hypot(x - t.position[0], sign * y - t.position[1]) > radius + r + area.apart for t, r in others):
                 colour = COLOURS[kind][int(rng.integers(len(COLOURS[kind])))]
                 yaw = float(rng.uniform(-np.pi, np.pi))
                 place = (float(x), float(sign * y), top)
@@ -199,9 +194,7 @@ def add_kitchen(
     _add_room(spec, at)
     room = spec.worldbody.add_body(name="kitchen", pos=[*at, 0.0])
     _add_counter(room, layout, sign)
-    fridge = replace(
-        layout.fridge, front=layout.fridge.front + at[0], handle_y=layout.fridge.handle_y + at[1]
-    )
+    fridge = replace(layout.fridge, front=layout.fridge.front + at[0], handle_y=layout.fridge.handle_y + at[1])
     add_fridge(spec, fridge)
     found = [_handle(fridge)]
     for thing in layout.things:
@@ -259,11 +252,7 @@ def _add_room(spec: mujoco.MjSpec, at: tuple[float, float]) -> None:
         contype=parts.WORLD_CONTACT, conaffinity=parts.WORLD_CONTACT, group=1,
         friction=[hall.FLOOR_FRICTION, 0.01, 0.001],
     )  # fmt: skip
-    for size, x, y in (
-        ((0.05, 4.0, 1.35), 1.40, 0.0),
-        ((3.0, 0.05, 1.35), -1.6, 3.2),
-        ((3.0, 0.05, 1.35), -1.6, -3.2),
-    ):
+    for size, x, y in (((0.05, 4.0, 1.35), 1.40, 0.0), ((3.0, 0.05, 1.35), -1.6, 3.2), ((3.0, 0.05, 1.35), -1.6, -3.2)):
         pos, material = (x + at[0], y + at[1], 1.35), "wall_paint"
         parts.collider(world, _BOX, size, pos)
         parts.visual(world, _BOX, size, pos, material=material)
@@ -308,12 +297,7 @@ def _add_counter(body: mujoco.MjsBody, layout: KitchenLayout, sign: float) -> No
                  quat=(0.70710678, 0.0, 0.70710678, 0.0))  # fmt: skip
 
 
-def _front(
-    body: mujoco.MjsBody,
-    at: tuple[float, float, float],
-    size: tuple[float, float],
-    sign: float,
-) -> None:
+def _front(body: mujoco.MjsBody, at: tuple[float, float, float], size: tuple[float, float], sign: float) -> None:
     """Add a cabinet's front with a frame and a knob, facing the robot."""
     x, y, z = at
     half_w, half_h = size

@@ -67,12 +67,7 @@ class PackLayout:
         pack = stance @ PlanarPose(self.near_edge, self.center_y, self.yaw)
         tray = stance @ PlanarPose(*self.tray_xy, self.tray_yaw)
         return replace(
-            self,
-            near_edge=pack.x,
-            center_y=pack.y,
-            yaw=pack.yaw,
-            tray_xy=(tray.x, tray.y),
-            tray_yaw=tray.yaw,
+            self, near_edge=pack.x, center_y=pack.y, yaw=pack.yaw, tray_xy=(tray.x, tray.y), tray_yaw=tray.yaw
         )
 
     def pose(self) -> Array:

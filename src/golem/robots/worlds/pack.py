@@ -150,13 +150,9 @@ def _add_stand(body: mujoco.MjsBody, layout: PackLayout) -> None:
             parts.collider(body, _BOX, size, pos)
     for y in np.linspace(-hy + 0.12, hy - 0.12, 6):
         for x in (0.008, layout.size_x - 0.008):
-            parts.visual(
-                body, _BOX, (0.02, 0.03, 0.02), (x, y, -layout.thickness + 0.03), material="aluminium"
-            )
+            parts.visual(body, _BOX, (0.02, 0.03, 0.02), (x, y, -layout.thickness + 0.03), material="aluminium")
     for x, length in ((0.12, hy + 0.03), (layout.size_x - 0.12, hy + 0.03)):
-        parts.visual(
-            body, _BOX, (0.03, length, 0.03), (x, 0, -layout.thickness - 0.03), material="stand_blue"
-        )
+        parts.visual(body, _BOX, (0.03, length, 0.03), (x, 0, -layout.thickness - 0.03), material="stand_blue")
     for y in (-0.7, 0.0, 0.7):
         parts.visual(body, _BOX, (hx - 0.06, 0.025, 0.025), (cx, y, -layout.thickness - 0.085),
                      material="stand_blue")  # fmt: skip
@@ -307,12 +303,7 @@ def _add_window(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout) -
 
 
 def _add_bus_bar(
-    body: mujoco.MjsBody,
-    pos: tuple[float, float, float],
-    name: str,
-    meshes: tuple[str, str],
-    *,
-    along: int,
+    body: mujoco.MjsBody, pos: tuple[float, float, float], name: str, meshes: tuple[str, str], *, along: int
 ) -> list[PackPart]:
     """Add one bar with an orange sleeve, a nut on a stud at each end, and their colliders."""
     half = STUD_PITCH / 2 + 0.016
@@ -342,9 +333,7 @@ def _add_bus_bar(
     return found
 
 
-def _add_fasteners(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, loose: set[int]
-) -> list[PackPart]:
+def _add_fasteners(spec: mujoco.MjSpec, body: mujoco.MjsBody, layout: PackLayout, loose: set[int]) -> list[PackPart]:
     """Add the tight fasteners and list the empty holes; where they are is in the pack frame."""
     flats, height = FASTENER_HEAD
     head = parts.add_mesh(spec, "fastener_hex", *parts.hexagon(flats, height))

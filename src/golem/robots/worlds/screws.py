@@ -209,17 +209,11 @@ def _add_looks(spec: mujoco.MjSpec, body: mujoco.MjsBody, draw: ScrewDraw, name:
     else:
         edge = 0.0008
         socket = [(radius * 0.5, height), (radius * 0.45, height * 0.4)]
-        flange = parts.lathe(
-            [(radius, 0.0), (radius, height - edge), (radius - edge, height), *socket], sides=28
-        )
+        flange = parts.lathe([(radius, 0.0), (radius, height - edge), (radius - edge, height), *socket], sides=28)
         top = None
-    parts.visual_mesh(
-        body, parts.add_mesh(spec, f"{name}_flange", *flange), material="zinc", name=f"{name}_flange"
-    )
+    parts.visual_mesh(body, parts.add_mesh(spec, f"{name}_flange", *flange), material="zinc", name=f"{name}_flange")
     if top is not None:
-        parts.visual_mesh(
-            body, parts.add_mesh(spec, f"{name}_hex", *top), material="zinc", name=f"{name}_hex"
-        )
+        parts.visual_mesh(body, parts.add_mesh(spec, f"{name}_hex", *top), material="zinc", name=f"{name}_hex")
     pitch = 0.001
     turns = int((draw.shank_length - 0.004) / pitch)
     r = draw.shank_diameter / 2

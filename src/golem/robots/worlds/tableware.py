@@ -103,9 +103,7 @@ def _mug(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str) ->
     names = [f"{name}_cup"]
     # Half a ring of capsules on one side: what a finger goes through.
     angles = np.linspace(-np.pi / 2, np.pi / 2, 7)
-    arc = np.column_stack(
-        [radius - 0.004 + 0.028 * np.cos(angles), 0 * angles, height / 2 + 0.032 * np.sin(angles)]
-    )
+    arc = np.column_stack([radius - 0.004 + 0.028 * np.cos(angles), 0 * angles, height / 2 + 0.032 * np.sin(angles)])
     for k, (a, b) in enumerate(zip(arc, arc[1:], strict=False)):
         geom = parts.collider(body, _CAPSULE, (0.0055,), mass=0.05 * MASSES["mug"] / 6)
         geom.fromto = [*a, *b]
@@ -121,9 +119,7 @@ def _bowl(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str) -
     curve = np.linspace(0.0, 1.0, 7)
     outer = [(foot + (radius - foot) * float(np.sqrt(s)), 0.004 + (height - 0.004) * float(s)) for s in curve]
     inner = [(r - WALL, max(z + 0.002, 0.008)) for r, z in reversed(outer)]
-    mesh = parts.add_mesh(
-        spec, f"{name}_shell", *parts.lathe([(foot, 0.0), *outer, *inner, (0.002, 0.008)], sides=40)
-    )
+    mesh = parts.add_mesh(spec, f"{name}_shell", *parts.lathe([(foot, 0.0), *outer, *inner, (0.002, 0.008)], sides=40))
     parts.visual_mesh(body, mesh, material=material, name=f"{name}_shape")
     parts.collider(body, _CYLINDER, (foot, 0.005), (0.0, 0.0, 0.005), mass=0.3 * MASSES["bowl"])
     # The wall in rings that follow its curve: a straight one leans by 34 deg, and no finger holds that by friction.
@@ -159,9 +155,7 @@ def _bottle(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str)
                  name=f"{name}_cap")  # fmt: skip
     parts.visual(body, _CYLINDER, (radius + 0.0005, 0.026), (0, 0, 0.096), material="label_white",
                  name=f"{name}_label")  # fmt: skip
-    parts.collider(
-        body, _CYLINDER, (radius, 0.32 * height), (0, 0, 0.32 * height), mass=0.9 * MASSES["bottle"]
-    )
+    parts.collider(body, _CYLINDER, (radius, 0.32 * height), (0, 0, 0.32 * height), mass=0.9 * MASSES["bottle"])
     neck = (0.0155, 0.16 * height)
     parts.collider(body, _CYLINDER, neck, (0, 0, 0.84 * height), mass=0.08 * MASSES["bottle"])
     for share, low in ((0.83, 0.64), (0.62, 0.71)):  # the shoulder, in steps
@@ -170,9 +164,7 @@ def _bottle(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, material: str)
     return f"{name}_shape", f"{name}_cap", f"{name}_label"
 
 
-def _leaning_ring(
-    body: mujoco.MjsBody, low: tuple[float, float], high: tuple[float, float], mass: float
-) -> None:
+def _leaning_ring(body: mujoco.MjsBody, low: tuple[float, float], high: tuple[float, float], mass: float) -> None:
     """Add a wall of boxes around the z axis whose outer side goes from one (radius, height) to another."""
     run, rise = high[0] - low[0], high[1] - low[1]
     lean, length = float(np.arctan2(run, rise)), float(np.hypot(run, rise)) / 2

@@ -48,9 +48,7 @@ def add_slope(spec: mujoco.MjSpec, angle: float) -> None:
     # Each box lies half its thickness below the middle of its top, along its normal; up is a negative turn about y.
     for x, turn in ((run / 2, -1.0), (run * 1.5 + level, 1.0)):
         quat = (math.cos(angle / 2), 0.0, turn * math.sin(angle / 2), 0.0)
-        _block(
-            body, (length / 2, width / 2, half), (x - turn * s * half, 0.0, rise / 2 - c * half), quat=quat
-        )
+        _block(body, (length / 2, width / 2, half), (x - turn * s * half, 0.0, rise / 2 - c * half), quat=quat)
     _block(body, (level / 2, width / 2, half), (run + level / 2, 0.0, rise - half))
 
 

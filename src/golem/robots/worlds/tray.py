@@ -19,9 +19,7 @@ def add_tray(spec: mujoco.MjSpec, layout: PackLayout) -> str:
         The name of the body.
     """
     sx, sy, sz = layout.tray_size
-    body = spec.worldbody.add_body(
-        name="tray", pos=[*layout.tray_xy, layout.tray_z], quat=yaw_quat(layout.tray_yaw)
-    )
+    body = spec.worldbody.add_body(name="tray", pos=[*layout.tray_xy, layout.tray_z], quat=yaw_quat(layout.tray_yaw))
     hx, hy, hz = sx / 2, sy / 2, sz / 2
     walls = [
         ((hx, hy, WALL / 2), (0.0, 0.0, WALL / 2)),
@@ -49,9 +47,7 @@ def add_tray(spec: mujoco.MjSpec, layout: PackLayout) -> str:
     if layout.tray_z - foot > 0.005:
         post = (layout.tray_z - foot) / 2
         radius = 0.03
-        parts.visual(
-            body, mujoco.mjtGeom.mjGEOM_CYLINDER, (radius, post), (0, 0, -post), material="stand_blue"
-        )
+        parts.visual(body, mujoco.mjtGeom.mjGEOM_CYLINDER, (radius, post), (0, 0, -post), material="stand_blue")
         parts.collider(body, mujoco.mjtGeom.mjGEOM_CYLINDER, (radius, post), (0, 0, -post))
         if not over_cover:
             parts.visual(body, _BOX, (hx, hy, 0.01), (0, 0, -2 * post + 0.01), material="stand_blue")

@@ -110,9 +110,7 @@ class BringupConfig:
         if not 0.05 <= self.share <= 0.5:
             raise ConfigError(f"The share of the gains is 0.05 to 0.5, not {self.share:g}.")
         if self.dds.robot and self.estop.use != "serial":
-            raise ConfigError(
-                "A real robot needs its e-stop board: --estop.use serial --estop.port /dev/ttyACM0."
-            )
+            raise ConfigError("A real robot needs its e-stop board: --estop.use serial --estop.port /dev/ttyACM0.")
 
 
 @dataclass

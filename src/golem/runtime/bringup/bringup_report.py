@@ -62,12 +62,7 @@ class BringupReport:
         """
         self._entries[name] = Entry(datetime.now().astimezone().isoformat(timespec="seconds"), finding)
         rows = {
-            name: {
-                "at": e.at,
-                "passed": e.finding.passed,
-                "text": e.finding.text,
-                "figures": e.finding.figures,
-            }
+            name: {"at": e.at, "passed": e.finding.passed, "text": e.finding.text, "figures": e.finding.figures}
             for name, e in self._entries.items()
         }
         self._write(FILE, json.dumps({"where": self._where, "checks": rows}, indent=1) + "\n")

@@ -58,9 +58,7 @@ def check_state(bench: Workbench) -> StepFinding:
     link = bench.link
     heard = link.listen(LISTEN)
     if len(heard) < 100:
-        return StepFinding(
-            False, f"{len(heard)} states in {LISTEN:g} s, and {link.damaged} that cannot be read"
-        )
+        return StepFinding(False, f"{len(heard)} states in {LISTEN:g} s, and {link.damaged} that cannot be read")
     states = [s for _, s in heard]
     robot, ours = states[-1].t - states[0].t, heard[-1][0] - heard[0][0]
     rate, lost = robot / ours, 1.0 - (len(states) - 1) / (FREQUENCY * robot)
@@ -109,10 +107,7 @@ def frozen_groups(states: list[LowState]) -> list[str]:
     frozen = [
         name
         for name, part in LIMBS.items()
-        if all(
-            (s.q[part] == states[0].q[part]).all() and (s.dq[part] == states[0].dq[part]).all()
-            for s in states
-        )
+        if all((s.q[part] == states[0].q[part]).all() and (s.dq[part] == states[0].dq[part]).all() for s in states)
     ]
     if all((s.imu.gyro == states[0].imu.gyro).all() for s in states):
         frozen.append("IMU")

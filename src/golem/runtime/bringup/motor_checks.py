@@ -67,21 +67,15 @@ def check_release(bench: Workbench) -> StepFinding:
         return StepFinding(False, "the robot does not say which of its own controllers has the motors")
     owner = switcher.owner
     if owner:
-        if not person.confirm(
-            f"'{owner}' has the motors; released, the robot goes limp. Type 'limp'.", "limp"
-        ):
+        if not person.confirm(f"'{owner}' has the motors; released, the robot goes limp. Type 'limp'.", "limp"):
             return StepFinding(False, f"'{owner}' keeps the motors")
         switcher.release()
         if not link.spin(10.0, lambda: switcher.free):
-            return StepFinding(
-                False, f"'{owner}' still has the motors: switch to the debug mode by remote control"
-            )
+            return StepFinding(False, f"'{owner}' still has the motors: switch to the debug mode by remote control")
     if not link.spin(20.0, lambda: link.gate is not None and link.gate.state is GateState.ARMED):
         why = "it is silent" if link.gate is None else link.gate.why
         return StepFinding(False, f"the gate is not armed: {why}")
-    return StepFinding(
-        True, f"released by '{owner}'" if owner else "nobody had them", {"before": owner or "none"}
-    )
+    return StepFinding(True, f"released by '{owner}'" if owner else "nobody had them", {"before": owner or "none"})
 
 
 class LowGainMotion:
@@ -165,9 +159,7 @@ def check_motion(bench: Workbench) -> StepFinding:
     if not link.spin(2.0, lambda: link.gate is not None and link.gate.stopped):
         wrong = wrong or "the gate was asked to stop and did not"
     figures["from the request to the stop [s]"] = round(time.monotonic() - asked, 3)
-    return StepFinding(
-        not wrong, wrong or f"{NUM_JOINTS} motors move their joints; stopped on request", figures
-    )
+    return StepFinding(not wrong, wrong or f"{NUM_JOINTS} motors move their joints; stopped on request", figures)
 
 
 def _is(bench: Workbench, state: GateState) -> Callable[[], bool]:

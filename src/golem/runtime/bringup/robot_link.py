@@ -58,9 +58,7 @@ class RobotLink:
         """Listen through `participant` and `node` on the domain of `dds`."""
         self._participant, self._node, self._dds = participant, node, dds
         row = public.topic("/lowstate")
-        self._reader = participant.reader(
-            names.topic(row.name), dds_name(row.type), Qos(reliable=False, depth=256)
-        )
+        self._reader = participant.reader(names.topic(row.name), dds_name(row.type), Qos(reliable=False, depth=256))
         self.states: deque[tuple[float, LowState]] = deque(maxlen=KEPT)
         self.damaged = 0
         self.gate: GateStatus | None = None
@@ -84,10 +82,7 @@ class RobotLink:
         return self.states[-1][1] if self.states else None
 
     def spin(
-        self,
-        seconds: float,
-        until: Callable[[], bool] = lambda: False,
-        every: Callable[[], None] | None = None,
+        self, seconds: float, until: Callable[[], bool] = lambda: False, every: Callable[[], None] | None = None
     ) -> bool:
         """Take what comes for `seconds`, or until `until()`; return whether that became true.
 
@@ -138,9 +133,7 @@ class RobotLink:
         found = discovery.writers(self._participant)
         mine = self._participant.guid
         return [
-            owner(self._participant, w.guid)
-            for w in found
-            if w.topic == names.topic(topic) and w.participant != mine
+            owner(self._participant, w.guid) for w in found if w.topic == names.topic(topic) and w.participant != mine
         ]
 
     def others(self) -> int:
@@ -194,9 +187,7 @@ class RobotLink:
         if state is None:
             return
         if self._commands is None:
-            self._commands = RoleEndpoints(
-                "stack", self._participant, self._node, only=("/safety/lowcmd_in",)
-            )
+            self._commands = RoleEndpoints("stack", self._participant, self._node, only=("/safety/lowcmd_in",))
         zero = np.zeros_like(q)
         command = LowCommand(t=state.t, q=q, dq=zero, tau=zero, kp=kp, kd=kd)
         machine = convert.mode_machine(self.payload)

@@ -47,9 +47,7 @@ class BlackBox:
     def __init__(self, folder: Path, tell: Callable[[str], None], run: Write = beside) -> None:
         """Write bags into `folder`, and `tell` where each is; `run` runs what writes one."""
         self._folder, self._tell, self._run = folder, tell, run
-        self._topics = {
-            name: topic(name, public.topic(name).type, public.topic(name).qos) for name in RECORDED
-        }
+        self._topics = {name: topic(name, public.topic(name).type, public.topic(name).qos) for name in RECORDED}
         self._frames: deque[tuple[float, str, Payload]] = deque()
         self._stop: tuple[float, GateStatus] | None = None
         self.written: list[Path] = []

@@ -30,9 +30,7 @@ class RejectedMessages:
         why: the reason of the last one.
     """
 
-    def __init__(
-        self, what: str, tell: Callable[[str], None], clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, what: str, tell: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
         """Call a message `what`; `tell` a person, without being held up, on this process's own `clock` [s]."""
         self._what, self._tell, self._clock = what, tell, clock
         self.count, self.why = 0, ""

@@ -48,9 +48,7 @@ class StatusOut:
 class Broadcast:
     """Passes what is public of a running stack to a sink; to be called after every tick."""
 
-    def __init__(
-        self, running: LockstepRunner, robot: Robot, sink: Sink, choose: Callable[[Recorder], None]
-    ) -> None:
+    def __init__(self, running: LockstepRunner, robot: Robot, sink: Sink, choose: Callable[[Recorder], None]) -> None:
         """Show `running`, whose robot is `robot`, to `sink`; `choose` is asked time and again for which topics."""
         self._executor, self._choose = running.executor, choose
         domain = LocalDomain(clock=self._time)

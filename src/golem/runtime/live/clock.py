@@ -49,9 +49,7 @@ class Rate:
         if self.value is None:
             return f"the robot's time is compared with ours for {WINDOW:g} s first"
         minimum, maximum = AGREEMENT
-        return (
-            "" if minimum <= self.value <= maximum else f"the robot's time runs at {self.value:.2f} of ours"
-        )
+        return "" if minimum <= self.value <= maximum else f"the robot's time runs at {self.value:.2f} of ours"
 
 
 class RobotClock:
@@ -94,9 +92,7 @@ class RobotClock:
         that the robot was restarted: one that was lost for long comes back as another.
         """
         known, now = self._writer, self._now()
-        foreign = (
-            known is not None and known != writer and now - self._heard < GONE and known in self._writers()
-        )
+        foreign = known is not None and known != writer and now - self._heard < GONE and known in self._writers()
         overtaken = writer == known and t >= self.t - BACK
         self.restarted = t < self.t and not overtaken and not foreign
         if foreign or not (self.restarted or t > self.t):

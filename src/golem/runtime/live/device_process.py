@@ -284,9 +284,7 @@ def run_hands(config: HandsConfig) -> None:
         hands: dict[Side, MagpieServos] = {
             side: opened.enter_context(closing(MagpieServos(hand))) for side, hand in ports.items()
         }
-        words = (
-            f"Hands on {config.dds}: {', '.join(hands)}. Ctrl-C ends their driver; they keep what they hold."
-        )
+        words = f"Hands on {config.dds}: {', '.join(hands)}. Ctrl-C ends their driver; they keep what they hold."
         _drive("hands", config.dds, words, partial(HandProcess, hands=hands))
 
 
@@ -318,11 +316,7 @@ def run_camera(config: CameraConfig) -> None:
 
 def _drive(name: str, dds: DdsConfig, words: str, make: Callable[..., DeviceProcess]) -> None:
     """Join the domain as `name`, say `words`, and run the process that `make` returns until Ctrl-C."""
-    with (
-        interrupted() as stop,
-        closing(AsyncLogger()) as tell,
-        member(name, dds, tell) as (participant, node),
-    ):
+    with interrupted() as stop, closing(AsyncLogger()) as tell, member(name, dds, tell) as (participant, node):
         process = make(participant, node, tell=tell)
         tell(words)
         while not stop.wait(TICK):

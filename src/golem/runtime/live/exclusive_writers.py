@@ -14,12 +14,7 @@ from golem.middleware.ros.graph import PARTICIPANT_USER_DATA
 
 DISCOVERY = 0.3
 """Time that whoever is on the domain already gets to be seen [s]."""
-SOLE = {
-    "/lowstate": "a robot",
-    "/clock": "a clock",
-    "/lowcmd": "a safety gate",
-    "/safety/lowcmd_in": "a stack",
-}
+SOLE = {"/lowstate": "a robot", "/clock": "a clock", "/lowcmd": "a safety gate", "/safety/lowcmd_in": "a stack"}
 """Topics that one process alone may write, and what that process is."""
 ANYBODYS = ("/lowstate", "/clock")
 """Those of them that others' programs may write, too."""
@@ -70,9 +65,7 @@ def refuse_second_launch(participant: CycloneParticipant, dds: DdsConfig) -> Non
     time.sleep(DISCOVERY)
     first = launcher(participant)
     if first:
-        raise ConfigError(
-            f"There is a launched robot on {dds} already: {first}; end it, or choose another domain."
-        )
+        raise ConfigError(f"There is a launched robot on {dds} already: {first}; end it, or choose another domain.")
     _refuse_writers(participant, dds, SOLE)
 
 

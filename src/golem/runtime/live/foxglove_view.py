@@ -58,16 +58,11 @@ def run_view(config: ViewConfig) -> None:
             raise unknown_name("public topic", name, (row.name for row in public.TOPICS))
     with closing(connect(config.dds, identity("view"))) as participant, interrupted() as stop:
         with closing(FoxgloveServer(ServerConfig(config.host, config.port))) as server:
-            print(
-                f"Serving {config.dds} at {server.url} (in Foxglove: Open connection). Ctrl-C ends it.",
-                flush=True,
-            )
+            print(f"Serving {config.dds} at {server.url} (in Foxglove: Open connection). Ctrl-C ends it.", flush=True)
             serve(participant, topics, server, stop)
 
 
-def serve(
-    participant: Participant, topics: Sequence[BagTopic], server: FoxgloveServer, stop: threading.Event
-) -> None:
+def serve(participant: Participant, topics: Sequence[BagTopic], server: FoxgloveServer, stop: threading.Event) -> None:
     """Send viewers what they subscribe to until `stop` is set; nothing else is taken off the domain but the time."""
     with closing(Recorder(participant, server)) as recorder:
         while not stop.wait(PERIOD):

@@ -256,15 +256,9 @@ class Launcher:
         """Return what becomes of the robot once a process has died, as far as it is seen here."""
         if name == "safety":
             return "The motors are damped from here, and then go limp."
-        until(
-            self._node,
-            lambda: self.gate is not None and self.gate.state is not GateState.ACTIVE,
-            SILENCE + 1.0,
-        )
+        until(self._node, lambda: self.gate is not None and self.gate.state is not GateState.ACTIVE, SILENCE + 1.0)
         return (
-            "The safety gate is silent."
-            if self.gate is None
-            else f"The safety gate is {describe_status(self.gate)}."
+            "The safety gate is silent." if self.gate is None else f"The safety gate is {describe_status(self.gate)}."
         )
 
     def _restarter(self, name: Part) -> Callable[[Any], Trigger_Response]:

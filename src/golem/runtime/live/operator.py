@@ -141,9 +141,7 @@ def _take(participant: Participant, node: RosNode, config: TakeConfig) -> bool:
         return until(node, ask, timeout)
 
     if not answered(lambda: switcher.known, SEARCH):
-        raise RosError(
-            f"No robot on {config.dds} says which of its own controllers has the motors; is it switched on?"
-        )
+        raise RosError(f"No robot on {config.dds} says which of its own controllers has the motors; is it switched on?")
     if not switcher.free:
         if not config.hanging:
             raise ConfigError(
@@ -153,9 +151,7 @@ def _take(participant: Participant, node: RosNode, config: TakeConfig) -> bool:
         log_line(f"'{switcher.owner}' has the motors and lets go of them: the robot goes limp.")
         switcher.release()
         if not answered(lambda: switcher.free, SEARCH):
-            log_line(
-                f"'{switcher.owner}' still has them: switch the robot to its debug mode by remote control."
-            )
+            log_line(f"'{switcher.owner}' still has them: switch the robot to its debug mode by remote control.")
             return False
     log_line("None of the robot's own controllers has the motors.")
     return True

@@ -69,9 +69,7 @@ class Console:
                 if word not in WORDS:
                     raise unknown_name("request", word, WORDS)
                 if not self._ask(word) and word == "press":
-                    self._ask(
-                        "stop"
-                    )  # a robot with a button of its own has none that can be pressed from here
+                    self._ask("stop")  # a robot with a button of its own has none that can be pressed from here
             except GolemError as error:
                 self._tell(str(error))
 

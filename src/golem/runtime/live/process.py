@@ -94,22 +94,14 @@ def run_twin(config: TwinConfig) -> None:
         DdsError: the domain cannot be joined.
     """
     if config.dds.robot or config.dds.domain == ROBOT_DOMAIN:
-        raise ConfigError(
-            f"A twin never joins domain {ROBOT_DOMAIN}, which is the real robot's; choose another."
-        )
+        raise ConfigError(f"A twin never joins domain {ROBOT_DOMAIN}, which is the real robot's; choose another.")
     stack = twin_stack(config)
-    with (
-        interrupted() as stop,
-        closing(AsyncLogger()) as tell,
-        member("twin", config.dds, tell) as (participant, node),
-    ):
+    with interrupted() as stop, closing(AsyncLogger()) as tell, member("twin", config.dds, tell) as (participant, node):
         refuse_second(participant, config.dds, "/lowstate", "/clock")
         with closing(build_robot(stack, config.seed)) as robot, ExitStack() as closing_time:
             render_worker = None
             if isinstance(robot, Restorable):
-                render_worker = closing_time.enter_context(
-                    closing(RenderWorker(stack, config.seed, robot, config.dds))
-                )
+                render_worker = closing_time.enter_context(closing(RenderWorker(stack, config.seed, robot, config.dds)))
             twin = Twin(stack, robot, participant, node, render_worker, tell=tell)
             if render_worker is not None:
                 render_worker.wait(stop.is_set)
@@ -137,13 +129,7 @@ def run_up(config: UpConfig) -> None:
         refuse_second(participant, config.dds, "/safety/lowcmd_in")
         pools = {slot: threads.enter_context(ThreadPoolExecutor(1, slot)) for slot in POOLED}
         live = StackProcess(
-            stack,
-            participant,
-            node,
-            real=config.dds.robot,
-            pools=pools,
-            tell=tell,
-            who=partial(owner, participant),
+            stack, participant, node, real=config.dds.robot, pools=pools, tell=tell, who=partial(owner, participant)
         )
         tell(f"The stack '{config.stack}' is on {config.dds}. Ctrl-C ends it.")
         waiting_since = time.monotonic()

@@ -146,10 +146,7 @@ def run_replay(config: ReplayBagConfig) -> int:
     play = PlayConfig(config.rate, config.loop, config.start, config.stop, config.topics)
     bag = Bag(config.bag)
     if not bag.finished:
-        print(
-            "The recorder of this bag was killed; it is played up to the last chunk that is whole.",
-            flush=True,
-        )
+        print("The recorder of this bag was killed; it is played up to the last chunk that is whole.", flush=True)
     if bag.foreign:
         print(f"Left out: {told(bag)}.", flush=True)
     with closing(connect(config.dds, identity("replay"))) as participant, interrupted() as stop:

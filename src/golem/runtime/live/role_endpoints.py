@@ -92,10 +92,7 @@ class RoleEndpoints:
         return any((self._writers.get(topic) or self._publishers[topic]).matched() > 0 for topic in topics)
 
     def listen(
-        self,
-        topic: str,
-        take: Callable[[Any], None],
-        refuse: Callable[[Exception], None] = lambda error: None,
+        self, topic: str, take: Callable[[Any], None], refuse: Callable[[Exception], None] = lambda error: None
     ) -> None:
         """Give the values of a topic to `take`, as the table reads them, when what has arrived is handled.
 
@@ -162,10 +159,7 @@ class RoleEndpoints:
         """Offer every action of the role; `handlers` says who decides about the goals of each."""
         rows = {row.name: row for row in public.ACTIONS if row.by == self.role}
         _same(rows, handlers)
-        return {
-            name: self.node.action_server(name, rows[name].type, handler)
-            for name, handler in handlers.items()
-        }
+        return {name: self.node.action_server(name, rows[name].type, handler) for name, handler in handlers.items()}
 
     def _read(self, topic: str) -> TopicRow:
         row = public.topic(topic)

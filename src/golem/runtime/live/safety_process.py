@@ -44,9 +44,7 @@ class CommandLease:
         ignored: handles of the writers that are heard no more since an operator handed over.
     """
 
-    def __init__(
-        self, topic: str, writers: Callable[[], Mapping[int, bytes]], who: Callable[[bytes], str]
-    ) -> None:
+    def __init__(self, topic: str, writers: Callable[[], Mapping[int, bytes]], who: Callable[[bytes], str]) -> None:
         """Look after `topic`, whose `writers` are guids by handle; `who` names the owner of one."""
         self._topic, self._writers, self._who = topic, writers, who
         self.holder: bytes | None = None

@@ -30,10 +30,5 @@ def relaxed_limits(limits: SafetyLimits) -> SafetyLimits:
     """Return `limits` for a robot whose time may stand still."""
     base_age = SILENCE + limits.base_age
     return replace(
-        limits,
-        state_age=SILENCE,
-        command_age=SILENCE,
-        command_late=SILENCE,
-        base_age=base_age,
-        stall=SILENCE,
+        limits, state_age=SILENCE, command_age=SILENCE, command_late=SILENCE, base_age=base_age, stall=SILENCE
     )

@@ -34,10 +34,7 @@ class SkillActionServer:
     period = TICK
 
     def __init__(
-        self,
-        endpoints: RoleEndpoints,
-        log: Callable[[str], None] = log_error,
-        who: Callable[[bytes], str] = bytes.hex,
+        self, endpoints: RoleEndpoints, log: Callable[[str], None] = log_error, who: Callable[[bytes], str] = bytes.hex
     ) -> None:
         """Offer the actions on `endpoints`; what a skill raises is logged by `log`, `who` names a client."""
         self._lease: ServerGoal | None = None
@@ -99,9 +96,7 @@ class SkillActionServer:
                 f"{self._who(lease.client)} has the lease for skills; end it, or: golem skill --take-over ..."
             )
         if safety.state is not GateState.ACTIVE:
-            raise GolemError(
-                f"The safety gate is {describe_status(safety)}; activate it first: golem safety activate."
-            )
+            raise GolemError(f"The safety gate is {describe_status(safety)}; activate it first: golem safety activate.")
         return stack
 
     def cancel(self, goal: ServerGoal) -> bool:
@@ -124,9 +119,7 @@ class SkillActionServer:
         if pursuit.run.result is not None:
             self._tell(pursuit, pursuit.run.result)
         elif safety is not None and safety.state is not GateState.ACTIVE:
-            self._end(
-                SkillResult(False, "safety", "safety", f"The safety gate is {describe_status(safety)}.")
-            )
+            self._end(SkillResult(False, "safety", "safety", f"The safety gate is {describe_status(safety)}."))
 
     def _end(self, result: SkillResult) -> None:
         """End the goal that is pursued with `result`, whatever its skill has to say; it may clean up."""

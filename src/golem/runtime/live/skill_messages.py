@@ -63,12 +63,7 @@ def _pick_goal(message: golem_interfaces.Pick_Goal) -> tuple[str, Fields]:
 def _walk_goal(message: golem_interfaces.Walk_Goal, skill: str = "walk") -> tuple[str, Fields]:
     T, timeout = convert.matrix(message.pose.pose), convert.seconds(message.timeout)
     yaw = math.atan2(T[1, 0], T[0, 0])
-    goal: Fields = {
-        "x": float(T[0, 3]),
-        "y": float(T[1, 3]),
-        "yaw": yaw,
-        "frame": message.pose.header.frame_id,
-    }
+    goal: Fields = {"x": float(T[0, 3]), "y": float(T[1, 3]), "yaw": yaw, "frame": message.pose.header.frame_id}
     return skill, goal if timeout == 0.0 else goal | {"timeout": timeout}
 
 

@@ -130,9 +130,7 @@ class GateIn:
         self._t = t
         silent = self._clock() - self._heard_at > SILENCE
         if silent or self._status is None:
-            self._bus.publish(
-                topics.SAFETY, GateStatus(t, GateState.INIT, None, "the safety process is silent"), t
-            )
+            self._bus.publish(topics.SAFETY, GateStatus(t, GateState.INIT, None, "the safety process is silent"), t)
         else:
             self._bus.publish(topics.SAFETY, self._status, t)
 

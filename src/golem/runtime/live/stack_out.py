@@ -95,9 +95,7 @@ def hand_services(bus: Bus, side: Side, now: Callable[[], float]) -> dict[str, C
 
     return {
         public.gripper(side, "open"): lambda _: Trigger_Response(*give(HandGoal(magpie_model.MAX_GAP))),
-        public.gripper(side, "close"): lambda _: Trigger_Response(
-            *give(HandGoal(None, magpie_model.MAX_FORCE))
-        ),
+        public.gripper(side, "close"): lambda _: Trigger_Response(*give(HandGoal(None, magpie_model.MAX_FORCE))),
         public.gripper(side, "set_position"): set_gap,
         public.gripper(side, "set_force"): set_force,
     }

@@ -102,9 +102,7 @@ class LegsMonitor:
         legs = self._bus.latest(topics.LEG_STATUS)
         if legs is not None and legs.fault is not None and legs.fault != self._fault:
             self._fault = legs.fault
-            self._tell(
-                f"{legs.fault}. '{legs.controller}' has the legs now, and stands until a new twist comes."
-            )
+            self._tell(f"{legs.fault}. '{legs.controller}' has the legs now, and stands until a new twist comes.")
         base = self._bus.latest(topics.BASE)
         if not moving(self._bus):
             self._blind_since = t
@@ -194,11 +192,7 @@ class StackProcess:
         unheard = () if hears_lidar(stack) else public.LIDAR
         velocities = Velocities(self._bus, self._now, lambda: self._skills.busy() or not moving(self._bus))
         self._lidar_imu = OnePerTick(self._bus, topics.LIDAR_IMU, IMU_BACKLOG)
-        takers = {
-            "/safety/status": self._gate.take,
-            "/cmd_vel": velocities.take,
-            "/livox/imu": self._lidar_imu.take,
-        }
+        takers = {"/safety/status": self._gate.take, "/cmd_vel": velocities.take, "/livox/imu": self._lidar_imu.take}
         incoming(self._bus, endpoints, self._now, tell, takers, without=("/lowstate", *unheard))
         endpoints.subscribe("/tf_static", lambda message: self._calibration.update(calibrations(message)))
         self._drivers = RoleEndpoints("robot", participant, node, only=SHOWN) if real else None
@@ -280,9 +274,7 @@ class StackProcess:
             (Phase.RECEIVE, AnswersIn(bus, service, self._calls, identities)),
             *self._nav2(bus),
             *side.nodes,
-            *outgoing(
-                bus, endpoints, out.encoders(bus, lambda: self._mode_machine, self._calibrated.joint_offset)
-            ),
+            *outgoing(bus, endpoints, out.encoders(bus, lambda: self._mode_machine, self._calibrated.joint_offset)),
             (Phase.SEND, CallsOut(bus, service, self._calls, identities)),
             (Phase.SEND, self._skills),
             (Phase.SEND, LegsMonitor(bus, self._tell)),

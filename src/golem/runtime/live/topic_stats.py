@@ -79,9 +79,7 @@ def run_topic_stats(config: TopicStatsConfig) -> None:
 def survey(participant: CycloneParticipant, seconds: float, everything: bool = False) -> list[Row]:
     """Return a row for each topic of the domain, after listening for some seconds; `participant` itself counts not."""
     time.sleep(DISCOVERY)
-    writers, readers = (
-        _of_others(participant, f(participant)) for f in (discovery.writers, discovery.readers)
-    )
+    writers, readers = (_of_others(participant, f(participant)) for f in (discovery.writers, discovery.readers))
     topics = {(e.topic, e.type_name) for e in (*writers, *readers) if everything or _is_topic(e.topic)}
     ears: dict[tuple[str, str], Reader] = {}
     known: set[str] = set()

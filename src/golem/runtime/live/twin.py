@@ -153,9 +153,7 @@ class Twin:
         endpoints = RoleEndpoints("robot", participant, node, only)
         self._robot = robot
         self.commands = CommandIn(bus, endpoints, tell, patience)
-        exposed = (
-            None if render_worker is not None else lambda camera: partial(images_wanted, endpoints, camera)
-        )
+        exposed = None if render_worker is not None else lambda camera: partial(images_wanted, endpoints, camera)
         side = RobotNodes(bus, stack, robot, exposed, partial(lidar_wanted, endpoints))
         placed: list[Placed] = [
             (Phase.RECEIVE, endpoints),

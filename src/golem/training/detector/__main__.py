@@ -133,9 +133,7 @@ def evaluate(data: Path = RUNS / "data", weights: Path | None = None) -> None:
         others = [name for name in detector.classes if name not in classes]
         if others:
             per_image = false_alarms(part, detect, others)
-            print(
-                f"{world}: {per_image:.3f} false {', '.join(others)} per image ({len(part.images)} images)\n"
-            )
+            print(f"{world}: {per_image:.3f} false {', '.join(others)} per image ({len(part.images)} images)\n")
     print(condition_table(held.of_world("pack"), detect))
     for camera, taken in times.items():
         print(f"{camera}: {np.median(taken):.1f} ms CPU per image (median of {len(taken)}, one thread)")
@@ -170,19 +168,11 @@ def own(
     if steps < 1 or width < 64 or seed < 0:
         raise ConfigError("--steps must be 1 or more, --width 64 px or more, --seed 0 or more.")
     data, held, classes = load_own(labels, seed, width)
-    print(
-        f"{len(data.images)} images to train on, {len(held.images)} held out; classes: {', '.join(classes)}"
-    )
+    print(f"{len(data.images)} images to train on, {len(held.images)} held out; classes: {', '.join(classes)}")
     shipped = resources.files("golem.capabilities.perception").joinpath(SHIPPED)
     with resources.as_file(shipped) as default:
         config = TrainDetectorConfig(
-            labels,
-            out,
-            seed,
-            steps,
-            check_every=min(250, steps),
-            start=start or default,
-            classes=classes,
+            labels, out, seed, steps, check_every=min(250, steps), start=start or default, classes=classes
         )
         best = fit(config, data, held)
     path = export_onnx(best, out / "detector.onnx")

@@ -19,15 +19,7 @@ from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.streams import stream
 from golem.robots.worlds.conditions import Conditions, draw_conditions
 from golem.robots.worlds.fridge import HINGE
-from golem.robots.worlds.kitchen import (
-    FRONTS,
-    STEELS,
-    TOPS,
-    KitchenLayout,
-    add_kitchen,
-    draw_counter,
-    draw_kitchen,
-)
+from golem.robots.worlds.kitchen import FRONTS, STEELS, TOPS, KitchenLayout, add_kitchen, draw_counter, draw_kitchen
 from golem.robots.worlds.pack import PackPart
 from golem.robots.worlds.tableware import COLOURS, KINDS
 from golem.training.detector import random_scene
@@ -72,9 +64,7 @@ class RandomKitchen(RandomScene):
             model.mat_rgba[mat, :3] = np.clip(base * tint, 0.0, 1.0)
             model.mat_specular[mat], model.mat_shininess[mat] = rng.uniform((0.1, 0.1), (0.8, 0.8))
         bar = model.material("fridge_bar").id
-        model.mat_rgba[bar, :3] = (
-            random_scene.random_colour(rng) if wild else rng.choice([0.25, 0.8]) * np.ones(3)
-        )
+        model.mat_rgba[bar, :3] = random_scene.random_colour(rng) if wild else rng.choice([0.25, 0.8]) * np.ones(3)
         random_scene.randomise_robot(self.world, wild, rng)
         random_scene.randomise_lights(model, rng)
         return draw_conditions("varied", {}, rng)
@@ -160,10 +150,7 @@ def build_kitchen(rng: np.random.Generator) -> RandomKitchen:
     return RandomKitchen(random_scene.compile_scene(spec, plain, rng), layout, parts)
 
 
-BUILDERS: dict[str, Callable[[np.random.Generator], RandomScene]] = {
-    "pack": build_pack,
-    "kitchen": build_kitchen,
-}
+BUILDERS: dict[str, Callable[[np.random.Generator], RandomScene]] = {"pack": build_pack, "kitchen": build_kitchen}
 """What compiles a world, by its kind."""
 JPEG_QUALITY = 96
 CONDITIONS = ("finish", "cover", "tray", "light")
@@ -219,8 +206,7 @@ def render(
     """
     # A pack's stream is named as before there were kitchens, so that held-out images stay the same.
     rng = stream(
-        seed,
-        f"detector/{split}/{world_index}" if kind == "pack" else f"detector/{split}/{kind}/{world_index}",
+        seed, f"detector/{split}/{world_index}" if kind == "pack" else f"detector/{split}/{kind}/{world_index}"
     )
     scene = BUILDERS[kind](rng)
     plain, fancy = make_rigs(scene.world)
@@ -242,9 +228,7 @@ def named(conditions: Conditions) -> list[str]:
     return [conditions.finish, conditions.cover, conditions.tray, light]
 
 
-def generate(
-    folder: Path, seed: int, split: str, worlds: dict[str, int], per_camera: int, jobs: int = 1
-) -> None:
+def generate(folder: Path, seed: int, split: str, worlds: dict[str, int], per_camera: int, jobs: int = 1) -> None:
     """Render a split into `folder/split`; worlds already there are kept.
 
     Args:
@@ -280,9 +264,7 @@ def _path(folder: Path, kind: str, index: int) -> Path:
 def _write(path: Path, seed: int, index: int, split: str, per_camera: int, kind: str) -> None:
     arrays: dict[str, NDArray[np.float32] | NDArray[np.uint8] | NDArray[np.str_]] = {}
     for k, (rgb, labels, camera, conditions) in enumerate(render(seed, index, split, per_camera, kind)):
-        ok, code = cv2.imencode(
-            ".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
-        )
+        ok, code = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
         if not ok:
             raise RuntimeError("JPEG encoding failed")
         arrays[f"image_{camera}_{k:04d}"] = np.asarray(code, np.uint8)
@@ -324,7 +306,5 @@ def _read(path: Path) -> Dataset:
             data.labels.append(file[key.replace("image_", "label_")].reshape(-1, len(COLUMNS)).astype(float))
             data.cameras.append(key.split("_")[1])
             words = file[key.replace("image_", "conditions_")].tolist()
-            data.conditions.append(
-                {"world": path.stem.split("_")[0], **dict(zip(CONDITIONS, words, strict=True))}
-            )
+            data.conditions.append({"world": path.stem.split("_")[0], **dict(zip(CONDITIONS, words, strict=True))})
     return data

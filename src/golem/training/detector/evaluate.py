@@ -99,13 +99,9 @@ def evaluate(
     return {key: _score(hits[key], counts[key], working_score) for key in sorted(counts)}
 
 
-def false_alarms(
-    data: Dataset, detect: Detector, classes: Sequence[str], working_score: float = 0.3
-) -> float:
+def false_alarms(data: Dataset, detect: Detector, classes: Sequence[str], working_score: float = 0.3) -> float:
     """Return how many detections of `classes` an image has on average where there are no such things."""
-    count = sum(
-        d.label in classes and d.score >= working_score for image in data.images for d in detect(image)
-    )
+    count = sum(d.label in classes and d.score >= working_score for image in data.images for d in detect(image))
     return count / max(len(data.images), 1)
 
 
@@ -130,11 +126,7 @@ def _match(found: list[Detection], truth: Array) -> list[tuple[float, bool, floa
 
 
 def _lies_on(center: Array, labels: Array) -> bool:
-    return bool(
-        ((labels[:, 3:5] - MATCH_FLOOR <= center) & (center <= labels[:, 5:7] + MATCH_FLOOR))
-        .all(axis=1)
-        .any()
-    )
+    return bool(((labels[:, 3:5] - MATCH_FLOOR <= center) & (center <= labels[:, 5:7] + MATCH_FLOOR)).all(axis=1).any())
 
 
 def _score(hits: list[tuple[float, bool, float]], count: int, working_score: float) -> Score:

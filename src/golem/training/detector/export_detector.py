@@ -71,13 +71,7 @@ class _Graph:
     def up(self, x: str) -> str:
         scales = self.constant(np.array([1, 1, 2, 2], np.float32))
         return self.add(
-            "Resize",
-            x,
-            "",
-            scales,
-            mode="nearest",
-            nearest_mode="floor",
-            coordinate_transformation_mode="asymmetric",
+            "Resize", x, "", scales, mode="nearest", nearest_mode="floor", coordinate_transformation_mode="asymmetric"
         )
 
 

@@ -98,18 +98,11 @@ def _solid(
 
 
 def _hole(
-    scene: RandomScene,
-    info: CameraInfo,
-    T: Array,
-    mouth: Array,
-    radius: float,
-    segmentation: NDArray[np.int32],
+    scene: RandomScene, info: CameraInfo, T: Array, mouth: Array, radius: float, segmentation: NDArray[np.int32]
 ) -> list[list[float]]:
     angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(12)])
-    optical = (np.concatenate([[mouth], mouth + radius * circle, mouth + 1.4 * radius * circle])) @ T[
-        :3, :3
-    ].T
+    optical = (np.concatenate([[mouth], mouth + radius * circle, mouth + 1.4 * radius * circle])) @ T[:3, :3].T
     optical += T[:3, 3]
     if optical[:, 2].min() < 0.02:
         return []

@@ -40,16 +40,12 @@ def load_own(folder: Path, seed: int, width: int) -> tuple[Dataset, Dataset, tup
     if not classes:
         raise ConfigError(f"No image of {folder} has a label.")
     base = folder.expanduser()
-    held = np.array(
-        [any(_plain(p) in HELD_OUT for p in (i.split, *i.path.relative_to(base).parts)) for i in images]
-    )
+    held = np.array([any(_plain(p) in HELD_OUT for p in (i.split, *i.path.relative_to(base).parts)) for i in images])
     if not held.any():
         count = round(SHARE * len(images))
         held[stream(seed, "detector/own").permutation(len(images))[: max(count, 1)]] = True
     if held.all():
-        raise ConfigError(
-            f"{folder} has {len(images)} images, and all are held out; training needs some, too."
-        )
+        raise ConfigError(f"{folder} has {len(images)} images, and all are held out; training needs some, too.")
     splits = [Dataset([], [], [], []) for _ in range(2)]
     for image, out in zip(images, held, strict=True):
         pixels, labels = _scaled(image, classes, width)

@@ -36,9 +36,7 @@ class RandomPack(RandomScene):
         draws: its loosened screws.
     """
 
-    def __init__(
-        self, world: Compiled, layout: PackLayout, names: PackNames, draws: tuple[ScrewDraw, ...]
-    ) -> None:
+    def __init__(self, world: Compiled, layout: PackLayout, names: PackNames, draws: tuple[ScrewDraw, ...]) -> None:
         """Keep what was compiled."""
         pairs = zip(draws, names.mouths, strict=True)
         bores = tuple(Bore(mouth, draw.bore_radius, screw_name(draw.slot)) for draw, mouth in pairs)
@@ -78,9 +76,7 @@ class RandomPack(RandomScene):
         random_scene.reset(self.world)
         tray = model.body(self.tray).id
         side = rng.choice([-1.0, 1.0])
-        tray_at = np.array(
-            [layout.near_edge + rng.uniform(-0.02, 0.5), side * rng.uniform(0.15, 0.65), layout.tray_z]
-        )
+        tray_at = np.array([layout.near_edge + rng.uniform(-0.02, 0.5), side * rng.uniform(0.15, 0.65), layout.tray_z])
         model.body_pos[tray] = tray_at
         turn = rng.uniform(-np.pi, np.pi) if rng.random() < 0.3 else rng.normal(0.0, 0.05)
         model.body_quat[tray] = [np.cos(turn / 2), 0.0, 0.0, np.sin(turn / 2)]
@@ -99,9 +95,7 @@ class RandomPack(RandomScene):
                     spot = np.array([layout.near_edge + rng.uniform(0.0, 0.7), rng.uniform(-0.6, 0.6)])
                     z = layout.top_z
                 data.qpos[at : at + 3] = [*spot, z + draw.head_diameter / 2]
-                lying = Rotation.from_euler(
-                    "zy", [rng.uniform(-np.pi, np.pi), np.pi / 2 + rng.uniform(0.0, 0.3)]
-                )
+                lying = Rotation.from_euler("zy", [rng.uniform(-np.pi, np.pi), np.pi / 2 + rng.uniform(0.0, 0.3)])
                 data.qpos[at + 3 : at + 7] = lying.as_quat(scalar_first=True)
         random_scene.pose_arms(self.world, rng)
 
@@ -117,13 +111,9 @@ class RandomPack(RandomScene):
         side = random_scene.random_side(rng)
         info = CAMERAS[f"{side}_hand"]
         part = random_scene.random_part(self.parts, rng)
-        target = (
-            self.data.xpos[self.model.body(part.body).id].copy() if part.label == "tray" else part.position
-        )
+        target = self.data.xpos[self.model.body(part.body).id].copy() if part.label == "tray" else part.position
         height = float(np.exp(rng.uniform(np.log(0.10), np.log(0.50))))
-        turn = Rotation.from_euler(
-            "ZYX", [rng.uniform(-np.pi, np.pi), rng.normal(0, 0.12), rng.normal(0, 0.12)]
-        )
+        turn = Rotation.from_euler("ZYX", [rng.uniform(-np.pi, np.pi), rng.normal(0, 0.12), rng.normal(0, 0.12)])
         view = turn.as_matrix() @ T_MUJOCO_OPTICAL[:3, :3]
         T_world_optical = random_scene.aim(info, target, view, height, rng)
         held = None
@@ -158,11 +148,7 @@ def build_pack(rng: np.random.Generator) -> RandomPack:
         window_y=(float(rng.uniform(-0.5, -0.3)), float(rng.uniform(0.3, 0.55))),
         window_depth=float(rng.uniform(0.03, 0.06)),
         empty_holes=tuple(int(i) for i in rng.choice(68, size=int(rng.integers(10, 22)), replace=False)),
-        tray_size=(
-            float(rng.uniform(0.16, 0.30)),
-            float(rng.uniform(0.2, 0.34)),
-            float(rng.uniform(0.03, 0.08)),
-        ),
+        tray_size=(float(rng.uniform(0.16, 0.30)), float(rng.uniform(0.2, 0.34)), float(rng.uniform(0.03, 0.08))),
     )
     lifted = float(rng.choice([0.0, rng.uniform(0.02, 0.12)]))
     layout = replace(layout, tray_z=layout.top_z + lifted, tray_xy=(layout.near_edge + 0.1, -0.3))

@@ -229,15 +229,11 @@ def pose_arms(world: Compiled, rng: np.random.Generator) -> None:
         set_gap(world, side, float(rng.uniform(0.0, magpie_model.MAX_GAP)))
 
 
-def stand(
-    world: Compiled, position: Array, sway: tuple[float, float, float], rng: np.random.Generator
-) -> None:
+def stand(world: Compiled, position: Array, sway: tuple[float, float, float], rng: np.random.Generator) -> None:
     """Put the base at `position` (3,) [m], turned by normal errors about z, y and x of these sizes [rad]."""
     data = world.data
     data.qpos[:3] = position
-    data.qpos[3:7] = Rotation.from_euler("ZYX", [rng.normal(0.0, size) for size in sway]).as_quat(
-        scalar_first=True
-    )
+    data.qpos[3:7] = Rotation.from_euler("ZYX", [rng.normal(0.0, size) for size in sway]).as_quat(scalar_first=True)
     refresh(world)
 
 
@@ -303,9 +299,7 @@ def refresh(world: Compiled) -> None:
 def camera_pose(world: Compiled, name: str) -> Array:
     """Return the (4, 4) pose of a camera's optical frame in the world."""
     camera = world.model.camera(name).id
-    return (
-        transform(world.data.cam_xpos[camera], world.data.cam_xmat[camera].reshape(3, 3)) @ T_MUJOCO_OPTICAL
-    )
+    return transform(world.data.cam_xpos[camera], world.data.cam_xmat[camera].reshape(3, 3)) @ T_MUJOCO_OPTICAL
 
 
 def make_rigs(world: Compiled) -> tuple[CameraRig, CameraRig]:

@@ -124,8 +124,7 @@ def targets(labels: Sequence[Array], classes: int, device: str) -> tuple[Tensor,
     far = torch.maximum(along(line, i).abs()[:, :, :, None], along(column, j).abs()[:, :, None, :])
     blob = torch.where(far == 0, 1.0, blob)
     hidden = [
-        (cells >= torch.floor(low / STRIDE)[:, :, None] - 1)
-        & (cells < torch.ceil(high / STRIDE)[:, :, None] + 2)
+        (cells >= torch.floor(low / STRIDE)[:, :, None] - 1) & (cells < torch.ceil(high / STRIDE)[:, :, None] + 2)
         for cells, low, high in ((line, y0, y1), (column, x0, x1))
     ]
     covered = hidden[0][:, :, :, None] & hidden[1][:, :, None, :]
@@ -141,9 +140,7 @@ def targets(labels: Sequence[Array], classes: int, device: str) -> tuple[Tensor,
     place = torch.arange(most, device=device).float()
     # Centres before neighbours; of centres the smallest part's, of neighbours those that weigh most.
     claim = torch.where(
-        far == 0,
-        2.0 + place[None, :, None, None],
-        share[:, :, None, None] - 1e-5 * place[None, :, None, None],
+        far == 0, 2.0 + place[None, :, None, None], share[:, :, None, None] - 1e-5 * place[None, :, None, None]
     )
     claim = torch.where((far <= reach[:, :, None, None]) & counted[:, :, None, None], claim, -1.0)
     best, owner = claim.max(dim=1, keepdim=True)
@@ -152,8 +149,7 @@ def targets(labels: Sequence[Array], classes: int, device: str) -> tuple[Tensor,
     taken = torch.gather(values, 1, owner.reshape(n, h * w, 1).expand(-1, -1, 7))
     own_x, own_y, own_share, *own_sides = taken.reshape(n, h, w, 7).unbind(dim=3)
     regression = torch.stack(
-        [own_x - column, own_y - line[:, None], *own_sides, torch.where(best[:, 0] >= 2.0, 1.0, own_share)],
-        dim=1,
+        [own_x - column, own_y - line[:, None], *own_sides, torch.where(best[:, 0] >= 2.0, 1.0, own_share)], dim=1
     )
     return heat, weight, torch.where(best >= 0.0, regression, 0.0)
 
@@ -213,9 +209,7 @@ class Crops:
         return crops, *targets(labels, self._classes, self._device)
 
 
-def loss_terms(
-    output: Tensor, heat: Tensor, weight: Tensor, regression: Tensor
-) -> tuple[Tensor, Tensor, Tensor]:
+def loss_terms(output: Tensor, heat: Tensor, weight: Tensor, regression: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """Return the focal loss of the heatmaps, the offset loss and the box loss.
 
     The focal loss is equation (1) of Zhou et al. (2019) with alpha 2 and beta 4, divided by the number of labelled
@@ -229,12 +223,8 @@ def loss_terms(
     focal = -((gain * weight).sum(dim=(0, 2, 3)) / count).sum() / 2
     mask = regression[:, 6:7]
     total = mask.sum().clamp(min=1.0)
-    offset = (
-        functional.smooth_l1_loss(guess[:, :2], regression[:, :2], reduction="none", beta=0.1) * mask
-    ).sum()
-    box = (
-        functional.smooth_l1_loss(guess[:, 2:], regression[:, 2:6], reduction="none", beta=0.2) * mask
-    ).sum()
+    offset = (functional.smooth_l1_loss(guess[:, :2], regression[:, :2], reduction="none", beta=0.1) * mask).sum()
+    box = (functional.smooth_l1_loss(guess[:, 2:], regression[:, 2:6], reduction="none", beta=0.2) * mask).sum()
     return focal, offset / total, box / total
 
 
@@ -264,9 +254,7 @@ def train(config: TrainDetectorConfig, stop: int | None = None) -> Path:
     return fit(config, dataset.load(config.data, "train"), dataset.load(config.data, "held_out"), stop)
 
 
-def fit(
-    config: TrainDetectorConfig, data: dataset.Dataset, held: dataset.Dataset, stop: int | None = None
-) -> Path:
+def fit(config: TrainDetectorConfig, data: dataset.Dataset, held: dataset.Dataset, stop: int | None = None) -> Path:
     """Train or resume on images in memory; see `train`.
 
     Raises:
@@ -297,18 +285,14 @@ def fit(
     else:
         with curve_path.open("w") as file:
             names = [f"ap_{camera}_{label}" for camera, label in keys]
-            csv.writer(file).writerow(
-                ["step", "images", "cpu_s", "loss_heat", "loss_offset", "loss_box", *names]
-            )
+            csv.writer(file).writerow(["step", "images", "cpu_s", "loss_heat", "loss_offset", "loss_box", *names])
     last = config.steps if stop is None else stop
     crops = Crops(data, len(config.classes), config.device)
     del data  # the images are on the device now: once is enough
     sums = torch.zeros(3, device=config.device)
     started = time.process_time()
     while step < last:
-        image, heat, weight, regression = crops.batch(
-            stream(config.seed, f"detector/batch/{step}"), config.batch
-        )
+        image, heat, weight, regression = crops.batch(stream(config.seed, f"detector/batch/{step}"), config.batch)
         rate = config.rate * min(1.0, (step + 1) / 300) * 0.5 * (1 + math.cos(math.pi * step / config.steps))
         for group in optimiser.param_groups:
             group["lr"] = rate
@@ -328,12 +312,7 @@ def fit(
             means = sums.cpu().numpy() / config.check_every
             sums.zero_()
             with curve_path.open("a") as file:
-                row = [
-                    step,
-                    step * config.batch,
-                    round(time.process_time() - started, 1),
-                    *np.round(means, 4),
-                ]
+                row = [step, step * config.batch, round(time.process_time() - started, 1), *np.round(means, 4)]
                 by_key = [scores[key].ap for key in keys]
                 csv.writer(file).writerow([*row, *np.round(by_key, 4)])
             quality = float(np.mean(by_key))

@@ -38,9 +38,7 @@ def train_grasps(
     held = label(out / "labels", seed, "held_out", held_out)
     data = label(out / "labels", seed, "train", wares)
     if min(data.held.sum(), (~data.held).sum()) < LEAST:
-        raise ConfigError(
-            f"Training needs {LEAST} grasps that hold and as many that do not; give more --wares."
-        )
+        raise ConfigError(f"Training needs {LEAST} grasps that hold and as many that do not; give more --wares.")
     path = out / "scorer.npz"
     train(data, held, TrainScorerConfig(seed, epochs), out / "curve.csv").save(path)
     print(table(held, load_net(path).logits(held.cells, held.facts)))
@@ -62,9 +60,7 @@ def table(held: GraspLabels, scores: NDArray[np.floating]) -> str:
         some = np.flatnonzero((held.kind == number) | (number < 0))
         if not len(some):
             continue
-        part = GraspLabels(
-            *(getattr(held, name)[some] for name in ("cells", "facts", "held", "ware", "kind"))
-        )
+        part = GraspLabels(*(getattr(held, name)[some] for name in ("cells", "facts", "held", "ware", "kind")))
         lines.append(
             f"| {kind} | {len(some)} | {part.held.mean():.0%} | {auc(scores[some], part.held):.3f} "
             f"| {auc(before[some], part.held):.3f} | {first_held(scores[some], part):.0%} "

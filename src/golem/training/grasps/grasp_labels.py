@@ -194,9 +194,7 @@ def label_ware(seed: int, split: str, number: int) -> GraspLabels:
     rest = rng.permutation(np.arange(FIRST, len(grasps)))[: PER_WARE - FIRST]
     tried = [grasps[k] for k in (*range(min(FIRST, len(grasps))), *rest.tolist())]
     held = [trial.held(_off(grasp.T_odom_gripper, rng), grasp.gap) for grasp in tried]
-    cells, facts = (
-        hand_view(tried, cloud) if tried else (np.zeros((0, SEEN), bool), np.zeros((0, FACTS), np.float32))
-    )
+    cells, facts = hand_view(tried, cloud) if tried else (np.zeros((0, SEEN), bool), np.zeros((0, FACTS), np.float32))
     ones = np.ones(len(tried), np.int64)
     return GraspLabels(cells, facts, np.array(held, bool), number * ones, list(KINDS).index(draw.kind) * ones)
 

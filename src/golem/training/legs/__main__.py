@@ -109,17 +109,11 @@ def shove(
 
     rows = shove_all(network, impulse, n, seed, threads, speed)
     table = Table(
-        "direction",
-        "survived",
-        "stopped by the gate",
-        "fell",
-        title=f"{impulse:g} N s at {speed:g} m/s, n = {n} each",
+        "direction", "survived", "stopped by the gate", "fell", title=f"{impulse:g} N s at {speed:g} m/s, n = {n} each"
     )
     for row in rows:
         table.add_row(row.direction.replace("_", " "), str(row.survived), str(row.stopped), str(row.fell))
-    table.add_row(
-        "all", *(str(sum(getattr(row, what) for row in rows)) for what in ("survived", "stopped", "fell"))
-    )
+    table.add_row("all", *(str(sum(getattr(row, what) for row in rows)) for what in ("survived", "stopped", "fell")))
     Console().print(table)
 
 

@@ -35,9 +35,7 @@ def average(networks: Sequence[Path], weights: Sequence[float], out: Path) -> No
     if not all(0.0 <= w < math.inf for w in weights) or sum(weights) == 0.0:
         raise ConfigError("--weights are numbers of 0 or more, and not all of them 0.")
     if out.suffix != ".onnx" or any(path.suffix != ".onnx" for path in networks):
-        raise ConfigError(
-            "Networks are files that end in .onnx; 'golem train legs export' makes them of checkpoints."
-        )
+        raise ConfigError("Networks are files that end in .onnx; 'golem train legs export' makes them of checkpoints.")
     share = torch.tensor(weights, dtype=torch.float64) / sum(weights)
     actors = [load_actor(path) for path in networks]
     mean = actors[0]
@@ -46,9 +44,7 @@ def average(networks: Sequence[Path], weights: Sequence[float], out: Path) -> No
             stacked = torch.stack([part.double() for part in parts])
             parts[0].copy_(torch.tensordot(share, stacked, dims=1))
     graph = graph_of(mean)
-    said = "; ".join(
-        f"{w:g} x {path.name}: {_trained(path)}" for w, path in zip(weights, networks, strict=True)
-    )
+    said = "; ".join(f"{w:g} x {path.name}: {_trained(path)}" for w, path in zip(weights, networks, strict=True))
     helper.set_model_props(graph, {TRAINED: f"golem train legs average: {said}"})
     out.parent.mkdir(parents=True, exist_ok=True)
     onnx.save(graph, str(out))

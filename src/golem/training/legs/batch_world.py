@@ -185,9 +185,7 @@ class BatchWorld:
         self._contact.reset(mask)
         self._gate.reset(where, q[:, LEGS])
 
-    def step(
-        self, legs: Array, upper: Array, force: Array, on_torso: NDArray[np.bool_], substeps: int
-    ) -> None:
+    def step(self, legs: Array, upper: Array, force: Array, on_torso: NDArray[np.bool_], substeps: int) -> None:
         """Advance by `substeps` physics steps under leg targets (n, 12), upper-body targets (n, 15) and a push."""
         self._xfrc[:, self.ids.torso, :3] = force * on_torso[:, None]
         self._xfrc[:, self.ids.base, :3] = force * ~on_torso[:, None]
@@ -263,9 +261,7 @@ class BatchWorld:
         x = np.array([-0.5, -0.5, 0.5, 0.5])
         y = np.array([-0.5, 0.5, -0.5, 0.5])
         plane = rng.uniform(-1.0, 1.0, (m, 3))
-        height = (
-            0.4 * plane[:, :1] + 0.6 * (plane[:, 1:2] * x + plane[:, 2:] * y) + rng.uniform(-0.3, 0.3, (m, 4))
-        )
+        height = 0.4 * plane[:, :1] + 0.6 * (plane[:, 1:2] * x + plane[:, 2:] * y) + rng.uniform(-0.3, 0.3, (m, 4))
         raised = self.config.roughness * height + self.config.ledge * rng.random((m, 1))
         corners = self.ids.soles.reshape(2, 4)[side]
         nominal = self._model.geom_pos[corners, 2]

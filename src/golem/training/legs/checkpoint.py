@@ -63,9 +63,7 @@ def _rows(path: Path) -> list[dict[str, str]]:
         with path.open() as file:
             return list(csv.DictReader(file))
     except OSError as error:
-        raise ConfigError(
-            f"The curve {path} cannot be read: {error.strerror}; name folders of runs."
-        ) from error
+        raise ConfigError(f"The curve {path} cannot be read: {error.strerror}; name folders of runs.") from error
 
 
 def _columns(path: Path, rows: Sequence[Mapping[str, str]]) -> dict[str, Array]:

@@ -104,9 +104,7 @@ class UpperBodyMotion:
         centre = self._centre[where]
         anywhere = self._rng.uniform(self._lower, self._upper, centre.shape)
         moved = self._rng.random(centre.shape) < 0.8
-        return centre + amplitude * self._rng.random((len(where), 1)) * np.where(
-            moved, anywhere - centre, 0.0
-        )
+        return centre + amplitude * self._rng.random((len(where), 1)) * np.where(moved, anywhere - centre, 0.0)
 
 
 class RandomPushes:

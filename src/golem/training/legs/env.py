@@ -308,9 +308,7 @@ class LegsEnv:
         swing = swing_offset(self.gait.phases, gait.period, gait.stance, config.swing, KD / KP)
         target = STANCE + config.action_scale * action + swing
         target = np.clip(target, self._limits.lower[LEGS], self._limits.upper[LEGS])
-        self.world.step(
-            target, self.upper.target, self._pushes.force, self._pushes.on_torso, round(dt / STEP)
-        )
+        self.world.step(target, self.upper.target, self._pushes.force, self._pushes.on_torso, round(dt / STEP))
         truth = self.world.truth
         reward, terms = self._rewards(
             truth,

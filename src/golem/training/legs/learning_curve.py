@@ -78,9 +78,7 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
         raise ConfigError(f"The picture is a file that ends in .png, not {out}; the table goes beside it.")
     table = out.with_suffix(".csv")
     if table.resolve() in [(run / CURVE).resolve() for run in runs]:
-        raise ConfigError(
-            f"The table beside {out} would replace the run's own {CURVE}; choose another --out."
-        )
+        raise ConfigError(f"The table beside {out} would replace the run's own {CURVE}; choose another --out.")
     if len(runs) > len(COLOURS):
         raise ConfigError(f"One picture shows {len(COLOURS)} runs at most, not {len(runs)}; draw two.")
     curves = [Curve.of(run) for run in runs]
@@ -97,11 +95,7 @@ def draw_curves(runs: Sequence[Path], out: Path) -> None:
             values = np.convolve(curve.columns[column], np.full(rows, 1.0 / rows), mode="valid")
             axes.plot(1e-6 * curve.columns["steps"][-len(values) :], values, color=colour)
     figure.legend(
-        plots[0].get_lines(),
-        [curve.name for curve in curves],
-        loc="outside lower left",
-        ncols=4,
-        frameon=False,
+        plots[0].get_lines(), [curve.name for curve in curves], loc="outside lower left", ncols=4, frameon=False
     )
     out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(out)

@@ -67,9 +67,7 @@ class Actor(nn.Module):
     robot neither drifts nor turns to one side and learns from every step twice.
     """
 
-    def __init__(
-        self, observation: Mirror, action: Mirror, hidden: tuple[int, ...], noise: float = 0.8
-    ) -> None:
+    def __init__(self, observation: Mirror, action: Mirror, hidden: tuple[int, ...], noise: float = 0.8) -> None:
         """Build a network for the vectors that the two mirrors are for."""
         super().__init__()
         self.net = mlp((len(observation.sign), *hidden, len(action.sign)), 0.01)

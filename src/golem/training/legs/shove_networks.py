@@ -37,9 +37,7 @@ class Shoved:
     fell: int
 
 
-def shove_all(
-    network: Path, impulse: float, n: int, seed: int, threads: int, speed: float = 0.0
-) -> list[Shoved]:
+def shove_all(network: Path, impulse: float, n: int, seed: int, threads: int, speed: float = 0.0) -> list[Shoved]:
     """Shove `n` robots in each direction once, arms at rest, without exploration.
 
     Args:
@@ -55,9 +53,7 @@ def shove_all(
         ConfigError: it is neither, or a number is not positive.
     """
     if impulse <= 0.0 or n < 1 or threads < 1 or seed < 0:
-        raise ConfigError(
-            "Give --impulse more than 0, -n 1 or more, --threads 1 or more and --seed 0 or more."
-        )
+        raise ConfigError("Give --impulse more than 0, -n 1 or more, --threads 1 or more and --seed 0 or more.")
     torch.set_num_threads(1)
     actor = load_actor(network)
     task = TASKS["walk" if speed else "stand"]

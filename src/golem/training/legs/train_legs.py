@@ -131,9 +131,7 @@ class _Run:
         )
         half = config.robots // 2
         self._steered: Rows = np.arange(half)
-        self.upper = Ppo(
-            Actor(seen, upper_mirror(), ppo.hidden, 0.6), known.shape[1], half, ppo, config.seed + 1
-        )
+        self.upper = Ppo(Actor(seen, upper_mirror(), ppo.hidden, 0.6), known.shape[1], half, ppo, config.seed + 1)
         self._survival = 0.0
         self._obs, self._known = obs, known
         self._log: list[dict[str, float]] = []
@@ -212,9 +210,7 @@ class _Run:
             )
         before = saved.get("codes", ["unknown"])
         if before[-1] != self._codes[-1]:
-            print(
-                f"This run was begun by the code of commit {before[-1]} and goes on with that of {self._codes[-1]}."
-            )
+            print(f"This run was begun by the code of commit {before[-1]} and goes on with that of {self._codes[-1]}.")
             self._codes = [*before, *self._codes]
         else:
             self._codes = before
@@ -293,17 +289,7 @@ class _Run:
                 writer.writeheader()
             for row in self._log:
                 writer.writerow({name: f"{value:.5g}" for name, value in row.items()})
-        shown = (
-            "steps",
-            "cpu_s",
-            "falls",
-            "error_moving",
-            "error_standing",
-            "survival",
-            "push",
-            "std",
-            "reward",
-        )
+        shown = ("steps", "cpu_s", "falls", "error_moving", "error_standing", "survival", "push", "std", "reward")
         print("  ".join(f"{name} {self._log[-1][name]:.4g}" for name in shown), flush=True)
         self._log.clear()
 
@@ -353,9 +339,7 @@ class _Meter:
             "steps_standing": float(np.mean(self._stepping)),
             "reward": float(np.mean(self._rewards)),
         }
-        return out | {
-            f"r_{name}": float(np.mean([terms[name] for terms in self._terms])) for name in self._terms[0]
-        }
+        return out | {f"r_{name}": float(np.mean([terms[name] for terms in self._terms])) for name in self._terms[0]}
 
 
 def _plain(config: TrainLegsConfig | EnvConfig) -> dict[str, Any]:

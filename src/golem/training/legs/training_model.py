@@ -87,21 +87,14 @@ def build_model() -> tuple[mujoco.MjModel, Ids]:
     model = spec.compile()
     feet = [model.body(f"{side}_ankle_roll_link").id for side in SIDES]
     sphere = mujoco.mjtGeom.mjGEOM_SPHERE
-    soles = [
-        g
-        for f in feet
-        for g in range(model.ngeom)
-        if model.geom_bodyid[g] == f and model.geom_type[g] == sphere
-    ]
+    soles = [g for f in feet for g in range(model.ngeom) if model.geom_bodyid[g] == f and model.geom_type[g] == sphere]
     return model, Ids(
         base=model.body(BASE_LINK).id,
         torso=model.body("torso_link").id,
         hands=np.array([model.body(magpie_model.hand_name(side)).id for side in SIDES]),
         soles=np.array(soles),
         touch=np.array([model.sensor(f"{side}_touch").adr[0] for side in SIDES]),
-        sole_velocity=np.array(
-            [model.sensor(f"{side}_sole_velocity").adr[0] + np.arange(3) for side in SIDES]
-        ),
+        sole_velocity=np.array([model.sensor(f"{side}_sole_velocity").adr[0] + np.arange(3) for side in SIDES]),
     )
 
 

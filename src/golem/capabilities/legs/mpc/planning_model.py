@@ -157,9 +157,7 @@ class PlanningModel:
         n, m = targets.shape[:2]
         state: Array = np.empty((n, m, self._state.size))
         sensors: Array = np.empty((n, m, self._model.nsensordata))
-        self._pool().rollout(
-            self._model, self._workers, self._state, targets, state=state, sensordata=sensors
-        )
+        self._pool().rollout(self._model, self._workers, self._state, targets, state=state, sensordata=sensors)
         vectors = sensors[..., : 3 * 7].reshape(n, m, 7, 3)
         rates = 1 + self._model.nq
         return Trajectories(
