@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import trimesh
@@ -71,7 +73,7 @@ def test_edges_that_join_four_faces_are_no_hole() -> None:
     one = trimesh.creation.box(extents=(0.1, 0.1, 0.1))
     other = one.copy()
     other.apply_translation((0.1, 0.1, 0.0))
-    both = trimesh.util.concatenate([one, other])
+    both: Any = trimesh.util.concatenate([one, other])
     vertices, faces = np.asarray(both.vertices, float), np.asarray(both.faces, np.int64)
     assert not trimesh.Trimesh(vertices, faces).is_watertight and open_edges(vertices, faces) == 0
     assert link_surface("pair", [SurfacePart(vertices, faces)]).volume == pytest.approx(0.002, rel=0.05)

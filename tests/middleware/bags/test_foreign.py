@@ -27,8 +27,10 @@ def text(words: str, order: str = "<") -> bytes:
     return bytes([0, order == "<", 0, 0]) + struct.pack(f"{order}I", len(data)) + data
 
 
-STRING = ("cdr", "ros2msg", "std_msgs/msg/String", b"string data")
-FOREIGN: dict[str, tuple[tuple[str, str, str, bytes] | tuple[str], bytes, str]] = {
+Channel = tuple[str, str, str, bytes] | tuple[str]
+"""Encoding of the messages, then encoding, name and text of their schema."""
+STRING: Channel = ("cdr", "ros2msg", "std_msgs/msg/String", b"string data")
+FOREIGN: dict[str, tuple[Channel, bytes, str]] = {
     "json": (("json", "jsonschema", "Foo", b"{}"), b'{"a": 1}', "'json', not 'cdr'"),
     "protobuf": (("protobuf", "protobuf", "foxglove.Log", b"x"), b"\x0a\x01a", "'protobuf', not 'cdr'"),
     "ros1": (("ros1", "ros1msg", "std_msgs/String", b"string data"), b"\2\0\0\0hi", "'ros1', not 'cdr'"),
@@ -38,7 +40,7 @@ FOREIGN: dict[str, tuple[tuple[str, str, str, bytes] | tuple[str], bytes, str]] 
 }
 
 
-def write(path: Path, channels: Mapping[str, tuple[tuple[str, ...], list[bytes]]], chunks: bool = True) -> None:
+def write(path: Path, channels: Mapping[str, tuple[Channel, list[bytes]]], chunks: bool = True) -> None:
     """Write an MCAP file: per topic its encoding, schema and messages, 10 ms apart."""
     with path.open("wb") as file:
         writer = Writer(file, use_chunking=chunks)

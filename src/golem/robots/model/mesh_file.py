@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -109,7 +110,8 @@ def read_mesh(path: Path) -> tuple[Array, NDArray[np.int64]]:
 def _assimp(path: Path) -> tuple[Array, NDArray[np.int64]]:
     import coal
 
-    mesh = coal.MeshLoader().load(str(path), np.ones(3))
+    library: Any = coal  # its types do not name the loader
+    mesh = library.MeshLoader().load(str(path), np.ones(3))
     triangles = (mesh.tri_indices(i) for i in range(mesh.num_tris))
     faces = np.array([(t[0], t[1], t[2]) for t in triangles], np.int64)
     unit = _unit(path) if path.suffix.lower() == ".dae" else 1.0
