@@ -58,20 +58,20 @@ FAULTS = {
     ),
     "estimator-half-bias": PlantedFault(
         "hardware/estimator/attitude.py",
-        "(state.imu.gyro - (2.0 * sign / dt) * turn - self.value)",
-        "(state.imu.gyro - (1.0 * sign / dt) * turn - self.value)",
+        "m.value[0] += share * (gyro[0] - twice",
+        "m.value[0] += share * (gyro[0] - 0.5 * twice",
         ("tests/hardware/estimator/test_attitude.py",),
     ),
     "servo-no-ramp": PlantedFault(
         "hardware/servo/servo.py",
-        "kp[ramped] *= self._elapsed / self.config.ramp",
-        "kp[ramped] *= 1.0",
+        "kp *= m.elapsed / m.ramp",
+        "kp *= 1.0",
         ("tests/hardware/servo",),
     ),
     "servo-bias-unbounded": PlantedFault(
         "hardware/servo/servo.py",
-        "out[i] = min(max(bias[i] + gain[i] * error[i], -bound[i]), bound[i])",
-        "out[i] = bias[i] + gain[i] * error[i]",
+        "m.bias[i] = min(max(m.bias[i] + m.gains[2, i] * r.dt * error, -bound), bound)",
+        "m.bias[i] = m.bias[i] + m.gains[2, i] * r.dt * error",
         ("tests/hardware/servo",),
     ),
     "codec-no-padding": PlantedFault(
@@ -81,13 +81,13 @@ FAULTS = {
         ("tests/middleware/ros/test_codec.py", "tests/middleware/ros/test_vendor_messages.py"),
     ),
     "planner-too-fast": PlantedFault(
-        "capabilities/planning/timed_path.py",
+        "capabilities/planning/path_planner.py",
         "cap = (SLACK * limits.speed / both).min(axis=1)",
         "cap = (1.2 * limits.speed / both).min(axis=1)",
         ("tests/capabilities/planning/test_rrt_connect.py",),
     ),
     "memory-rivals-itself": PlantedFault(
-        "capabilities/memory/rivals.py",
+        "capabilities/memory/object_map.py",
         "for k in chosen if records.label(k) != label",
         "for k in chosen if records.label(k) == label",
         ("tests/capabilities/memory/test_object_map.py",),
@@ -112,8 +112,8 @@ FAULTS = {
     ),
     "walkers-go-back": PlantedFault(
         "capabilities/navigation/movers.py",
-        "mean(axis=0) + (t - then) * self.velocity",
-        "mean(axis=0) - (t - then) * self.velocity",
+        "return self.middle + (t - self.places[-1][0]) * self.velocity",
+        "return self.middle - (t - self.places[-1][0]) * self.velocity",
         ("tests/capabilities/navigation/test_movers.py",),
     ),
     "collision-clears-the-rest": PlantedFault(
