@@ -63,10 +63,7 @@ FAULTS = {
         ("tests/hardware/estimator/test_attitude.py",),
     ),
     "servo-no-ramp": PlantedFault(
-        "hardware/servo/servo.py",
-        "kp *= m.elapsed / m.ramp",
-        "kp *= 1.0",
-        ("tests/hardware/servo",),
+        "hardware/servo/servo.py", "kp *= m.elapsed / m.ramp", "kp *= 1.0", ("tests/hardware/servo",)
     ),
     "servo-bias-unbounded": PlantedFault(
         "hardware/servo/servo.py",

@@ -97,7 +97,7 @@ def test_the_encoders_are_off_by_what_the_episode_drew() -> None:
     np.testing.assert_array_equal(truth, start_posture())
     off = q - truth
     assert np.abs(off).max() > np.radians(0.1)
-    np.testing.assert_allclose(off, field._errors.joint_offset, atol=1e-15)
+    np.testing.assert_allclose(off, field._errors.joint_offset, atol=field.profile.motors.encoder_step)
 
 
 def test_the_motors_servo_what_the_encoders_report() -> None:

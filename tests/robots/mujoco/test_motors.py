@@ -8,6 +8,7 @@ import pytest
 
 from golem.robots.model.mjcf import robot_spec
 from golem.robots.mujoco.motors import Motors
+from golem.robots.sensors.motor_errors import MotorErrors
 from golem.types import NUM_JOINTS, LowCommand
 
 ZERO = np.zeros(NUM_JOINTS)
@@ -68,3 +69,29 @@ def test_without_a_command_the_motors_are_limp() -> None:
     drive = Drive(0.0)
     drive.motors.drive(drive.data)
     assert not drive.data.ctrl.any()
+
+
+def test_reports_are_off_by_the_errors_that_are_asked_for_and_ideal_ones_are_not() -> None:
+    model = robot_spec(hands=False).compile()
+    data = mujoco.MjData(model)
+    errors = MotorErrors(encoder_step=0.01, speed_noise=0.02, torque_noise=0.3, torque_gain=0.05)
+    motors = Motors(model, np.full(NUM_JOINTS, 100.0), ZERO, 0.0, None, errors, np.random.default_rng(1))
+    data.qpos[7:] = np.linspace(-1.0, 1.0, NUM_JOINTS)
+    motors.give(torque(20.0), 0.0)
+    motors.drive(data)
+    q, dq, tau = (np.array(column) for column in zip(*(motors.measure(data) for _ in range(3000)), strict=True))
+    np.testing.assert_allclose(q[0], np.round(data.qpos[7:] / 0.01) * 0.01, atol=1e-12)
+    assert (q == q[0]).all()
+    np.testing.assert_allclose(dq.std(axis=0), 0.02, rtol=0.1)
+    np.testing.assert_allclose(dq.mean(axis=0), 0.0, atol=0.002)
+    np.testing.assert_allclose(tau.std(axis=0), 0.3, rtol=0.1)
+    gain = tau.mean(axis=0) / 20.0 - 1.0
+    assert 0.03 < gain.std() < 0.08
+    assert np.abs(np.corrcoef(dq.T)[~np.eye(NUM_JOINTS, dtype=bool)]).max() < 0.08
+    sound = Motors(model, np.full(NUM_JOINTS, 100.0), ZERO, 0.0)
+    sound.give(torque(20.0), 0.0)
+    sound.drive(data)
+    for reported, true in zip(
+        sound.measure(data), (data.qpos[7:], data.qvel[6:], np.full(NUM_JOINTS, 20.0)), strict=True
+    ):
+        np.testing.assert_array_equal(reported, true)

@@ -113,6 +113,8 @@ class MujocoRobot:
             self._errors.joint_offset,
             self.profile.actuator_delay + self.config.latency,
             memory["motors"],
+            self.profile.motors,
+            stream(seed, "motors"),
         )
         self._rig: CameraRig | None = None
         self._watched: NDArray[np.int64] | None = None

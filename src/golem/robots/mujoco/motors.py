@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 
 from golem.errors import ConfigError
 from golem.kernels import njit
-from golem.native import COMMAND, Record, Records, address, floats, new_record
+from golem.native import COMMAND, Record, Records, address, floats, new_record, view
 from golem.native_messages import put_command
+from golem.robots.sensors.motor_errors import MotorErrors
 from golem.types import NUM_JOINTS, TICK, Array, LowCommand
 
 SLOTS = 128
@@ -32,13 +35,57 @@ MOTORS = np.dtype(
         ("tau", "f8", (NUM_JOINTS,)),
         ("times", "f8", (SLOTS,)),
         ("waiting", "f8", (SLOTS, 3, NUM_JOINTS)),
+        ("encoder_step", "f8"),
+        ("noise", "f8", (2,)),
+        ("torque_gain", "f8", (NUM_JOINTS,)),
+        ("random", "u8"),
     ]
 )
 """Indices, options and memory of the drives.
 
 Waiting commands are a ring: the k-th one given is in slot k modulo `SLOTS`, rows `constant`, `kp`, `kd`. `constant` is
-what the motors add to -kp q - kd dq; q is the true position, the encoders' error is in the target.
+what the motors add to -kp q - kd dq; q is the true position, the encoders' error is in the target. `noise` is that of
+speed and torque, `random` the state of their generator; see `MotorErrors`.
 """
+_motors_at = view(MOTORS)
+
+
+@njit(cache=True, nogil=True)
+def report(m: Record, qpos: int, qvel: int, q: Array, dq: Array, tau: Array) -> None:
+    """Write what encoders and drives report into `q`, `dq`, `tau` (27,); arrays of the simulation by address."""
+    place, speed, step, state = floats(qpos), floats(qvel), m.encoder_step, m.random
+    noisy = m.noise[0] + m.noise[1] > 0.0
+    for i in range(NUM_JOINTS):
+        q[i] = place[m.q[i]] + m.offset[i]
+        if step > 0.0:
+            q[i] = step * round(q[i] / step)
+        dq[i], tau[i] = speed[m.v[i]], m.torque_gain[i] * m.tau[i]
+        if noisy:  # two normal numbers by Box and Muller, of two uniform ones by xorshift64*
+            state = _shifted(state)
+            radius = math.sqrt(-2.0 * math.log(_unit(state)))
+            state = _shifted(state)
+            angle = 2.0 * math.pi * _unit(state)
+            dq[i] += m.noise[0] * radius * math.cos(angle)
+            tau[i] += m.noise[1] * radius * math.sin(angle)
+    m.random = state
+
+
+@njit(cache=True, nogil=True)
+def _shifted(state: np.uint64) -> np.uint64:
+    state ^= state >> np.uint64(12)
+    state ^= state << np.uint64(25)
+    return state ^ (state >> np.uint64(27))
+
+
+@njit(cache=True, nogil=True)
+def _unit(state: np.uint64) -> float:
+    """Return a number above 0 and up to 1."""
+    return (float((state * np.uint64(2685821657736338717)) >> np.uint64(11)) + 1.0) * 2.0**-53
+
+
+@njit(cache=True, nogil=True)
+def _report_at(motors: int, qpos: int, qvel: int, out: Array) -> None:
+    report(_motors_at(motors), qpos, qvel, out[0], out[1], out[2])
 
 
 @njit(cache=True, nogil=True)
@@ -90,7 +137,14 @@ class Motors:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, limit: Array, offset: Array, delay: float, memory: Records | None = None
+        self,
+        model: mujoco.MjModel,
+        limit: Array,
+        offset: Array,
+        delay: float,
+        memory: Records | None = None,
+        errors: MotorErrors | None = None,
+        rng: np.random.Generator | None = None,
     ) -> None:
         """Attach to `model`.
 
@@ -100,6 +154,8 @@ class Motors:
             offset: (27,) reported minus true joint position [rad].
             delay: time from a command being given to its torque [s].
             memory: where they remember, a `MOTORS`; None is a place of their own.
+            errors: of what they report; None reports what is.
+            rng: draws those.
 
         Raises:
             ConfigError: the delay is longer than commands are kept.
@@ -112,7 +168,11 @@ class Motors:
         self.memory = memory = new_record(MOTORS) if memory is None else memory
         memory["q"], memory["v"] = self._q, self._v
         memory["limit"], memory["offset"], memory["delay"] = limit, offset, delay
-        self._offset, self._numbers = offset, np.empty(COMMAND)
+        errors, rng = errors or MotorErrors(), rng or np.random.default_rng(0)
+        memory["encoder_step"], memory["noise"] = errors.encoder_step, (errors.speed_noise, errors.torque_noise)
+        memory["torque_gain"] = 1.0 + errors.torque_gain * rng.standard_normal(NUM_JOINTS)
+        memory["random"] = rng.integers(1, 2**63)
+        self._numbers = np.empty(COMMAND)
         self.tau: Array = memory["tau"][0]
 
     def place(self, data: mujoco.MjData, q: Array) -> None:
@@ -121,7 +181,9 @@ class Motors:
 
     def measure(self, data: mujoco.MjData) -> tuple[Array, Array, Array]:
         """Return q, dq, tau, (27,) each, as encoders and drives report them."""
-        return data.qpos.take(self._q) + self._offset, data.qvel.take(self._v), self.tau.copy()
+        out = np.empty((3, NUM_JOINTS))
+        _report_at(address(self.memory), address(data.qpos), address(data.qvel), out)
+        return out[0], out[1], out[2]
 
     def give(self, command: LowCommand, t: float) -> None:
         """Take `command` at time `t` [s]; it acts when its delay has passed. The very first acts at once."""

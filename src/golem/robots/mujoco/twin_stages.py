@@ -32,7 +32,7 @@ from golem.robots.mujoco.c_structs import data_struct, struct
 from golem.robots.mujoco.external_forces import PUSHES, apply_pushes, clear_pushes
 from golem.robots.mujoco.hand_servos import HAND, drive_hand, move_reference, read_hand
 from golem.robots.mujoco.hoist import HOIST, pull
-from golem.robots.mujoco.motors import MOTORS, drive, give
+from golem.robots.mujoco.motors import MOTORS, drive, give, report
 from golem.robots.mujoco.scene import COARSE_STEP, FINE_STEP
 from golem.robots.sensors.imu import BLOCK, IMU, measure_imu
 from golem.robots.sensors.sway import TONES
@@ -144,10 +144,9 @@ def sense(r: Record, m: Record) -> None:
     """Write what motors, IMU and hands report into the shared record `r`; `m` is a `TWIN` whose IMU has noise left."""
     qpos, qvel, sensors = floats(m.qpos), floats(m.qvel), floats(m.sensordata)
     motors = m.motors
+    report(motors, m.qpos, m.qvel, r.q, r.dq, r.tau)
     for i in range(NUM_JOINTS):
-        r.q[i] = qpos[motors.q[i]] + motors.offset[i] - m.joint_offset[i]
-        r.dq[i] = qvel[motors.v[i]]
-        r.tau[i] = motors.tau[i]
+        r.q[i] -= m.joint_offset[i]
     # MuJoCo's sensors describe the beginning of the last step. Orientation and rate must be of the encoders'
     # instant: 2 ms apart they make planted feet seem to move by a centimetre per second.
     quat, rate, acc = np.empty(4), np.empty(3), np.empty(3)

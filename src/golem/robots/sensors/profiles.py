@@ -18,6 +18,7 @@ from golem.errors import unknown_name
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import DepthErrors
 from golem.robots.sensors.imu import ImuBias, ImuErrors
+from golem.robots.sensors.motor_errors import MotorErrors
 from golem.robots.sensors.sway import Sway, draw_sway
 from golem.robots.worlds.screws import ScrewRanges
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array
@@ -57,6 +58,7 @@ class RealismProfile:
         colour_noise: noise of the colour images, in multiples of what `auto_exposure` has.
         arm_offset, leg_offset: standard deviation of the encoder zero of torso and arm joints, of leg joints [rad].
         actuator_delay: time from a motor command's publication to the torque [s].
+        motors: errors of what the motors report.
         imu: errors of the IMU.
         hoist_sway: radial RMS of the base's horizontal sway in the hoist [m]; a robot that stands sways by itself.
         screws: ranges of the loosened screws.
@@ -72,6 +74,7 @@ class RealismProfile:
     arm_offset: float = 0.0
     leg_offset: float = 0.0
     actuator_delay: float = 0.0
+    motors: MotorErrors = MotorErrors()
     imu: ImuErrors = ImuErrors()
     hoist_sway: float = 0.0
     screws: ScrewRanges = field(default_factory=ScrewRanges)
@@ -99,6 +102,16 @@ D400 = DepthErrors(
     grazing=np.deg2rad(70.0),
     specular_loss=0.5,
     occlusion=True,
+)
+
+MOTORS = MotorErrors(
+    # [assumption] 15 bits per turn of the output, as of the vendor's smaller motors; nobody publishes the H1-2's.
+    encoder_step=2.0 * np.pi / 2**15,
+    # [assumption] what a filtered derivative of such an encoder leaves.
+    speed_noise=0.01,
+    # [assumption] ripple of the currents' measurement, and a torque constant known to 3 %.
+    torque_noise=0.2,
+    torque_gain=0.03,
 )
 
 IMU = ImuErrors(
@@ -132,6 +145,7 @@ PROFILES: dict[str, RealismProfile] = {
         leg_offset=0.005,
         # [C] one period of the 500 Hz command stream.
         actuator_delay=0.002,
+        motors=MOTORS,
         imu=IMU,
         # [paper] sway while standing in their simulation: 0.10 mm radial RMS. [assumption] the same in the hoist.
         hoist_sway=0.0001,
@@ -157,6 +171,7 @@ PROFILES: dict[str, RealismProfile] = {
         leg_offset=0.010,
         # [C] one period of the command stream and one of the motor bus.
         actuator_delay=0.004,
+        motors=MOTORS,
         imu=IMU,
         # [assumption] half of the standing robot's 4.6 mm radial RMS [paper]; nobody published that of the hoisted one.
         hoist_sway=0.0023,
