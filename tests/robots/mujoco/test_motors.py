@@ -95,3 +95,12 @@ def test_reports_are_off_by_the_errors_that_are_asked_for_and_ideal_ones_are_not
         sound.measure(data), (data.qpos[7:], data.qvel[6:], np.full(NUM_JOINTS, 20.0)), strict=True
     ):
         np.testing.assert_array_equal(reported, true)
+
+
+def test_joints_get_their_own_friction_and_keep_the_models_where_none_is_told() -> None:
+    model = robot_spec(hands=False).compile()
+    before = model.dof_frictionloss[6:].copy()
+    friction = np.where(np.arange(NUM_JOINTS) % 2, 1.5, np.nan)
+    Motors(model, np.full(NUM_JOINTS, 100.0), ZERO, 0.0).resist(model, friction)
+    np.testing.assert_array_equal(model.dof_frictionloss[6:][1::2], 1.5)
+    np.testing.assert_array_equal(model.dof_frictionloss[6:][::2], before[::2])

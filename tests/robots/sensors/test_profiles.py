@@ -53,6 +53,14 @@ def test_a_camera_is_not_quite_what_it_says_of_itself() -> None:
     )
 
 
+def test_joints_rub_each_with_its_own_friction() -> None:
+    assert np.isnan(episodes("ideal", 1)[0].friction).all()
+    profile, drawn = load_profile("field"), np.array([e.friction for e in episodes("field", 50)])
+    for part, span in ((drawn[:, LEGS], profile.leg_friction), (drawn[:, UPPER], profile.arm_friction)):
+        assert span is not None and span[0] <= part.min() < part.max() <= span[1]
+        assert np.ptp(part, axis=1).min() > 0.3 * (span[1] - span[0])
+
+
 def test_field_head_camera_is_off_by_what_the_paper_reports() -> None:
     errors = [displacement(e.T_nominal_actual["head"], 1.0) for e in episodes("field")]
     assert min(errors) >= 0.05

@@ -116,6 +116,7 @@ class MujocoRobot:
             self.profile.motors,
             stream(seed, "motors"),
         )
+        self._motors.resist(model, self._errors.friction)
         self._rig: CameraRig | None = None
         self._watched: NDArray[np.int64] | None = None
         self._seed = seed

@@ -175,6 +175,10 @@ class Motors:
         self._numbers = np.empty(COMMAND)
         self.tau: Array = memory["tau"][0]
 
+    def resist(self, model: mujoco.MjModel, friction: Array) -> None:
+        """Give the joints of `model` their dry `friction` (27,) [N m]; NaN leaves one as it is."""
+        model.dof_frictionloss[self._v] = np.where(np.isnan(friction), model.dof_frictionloss[self._v], friction)
+
     def place(self, data: mujoco.MjData, q: Array) -> None:
         """Put the joints at their true positions `q` (27,) [rad]."""
         data.qpos[self._q] = q

@@ -59,6 +59,8 @@ class RealismProfile:
         arm_offset, leg_offset: standard deviation of the encoder zero of torso and arm joints, of leg joints [rad].
         actuator_delay: time from a motor command's publication to the torque [s].
         motors: errors of what the motors report.
+        leg_friction, arm_friction: range of each joint's dry friction, legs and then torso and arms [N m]; None leaves
+            that of the model.
         imu: errors of the IMU.
         hoist_sway: radial RMS of the base's horizontal sway in the hoist [m]; a robot that stands sways by itself.
         screws: ranges of the loosened screws.
@@ -75,6 +77,8 @@ class RealismProfile:
     leg_offset: float = 0.0
     actuator_delay: float = 0.0
     motors: MotorErrors = MotorErrors()
+    leg_friction: tuple[float, float] | None = None
+    arm_friction: tuple[float, float] | None = None
     imu: ImuErrors = ImuErrors()
     hoist_sway: float = 0.0
     screws: ScrewRanges = field(default_factory=ScrewRanges)
@@ -146,6 +150,9 @@ PROFILES: dict[str, RealismProfile] = {
         # [C] one period of the 500 Hz command stream.
         actuator_delay=0.002,
         motors=MOTORS,
+        # [assumption] dry friction of planetary gears of that torque; nobody publishes it, and no two joints are alike.
+        leg_friction=(0.3, 2.0),
+        arm_friction=(0.1, 0.8),
         imu=IMU,
         # [paper] sway while standing in their simulation: 0.10 mm radial RMS. [assumption] the same in the hoist.
         hoist_sway=0.0001,
@@ -172,6 +179,9 @@ PROFILES: dict[str, RealismProfile] = {
         # [C] one period of the command stream and one of the motor bus.
         actuator_delay=0.004,
         motors=MOTORS,
+        # [assumption] dry friction of planetary gears of that torque; nobody publishes it, and no two joints are alike.
+        leg_friction=(0.3, 2.0),
+        arm_friction=(0.1, 0.8),
         imu=IMU,
         # [assumption] half of the standing robot's 4.6 mm radial RMS [paper]; nobody published that of the hoisted one.
         hoist_sway=0.0023,
@@ -205,6 +215,7 @@ class EpisodeErrors:
         intrinsics: per camera (3,), its true focal length as a share of what it claims, and its principal point beside
             what it claims [px].
         joint_offset: (27,) reported minus true joint position [rad].
+        friction: (27,) dry friction of the joints [N m]; NaN leaves that of the model.
         imu: bias of the IMU.
         hoist_sway: horizontal motion of the base in the hoist.
     """
@@ -212,6 +223,7 @@ class EpisodeErrors:
     T_nominal_actual: dict[str, Array]
     intrinsics: dict[str, Array]
     joint_offset: Array
+    friction: Array
     imu: ImuBias
     hoist_sway: Sway
 
@@ -223,7 +235,7 @@ def sample_episode(profile: RealismProfile, rng: np.random.Generator) -> Episode
         profile: magnitudes.
         rng: e.g. `stream(seed, "episode")`; each kind of error draws from a child of it.
     """
-    cameras, joints, imu, hoist, lenses = rng.spawn(5)
+    cameras, joints, imu, hoist, lenses, gears = rng.spawn(6)
     sigma = np.zeros(NUM_JOINTS)
     sigma[LEGS] = profile.leg_offset
     sigma[UPPER] = profile.arm_offset
@@ -238,9 +250,19 @@ def sample_episode(profile: RealismProfile, rng: np.random.Generator) -> Episode
             for name, child in zip(CAMERAS, lenses.spawn(len(CAMERAS)), strict=True)
         },
         joint_offset=sigma * joints.standard_normal(NUM_JOINTS),
+        friction=np.concatenate(
+            [
+                _spread(profile.leg_friction, LEGS.stop, gears),
+                _spread(profile.arm_friction, NUM_JOINTS - LEGS.stop, gears),
+            ]
+        ),
         imu=profile.imu.draw_bias(imu),
         hoist_sway=draw_sway(profile.hoist_sway, hoist),
     )
+
+
+def _spread(span: tuple[float, float] | None, count: int, rng: np.random.Generator) -> Array:
+    return np.full(count, np.nan) if span is None else rng.uniform(*span, count)
 
 
 def _draw_extrinsic(errors: ExtrinsicErrors, rng: np.random.Generator) -> Array:
