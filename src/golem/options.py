@@ -70,14 +70,19 @@ def convert_all(
     return {key: convert(f"{what} '{key}'", hints.get(key), value) for key, value in options.items()}
 
 
-def read_yaml(text: str, name: str) -> object:
+def read_yaml(text: str, name: str, foreign: bool = False) -> object:
     """Return what the YAML `text` of the file called `name` says: None, a scalar, a list or a mapping.
+
+    Args:
+        text: the file's text.
+        name: the file, for messages.
+        foreign: whether another program wrote it: its Python objects are read as None then.
 
     Raises:
         ConfigError: it is not YAML, names a key twice, or refers to itself; names the line.
     """
     try:
-        return yaml.load(text, _Loader)
+        return yaml.load(text, _ForeignLoader if foreign else _Loader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         where = f", line {mark.line + 1}" if mark else ""
@@ -226,3 +231,14 @@ class _Loader(yaml.SafeLoader):
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float", re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$"), list("-+.0123456789")
 )
+
+
+class _ForeignLoader(_Loader):
+    """The same, which makes nothing of Python objects."""
+
+
+def _nothing(loader: yaml.SafeLoader, suffix: str, node: yaml.Node) -> None:
+    """Read any Python object as None."""
+
+
+_ForeignLoader.add_multi_constructor("tag:yaml.org,2002:python/", _nothing)

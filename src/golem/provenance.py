@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import golem
+from golem.capabilities.legs.passports.read import read_passport
 from golem.errors import ConfigError, OutputError
 from golem.slots import KEYS
 from golem.stack import Stack
@@ -123,10 +124,8 @@ def _named(options: Mapping[str, Any]) -> dict[str, Path]:
                 path = found[name].resolve()
                 found |= {f"{name}/{p.relative_to(path.parent)}": p for p in neighbours(path)}
             if found[name].suffix in (".yaml", ".yml"):
-                from golem.capabilities.legs.description import load_description
-
                 with suppress(ConfigError):  # another kind of file, or absent: said elsewhere
-                    found.setdefault("network", load_description(value)[1])
+                    found.setdefault("network", read_passport(value).network)
     return {name: path for name, path in found.items() if path.is_file()}
 
 

@@ -72,6 +72,15 @@ def load(slot: str, use: str) -> type[Any]:
     return cls
 
 
+def resolve(slot: str, use: str, options: Mapping[str, object]) -> tuple[str, Mapping[str, object]]:
+    """Return `use` and its options; for a file that an implementation of `slot` takes, that implementation's.
+
+    A leg policy's file, `policy.onnx`, stands for `policy` with the option `file: policy.onnx`.
+    """
+    name = SLOTS[slot].files.get(Path(use).suffix)
+    return (use, options) if name is None else (name, {"file": use, **options})
+
+
 def create(slot: str, use: str, options: Mapping[str, object], **context: object) -> Any:
     """Build the implementation `use` of `slot`.
 
@@ -83,6 +92,7 @@ def create(slot: str, use: str, options: Mapping[str, object], **context: object
         ConfigError: an option does not exist, has the wrong type, or has no default and is missing.
         ModuleFault: the constructor raised.
     """
+    use, options = resolve(slot, use, options)
     cls = load(slot, use)
     with _blamed(slot, use):
         parameters = inspect.signature(cls).parameters
@@ -144,6 +154,7 @@ def configure(slot: str, use: str, options: Mapping[str, object]) -> Any:
     Raises:
         ConfigError, ModuleFault: see `create`.
     """
+    use, options = resolve(slot, use, options)
     config = config_class(load(slot, use))
     return None if config is None else fill(_option(slot, use), config, options)
 
@@ -186,6 +197,7 @@ def _target(slot: str, use: str) -> str:
         ConfigError: two packages register it.
     """
     shipped = SLOTS[slot].shipped
+    use = SLOTS[slot].files.get(Path(use).suffix, use)
     owners = [(PACKAGE, shipped[use])] if use in shipped else []
     owners += _others(slot, tuple(sys.path)).get(use, [])
     if len(owners) > 1:

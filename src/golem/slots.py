@@ -7,7 +7,7 @@ A new implementation is one line here. A new slot is a row in `SLOTS`, a row in 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,11 +18,14 @@ class Slot:
         contract: the protocol that its modules satisfy, `package.module:Class`.
         shipped: implementations of this package by name, each `package.module:Class`.
         supplied: parameters of a constructor that the stack fills in; they are no options.
+        files: endings of files that can be used themselves, without a class: which implementation takes them, by its
+            option `file`.
     """
 
     contract: str
     shipped: Mapping[str, str]
     supplied: tuple[str, ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict[str, str])
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +80,7 @@ SLOTS: dict[str, Slot] = {
             "wbc": "golem.capabilities.legs.wbc:Wbc",
         },
         ("onboard",),
+        dict.fromkeys((".onnx", ".pt", ".yaml", ".yml"), "policy"),
     ),
     "upper_body": Slot(
         "golem.capabilities.arms.base:UpperBody",

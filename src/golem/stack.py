@@ -309,7 +309,7 @@ def _skills(name: str, value: object) -> dict[str, Choice]:
 
 def _choice(name: str, key: str, slot: str, value: object) -> Choice:
     if isinstance(value, str):
-        return Choice(value)
+        return Choice(*_resolved(slot, value, {}))
     if not isinstance(value, Mapping) or not isinstance(value.get("use"), str):
         raise ConfigError(
             f"{name}: '{key}' wants '{{use: NAME, option: value, ...}}', with NAME one of "
@@ -317,4 +317,10 @@ def _choice(name: str, key: str, slot: str, value: object) -> Choice:
         )
     options = {key: v for key, v in value.items() if key != "use"}
     check_values(f"{name}: {key}", options)
-    return Choice(value["use"], options)
+    return Choice(*_resolved(slot, value["use"], options))
+
+
+def _resolved(slot: str, use: str, options: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Return `registry.resolve` of what a stack file says."""
+    name, own = registry.resolve(slot, use, options)
+    return name, dict(own)

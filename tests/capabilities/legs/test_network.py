@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
-import onnxruntime
 import pytest
 
 from golem.capabilities.legs.network import load_network
@@ -137,34 +135,3 @@ def test_torch_is_named_where_it_is_missing(tmp_path: Path, monkeypatch: pytest.
 
 OWN = "left_hip_yaw,left_hip_pitch,left_hip_roll,left_knee,left_ankle_pitch,left_ankle_roll"
 OWN = f"{OWN},{OWN.replace('left', 'right')}"
-ISAAC = ",".join(f"{side}_{joint}" for joint in ("hip_yaw", "knee") for side in ("left", "right"))
-
-
-@pytest.mark.parametrize(
-    ("names", "fits"),
-    [
-        ("", True),
-        (OWN, True),
-        (f"[{OWN.replace(',', '_joint, ')}_joint, torso_joint]", True),
-        (ISAAC, False),
-        (",".join(reversed(OWN.split(","))), False),
-        ("waist,neck", False),
-    ],
-)
-def test_an_export_that_names_its_joints_has_our_order(
-    names: str, fits: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    class Session:
-        def get_modelmeta(self) -> object:
-            return SimpleNamespace(custom_metadata_map={"joint_names": names})
-
-        def get_inputs(self) -> list[object]:
-            return [SimpleNamespace(name="x", shape=[1, 5], type="tensor(double)")]
-
-        get_outputs = get_inputs
-
-    monkeypatch.setattr(onnxruntime, "InferenceSession", lambda *_: Session())
-    (tmp_path / "net.onnx").write_bytes(b"")
-    what = "a policy's are tensor" if fits else "names its joints in another order"
-    with pytest.raises(ConfigError, match=what):
-        load_network(tmp_path / "net.onnx", 5)

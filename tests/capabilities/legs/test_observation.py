@@ -10,7 +10,7 @@ import pytest
 from golem.capabilities.legs.base import STANDING, LocomotionCommand
 from golem.capabilities.legs.observation import TERMS, ObservationLayout, Signals, Term
 from golem.errors import ConfigError
-from golem.robots.model.spatial import rotation_rpy, transform
+from golem.robots.model.spatial import quat_of, rotation_rpy, transform
 from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, Array, BaseEstimate, Imu, LowState, Twist
 
@@ -26,7 +26,8 @@ def signals(shape: tuple[int, ...] = (), seed: int = 0) -> Signals:
 
 
 def everything() -> tuple[Term, ...]:
-    return tuple(Term(name) for name in TERMS)
+    """Return the terms that both one robot and many have."""
+    return tuple(Term(name) for name in TERMS if name not in ("orientation", "one"))
 
 
 def test_every_term_is_what_its_name_says() -> None:
@@ -41,8 +42,11 @@ def test_every_term_is_what_its_name_says() -> None:
         "last_action": s.action,
         "phase_sin": np.sin(2 * np.pi * s.phase) * s.stepping,
         "phase_cos": np.cos(2 * np.pi * s.phase) * s.stepping,
+        "joint_angle": s.q,
     }
-    assert set(expected) == set(TERMS)
+    left, right = 2 * np.pi * s.phase
+    expected["phase"] = np.array([np.sin(left), np.cos(left), np.sin(right), np.cos(right)]) * s.stepping
+    assert set(expected) == {term.term for term in everything()}
     for name, values in expected.items():
         np.testing.assert_allclose(ObservationLayout([Term(name)], POSTURE).observe(s), values)
 
@@ -89,7 +93,9 @@ def test_many_robots_are_many_single_ones(shape: tuple[int, ...]) -> None:
         ([], ["at least one term", "base_rate"]),
         ([Term("base_rte")], ["observation term 'base_rte'", "Did you mean 'base_rate'?"]),
         ([Term("joint_position", 1.0, ("left_kne_joint",))], ["'left_kne_joint'", "left_knee_joint"]),
-        ([Term("last_action", 1.0, ("upper",))], ["component of last_action 'upper'"]),
+        ([Term("twist", 1.0, ("upper",))], ["component of twist 'upper'"]),
+        ([Term("gravity", clip=(1.0, -1.0))], ["term gravity's clip"]),
+        ([Term("gravity", history=0)], ["term gravity's history", "from 1 to 1000"]),
         ([Term("twist", 1.0, ("legs",))], ["component of twist 'legs'", "vx"]),
         ([Term("twist", (1.0, 2.0))], ["scale of twist", "not a list of 2"]),
         ([Term("twist", float("nan"))], ["scale of twist", "finite"]),
@@ -130,7 +136,7 @@ def test_one_robots_signals_are_in_base_link() -> None:
 
 def test_one_robot_sees_what_each_of_many_would() -> None:
     rng = np.random.default_rng(2)
-    terms = [Term(name, rng.uniform(0.5, 2.0)) for name in rng.permutation(list(TERMS))]
+    terms = [Term(name, rng.uniform(0.5, 2.0)) for name in rng.permutation([t.term for t in everything()])]
     layout = ObservationLayout(terms, POSTURE)
     for stepping in (False, True):
         R, q, dq, gyro = rotation_rpy(*rng.normal(size=3)), *rng.normal(size=(2, 27)), rng.normal(size=3)
@@ -143,6 +149,48 @@ def test_one_robot_sees_what_each_of_many_would() -> None:
         base = BaseEstimate(0.0, transform((1.0, 2.0, 0.9), R), velocity)
         one = layout.look(low_state(q, dq, gyro), base, motion, action)
         np.testing.assert_allclose(one, layout.observe(many), rtol=0.0, atol=1e-12)
+
+
+def test_what_only_one_robot_sees() -> None:
+    zero, R = np.zeros(NUM_JOINTS), rotation_rpy(0.2, -0.3, 0.7)
+    base = BaseEstimate(0.0, transform((0, 0, 0.9), R))
+    terms = (Term("orientation"), Term("orientation", 1.0, ("x", "w")), Term("one", 0.98))
+    terms += (Term("last_action", 1.0, ("torso_joint", "left_knee_joint")), Term("twist", 10.0, ("vx",), (-0.1, 0.1)))
+    motion = LocomotionCommand(Twist(0.4), np.zeros(2), False, True)
+    seen = ObservationLayout(terms, POSTURE).look(low_state(zero, zero, zero[:3]), base, motion, np.arange(27.0))
+    q = quat_of(R)
+    np.testing.assert_allclose(seen, [*q, q[1], q[0], 0.98, 12.0, 3.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("order", "newest_first", "expected"), [("term", False, [1, 2, 3, 30, 40]), ("term", True, [3, 2, 1, 40, 30])]
+)
+def test_past_ticks_are_laid_out_as_told(order: str, newest_first: bool, expected: list[float]) -> None:
+    terms = (Term("twist", 1.0, ("vx",), history=3), Term("twist", 10.0, ("vy",), history=2))
+    assert ticks(ObservationLayout(terms, POSTURE, order, newest_first)) == expected  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("newest_first", "expected"), [(False, [2, 30, 3, 40]), (True, [3, 40, 2, 30])])
+def test_past_ticks_by_frames(newest_first: bool, expected: list[float]) -> None:
+    terms = (Term("twist", 1.0, ("vx",), history=2), Term("twist", 10.0, ("vy",), history=2))
+    assert ticks(ObservationLayout(terms, POSTURE, "frame", newest_first)) == expected
+    with pytest.raises(ConfigError, match="same length"):
+        ObservationLayout((*terms, Term("gravity")), POSTURE, "frame")
+
+
+def ticks(layout: ObservationLayout) -> list[float]:
+    """Return what is seen of vx 1, 2, 3 and vy 2, 3, 4 after a reset, at which all past ticks are like the first."""
+    zero, base = np.zeros(NUM_JOINTS), BaseEstimate(0.0, np.eye(4))
+
+    def look(vx: float) -> list[float]:
+        motion = LocomotionCommand(Twist(vx, vx + 1.0), np.zeros(2), False, True)
+        return layout.look(low_state(zero, zero, zero[:3]), base, motion, zero).tolist()
+
+    look(7.0)
+    layout.reset()
+    assert len(set(look(1.0))) == 2
+    look(2.0)
+    return look(3.0)
 
 
 def test_the_clock_shows_zero_while_it_rests() -> None:

@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from golem.capabilities.legs.base import Envelope
 from golem.capabilities.legs.gait import GaitConfig
-from golem.capabilities.legs.observation import ObservationLayout, Term
-from golem.errors import ConfigError
+from golem.capabilities.legs.observation import HistoryOrder, ObservationLayout, Term
+from golem.errors import ConfigError, unknown_name
 from golem.options import check_values, fill, read_yaml, require, vector
+from golem.robots.model.table import JOINT_INDEX, JOINT_NAMES
 from golem.types import LEGS, NUM_JOINTS, Array
 
 JOINTS = LEGS.stop - LEGS.start
@@ -31,11 +33,13 @@ class ActionScaling:
         scale: factor of the actions [rad]; one number, six (both legs alike) or twelve.
         clip: actions are limited to +- this before scaling.
         swing: amplitude of the stepping motion underneath (see `swing.swing_offset`) [rad]; 0 leaves it out.
+        targets: lowest and highest target of each leg motor [rad]; empty limits none.
     """
 
     scale: float | tuple[float, ...] = 0.25
     clip: float = 100.0
     swing: float = 0.0
+    targets: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,10 @@ class Description:
         envelope: the twists it can follow.
         rate: ticks per second [Hz].
         latency: time from reading the state to the targets being available [s].
+        joints: what each output of the network moves, in its order; empty is the leg motors in the robot's. Outputs of
+            the upper body are remembered as last_action, and move nothing.
+        history: how past ticks are laid out.
+        newest_first: whether the present tick comes before past ones.
     """
 
     network: str
@@ -66,6 +74,27 @@ class Description:
     envelope: Envelope = field(default_factory=Envelope)
     rate: float = 50.0
     latency: float = 0.002
+    joints: tuple[str, ...] = ()
+    history: HistoryOrder = "term"
+    newest_first: bool = False
+
+    def outputs(self) -> NDArray[np.intp]:
+        """Return the motor that each output of the network moves, (n,).
+
+        Raises:
+            ConfigError: a joint does not exist, is named twice, or a leg motor is missing.
+        """
+        names = self.joints or JOINT_NAMES[LEGS]
+        for name in names:
+            if name not in JOINT_INDEX:
+                raise unknown_name("joint", name, JOINT_NAMES)
+        absent = [name for name in JOINT_NAMES[LEGS] if name not in names]
+        if absent or len(set(names)) < len(names):
+            raise ConfigError(
+                f"The joints are every leg motor once, and others if the network moves them; "
+                f"{f'{absent[0]} is missing' if absent else 'one is named twice'}."
+            )
+        return np.array([JOINT_INDEX[name] for name in names], dtype=np.intp)
 
     def q0(self) -> Array:
         """Return the default posture as (27,) [rad].
@@ -109,7 +138,7 @@ class Description:
         Raises:
             ConfigError: see `ObservationLayout`.
         """
-        return ObservationLayout(self.observation, self.q0())
+        return ObservationLayout(self.observation, self.q0(), self.history, self.newest_first)
 
 
 def shipped() -> tuple[str, ...]:
@@ -145,17 +174,24 @@ def load_description(file: str | Path, network: str | Path | None = None) -> tup
     options = cast(Mapping[str, object], data)
     try:
         description: Description = fill(f"key of {file}", Description, options)
-        _check(description)
+        check_description(description)
     except ConfigError as error:
         raise ConfigError(str(error) if str(file) in str(error) else f"{file}: {error}") from error
     return description, Path(network).expanduser() if network else path.parent / description.network
 
 
-def _check(d: Description) -> None:
-    """Raise where something in `d` cannot be meant."""
+def check_description(d: Description) -> None:
+    """Raise where something in `d` cannot be meant.
+
+    Raises:
+        ConfigError: names what, and what would be valid.
+    """
     d.gains()
     d.action_scale()
     d.layout()
+    d.outputs()
+    if len(d.action.targets) not in (0, JOINTS) or any(not low < high for low, high in d.action.targets):
+        raise ConfigError(f"The action.targets are {JOINTS} pairs of a lower and a higher angle, or none.")
     require(
         "",
         ("rate", d.rate, 1.0 <= d.rate < inf, "a number of ticks per second, at least 1"),

@@ -14,8 +14,8 @@ import numpy as np
 
 from golem import registry
 from golem.capabilities.legs.base import Envelope, LowerBody
-from golem.capabilities.legs.description import load_description
 from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
+from golem.capabilities.legs.passports.read import read_passport
 from golem.errors import ConfigError, ModuleFault
 from golem.evaluation.episodes.episode import Loss, with_legs
 from golem.hardware.servo.gains import default_gains
@@ -148,4 +148,4 @@ def own_legs(method: str) -> Choice:
 
 def _posture(choice: Choice) -> Array:
     """Return the (27,) posture of the description that the policy `choice` names."""
-    return load_description(str(choice.options["file"]))[0].q0()
+    return read_passport(str(choice.options["file"]), choice.options.get("network")).description.q0()

@@ -1,0 +1,1 @@
+"""Leg policies as their trainers describe them, one module per format."""
