@@ -37,7 +37,7 @@ class Servo:
     def step(self, state, q_cmd, dt, leg_gains=None, leg_tau=None):
         z, n = np.zeros(27), np.full(27, np.nan)
         bad = {{"": z, "nan": n, "shape": np.zeros(26), "none": None}}[BROKEN]
-        return None if BROKEN == "none" else LowCommand(state.t, z, z, bad, z, z)
+        return None if BROKEN == "none" else LowCommand(state.t, q_cmd, z, bad, z + 200.0, z + 5.0)
 
 class Hand:
     def open(self, gap): pass
@@ -51,9 +51,9 @@ class Legs:
     rate, latency, envelope, gait = 50.0, 0.0, Envelope(), GaitConfig()
     def reset(self, state): pass
     def step(self, state, base, motion, dt):
-        z = np.zeros(12)
-        return {{"": LegCommand(z, z, z), "none": None, "nan": LegCommand(z, z * np.nan, z),
-                "shape": LegCommand(np.zeros(27), z, z)}}[BROKEN]
+        q, kp, kd = state.q[:12], np.full(12, 200.0), np.full(12, 5.0)
+        return {{"": LegCommand(q, kp, kd), "none": None, "nan": LegCommand(q, kp * np.nan, kd),
+                "shape": LegCommand(np.zeros(27), kp, kd)}}[BROKEN]
 
 class Arms:
     rate, latency = 100.0, 0.0
@@ -172,7 +172,7 @@ def test_a_skill_that_fails_itself_is_told_where() -> None:
 def test_a_module_without_its_methods_is_refused_when_the_stack_is_built(slot: str, tmp_path: Path) -> None:
     path = tmp_path / f"empty_{slot}.py"
     path.write_text("class Empty:\n    rate, latency = 50.0, 0.0\n")
-    with pytest.raises(ModuleFault, match="it lacks .* of the contract"):
+    with pytest.raises(ConfigError, match="it lacks .* of the contract"):
         running(slot, f"{path}:Empty")
 
 

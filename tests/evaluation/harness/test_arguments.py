@@ -31,12 +31,13 @@ def test_a_module_is_replaced_once() -> None:
 
 def test_a_lower_body_is_tested_beside_the_modules_that_were_asked_for(tmp_path: Path) -> None:
     mine = tmp_path / "mine.py"
-    mine.write_text("class Mine: ...\n")
+    text = "class Mine:\n    def reset(self, state): ...\n    def step(self, state, dt): ...\n"
+    mine.write_text(text)
     rung, use = PushRung(), {"estimator": f"{mine}:Mine"}
     used = [rung.stack("almi", "bench", u).choice("estimator").use for u in ({}, use)]
     assert used == ["random_walk_kf", f"{mine}:Mine"]
     before = rung.config("almi", "bench", use)
-    mine.write_text("class Mine: changed = True\n")
+    mine.write_text(f"{text}    changed = True\n")
     assert rung.config("almi", "bench", use) != before
     with pytest.raises(ConfigError, match="brings its own lower_body"):
         rung.config("almi", "bench", {"lower_body": "wbc"})

@@ -156,7 +156,9 @@ def test_a_file_in_the_home_folder_may_be_named_by_the_tilde(
     rung: TetherRung, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
-    (tmp_path / "mine.py").write_text("class Arms:\n    pass\n")
+    text = "class Arms:\n    rate = latency = 0.0\n    def reset(self, q): ...\n"
+    text += "    def step(self, left, right, q, dt): ...\n"
+    (tmp_path / "mine.py").write_text(text)
     assert rung.config("centroid", "ideal", {"upper_body": "~/mine.py:Arms"})["user_files"].keys() == {"upper_body/use"}
 
 

@@ -185,7 +185,8 @@ def test_no_module_of_a_real_robots_stack_can_call_its_own_controller(live: Live
     mine = tmp_path / "hidden.py"
     mine.write_text(
         "from golem.capabilities.legs.vendor import Vendor\n\n"
-        "class Mine:\n    def __new__(cls, onboard): return Vendor(onboard=onboard)\n"
+        "class Mine:\n    rate = latency = envelope = gait = reset = step = None\n"
+        "    def __new__(cls, onboard): return Vendor(onboard=onboard)\n"
     )
     live.stack = live.stack.with_choice("lower_body", f"{mine}:Mine")
     live.start_twin()

@@ -11,10 +11,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from golem.capabilities.arms.ik_kernel import error_to, hand_jacobian, place_hand
 from golem.capabilities.collision.sphere_kernel import Indices, Ints, nearest_pairs
+from golem.kernels import njit
 from golem.robots.model.linear_kernel import cholesky
 from golem.types import Array
 
