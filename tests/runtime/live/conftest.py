@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import pytest
 
 from golem.hardware.estop.base import EmergencyStop
@@ -111,6 +112,16 @@ class Live:
         self.leave_quietly(node)
         response = answer.result()
         return response.success, response.message
+
+    def reset(self) -> None:
+        """Wait for a second after a stop, and for rest, and have the gate armed again at the first request."""
+        self.run(1.0)
+        self.run(5.0, self._rests)
+        assert self.ask("reset") == (True, "armed")
+
+    def _rests(self) -> bool:
+        state = self.gate and self.gate._arrivals.state
+        return bool(state and np.abs(state.imu.gyro).max() < 0.2 and np.abs(state.dq).max() < 0.5)
 
     def leave_quietly(self, node: RosNode) -> None:
         """Take a member off the domain that is none of the three processes."""

@@ -341,6 +341,5 @@ def test_thousands_of_random_frames_of_the_vendors(live: Live) -> None:
         live.run(TICK)
     assert live.state.stopped
     participant.close()
-    live.run(1.0)
-    assert live.ask("reset")[0]
+    live.reset()
     live.activate()

@@ -53,7 +53,7 @@ def test_a_stack_that_dies_is_noticed_and_the_robot_damped_then_it_comes_back(li
     live.start_up()
     live.run(0.1)
     assert live.state is GateState.STOP1  # latched, whatever comes back
-    assert live.ask("reset") == (True, "armed")
+    live.reset()
     assert live.ask("activate") == (True, "active")
 
 
@@ -83,7 +83,7 @@ def test_a_twin_that_is_started_anew_freezes_nobody(live: Live) -> None:
     live.start_twin(seed=1)  # its time begins at zero again
     live.run(0.1)
     assert live.up is not None and live.up.restarts == 1
-    assert live.ask("reset") == (True, "armed")
+    live.reset()
     assert live.ask("activate") == (True, "active")
     live.run(0.5)
     assert live.state is GateState.ACTIVE and stiff(live)
@@ -96,10 +96,11 @@ def test_another_writer_of_the_motors_command_is_named_and_stops_the_robot(live:
     live.run(0.1)
     assert (live.state, live.reason) == (GateState.STOP1, "two_writers")
     assert live.gate is not None and writer.guid.hex() in live.gate.status.detail
-    assert not live.ask("reset")[0]
+    live.run(1.0)
+    assert not live.ask("reset")[0]  # however long ago the stop was
     intruder.close()
     live.run(0.1)
-    assert live.ask("reset")[0]
+    live.reset()
 
 
 def test_states_that_are_refused_are_said_and_keep_nobody_waiting(
@@ -154,10 +155,21 @@ def test_an_operator_stops_the_robot_and_sets_it_free_again(live: Live, what: st
     assert live.state is GateState.STOP1
     assert live.reason == {"stop": "stop_requested", "press": "estop_pressed"}[what]
     if what == "press":
-        assert live.ask("reset") == (False, "stop1 (estop_pressed)")
+        live.run(1.0)
+        success, said = live.ask("reset")
+        assert not success and said.startswith("stop1 (estop_pressed); a reset needs the button released")
         assert live.ask("release")[0]
         live.run(0.02)
-    assert live.ask("reset") == (True, "armed")
+    live.reset()
+
+
+def test_a_reset_right_after_a_stop_is_refused_with_what_it_needs(live: Live) -> None:
+    live.activate()
+    live.ask("stop")
+    live.run(0.5)
+    words = "a reset needs the button released, no fault, 1 s since the stop, and a robot at rest"
+    assert live.ask("reset") == (False, f"stop1 (stop_requested); {words}")
+    live.reset()
 
 
 def test_a_clock_that_jumps_stops_the_robot_and_it_can_go_on(live: Live) -> None:
@@ -167,7 +179,7 @@ def test_a_clock_that_jumps_stops_the_robot_and_it_can_go_on(live: Live) -> None
     assert live.ask("/lowstate/jump")[0]
     live.run(0.01)
     assert (live.state, live.reason) == (GateState.STOP1, "state_clock_jumped")
-    assert live.ask("reset") == (True, "armed")
+    live.reset()
 
 
 def test_a_command_is_as_old_as_the_state_it_answers(live: Live) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from tests.runtime.live.conftest import Live
@@ -27,8 +28,13 @@ def test_enter_presses_and_words_are_asked_for(live: Live) -> None:
         states.append(live.state)
         return answer.result()
 
+    def lines() -> Iterator[str]:
+        yield from ("\n", "release\n", "reste\n")
+        live.run(1.5)  # a reset waits for a second, and for rest
+        yield from ("reset\n", "activate\n")
+
     console = Console(node, wait, said.append)
     console.connect("start it")
-    console.run(["\n", "release\n", "reste\n", "reset\n", "activate\n"])
+    console.run(lines())
     assert states == [GateState.STOP1, GateState.STOP1, GateState.ARMED, GateState.ACTIVE]
     assert said[0] == "pressed" and "Did you mean 'reset'?" in said[2] and said[-1] == "active"

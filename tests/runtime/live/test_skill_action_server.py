@@ -154,8 +154,8 @@ def test_a_joystick_that_is_held_does_not_move_a_robot_that_is_released(client: 
 
     live.ask("stop")
     live.run(0.1)
-    hold(0.5)
-    live.ask("reset")
+    hold(1.5)  # a reset waits for a second, and for rest
+    assert live.ask("reset")[0]
     hold(0.1)
     live.activate()
     hold(0.5)
@@ -193,7 +193,7 @@ def test_a_robot_that_falls_silent_aborts_its_skill_and_begins_none(client: Clie
     assert (status, result.stage) == (GoalStatus.ABORTED, "refused") and "silent" in result.reason
     live.twin = twin
     live.run(0.2)
-    live.ask("reset")
+    live.reset()
     live.activate()
     live.run(0.02)
     status, result = client.outcome(client.send("/skill/stand", stand(0.1)))

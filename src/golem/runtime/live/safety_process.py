@@ -329,7 +329,8 @@ class SafetyProcess:
         self._judge(request)
         said, done = describe_status(self.status), self.status.state in wanted
         if request is OperatorRequest.RESET and self.status.stopped and self.status.reason:
-            said += f"; a reset waits until {self._reset_after:g} s after the stop, and for a robot at rest"
+            rest = f"{self._reset_after:g} s since the stop, and a robot at rest"
+            said += f"; a reset needs the button released, no fault, {rest}"
         return Trigger_Response(done, said)
 
     def _hand_over(self) -> Trigger_Response:
