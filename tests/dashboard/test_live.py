@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from golem.dashboard import live
-from golem.dashboard.live import LiveView
+from golem.dashboard.live import PATIENCE, LiveView
 from golem.dashboard.panel import Button
 from golem.errors import ConfigError
+from golem.hardware.safety.base import OperatorRequest
 from golem.interfaces import topics
 from golem.interfaces.payloads import Feedback, GateState, Reason
 from golem.robots.mujoco.balance import PERIOD
@@ -46,7 +47,7 @@ def view(twin: tuple[LockstepRunner, Any], monkeypatch: pytest.MonkeyPatch) -> I
         yield view
 
 
-def until_state(view: LiveView, running: LockstepRunner, state: GateState, seconds: float = 2.0) -> None:
+def until_state(view: LiveView, running: LockstepRunner, state: GateState, seconds: float = 3.0) -> None:
     end = running.executor.t + seconds
     view.idle(lambda: running.executor.t > end or (running.safety is not None and running.safety.state is state))
     assert running.safety is not None and running.safety.state is state
@@ -89,13 +90,26 @@ def test_the_button_stops_the_robot_through_the_gate_and_a_reset_revives_it(
     command = running.bus.latest(topics.LOW_CMD)
     assert command is not None and (command.kp == 0.0).all()
     view.panel.press(Button.REVIVE)  # refused: still pressed
-    end = running.executor.t + 0.7
+    end = running.executor.t + PATIENCE + 0.2
     view.idle(lambda: running.executor.t > end)
     assert running.safety.state is GateState.STOP1
     assert "refuses" in view.panel._status.content
     view.panel.press(Button.RELEASE)
     view.panel.press(Button.REVIVE)
     until_state(view, running, GateState.ACTIVE)
+
+
+def test_revived_right_after_a_stop_the_robot_moves_once_the_gate_takes_a_reset(
+    twin: tuple[LockstepRunner, Any], view: LiveView
+) -> None:
+    running, _ = twin
+    until_state(view, running, GateState.ACTIVE)
+    running.request(OperatorRequest.STOP)
+    until_state(view, running, GateState.STOP1)
+    stopped = running.executor.t
+    view.panel.press(Button.REVIVE)
+    until_state(view, running, GateState.ACTIVE)
+    assert running.executor.t > stopped + 0.9
 
 
 def test_pause_lets_time_stand_still(twin: tuple[LockstepRunner, Any], view: LiveView) -> None:

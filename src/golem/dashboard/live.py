@@ -46,8 +46,8 @@ CAMERA_WIDTH = 320
 CAMERAS = {"right_hand": "right palm camera", "head": "head camera"}
 LAG = 0.25
 """Delay behind the wall clock that is made up for [s]; a machine that is slower falls behind for good."""
-PATIENCE = 0.5
-"""Time within which the safety gate must have armed after a reset [s]."""
+PATIENCE = 2.5
+"""Time for which the safety gate is asked for a reset [s]: it waits for a second since the stop, and for rest."""
 CHART = (CAMERA_WIDTH, 84)
 """Size of the chart of the CoM margin [px]."""
 ARRIVAL = 15.0
@@ -310,15 +310,15 @@ class LiveView:
             self._note = str(error)
 
     def _revive(self) -> None:
-        """Reset the gate, and activate it as soon as that has armed it."""
+        """Reset the gate, and activate it as soon as that has armed it, or taken the reason from legs that stand."""
         gate, t = self._running.safety, self._running.executor.t
         if self._revive_until is None or gate is None:
             return
-        if gate.state is GateState.ARMED:
+        if gate.state is GateState.ARMED or (gate.state is GateState.STOP2 and gate.reason is None):
             self._running.request(OperatorRequest.ACTIVATE)
             self._revive_until = None
         elif t > self._revive_until:
-            self._note = f"The safety gate refuses the reset: {gate.reason}."
+            self._note = f"The safety gate refuses the reset ({gate.reason}): it needs no fault, and a robot at rest."
             self._revive_until = None
         else:
             # Only the change to a request counts; asked again, because a released button is seen a frame later.

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from tests.runtime.live.conftest import Live
 
-from golem.interfaces.payloads import GateState
+from golem.hardware.safety.base import GateInputs, OperatorRequest
+from golem.hardware.safety.memory import GateResult
+from golem.interfaces.payloads import GateState, Reason
 from golem.middleware.dds.base import Qos
 from golem.middleware.ros.msgs.std_srvs import Trigger_Request
 from golem.middleware.wire import hg
@@ -170,6 +172,23 @@ def test_a_reset_right_after_a_stop_is_refused_with_what_it_needs(live: Live) ->
     words = "a reset needs the button released, no fault, 1 s since the stop, and a robot at rest"
     assert live.ask("reset") == (False, f"stop1 (stop_requested); {words}")
     live.reset()
+
+
+def test_a_reset_of_legs_that_stand_by_the_gate_succeeds_once_its_reason_is_gone(
+    live: Live, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert live.gate is not None
+    step, left = live.gate._gate.step, [Reason.COMMAND_STALE, None]
+
+    def stands(inputs: GateInputs) -> GateResult:
+        reason = left.pop(0) if inputs.request is OperatorRequest.RESET else left[0]
+        return replace(step(inputs), state=GateState.STOP2, reason=reason, detail="")
+
+    monkeypatch.setattr(live.gate._gate, "step", stands)
+    success, said = live.ask("reset")
+    assert not success and said.startswith("stop2 (command_stale); a reset needs")
+    left.append(None)
+    assert live.ask("reset") == (True, "stop2")
 
 
 def test_a_clock_that_jumps_stops_the_robot_and_it_can_go_on(live: Live) -> None:

@@ -112,7 +112,9 @@ class LiveRobot:
             if gate is not None and gate.state is GateState.ACTIVE:
                 return True
             try:
-                self.link.ask("activate" if gate is not None and gate.state is GateState.ARMED else "reset")
+                # Legs that stand by the gate stay in stop2: a reset only takes the reason away.
+                ready = gate is not None and (gate.state is GateState.ARMED or gate.reason is None)
+                self.link.ask("activate" if ready else "reset")
             except GolemError:
                 pass  # its process is starting
             self.link.spin(0.3)

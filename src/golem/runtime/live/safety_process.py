@@ -328,9 +328,10 @@ class SafetyProcess:
             return Trigger_Response(False, f"The gate was held up; ask again in {WARY:g} s.")
         self._judge(request)
         said, done = describe_status(self.status), self.status.state in wanted
-        if request is OperatorRequest.RESET and self.status.stopped and self.status.reason:
+        if request is OperatorRequest.RESET and self.status.stopped:
+            done = self.status.reason is None  # the gate's own legs go on standing until the activation
             rest = f"{self._reset_after:g} s since the stop, and a robot at rest"
-            said += f"; a reset needs the button released, no fault, {rest}"
+            said += "" if done else f"; a reset needs the button released, no fault, {rest}"
         return Trigger_Response(done, said)
 
     def _hand_over(self) -> Trigger_Response:
