@@ -165,7 +165,7 @@ class Crowd:
 
     def revive(self) -> None:
         """Have the robot move again, whatever was done to it."""
-        for _ in range(30):
+        for _ in range(60):  # a reset waits for a second, and for rest
             if self.live.state is GateState.ACTIVE:
                 return
             self.live.run(0.05)
