@@ -8,7 +8,7 @@ import pytest
 
 from golem.errors import ConfigError
 from golem.hardware.estop.virtual import VirtualEstop
-from golem.hardware.safety.base import GateInputs, OperatorRequest
+from golem.hardware.safety.base import GateInputs, OperatorRequest, SafetyLimits
 from golem.hardware.safety.gate import Gate
 from golem.hardware.servo.base import MotorServo
 from golem.hardware.servo.servo import Servo, ServoConfig
@@ -190,8 +190,8 @@ def test_raised_arms_float_while_the_stiffness_is_still_low(plant: Any) -> None:
     assert np.abs(hold(robot, servo, READY, 1.0)).max() < 0.01
 
 
-def test_servo_and_gate_move_the_arms_and_the_gate_does_not_interfere(plant: Any) -> None:
-    robot, servo, gate, estop = plant(), Servo(ServoConfig(ramp=0.5)), Gate(), VirtualEstop()
+def test_servo_and_gate_move_the_arms_and_the_gate_does_not_interfere(plant: Any, limits: SafetyLimits) -> None:
+    robot, servo, gate, estop = plant(), Servo(ServoConfig(ramp=0.5)), Gate(limits), VirtualEstop()
     robot.place(np.zeros(27))
     servo.reset(robot.state())
     q_cmd = np.zeros(27)
@@ -208,8 +208,8 @@ def test_servo_and_gate_move_the_arms_and_the_gate_does_not_interfere(plant: Any
     assert np.abs(READY - robot.state().q).max() < 0.002
 
 
-def test_pressing_the_button_lets_raised_arms_sink_slowly(plant: Any) -> None:
-    robot, servo, gate, estop = plant(), Servo(ServoConfig(ramp=0.1)), Gate(), VirtualEstop()
+def test_pressing_the_button_lets_raised_arms_sink_slowly(plant: Any, limits: SafetyLimits) -> None:
+    robot, servo, gate, estop = plant(), Servo(ServoConfig(ramp=0.1)), Gate(limits), VirtualEstop()
     robot.place(READY)
     servo.reset(robot.state())
     fastest = 0.0
