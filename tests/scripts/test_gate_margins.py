@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from scripts.gate_margins import ROWS, MarginWatch
 
+from golem.hardware.safety.senses import FORGET
 from golem.interfaces import topics
 from golem.middleware.bus import Bus
 from golem.types import NUM_JOINTS, TICK, Imu, LowState
@@ -39,4 +41,5 @@ def test_a_calm_robot_is_far_from_every_limit() -> None:
 def test_what_comes_near_a_limit_is_seen() -> None:
     assert watched(600, jump=0.05)["jump of a joint in a tick [rad]"] == pytest.approx(0.05, rel=0.01)
     assert watched(600, jump=0.05)["drift of a joint [rad]"] == pytest.approx(0.05, rel=0.1)
-    assert watched(600, rate=0.1)["orientation against rate [rad]"] == pytest.approx(0.07, abs=0.02)
+    apart = 0.1 * FORGET * (1.0 - math.exp(-600 * TICK / FORGET))
+    assert watched(600, rate=0.1)["orientation against rate [rad]"] == pytest.approx(apart, rel=0.02)
