@@ -28,8 +28,10 @@ def test_each_name_lifts_its_own_limits() -> None:
     assert changed("speed") == {"velocity"}
     assert changed("range") == {"state_lower", "state_upper"}
     assert changed("effort+slew") == {"torque_command", "slew"}
+    assert changed("balance") == {"capture", "sinking", "lean"}
     assert changed("stops") == {
-        "velocity", "state_lower", "state_upper", "torque", "tilt", "sane", "jolts", "throw"
+        "velocity", "state_lower", "state_upper", "torque", "tilt", "sane", "jolts", "throw",
+        "capture", "sinking", "lean", "hung", "least_kp", "least_kd",
     }  # fmt: skip
     assert changed("bounds") == {
         "lower", "upper", "slew", "torque_command", "kp_max", "kd_max", "kp_rate", "kd_rate"
@@ -48,8 +50,9 @@ def run(lift: str, level: float) -> TrialOutcome:
 
 
 def test_a_robot_that_falls_is_stopped_by_the_gate_unless_that_is_lifted() -> None:
-    stopped, fallen = run("nothing", 150.0), run("stops", 150.0)
-    assert (stopped.stage, fallen.stage) == ("safety", "fall")
+    stopped, later, fallen = run("nothing", 150.0), run("balance", 150.0), run("stops", 150.0)
+    assert (stopped.stage, later.stage, fallen.stage) == ("safety", "safety", "fall")
+    assert "balance_lost" in stopped.detail and "tilt" in later.detail
 
 
 def test_the_table_counts_and_names_what_ended_the_others() -> None:

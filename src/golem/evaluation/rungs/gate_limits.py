@@ -29,12 +29,20 @@ STOPS: dict[str, Lift] = {
     "range": lambda limits: replace(limits, state_lower=-FAR, state_upper=FAR),
     "torque": lambda limits: replace(limits, torque=FAR),
     "tilt": lambda limits: replace(limits, tilt=math.pi),
+    "balance": lambda limits: replace(limits, capture=math.inf, sinking=math.inf, lean=math.inf),
     "sender": lambda limits: replace(
-        limits, sane=np.full_like(limits.sane, 1e6), jolts=math.inf, throw=(1e6, 1e6, 1e6)
+        limits,
+        sane=np.full_like(limits.sane, 1e6),
+        jolts=math.inf,
+        throw=(1e6, 1e6, 1e6),
+        hung=math.inf,
+        least_kp=np.full(NUM_JOINTS, 1e-9),
+        least_kd=np.zeros(NUM_JOINTS),
     ),
 }
 """What stops the robot: measured quantities, of which `range` is position and braking distance, and `sender`, commands
-that are far beyond the robot or jump."""
+that are far beyond the robot, jump, hang, or hold too little. No stiffness at all stays less than the least: targets of
+such motors mean nothing."""
 BOUNDS: dict[str, Lift] = {
     "position": lambda limits: replace(limits, lower=-FAR, upper=FAR),
     "slew": lambda limits: replace(limits, slew=FAR),
@@ -70,7 +78,8 @@ class GateLimitsOptions(PushedOptions):
     level: tuple[float, ...] = (30.0, 60.0)
     """Sizes of the push."""
     lift: tuple[str, ...] = (NOTHING, "stops", "bounds", *(f"stops+{name}" for name in (*BOUNDS, "bounds")))
-    """What is lifted: speed, range, torque, tilt (stops), position, slew, effort, gains (bounds), joined by +."""
+    """What is lifted: speed, range, torque, tilt, balance, sender (stops), position, slew, effort, gains (bounds), with
+    a + between."""
 
 
 class GateLimits(PushedRung[GateLimitsOptions]):
