@@ -11,6 +11,8 @@ from golem.errors import ConfigError
 from golem.evaluation.episodes import episode as episodes
 from golem.evaluation.episodes.episode import Episode, legs_stack, with_legs
 from golem.evaluation.episodes.scripted_motion import WIDE_AREA, ArmMotion, ScriptedMotion
+from golem.evaluation.rungs.gate_limits import NOTHING, lifted
+from golem.hardware.safety.base import SafetyLimits
 from golem.interfaces import topics
 from golem.robots.mujoco.shoves import shove
 from golem.skills.base import FAULT
@@ -20,8 +22,8 @@ from golem.types import Twist
 METHODS = Path(__file__).parents[1] / "leg_methods.py"
 
 
-def episode(name: str) -> Episode:
-    return Episode(legs_stack(f"{METHODS}:{name}", "ideal"), 0)
+def episode(name: str, lift: str = NOTHING) -> Episode:
+    return Episode(legs_stack(f"{METHODS}:{name}", "ideal"), 0, limits=lifted(SafetyLimits.from_profile(), lift))
 
 
 def test_a_method_is_a_lower_body_or_the_files_of_a_policy() -> None:
@@ -62,8 +64,22 @@ def test_a_robot_that_never_carries_its_weight_is_lost(monkeypatch: pytest.Monke
         robot.close()
 
 
-def test_a_robot_that_stands_is_pushed_over_and_the_gate_stops_it() -> None:
+def test_a_robot_that_loses_its_balance_is_stopped_before_it_leans() -> None:
     robot = episode("Stiff")
+    try:
+        robot.stand(1.2)
+        begin = robot.t
+        robot.push(shove("front", 80.0))
+        robot.run(3.0)
+        loss, seen = robot.loss, robot.recorder.trace()
+        assert loss is not None and loss.stage == "safety" and "balance_lost" in loss.detail
+        assert robot.t < begin + 0.3 and 0.1 < seen.rpy[-1, 1] < 0.3
+    finally:
+        robot.close()
+
+
+def test_a_robot_that_stands_is_pushed_over_and_the_gate_stops_it() -> None:
+    robot = episode("Stiff", lift="balance")
     try:
         robot.stand(1.2)
         assert robot.loss is None and not robot.over
