@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from golem.hardware.safety.base import SafetyLimits
-from golem.hardware.safety.sender import SenderMemory, examine_command
+from golem.hardware.safety.sender import SenderMemory, examine_command, ungrasped
 from golem.interfaces.payloads import Fault, Reason
 from golem.types import LEGS, UPPER, LowCommand
 
@@ -33,6 +33,23 @@ def test_a_motor_that_was_held_is_not_let_go() -> None:
     assert run(command(0), limp) == ([True, False], None)
     _, fault = run(command(0), limp, limp, limp)
     assert fault is not None and fault.reason is Reason.COMMAND_GAINS
+
+
+@pytest.mark.parametrize(
+    ("fed", "soft"), [((), (0, 1)), ((3,), (1,)), ((3, 9), ())], ids=["no leg", "one leg", "both legs"]
+)
+def test_a_leg_that_carries_is_stiff_or_fed_forward_as_a_whole(fed: tuple[int, ...], soft: tuple[int, ...]) -> None:
+    """Joints 3 and 9 are the knees; at the other joints a torque that balances may be anything, nothing too."""
+    torques = np.zeros(27)
+    torques[list(fed)] = -20.0
+    limp = replace(command(1, kp=0.0), tau=torques)
+    found = ungrasped(limp, LIMITS)[1]
+    assert [bool(leg.all()) for leg in found[LEGS].reshape(2, 6)] == [k in soft for k in (0, 1)]
+    assert found.any() == bool(soft) and not found[UPPER].any()
+    memory, fault = SenderMemory(), None
+    for k in range(4):
+        memory, _, fault = examine_command(replace(limp, t=0.002 * k), memory, LIMITS, carries=True, late=True)
+    assert (fault is not None and fault.reason is Reason.COMMAND_GAINS) == bool(soft)
 
 
 def test_motors_that_were_never_held_may_be_limp() -> None:

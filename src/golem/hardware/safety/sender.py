@@ -114,8 +114,13 @@ def examine_command(
 
 
 def ungrasped(new: LowCommand, limits: SafetyLimits) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which motors have too little damping, and which of the legs' no stiffness and no feed-forward, (27,)."""
-    soft = (new.kp < limits.least_kp) & (np.abs(new.tau) <= SLACK * limits.torque)
+    """Return which motors have too little damping, and which are soft in a leg without any feed-forward, (27,).
+
+    A feed-forward counts for its whole leg: torques that balance a robot pass through zero at one joint or another.
+    """
+    soft = new.kp < limits.least_kp
+    fed = np.abs(new.tau[LEGS]) > SLACK * limits.torque[LEGS]
+    soft[LEGS] &= ~fed.reshape(2, -1).any(axis=1).repeat(len(fed) // 2)
     soft[LEGS.stop :] = False
     return ~(new.kd >= limits.least_kd), soft
 
