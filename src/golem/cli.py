@@ -312,11 +312,8 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
                        "golem.runtime.live.topic_stats", "TopicStatsConfig:run_topic_stats"),
     "record": _record,
     "replay": _replay,
-    "black-box": _command(
-        "Show a stop of the safety gate at the moment of the fault.",
-        "golem.dashboard.stop_view",
-        "StopViewConfig:run_stop_view",
-    ),
+    "black-box": _command("Show a stop of the safety gate at the moment of the fault.",
+                          "golem.dashboard.stop_view", "StopViewConfig:run_stop_view"),
     "view": _command("Show a domain live in Foxglove.", "golem.runtime.live.foxglove_view", "ViewConfig:run_view"),
     "check": _check,
     "new": _new,
