@@ -33,7 +33,7 @@ FAULTS: dict[str, tuple[Fault, str]] = {
     ),
     "another clock": (
         lambda samples, scan, last: (samples, scan and replace(scan, t=scan.t + 1e6)),
-        "No scan has fitted the map",
+        "they are of two clocks",
     ),
     "silence": (lambda samples, scan, last: ((), None), "Its sensors have fallen silent."),
 }

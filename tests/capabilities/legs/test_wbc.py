@@ -22,7 +22,7 @@ from golem.robots.model.limits import load_limits
 from golem.robots.model.table import DOF
 from golem.robots.mujoco.engine import MujocoRobot
 from golem.runtime.lockstep import build
-from golem.stack import load_stack
+from golem.stack import Choice, load_stack
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array, BaseEstimate, Imu, LowState
 
 FRICTION = 0.6
@@ -199,7 +199,7 @@ def test_bad_measurements_and_options_are_named() -> None:
 def test_stands_in_the_whole_stack_on_estimates_alone() -> None:
     stack = load_stack("stand", profile="field")
     stack = stack.with_options("robot", world="open").with_choice("lower_body", "wbc")
-    running, twin = build(stack.with_choice("fallback", "hold"), 3)
+    running, twin = build(stack.with_choice("fallback", Choice("hold", {"standing": True})), 3)
     assert isinstance(twin, MujocoRobot)
     running.executor.run(3.5)
     assert not twin.on_gantry

@@ -230,7 +230,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Seen, Seen,
     """The tethered demo's first seconds, until the hand's camera guides the hand: live and from its bag."""
     bag = tmp_path_factory.mktemp("replay") / "bag"
     stack = load_stack("tether")
-    live = pick(stack, 3.6, bag)
+    live = pick(stack, 7.0, bag)
     again = pick(stack.with_choice("robot", Choice("replay", {"file": str(bag)})), 10.0, None)
     yield live, again, bag
 

@@ -283,7 +283,7 @@ def _tell(links: Sequence[LinkGeometry]) -> None:
 def our_robot() -> tuple[str, tuple[LinkGeometry, ...]]:
     """Return name and links of the H1-2 with MAGPIE hands, whose fingers are open."""
     geometry = h12_geometry()
-    hinges = [name for side in SIDES for f in FINGERS for name in finger_names(side, f)[:2]]
+    hinges = [finger_names(side, f)[0] for side in SIDES for f in FINGERS]  # the blades follow their cranks
     return geometry.name, hold_joints(geometry.links, dict.fromkeys(hinges, 0.0))
 
 
