@@ -270,7 +270,7 @@ def test_a_replayed_stack_detects_the_same(runs: tuple[Seen, Seen, Path]) -> Non
 @pytest.mark.slow
 def test_the_end_of_the_recording_ends_the_skill(runs: tuple[Seen, Seen, Path]) -> None:
     _, again, bag = runs
-    assert again.result == SkillResult(False, "robot", "robot", f"The recording {bag} ends after 3.60 s.")
+    assert again.result == SkillResult(False, "robot", "robot", f"The recording {bag} ends after 7.00 s.")
 
 
 @pytest.mark.slow
@@ -289,8 +289,8 @@ def test_the_official_reader_reads_every_message(runs: tuple[Seen, Seen, Path]) 
             if channel.topic == "/lowstate":
                 assert message.tick * 1_000_000 == record.log_time
     assert sum(counts.values()) == sum(1 for _ in Bag(bag).messages())
-    # Ticks 0 to 1800: the skill is given up within the tick of its deadline, 3.6 s, and that tick is recorded.
-    assert counts["/lowstate"] == counts["/clock"] == counts["/lowcmd"] == 1801
+    # Ticks 0 to 3500: the skill is given up within the tick of its deadline, 7 s, and that tick is recorded.
+    assert counts["/lowstate"] == counts["/clock"] == counts["/lowcmd"] == 3501
     assert counts["/tf_static"] == counts["/robot_description"] == 1
     for name in ("head", "right_hand"):
         taken = sum(key[0] == name for key in live.exposures)
