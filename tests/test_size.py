@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tests.sources import SOURCE
 
-ALL = 99_860
+ALL = 99_812
 """Lines of the package [own: 92,000 is the goal; lower this with every line that goes]."""
 ON_A_ROBOT = 62_400
 """Lines of what a robot runs [own: 62,000 is the goal]."""

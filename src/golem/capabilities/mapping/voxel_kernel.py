@@ -97,39 +97,26 @@ def clear(
         last_k = int(math.floor((points[i, 2] - corner[2]) / resolution))
         inside = 0 < min(r, last_r) and max(r, last_r) < rows - 1 and 0 < min(c, last_c)
         inside = inside and max(c, last_c) < columns - 1 and 0 < min(k, last_k) and max(k, last_k) < layers - 1
-        if inside:
-            at, jump_r, jump_c = (r * columns + c) * layers + k, step_r * columns * layers, step_c * layers
-            while t < end:
-                if flat_stamps[at] != number:
-                    flat_stamps[at] = number
-                    flat_voxels[at] = max(flat_voxels[at] - MISS, LEAST)
-                t = min(next_x, next_y)
-                if next_z < t:
-                    t = next_z
-                    next_z += stride_z
-                    at += step_k
-                elif next_y < next_x:
-                    next_y += stride_y
-                    at += jump_r
-                else:
-                    next_x += stride_x
-                    at += jump_c
-            continue
+        at, jump_r, jump_c = (r * columns + c) * layers + k, step_r * columns * layers, step_c * layers
         while t < end:
-            if 0 <= r < rows and 0 <= c < columns and 0 <= k < layers and stamps[r, c, k] != number:
-                stamps[r, c, k] = number
-                voxels[r, c, k] = max(voxels[r, c, k] - MISS, LEAST)
+            here = inside or (0 <= r < rows and 0 <= c < columns and 0 <= k < layers)
+            if here and flat_stamps[at] != number:
+                flat_stamps[at] = number
+                flat_voxels[at] = max(flat_voxels[at] - MISS, LEAST)
             t = min(next_x, next_y)
             if next_z < t:
                 t = next_z
                 next_z += stride_z
                 k += step_k
+                at += step_k
             elif next_y < next_x:
                 next_y += stride_y
                 r += step_r
+                at += jump_r
             else:
                 next_x += stride_x
                 c += step_c
+                at += jump_c
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

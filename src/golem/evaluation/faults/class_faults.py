@@ -9,20 +9,11 @@ from typing import Any
 import numpy as np
 
 from golem.evaluation.faults.command_faults import JOINTS, LIMITS, PARTS, SENDER, TORQUE
-from golem.evaluation.faults.injection import (
-    Expect,
-    FaultMoment,
-    FaultSource,
-    Frames,
-    Injection,
-    edited_command,
-    edited_state,
-)
+from golem.evaluation.faults.injection import Edit, Expect, FaultMoment, FaultSource, Injection, by_command, by_state
 from golem.interfaces.payloads import Reason
 from golem.robots.model.table import JOINT_INDEX
 from golem.types import LEGS, NUM_JOINTS, Array, Imu, LowCommand, LowState
 
-Edit = Callable[[FaultMoment, Any], None]
 Senses = Callable[[FaultMoment, LowState], LowState]
 KNEE = 3
 BALANCE = (*SENDER, *LIMITS, Reason.BALANCE, Reason.COMMAND_HUNG)
@@ -44,16 +35,6 @@ def class_faults() -> Iterator[Injection]:
     yield from _lies()
     yield from _reports()
     yield from _gate()
-
-
-def by_command(edit: Edit) -> Callable[[FaultMoment, bytes], Frames]:
-    """Return a fault that edits each command."""
-    return lambda m, payload: [edited_command(payload, lambda image: edit(m, image))]
-
-
-def by_state(edit: Edit) -> Callable[[FaultMoment, bytes], Frames]:
-    """Return a fault that edits each state."""
-    return lambda m, payload: [edited_state(payload, lambda image: edit(m, image))]
 
 
 def scaled(fields: tuple[str, ...], where: slice, share: Callable[[FaultMoment], float], kd: float | None) -> Edit:

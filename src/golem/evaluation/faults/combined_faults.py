@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from golem.evaluation.faults.class_faults import KNEE, LYING, by_command, by_imu, by_state, scaled, turned
-from golem.evaluation.faults.injection import Expect, FaultMoment, FaultSource, Frames, Injection
+from golem.evaluation.faults.class_faults import KNEE, LYING, by_imu, scaled, turned
+from golem.evaluation.faults.injection import Expect, FaultMoment, FaultSource, Frames, Injection, by_command, by_state
 from golem.interfaces.payloads import Reason
 from golem.types import NUM_JOINTS, LowCommand, LowState
 

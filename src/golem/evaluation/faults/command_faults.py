@@ -7,7 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from golem.evaluation.faults.injection import Expect, FaultMoment, FaultSource, Frames, Injection, edited_command
+from golem.evaluation.faults.injection import (
+    Expect,
+    FaultMoment,
+    FaultSource,
+    Frames,
+    Injection,
+    by_command,
+    edited_command,
+)
 from golem.interfaces.payloads import Reason
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_INDEX
@@ -32,8 +40,6 @@ LIMITS = (Reason.POSITION, Reason.VELOCITY, Reason.TORQUE, Reason.BRAKING, Reaso
 """Reasons of a robot that was moved beyond what it may do."""
 SENDER = (Reason.COMMAND_GAINS, Reason.COMMAND_JOLTS, Reason.COMMAND_BEYOND)
 
-Edit = Callable[[FaultMoment, Any], None]
-
 
 def command_faults() -> Iterator[Injection]:
     """Yield every fault of commands."""
@@ -43,15 +49,11 @@ def command_faults() -> Iterator[Injection]:
     yield from _times()
 
 
-def _edit(edit: Edit) -> Callable[[FaultMoment, bytes], Frames]:
-    return lambda m, payload: [edited_command(payload, lambda image: edit(m, image))]
-
-
 def _set(field: str, part: slice, value: Callable[[FaultMoment], Any]) -> Callable[[FaultMoment, bytes], Frames]:
     def edit(m: FaultMoment, image: Any) -> None:
         image["motor"][field][part] = value(m)
 
-    return _edit(edit)
+    return by_command(edit)
 
 
 def _stop(name: str, reasons: tuple[Reason, ...], within: float = 0.006, **more: Any) -> Injection:
@@ -98,7 +100,7 @@ def _damaged() -> Iterator[Injection]:
         def edit(m: FaultMoment, image: Any, word: str = word, value: int = value) -> None:
             image[word] = value
 
-        yield _stop(f"{word} {value}", DAMAGED, command=_edit(edit))
+        yield _stop(f"{word} {value}", DAMAGED, command=by_command(edit))
 
 
 def _gains() -> Iterator[Injection]:
@@ -115,8 +117,8 @@ def _gains() -> Iterator[Injection]:
             for field in ("kp", "kd", "tau"):
                 image["motor"][field][where] = 0.0
 
-        yield _stop(f"mode 0 of {part}", limp, command=_edit(off))
-        yield _stop(f"zero gains of {part}", limp, command=_edit(zero))
+        yield _stop(f"mode 0 of {part}", limp, command=by_command(off))
+        yield _stop(f"zero gains of {part}", limp, command=by_command(zero))
         yield _stop(f"kp -100 of {part}", limp, command=_set("kp", where, lambda m: -100.0))
         yield _stop(f"kd -20 of {part}", limp, command=_set("kd", where, lambda m: -20.0))
         yield _stop(f"kd 0 of {part}", limp, command=_set("kd", where, lambda m: 0.0))
@@ -159,7 +161,7 @@ def _motion() -> Iterator[Injection]:
             def shake(m: FaultMoment, image: Any, where: slice = where, size: float = size, n: int = period) -> None:
                 image["motor"]["q"][where] += size * (-1) ** (m.k // n)
 
-            yield _safe(f"q +-{size} every {2 * period} ms of {part}", command=_edit(shake))
+            yield _safe(f"q +-{size} every {2 * period} ms of {part}", command=by_command(shake))
 
 
 def _times() -> Iterator[Injection]:

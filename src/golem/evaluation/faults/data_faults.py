@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from golem.evaluation.faults.command_faults import JOINTS, LIMITS
-from golem.evaluation.faults.injection import Expect, FaultMoment, FaultSource, Frames, Injection, edited_state
+from golem.evaluation.faults.injection import Expect, FaultMoment, FaultSource, Frames, Injection, by_state
 from golem.interfaces.payloads import Reason
 from golem.robots.model.table import JOINT_INDEX
 from golem.types import Array, Imu, LowState
@@ -43,10 +43,6 @@ def _safe(name: str, reasons: tuple[Reason, ...], **more: Any) -> Injection:
     return Injection(f"state: {name}", FaultSource.DATA, Expect.SAFE, (*reasons, *LIMITS), **more)
 
 
-def _edit(edit: Callable[[FaultMoment, Any], None]) -> Callable[[FaultMoment, bytes], Frames]:
-    return lambda m, payload: [edited_state(payload, lambda image: edit(m, image))]
-
-
 def _frames() -> Iterator[Injection]:
     def flipped(payload: bytes) -> bytes:
         wrong = bytearray(payload)
@@ -74,17 +70,17 @@ def _frames() -> Iterator[Injection]:
                 ) -> None:
                     image["motor"][f][i] = v
 
-                yield _stop(f"{field} {value} {joint}", DAMAGED, state=_edit(edit))
+                yield _stop(f"{field} {value} {joint}", DAMAGED, state=by_state(edit))
 
     def pr(m: FaultMoment, image: Any) -> None:
         image["mode_pr"] = 1
 
-    yield _stop("mode_pr 1", DAMAGED, state=_edit(pr))
+    yield _stop("mode_pr 1", DAMAGED, state=by_state(pr))
 
     def zero(m: FaultMoment, image: Any) -> None:
         image["imu"]["quaternion"] = 0.0
 
-    yield _stop("quaternion zero", DAMAGED, state=_edit(zero))
+    yield _stop("quaternion zero", DAMAGED, state=by_state(zero))
 
 
 def _clock() -> Iterator[Injection]:
@@ -93,18 +89,18 @@ def _clock() -> Iterator[Injection]:
         def jump(m: FaultMoment, image: Any, by: int = round(1e3 * seconds)) -> None:
             image["tick"] = max(1, int(image["tick"]) + by)
 
-        yield _stop(f"tick jumps by {seconds:+g} s", JUMPED, 0.002, state=_edit(jump))
+        yield _stop(f"tick jumps by {seconds:+g} s", JUMPED, 0.002, state=by_state(jump))
 
     def slow(m: FaultMoment, image: Any) -> None:
         start = m.kept.setdefault("start", int(image["tick"]))
         image["tick"] = start + (int(image["tick"]) - start) // 2
 
-    yield _safe("tick at half rate", (Reason.STATE_CLOCK, Reason.COMMAND_STALE), state=_edit(slow))
+    yield _safe("tick at half rate", (Reason.STATE_CLOCK, Reason.COMMAND_STALE), state=by_state(slow))
 
     def stands(m: FaultMoment, image: Any) -> None:
         image["tick"] = m.kept.setdefault("tick", int(image["tick"]))
 
-    yield _stop("tick stands", STALE, 0.054, state=_edit(stands))
+    yield _stop("tick stands", STALE, 0.054, state=by_state(stands))
 
 
 def _frozen() -> Iterator[Injection]:
@@ -220,7 +216,7 @@ def _motors() -> Iterator[Injection]:
         def edit(m: FaultMoment, image: Any) -> None:
             image["motor"][field][where] = value
 
-        return _edit(edit)
+        return by_state(edit)
 
     for joint in (JOINTS[1], JOINTS[5]):
         i = JOINT_INDEX[joint]
@@ -236,4 +232,4 @@ def _motors() -> Iterator[Injection]:
     def brief(m: FaultMoment, image: Any) -> None:
         image["motor"]["motorstate"][3] = 1 if m.k < 10 else 0
 
-    yield _bear("a knee reports an error for 20 ms", state=_edit(brief))
+    yield _bear("a knee reports an error for 20 ms", state=by_state(brief))

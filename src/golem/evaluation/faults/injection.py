@@ -53,6 +53,8 @@ class FaultMoment:
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
 
 
+Edit = Callable[[FaultMoment, Any], None]
+"""Changes the image of a frame."""
 Frames = Sequence[bytes]
 
 
@@ -102,3 +104,13 @@ def edited_command(payload: bytes, edit: Callable[[Any], None]) -> bytes:
     edit(hg.LOW_CMD.read(changed))
     hg.COMMAND_CHECKSUM.seal(changed)
     return bytes(changed)
+
+
+def by_command(edit: Edit) -> Callable[[FaultMoment, bytes], Frames]:
+    """Return a fault that edits each command."""
+    return lambda m, payload: [edited_command(payload, lambda image: edit(m, image))]
+
+
+def by_state(edit: Edit) -> Callable[[FaultMoment, bytes], Frames]:
+    """Return a fault that edits each state."""
+    return lambda m, payload: [edited_state(payload, lambda image: edit(m, image))]
