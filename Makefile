@@ -4,7 +4,7 @@ BIN := .venv/bin
 # Without what Python keeps of a file that it has compiled, every process of the tests spends seconds on compiling.
 export PYTHONDONTWRITEBYTECODE :=
 # Types are checked on one core while the kernels are compiled on the other.
-MAKEFLAGS += --jobs=2 --output-sync=target
+MAKEFLAGS += --jobs=2 --output-sync=line
 
 .PHONY: help demo test test-slow test-long kernels lint format docs lock venv venv-isaac clean
 
