@@ -31,6 +31,7 @@ RUNGS: dict[str, str] = {
     "walk-stop": "golem.evaluation.rungs.walk_stop:WalkStop",
     "walk-endurance": "golem.evaluation.rungs.walk_endurance:WalkEndurance",
     "walk-rough": "golem.evaluation.rungs.walk_rough:WalkRough",
+    "tour": "golem.evaluation.rungs.tour:Tour",
     "navigate-line": "golem.evaluation.rungs.navigate_line:NavigateLine",
     "navigate": "golem.evaluation.rungs.navigate_hall:NavigateRung",
     "var-stand": "golem.evaluation.rungs.var_stand:VarStandRung",
@@ -48,7 +49,7 @@ COMPARED: dict[str, tuple[str, ...]] = {
     ),
     "lower_body": (
         *("push", "push-ramp", "push-limit", "gate-limits", "stand-quiet", "stand-arms"),
-        *("walk-twist", "walk-stop", "walk-endurance", "walk-rough", "navigate-line"),
+        *("walk-twist", "walk-stop", "walk-endurance", "walk-rough", "tour", "navigate-line"),
     ),
     "memory": ("memory", "fetch"),
     "navigator": ("navigate",),

@@ -30,7 +30,7 @@ def test_each_name_lifts_its_own_limits() -> None:
     assert changed("effort+slew") == {"torque_command", "slew"}
     assert changed("balance") == {"capture", "sinking", "lean"}
     assert changed("stops") == {
-        "velocity", "state_lower", "state_upper", "torque", "tilt", "sane", "jolts", "throw",
+        "velocity", "state_lower", "state_upper", "torque_samples", "tilt", "sane", "jolts", "throw",
         "capture", "sinking", "lean", "hung", "least_kp", "least_kd",
     }  # fmt: skip
     assert changed("bounds") == {

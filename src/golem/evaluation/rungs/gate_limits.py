@@ -27,7 +27,7 @@ FAR = np.full(NUM_JOINTS, 1e3)
 STOPS: dict[str, Lift] = {
     "speed": lambda limits: replace(limits, velocity=FAR),
     "range": lambda limits: replace(limits, state_lower=-FAR, state_upper=FAR),
-    "torque": lambda limits: replace(limits, torque=FAR),
+    "torque": lambda limits: replace(limits, torque_samples=10**9),
     "tilt": lambda limits: replace(limits, tilt=math.pi),
     "balance": lambda limits: replace(limits, capture=math.inf, sinking=math.inf, lean=math.inf),
     "sender": lambda limits: replace(
