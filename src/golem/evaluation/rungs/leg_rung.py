@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from golem import registry
 from golem.capabilities.legs.base import Envelope
+from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import LATENCY, Episode, Loss, episode_seed, legs_stack
 from golem.evaluation.harness.arguments import robot_options
@@ -45,6 +46,17 @@ class LegRung(Rung[O]):
     default_methods = ("almi",)
     twin: Mapping[str, object] = {}
     walks: bool = False
+
+    def _each(self, *options: str) -> None:
+        """Check options that name several things.
+
+        Raises:
+            ConfigError: one names nothing, or something twice.
+        """
+        for option in options:
+            names = getattr(self.options, option)
+            if not names or len(set(names)) < len(names):
+                raise ConfigError(f"--{option} names nothing, or one of them twice.")
 
     def methods(self) -> tuple[str, ...]:
         """Return the registered lower bodies."""

@@ -195,17 +195,6 @@ class PushedRung(LegRung[O]):
         for word in self.options.walk:
             walk_twist(word)
 
-    def _each(self, *options: str) -> None:
-        """Check options that name several things.
-
-        Raises:
-            ConfigError: one names nothing, or something twice.
-        """
-        for option in options:
-            names = getattr(self.options, option)
-            if not names or len(set(names)) < len(names):
-                raise ConfigError(f"--{option} names nothing, or one of them twice.")
-
     @property
     def gaits(self) -> Sequence[Gait]:
         """What the robot does when it is pushed: each phase, those of walking at each twist."""

@@ -51,15 +51,20 @@ class Tour(LegRung[TourOptions]):
     default_n = 64
     default_profile = "bench"
 
+    def __init__(self, options: TourOptions | None = None) -> None:
+        """Check what was asked for; see `Rung`."""
+        super().__init__(options)
+        self._each("engine")
+        lifted(SafetyLimits.from_profile(), self.options.lift)
+
     def cases(self, results: Results) -> Sequence[Case]:
         """Return every engine."""
-        return [{"engine": engine} for engine in dict.fromkeys(self.options.engine)]
+        return [{"engine": engine} for engine in self.options.engine]
 
     def config(self, method: str, profile: str, overrides: Mapping[str, str]) -> Mapping[str, Any]:
         """Return what determines a trial besides its seed; see `Rung`."""
         if "robot" in overrides:
             raise ConfigError("The rung tour has its engines by --engine; leave out --use robot=...")
-        lifted(SafetyLimits.from_profile(), self.options.lift)
         stacks = {e: self.stack(method, profile, {**overrides, "robot": e}) for e in self.options.engine}
         return {engine: stack_facts(stack) for engine, stack in stacks.items()}
 
