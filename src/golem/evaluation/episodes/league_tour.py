@@ -1,7 +1,6 @@
 """What a robot meets on a tour: waypoints, punches, restless arms, and the operator who steers it.
 
-The task is that of the public league rhoyn/teleop-walking-benchmark (README.md and main.cpp), which is for the G1; its
-figures are quoted below. What differs for this robot is marked `own`.
+The task is that of the public league rhoyn/teleop-walking-benchmark, which is for the G1; see docs/reference/tour.md.
 """
 
 from __future__ import annotations
@@ -13,12 +12,8 @@ import numpy as np
 from golem.capabilities.arms.base import ARM_COLUMNS
 from golem.capabilities.arms.postures import POSTURES, mirror
 from golem.capabilities.arms.trajectory import gate_limits
-from golem.interfaces import topics
-from golem.interfaces.payloads import JointTrajectory
 from golem.robots.model.kinematics import Kinematics
 from golem.robots.model.table import JOINTS
-from golem.skills.base import SkillResult
-from golem.skills.context import Context
 from golem.types import NUM_JOINTS, UPPER, Array, PlanarPose, Twist
 
 CENTRE, RADIUS = 0.3, 0.75
@@ -27,21 +22,17 @@ GAIN = 1.5
 """Speed per distance, and yaw rate per heading error [1/s]."""
 ARRIVED, LEFT = (0.10, 0.05), (0.20, 0.12)
 """Distance [m] and heading error [rad] from which the operator lets the robot rest, and steers it again."""
-PUNCH = 500.0 / 35.1
-"""Largest force by the mass of the robot [N/kg]: the league's, and the sum over its model, assets/g1_29dof.xml."""
-FIRST, RAMP = 1.0 / 3.0, 12
-"""Share of the largest force that is the ceiling at the start, and after how many punches, a minute's, it is all."""
+PUNCH, FIRST, RAMP = 500.0 / 35.1, 1.0 / 3.0, 12
+"""Largest force by the mass of the robot [N/kg], the league's and the sum over its assets/g1_29dof.xml; the share of it
+that is the ceiling at the start, and after how many punches, a minute's, it is all."""
 DELAY, LASTS = 0.1, 0.08
 """When after its waypoint is named a punch begins, and how long it lasts [s]."""
 ARM_PERIOD, ARM_STEP, ARM_STEPS, ARM_DRAWS = 0.5, 0.06, 25, 8
-"""Time between two places of the arms [s]; steps of up to so many rad, so many to the next place; how often that is
-drawn before the arms rest."""
+"""Time between two places of the arms [s]; steps [rad] to the next, how many; how often it is drawn at most."""
 ARM_ROOM = 0.5
-"""How far each joint goes from the posture `home` [rad] [own: the league's arms have their whole range, but neither a
-gate nor, in PhysX, each other to run into]."""
+"""How far each joint goes from the posture `home` [rad] [own: the league's have their range, but no gate]."""
 HAND_BOX = ((0.10, 0.15, -0.2), (0.80, 0.80, 0.60))
-"""Where the left hand stays in base_link [m]: ahead, on its side, below the head [own: the league has the first and the
-last, by its robot's hands]."""
+"""Where the left hand stays in base_link [m]: ahead and below the head, as in the league, and on its side [own]."""
 
 
 def draw_waypoints(rng: np.random.Generator, count: int) -> list[PlanarPose]:
@@ -68,7 +59,11 @@ def draw_arms(rng: np.random.Generator, seconds: float) -> tuple[Array, Array]:
     home, kinematics, q = POSTURES["home"], Kinematics(), np.zeros(NUM_JOINTS)
     left, right = ARM_COLUMNS["left"], ARM_COLUMNS["right"]
     low, high = (np.clip(home + way * ARM_ROOM, *gate_limits()[:2])[left] for way in (-1.0, 1.0))
-    times, places, place = ARM_PERIOD * np.arange(1, 1 + math.ceil(seconds / ARM_PERIOD)), list[Array](), home
+    times, places, place = (
+        ARM_PERIOD * np.arange(1, 1 + math.ceil(seconds / ARM_PERIOD), dtype=np.float64),
+        list[Array](),
+        home,
+    )
     for _ in times:
         for _ in range(ARM_DRAWS):
             drawn = place.copy()
@@ -108,18 +103,3 @@ class Operator:
 def errors(left: PlanarPose) -> tuple[float, float]:
     """Return distance [m] and heading error [rad] of a robot that has `left` to go."""
     return math.hypot(left.x, left.y), abs(left.yaw)
-
-
-class TourMotion:
-    """A routine that sends the arms along `draw_arms` and asks for `twist` until it is cancelled."""
-
-    def __init__(self, arms: tuple[Array, Array]) -> None:
-        """Move the arms so."""
-        self._arms, self.twist = arms, Twist()
-
-    async def run(self, context: Context, goal: None) -> SkillResult:
-        """Move until cancelled."""
-        context.publish(topics.ARM_TRAJECTORY, JointTrajectory(context.t, *self._arms))
-        while True:
-            context.publish(topics.TWIST, self.twist)
-            await context.tick()

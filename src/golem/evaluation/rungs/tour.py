@@ -14,22 +14,23 @@ from golem.errors import ConfigError
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
 from golem.evaluation.episodes import league_tour as league
 from golem.evaluation.episodes.episode import Episode, Loss, episode_seed
+from golem.evaluation.episodes.scripted_motion import ScriptedMotion
 from golem.evaluation.metrics.statistics import Interval, PairedTable, mcnemar, mean_interval, paired_difference
 from golem.evaluation.metrics.text_table import TextTable, short_names
 from golem.evaluation.report.svg_figure import method_colour
 from golem.evaluation.rungs.gate_limits import lifted
 from golem.evaluation.rungs.leg_rung import NO_WALKER, LegRung, PlantOptions, can_walk, judged
 from golem.hardware.safety.base import SafetyLimits
+from golem.interfaces import topics
+from golem.interfaces.payloads import JointTrajectory
 from golem.provenance import stack_facts
 from golem.robots.model.table import BASE_LINK, JOINT_NAMES
-from golem.types import LEGS, UPPER
+from golem.types import LEGS, UPPER, Twist
 
 WAYPOINTS, SEGMENT = 18, 5.0
 """Waypoints of a tour, and the time for each [s]."""
-SETTLE = 3.0
-"""Time between a robot carrying its weight and the tour [s]."""
-PERIOD = 0.02
-"""Time between two looks of the operator [s]."""
+SETTLE, PERIOD = 3.0, 0.02
+"""Time between a robot carrying its weight and the tour, and between two looks of the operator [s]."""
 
 
 @dataclass(frozen=True)
@@ -82,15 +83,16 @@ class Tour(LegRung[TourOptions]):
         speeds = model.jnt_dofadr[model.actuator_trnid[LEGS, 0]]
         goals = league.draw_waypoints(spec.rng("waypoints"), WAYPOINTS)
         punches = league.draw_punches(spec.rng("punches"), WAYPOINTS, mass)
-        motion = league.TourMotion(league.draw_arms(spec.rng("arms"), WAYPOINTS * SEGMENT))
+        arms, twist = league.draw_arms(spec.rng("arms"), WAYPOINTS * SEGMENT), Twist()
         episode.stand(SETTLE)
-        episode.start(motion)
+        episode.running.bus.publish(topics.ARM_TRAJECTORY, JointTrajectory(episode.t, *arms), episode.t)
+        episode.start(ScriptedMotion(twist=lambda t: twist))
         start, began, clock = robot.truth.pose(), episode.t, time.process_time()
         work, ends = 0.0, list[tuple[float, float]]()
         for goal, (link, force) in zip(goals, punches, strict=True):
             operator = league.Operator(start @ goal)
             for k in range(round(SEGMENT / PERIOD)):
-                motion.twist = operator.steer(robot.truth.pose())
+                twist = operator.steer(robot.truth.pose())
                 hit = league.DELAY <= (k + 0.5) * PERIOD < league.DELAY + league.LASTS
                 robot.push(force if hit else np.zeros(3), link, np.zeros(3))
                 episode.run(PERIOD)
@@ -107,7 +109,7 @@ class Tour(LegRung[TourOptions]):
         series = {"seconds": seconds, "lived": len(ends) / WAYPOINTS, "reached": near / WAYPOINTS}
         series |= {"distance": way, "work": work}
         if ends:
-            series |= dict(zip(("waypoint_error", "waypoint_turn"), np.mean(ends, axis=0).tolist(), strict=True))
+            series |= dict(zip(("goal_radial", "goal_turn"), np.mean(ends, axis=0).tolist(), strict=True))
         if way > 1.0:
             series["transport"] = work / (-mass * float(model.opt.gravity[2]) * way)
         loss = episode.loss
@@ -126,8 +128,7 @@ class Tour(LegRung[TourOptions]):
             (first, ours), *others = _by_engine(trials).items()
             rows += [(short[method], f"{first} - {other}", *_gap(ours, theirs)) for other, theirs in others]
         columns = ("lower body", "engines", "n", "tours completed [points]", "McNemar p", "time survived [s]")
-        note = "Differences with 95 % intervals, of the same tours."
-        return (TextTable("Gap between engines", columns, tuple(rows), note),) if rows else ()
+        return (TextTable("Gap between engines on the same tours", columns, tuple(rows)),) if rows else ()
 
     def plot(self, outcomes: Outcomes, figure: Any) -> str | None:
         """Draw who is still on the tour over time: a colour per method, a line per engine."""
