@@ -37,6 +37,7 @@ stopping() { rung walk-stop -n 200; }
 line() { rung navigate-line; }
 endurance() { rung walk-endurance -n 120; }
 rough() { rung walk-rough; }
+tour() { rung tour --engine mujoco physx --method almi vendor wbc "${public[@]}"; }
 plans() { JOBS=1 rung mpc-rate; }
 # On another plant.
 box_feet() { rung push-limit --phase standing --first 60 --robot feet=box cone=elliptic; }
@@ -47,8 +48,8 @@ tether() { rung tether -n 100; }
 stand() { rung stand -n 100; }
 mcnemar() { "$GOLEM" compare "$OUT/tether" "$OUT/stand"; }
 
-ALL=(shoves own_terms rods quiet tracking stopping push_rung ramp rough swings gate_share line arms endurance stand tether
-    mcnemar box_feet vendor_model plans estimators)
+ALL=(shoves own_terms rods quiet tracking stopping push_rung ramp rough swings gate_share line arms endurance tour stand
+    tether mcnemar box_feet vendor_model plans estimators)
 [ $# -gt 0 ] || set -- "${ALL[@]}"
 mkdir -p "$OUT"
 for name; do

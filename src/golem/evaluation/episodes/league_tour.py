@@ -59,12 +59,8 @@ def draw_arms(rng: np.random.Generator, seconds: float) -> tuple[Array, Array]:
     home, kinematics, q = POSTURES["home"], Kinematics(), np.zeros(NUM_JOINTS)
     left, right = ARM_COLUMNS["left"], ARM_COLUMNS["right"]
     low, high = (np.clip(home + way * ARM_ROOM, *gate_limits()[:2])[left] for way in (-1.0, 1.0))
-    times, places, place = (
-        ARM_PERIOD * np.arange(1, 1 + math.ceil(seconds / ARM_PERIOD), dtype=np.float64),
-        list[Array](),
-        home,
-    )
-    for _ in times:
+    places, place, count = list[Array](), home, math.ceil(seconds / ARM_PERIOD)
+    for _ in range(count):
         for _ in range(ARM_DRAWS):
             drawn = place.copy()
             for step in rng.uniform(-ARM_STEP, ARM_STEP, (ARM_STEPS, len(low))):
@@ -77,7 +73,7 @@ def draw_arms(rng: np.random.Generator, seconds: float) -> tuple[Array, Array]:
                 place = drawn
                 break
         places.append(place)
-    return times, np.array(places)
+    return np.linspace(ARM_PERIOD, count * ARM_PERIOD, count), np.array(places)
 
 
 class Operator:
