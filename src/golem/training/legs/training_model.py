@@ -82,8 +82,11 @@ def build_model() -> tuple[mujoco.MjModel, Ids]:
         )
     spec.option.timestep = STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.iterations = 4
-    spec.option.ls_iterations = 8
+    # Roughness moves the feet's spheres, but the midphase asks the volumes that were compiled around their old places.
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    # With 4 and 8 a foot that lands is off by up to 0.04 rad/s after one step; the mean is below 2.
+    spec.option.iterations = 10
+    spec.option.ls_iterations = 20
     model = spec.compile()
     feet = [model.body(f"{side}_ankle_roll_link").id for side in SIDES]
     sphere = mujoco.mjtGeom.mjGEOM_SPHERE
