@@ -25,23 +25,51 @@ from golem.training.legs.export_policy import TRAINED, command_of, export, load_
 from golem.training.legs.learning_curve import draw_curves
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
-from golem.training.legs.train_legs import EXPORTED_NOISE, EXPORTED_PUSH, Adversary, TrainLegsConfig, _Run, train
+from golem.training.legs.train_legs import (
+    EXPORTED_NOISE,
+    EXPORTED_PUSH,
+    Adversary,
+    Device,
+    TrainLegsConfig,
+    _Run,
+    train,
+)
 from golem.training.legs.training_model import STANCE
 
 QUARTERS = TASKS["stand"].quarters
 
 
 def small(
-    out: Path, seed: int = 0, updates: int = 2, *, robots: int = 8, threads: int = 1, **changes: Any
+    out: Path, seed: int = 0, updates: int = 2, *, robots: int = 8, device: Device = "cpu", **changes: Any
 ) -> TrainLegsConfig:
-    return TrainLegsConfig(out=out, seed=seed, robots=robots, steps=robots * 24 * updates, threads=threads, **changes)
+    return TrainLegsConfig(out=out, seed=seed, robots=robots, steps=robots * 24 * updates, device=device, **changes)
 
 
-def test_the_number_of_threads_changes_nothing(tmp_path: Path) -> None:
-    for threads in (1, 2):
-        train(small(tmp_path / str(threads), robots=512, updates=1, threads=threads))
-    one, two = (load_actor(tmp_path / str(threads) / CHECKPOINT).net[0].weight for threads in (1, 2))
-    assert torch.equal(one, two)
+def test_a_run_in_two_processes_is_reproduced_and_says_so(tmp_path: Path) -> None:
+    for name in "ab":
+        path = train(small(tmp_path / name, updates=12, learned_from=0.0, shards=2, seconds=1e3))
+    a, b = (load_actor(tmp_path / name / CHECKPOINT).net[0].weight for name in "ab")
+    assert torch.equal(a, b)
+    saved = read_checkpoint(path)
+    assert "--shards 2 " in command_of(saved) and saved["config"]["device"] == "cpu"
+    curve = read_curve(tmp_path / "a")
+    assert (np.diff(curve["cpu_s"]) > 0.0).all() and (np.diff(curve["wall_s"]) > 0.0).all()
+
+
+def test_a_run_stops_by_the_clock_with_its_checkpoint_and_goes_on(tmp_path: Path) -> None:
+    path = train(small(tmp_path, updates=2, seconds=1e-3))
+    assert read_checkpoint(path)["updates"] == 1
+    train(small(tmp_path, updates=2))
+    assert read_checkpoint(path)["updates"] == 2
+    with pytest.raises(ConfigError, match="more than 0 seconds"):
+        train(small(tmp_path, seconds=0.0))
+
+
+def test_the_device_is_what_there_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    assert read_checkpoint(train(small(tmp_path, updates=1, device="auto")))["config"]["device"] == "cpu"
+    with pytest.raises(ConfigError, match="--device cuda is not there; auto"):
+        train(small(tmp_path, device="cuda"))
 
 
 def test_a_run_is_reproduced_by_its_seed_and_goes_on_from_its_checkpoint(

@@ -17,7 +17,7 @@ from golem.training.legs.train_legs import TrainLegsConfig, train
 
 
 def test_every_robot_that_is_shoved_too_hard_is_lost_and_counted_once(tmp_path: Path) -> None:
-    train(TrainLegsConfig(out=tmp_path, task="stand", robots=8, steps=8 * 24, threads=1))
+    train(TrainLegsConfig(out=tmp_path, task="stand", robots=8, steps=8 * 24))
     found = shove_all(tmp_path / CHECKPOINT, 900.0, n=2, seed=0, threads=1)
     assert [row.direction for row in found] == list(DIRECTIONS)
     assert all((row.survived, row.stopped + row.fell) == (0, 2) for row in found)

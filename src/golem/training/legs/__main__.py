@@ -13,7 +13,7 @@ from tyro.conf import arg
 from golem.training.legs.checkpoint import CHECKPOINT
 from golem.training.legs.env import Task
 from golem.training.legs.learning_curve import draw_curves
-from golem.training.legs.train_legs import Adversary, TrainLegsConfig
+from golem.training.legs.train_legs import Adversary, Device, TrainLegsConfig
 from golem.training.legs.train_legs import train as run_training
 
 RUNS = Path("runs/legs")
@@ -26,7 +26,9 @@ def run(
     steps: float = TrainLegsConfig.steps,
     adversary: Adversary = "learned",
     robots: int = 512,
-    threads: int = 2,
+    shards: int = 1,
+    device: Device = "auto",
+    seconds: float = float("inf"),
     start: Path | None = None,
 ) -> None:
     """Train a leg policy, or go on where a run was stopped.
@@ -39,11 +41,13 @@ def run(
         adversary: who works against the legs through arms, waist and payloads: none, motions (a curriculum), or learned
             (motions, then a policy as well).
         robots: how many are simulated at once.
-        threads: of the physics; the result is the same with any number.
+        shards: processes that simulate them: one per core is fastest. With another number the draws are others.
+        device: of the networks; auto is a GPU where PyTorch finds one, else the CPU.
+        seconds: of wall clock after which it is interrupted; the same command goes on.
         start: checkpoint of another run to go on from, under this command's options; or an exported network, at
             full difficulty from its first step on.
     """
-    config = TrainLegsConfig(out, seed, task, steps, robots, threads, adversary, start=start)
+    config = TrainLegsConfig(out, seed, task, steps, robots, shards, device, seconds, adversary, start=start)
     print(run_training(config))
 
 

@@ -24,7 +24,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         ConfigError: there is no file, or it is no such checkpoint.
     """
     try:
-        saved = torch.load(path, weights_only=True)
+        saved = torch.load(path, map_location="cpu", weights_only=True)
         whole = {"legs", "upper", "steps", "config"} <= saved.keys() and "task" in saved["config"]
     except OSError as error:
         raise ConfigError(f"The checkpoint {path} cannot be read: {error.strerror or error}.") from error

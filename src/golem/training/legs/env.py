@@ -84,6 +84,9 @@ LAYOUT = (
     Term("phase_cos"),
 )
 """What the leg policy sees; the description beside its weights is written from this."""
+SEEN = ObservationLayout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
+KNOWN = 39
+"""How many values only the critic knows."""
 
 
 @dataclass(frozen=True)
@@ -183,19 +186,17 @@ class LegsEnv:
 
     Attributes:
         difficulty: of the disturbances, and how strict the rewards are.
-        layout: of the policy's observation.
         gait: the clocks.
         twist: (n, 3) present command.
         age: (n,) time since each episode began [s].
     """
 
-    def __init__(self, n: int, config: EnvConfig, seed: int, threads: int) -> None:
+    def __init__(self, n: int, config: EnvConfig, seed: int | tuple[int, ...], threads: int) -> None:
         """Build the world and start every robot."""
         self.n, self.config = n, config
         self._rng = np.random.default_rng(seed)
         self.world = BatchWorld(n, config.world, self._rng, threads)
         self.difficulty = Difficulty()
-        self.layout = ObservationLayout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
         self.gait = Gait(config.gait, (n,))
         self.upper = UpperBodyMotion(n, self._rng)
         self._pushes = RandomPushes(n, config.impulse, config.quarters, self._rng)
@@ -256,7 +257,7 @@ class LegsEnv:
         self._pushes.once(force, duration, start)
 
     def observe(self) -> tuple[Array, Array]:
-        """Return what the policy sees (n, layout.size), and beside it what only the critic knows (n, m)."""
+        """Return what the policy sees (n, SEEN.size), and beside it what only the critic knows (n, KNOWN)."""
         sensed, truth = self.world.sensed, self.world.truth
         R = sensed.R
         signals = Signals(
@@ -288,7 +289,7 @@ class LegsEnv:
             self.gait.stepping[:, None],
             self.recovers[:, None],
         ]
-        return self.layout.observe(signals), np.concatenate(known, axis=1)
+        return SEEN.observe(signals), np.concatenate(known, axis=1)
 
     def step(self, action: Array, steered: Rows, speeds: Array) -> Step:
         """Act for one period.

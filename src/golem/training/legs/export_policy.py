@@ -19,10 +19,9 @@ from onnx import TensorProto, helper, numpy_helper
 from torch import nn
 
 from golem.capabilities.legs.base import Envelope
-from golem.capabilities.legs.observation import ObservationLayout
 from golem.errors import ConfigError
 from golem.training.legs.checkpoint import read_checkpoint
-from golem.training.legs.env import LAYOUT, PERIOD, TASKS, EnvConfig, Task
+from golem.training.legs.env import LAYOUT, PERIOD, SEEN, TASKS, EnvConfig, Task
 from golem.training.legs.mirror import Mirror, leg_mirror
 from golem.training.legs.ppo import Actor, PpoConfig
 from golem.training.legs.training_model import KD, KP, STANCE
@@ -70,8 +69,7 @@ def _exported_actor(path: Path) -> Actor:
 
 
 def _untrained_actor() -> Actor:
-    layout = ObservationLayout(LAYOUT, np.concatenate([STANCE, np.zeros(15)]))
-    return Actor(Mirror(layout.components), leg_mirror(), PpoConfig().hidden).eval()
+    return Actor(Mirror(SEEN.components), leg_mirror(), PpoConfig().hidden).eval()
 
 
 def _linear(actor: Actor) -> list[nn.Linear]:
@@ -100,8 +98,8 @@ def export(checkpoint: Path, folder: Path) -> tuple[Path, Path]:
 def command_of(saved: dict[str, Any]) -> str:
     """Return the command that made a checkpoint, and with what code."""
     config = saved["config"]
-    words = ("task", "seed", "adversary", "robots")
-    options = " ".join(f"--{word} {config[word]}" for word in words)
+    words = ("task", "seed", "adversary", "robots", "shards")
+    options = " ".join(f"--{word} {config[word]}" for word in words if word in config)
     start = "" if config["start"] is None else f" --start {Path(config['start']).name}"
     codes = ", then ".join(saved.get("codes", ["unknown"]))
     return f"golem train legs run {options} --steps {config['steps']:g}{start} (commit {codes})"

@@ -1,6 +1,7 @@
 """Proximal policy optimisation (Schulman et al., 2017) with generalised advantages (2016), as small as it can be.
 
-Networks run in float32 on the CPU; the learning rate follows the KL divergence of each update, as ALMI's does.
+Networks and experience are float32 on one device; noise is drawn on the CPU, so that a run can go on on another. The
+learning rate follows the KL divergence of each update, as ALMI's does.
 """
 
 from __future__ import annotations
@@ -86,23 +87,20 @@ class Actor(nn.Module):
 class Ppo:
     """One player: actor, critic, their optimiser, and the experience since the last update."""
 
-    def __init__(self, actor: Actor, known: int, n: int, config: PpoConfig, seed: int) -> None:
+    def __init__(self, actor: Actor, known: int, n: int, config: PpoConfig, seed: int, device: str = "cpu") -> None:
         """Train `actor` on `n` robots, with a critic that sees `known` values beside the actor's observation."""
-        self.config, self.actor, self._n = config, actor, n
+        self.config, self.actor, self._device = config, actor.to(device), device
         self._generator = torch.Generator().manual_seed(seed)
         observed = len(actor.observation_sign)
-        self.critic = mlp((observed + known, *config.hidden, 1), 1.0)
+        self.critic = mlp((observed + known, *config.hidden, 1), 1.0).to(device)
         parameters = [*actor.parameters(), *self.critic.parameters()]
         self._optimiser = torch.optim.Adam(parameters, lr=config.rate)
         self._parameters = parameters
         actions = len(actor.action_sign)
-        shape = (config.steps, n)
-        self._obs = torch.zeros(*shape, observed)
-        self._known = torch.zeros(*shape, known)
-        self._act = torch.zeros(*shape, actions)
-        self._logp, self._value = torch.zeros(shape), torch.zeros(shape)
-        self._reward, self._cut = torch.zeros(shape), torch.zeros(shape)
-        self._mean = torch.zeros(*shape, actions)
+        self._obs, self._known, self._act, self._mean = (
+            torch.zeros(config.steps, n, size, device=device) for size in (observed, known, actions, actions)
+        )
+        self._logp, self._value, self._reward, self._cut = torch.zeros(4, config.steps, n, device=device)
         self._k = 0
 
     @torch.no_grad()
@@ -113,18 +111,17 @@ class Ppo:
         self._known[k] = torch.from_numpy(known)
         mean, std = self.actor(self._obs[k]), self.actor.log_std.exp()
         self._mean[k] = mean
-        self._act[k] = mean + std * torch.randn(mean.shape, generator=self._generator)
+        self._act[k] = mean + std * torch.randn(mean.shape, generator=self._generator).to(self._device)
         self._logp[k] = _log_prob(self._act[k], mean, self.actor.log_std)
         self._value[k] = self._evaluate(self._obs[k], self._known[k])
-        return self._act[k].double().numpy()
+        return self._act[k].double().cpu().numpy()
 
     def learn_of(self, reward: Array, ended: Bools, truncated: Bools) -> None:
         """Remember what the last actions led to; an episode that was merely cut goes on in the critic's eyes."""
         k = self._k
-        cut = torch.from_numpy(ended | truncated)
-        bonus = self.config.gamma * self._value[k] * torch.from_numpy(truncated)
-        self._reward[k] = torch.from_numpy(reward) + bonus
-        self._cut[k] = cut.float()
+        bonus = self.config.gamma * self._value[k] * self._tensor(truncated)
+        self._reward[k] = self._tensor(reward) + bonus
+        self._cut[k] = self._tensor(ended | truncated)
         self._k += 1
 
     def update(self, observation: Array, known: Array, policy: bool = True) -> dict[str, float]:
@@ -137,9 +134,9 @@ class Ppo:
         """
         c = self.config
         with torch.no_grad():
-            value = self._evaluate(torch.from_numpy(observation).float(), torch.from_numpy(known).float())
+            value = self._evaluate(self._tensor(observation), self._tensor(known))
             advantage = torch.zeros_like(self._reward)
-            running = torch.zeros(self._n)
+            running = torch.zeros_like(value)
             for k in reversed(range(c.steps)):
                 going = 1.0 - self._cut[k]
                 delta = self._reward[k] + c.gamma * going * value - self._value[k]
@@ -154,7 +151,7 @@ class Ppo:
         ]
         total, stats = len(flat[0]), {"value_loss": 0.0, "kl": 0.0}
         for _ in range(c.epochs):
-            order = torch.randperm(total, generator=self._generator)
+            order = torch.randperm(total, generator=self._generator).to(self._device)
             for part in order.chunk(c.batches):
                 loss, value_loss, kl = self._loss([x[part] for x in flat], old_std, policy)
                 if policy:
@@ -199,6 +196,9 @@ class Ppo:
         """Take over the networks of a checkpoint's `state`, and nothing else."""
         self.actor.load_state_dict(state["actor"])
         self.critic.load_state_dict(state["critic"])
+
+    def _tensor(self, values: Array | Bools) -> Tensor:
+        return torch.from_numpy(values).to(self._device, torch.float32)
 
     def _evaluate(self, observation: Tensor, known: Tensor) -> Tensor:
         return self.critic(torch.cat([observation, known], dim=-1)).squeeze(-1)

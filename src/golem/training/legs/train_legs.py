@@ -5,26 +5,28 @@ from __future__ import annotations
 import csv
 import os
 import time
-from dataclasses import asdict, dataclass, field
+from contextlib import closing
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from golem.errors import ConfigError, OutputError
+from golem.native import Records
 from golem.provenance import commit
-from golem.training.legs.batch_world import Rows
 from golem.training.legs.checkpoint import CHECKPOINT, CURVE, cut_curve, read_checkpoint
-from golem.training.legs.disturbances import NUM_UPPER
-from golem.training.legs.env import PERIOD, TASKS, EnvConfig, LegsEnv, Task
+from golem.training.legs.env import KNOWN, PERIOD, SEEN, TASKS, EnvConfig, Task
 from golem.training.legs.export_policy import load_actor
 from golem.training.legs.mirror import Mirror, leg_mirror, upper_mirror
 from golem.training.legs.ppo import Actor, Ppo, PpoConfig
-from golem.types import Array
+from golem.training.legs.sharded_env import ShardedEnv
 
 Adversary = Literal["none", "motions", "learned"]
+Device = Literal["auto", "cpu", "cuda"]
+SAVED = 60.0
+"""Time between checkpoints [s]."""
 VALUES_FIRST = 5e5
 """Steps in which a critic that begins from nothing learns what an exported network is worth: 40 updates [own]."""
 EXPORTED_PUSH = 0.5
@@ -45,7 +47,9 @@ class TrainLegsConfig:
         task: what is learned.
         steps: actions of all robots together, e.g. 38e6.
         robots: how many are simulated at once.
-        threads: of the physics; they change nothing of the result.
+        shards: processes that simulate them, each with draws of its own.
+        device: of networks and experience.
+        seconds: after which the run is interrupted, its checkpoint written.
         start: what this run begins with, exploring with `noise` or, from an exported one,
             with `EXPORTED_NOISE`: networks and steps of another run's checkpoint, or a
             network that was exported. A run from an exported network counts its steps from none, is at full difficulty
@@ -69,7 +73,9 @@ class TrainLegsConfig:
     task: Task = "walk"
     steps: float = 38e6
     robots: int = 512
-    threads: int = 2
+    shards: int = 1
+    device: Device = "auto"
+    seconds: float = np.inf
     adversary: Adversary = "learned"
     learned_from: float = 6e6
     start: Path | None = None
@@ -85,11 +91,16 @@ def train(config: TrainLegsConfig) -> Path:
     """Train, or go on; return the path of the checkpoint.
 
     Raises:
-        ConfigError: fewer than two robots, no steps, or a checkpoint of another configuration in the folder.
+        ConfigError: fewer than two robots, no steps, no such device, or a checkpoint of another configuration in the
+            folder.
         OutputError: the folder cannot be written.
     """
-    if config.robots < 2 or config.steps < 1 or config.threads < 1:
-        raise ConfigError("Training needs at least 2 robots, 1 step and 1 thread.")
+    if config.robots < 2 or config.steps < 1 or config.seconds <= 0.0:
+        raise ConfigError("Training needs at least 2 robots, 1 step and more than 0 seconds.")
+    found = torch.cuda.is_available()
+    if config.device == "cuda" and not found:
+        raise ConfigError("--device cuda is not there; auto takes it where it is, cpu is everywhere.")
+    config = replace(config, device="cuda" if found and config.device != "cpu" else "cpu")
     try:
         config.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -97,17 +108,19 @@ def train(config: TrainLegsConfig) -> Path:
     # Sums of several threads differ in their last bits, and threads of a busy machine wait for each other.
     torch.set_num_threads(1)
     torch.manual_seed(config.seed)
-    run = _Run(config)
     path = config.out / CHECKPOINT
-    if path.exists():
-        run.load(path)
-    elif config.start is not None:
-        run.begin_with(config.start)
-    while run.steps < config.steps:
-        run.update()
-        if run.updates % 20 == 0:
-            run.save(path)
-    run.save(path)
+    with closing(_Run(config)) as run:
+        if path.exists():
+            run.load(path)
+        elif config.start is not None:
+            run.begin_with(config.start)
+        began = saved = time.monotonic()
+        while run.steps < config.steps and time.monotonic() - began < config.seconds:
+            run.update()
+            if time.monotonic() - saved > SAVED:
+                run.save(path)
+                saved = time.monotonic()
+        run.save(path)
     return path
 
 
@@ -121,57 +134,54 @@ class _Run:
         self.steps = 0
         self.updates = 0
         self._cpu = 0.0
-        self.env = LegsEnv(config.robots, TASKS[config.task], config.seed, config.threads)
+        seen, ppo, half, on = Mirror(SEEN.components), config.ppo, config.robots // 2, config.device
+        legs, upper = Actor(seen, leg_mirror(), ppo.hidden, ppo.noise), Actor(seen, upper_mirror(), ppo.hidden, 0.6)
+        self.legs = Ppo(legs, KNOWN, config.robots, ppo, config.seed, on)
+        self.upper = Ppo(upper, KNOWN, half, ppo, config.seed + 1, on)
+        self._survival = self._seconds = 0.0
+        self.env = ShardedEnv(config.robots, TASKS[config.task], config.seed, config.shards)
         self._harden()
-        seen = Mirror(self.env.layout.components)
-        obs, known = self.env.observe()
-        ppo = config.ppo
-        self.legs = Ppo(
-            Actor(seen, leg_mirror(), ppo.hidden, ppo.noise), known.shape[1], config.robots, ppo, config.seed
-        )
-        half = config.robots // 2
-        self._steered: Rows = np.arange(half)
-        self.upper = Ppo(Actor(seen, upper_mirror(), ppo.hidden, 0.6), known.shape[1], half, ppo, config.seed + 1)
-        self._survival = 0.0
-        self._obs, self._known = obs, known
         self._log: list[dict[str, float]] = []
 
     def update(self) -> None:
         """Let every robot act `ppo.steps` times, then improve both players."""
-        began, config, env = time.process_time(), self.config, self.env
+        config, env, rows = self.config, self.env, self.env.rows
+        began, spent, clock = time.process_time(), env.cpu, time.monotonic()
         learned = config.adversary == "learned" and self._progress >= config.learned_from
-        steered: Rows = self._steered if learned else self._steered[:0]
+        steered = rows[: config.robots // 2]
+        steered["steered"] = learned
         self.legs.bound_noise(self._largest_noise)
-        meter = _Meter()
+        meter = _Meter(TASKS[config.task].episode)
         for _ in range(config.ppo.steps):
-            action = self.legs.act(self._obs, self._known)
-            speeds = np.zeros((0, NUM_UPPER))
+            rows["action"] = self.legs.act(rows["observed"], rows["known"])
             if learned:
-                speeds = self.upper.act(self._obs[steered], self._known[steered])
-            step = env.step(action, steered, speeds)
-            meter.add(env, step.reward, step.ended, step.truncated, step.terms)
-            self.legs.learn_of(step.reward, step.ended, step.truncated)
+                steered["speeds"] = self.upper.act(steered["observed"], steered["known"])
+            env.step()
+            meter.add(rows, env.terms)
+            self.legs.learn_of(rows["reward"], rows["ended"], rows["truncated"])
             if learned:
-                cut = step.ended[steered], step.truncated[steered]
-                self.upper.learn_of(-step.reward[steered], *cut)
-            env.restart(np.flatnonzero(step.ended | step.truncated))
-            self._obs, self._known = env.observe()
+                self.upper.learn_of(-steered["reward"], steered["ended"], steered["truncated"])
         sound = not self._exported or self.steps >= VALUES_FIRST
-        stats = self.legs.update(self._obs, self._known, sound)
+        stats = self.legs.update(rows["observed"], rows["known"], sound)
         if learned:
-            self.upper.update(self._obs[steered], self._known[steered])
+            self.upper.update(steered["observed"], steered["known"])
         self.steps += config.ppo.steps * config.robots
         self.updates += 1
         if meter.finished:
             share = min(1.0, meter.finished / 64.0)
             self._survival += share * 0.5 * (meter.lasted / meter.finished - self._survival)
         self._harden()
-        self._cpu += time.process_time() - began
-        row = {"steps": self.steps, "cpu_s": self._cpu, "survival": self._survival}
+        self._cpu += time.process_time() - began + env.cpu - spent
+        self._seconds += time.monotonic() - clock
+        row = {"steps": self.steps, "cpu_s": self._cpu, "wall_s": self._seconds, "survival": self._survival}
         row |= {"learned_adversary": float(learned)} | asdict(env.difficulty) | stats | meter.row()
         self._log.append({name: float(value) for name, value in row.items()})
         if self.updates % 10 == 0:
             self._write()
+
+    def close(self) -> None:
+        """End the processes of the environment."""
+        self.env.close()
 
     def save(self, path: Path) -> None:
         """Write the checkpoint, whole or not at all."""
@@ -184,6 +194,7 @@ class _Run:
                 "steps": self.steps,
                 "updates": self.updates,
                 "cpu": self._cpu,
+                "wall": self._seconds,
                 "survival": self._survival,
                 "config": _plain(self.config),
                 "env": _plain(TASKS[self.config.task]),
@@ -200,7 +211,7 @@ class _Run:
             ConfigError: it was made with another seed, network, task or reward.
         """
         saved = read_checkpoint(path)
-        free = ("out", "steps", "threads")
+        free = ("out", "steps", "device", "seconds")
         mine = {k: v for k, v in _plain(self.config).items() if k not in free}
         if mine != {k: v for k, v in saved["config"].items() if k not in free}:
             raise ConfigError(f"{path} was made with another configuration; choose another --out.")
@@ -218,10 +229,9 @@ class _Run:
         self.legs.load(saved["legs"])
         self.upper.load(saved["upper"])
         self.steps, self.updates, self._cpu = saved["steps"], saved["updates"], saved["cpu"]
-        self._survival = saved["survival"]
+        self._survival, self._seconds = saved["survival"], saved["wall"]
         self._harden()
-        self.env.reseed((self.config.seed, self.steps))
-        self._obs, self._known = self.env.observe()
+        self.env.reseed(self.steps)
 
     def begin_with(self, path: Path) -> None:
         """Take over networks and steps of another run's checkpoint, or a network that was exported.
@@ -297,7 +307,8 @@ class _Run:
 class _Meter:
     """Sums over one update."""
 
-    def __init__(self) -> None:
+    def __init__(self, episode: float) -> None:
+        self._episode = episode
         self.finished, self.lasted = 0, 0.0
         self._falls = 0
         self._seconds = 0.0
@@ -307,27 +318,19 @@ class _Meter:
         self._rewards: list[float] = []
         self._terms: list[dict[str, float]] = []
 
-    def add(
-        self,
-        env: LegsEnv,
-        reward: Array,
-        ended: NDArray[np.bool_],
-        truncated: NDArray[np.bool_],
-        terms: dict[str, float],
-    ) -> None:
+    def add(self, rows: Records, terms: dict[str, float]) -> None:
         """Count one step of all robots."""
-        self._falls += int(ended.sum())
-        over = ended | truncated
-        self.lasted += float(env.age[over].sum() / env.config.episode)
+        self._falls += int(rows["ended"].sum())
+        over = rows["ended"] | rows["truncated"]
+        self.lasted += float(rows["age"][over].sum() / self._episode)
         self.finished += int(over.sum())
-        self._seconds += PERIOD * env.n
-        moving = env.walking
-        error = np.linalg.norm((env.world.truth.heading_velocity() - env.twist)[:, :2], axis=1)
+        self._seconds += PERIOD * len(rows)
+        moving, error = rows["walking"], rows["error"]
         known = np.isfinite(error)
         for errors, who in ((self._moving, moving & known), (self._standing, ~moving & known)):
             errors.append(float(error[who].mean()) if who.any() else 0.0)
-        self._stepping.append(float(env.gait.stepping[~moving].mean()) if (~moving).any() else 0.0)
-        self._rewards.append(float(reward.mean()))
+        self._stepping.append(float(rows["stepping"][~moving].mean()) if (~moving).any() else 0.0)
+        self._rewards.append(float(rows["reward"].mean()))
         self._terms.append(terms)
 
     def row(self) -> dict[str, float]:
