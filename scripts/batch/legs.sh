@@ -14,8 +14,8 @@ shift 3
 # shellcheck source=scripts/batch/common.sh
 . "$(dirname "$0")/common.sh"
 resume
-RUN=$WORK/$NAME
-STARTS=15 # seconds until a run's processes are there
+RUN=$WORK/$NAME PROBE=${PROBE:-20}
+starts=15 # seconds until a run's processes are there
 
 # rate SHARDS OPTION...: steps per second of wall clock of a run with so many processes.
 rate() {
@@ -23,7 +23,7 @@ rate() {
     shift
     probe=$(mktemp -d)
     "$GOLEM" train legs run --out "$probe" "$@" --steps 1e12 --shards "$shards" --robots "$(robots "$shards")" \
-        --seconds $((${PROBE:-20} / 2)) > /dev/null
+        --seconds $((PROBE / 2)) > /dev/null
     awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) column[$i] = i } END { printf "%d", $column["steps"] / $column["wall_s"] }' \
         "$probe/curve.csv"
     rm -r "$probe"
@@ -33,18 +33,21 @@ robots() { echo $(($1 < 4 ? 512 / $1 * $1 : 128 * $1)); }
 if [ ! -e "$RUN/choice" ]; then
     best=0 chosen=1
     for shards in $( (echo $((JOBS / 2)); echo "$JOBS") | grep -v '^0$' | sort -un); do
+        before=$SECONDS
         found=$(rate "$shards" "$@")
+        starts=$((SECONDS - before - PROBE / 2 + 5))
         echo "golem: $shards processes make $found steps a second"
         [ "$found" -le "$best" ] || best=$found chosen=$shards
     done
+fi
+seconds=$(($(left) - starts))
+[ "$seconds" -gt 0 ] || { echo "golem: nothing is left of $LIMIT s to train in" >&2; exit 2; }
+if [ ! -e "$RUN/choice" ]; then
     mkdir -p "$RUN"
-    echo "--shards $chosen --robots $(robots "$chosen") --steps $((best * ($(left) - STARTS)))" > "$RUN/choice"
+    echo "--shards $chosen --robots $(robots "$chosen") --steps $((best * seconds))" > "$RUN/choice"
 fi
 read -ra choice < "$RUN/choice"
-seconds=$(($(left) - STARTS))
-if [ "$seconds" -gt 0 ]; then
-    within "$(left)" "$GOLEM" train legs run --out "$RUN" "${choice[@]}" "$@" --seconds "$seconds" || status=$?
-fi
+within "$(left)" "$GOLEM" train legs run --out "$RUN" "${choice[@]}" "$@" --seconds "$seconds" || status=$?
 [ ! -e "$RUN/checkpoint.pt" ] || "$GOLEM" train legs export --checkpoint "$RUN/checkpoint.pt" --folder "$RUN/export"
 save .
 exit "${status:-0}"

@@ -12,7 +12,7 @@ torch = pytest.importorskip("torch", reason="training needs the extra 'train'")
 from golem.capabilities.legs.description import SHIPPED
 from golem.capabilities.legs.gait import GaitConfig
 from golem.hardware.safety.base import SafetyLimits
-from golem.training.legs.batch_world import WorldConfig
+from golem.training.legs.batch_world import BatchWorld, WorldConfig
 from golem.training.legs.disturbances import Difficulty
 from golem.training.legs.env import PERIOD, TASKS, EnvConfig, LegsEnv, landing_errors
 from golem.training.legs.export_policy import load_actor
@@ -166,6 +166,19 @@ def test_slope_turns_gravity_and_roughness_lifts_soles() -> None:
     assert 0.0 < moved.max() <= 0.021
     changed = np.unique(np.nonzero(moved)[1])
     assert set(changed) <= set(world.ids.soles)
+
+
+def test_rough_ground_has_whole_steps_and_is_often_slippery() -> None:
+    rough = replace(TASKS["rough"].world, roughness=0.0)
+    world = BatchWorld(400, rough, np.random.default_rng(0), 1)
+    world.reset(np.arange(400), np.zeros((400, 15)), 0.0)
+    low, high = rough.friction
+    assert ((world.friction - low) / (high - low) < 0.1).mean() == pytest.approx(0.325, abs=0.06)
+    before = world._corners.copy()
+    world.shim(np.ones((400, 2), dtype=bool))
+    raised = (before - world._corners)[:, world.ids.soles, 2][:, ::4][world._rough > 0.0]
+    assert raised.min() > -1e-12 and raised.max() == pytest.approx(rough.ledge)
+    assert np.isclose(raised, rough.ledge).mean() == pytest.approx(0.15, abs=0.04)
 
 
 EVEN = WorldConfig(slope=0.0, roughness=0.0, torso_mass=(0.0, 0.0), leg_offset=0.0)

@@ -22,6 +22,10 @@ from golem.training.legs.training_model import STANCE, STAND_HEIGHT, STEP, build
 from golem.types import GRAVITY, LEGS, NUM_JOINTS, Array
 
 Rows = NDArray[np.intp]
+WHOLE = 0.3
+"""Share of the footholds on rough ground that are as high as a ledge is at most, or level: a step, up or down."""
+SLIPPERY = 0.25
+"""Share of the episodes in the most slippery tenth of the range: an even draw hardly ever is."""
 
 
 @dataclass(frozen=True)
@@ -262,14 +266,17 @@ class BatchWorld:
         y = np.array([-0.5, 0.5, -0.5, 0.5])
         plane = rng.uniform(-1.0, 1.0, (m, 3))
         height = 0.4 * plane[:, :1] + 0.6 * (plane[:, 1:2] * x + plane[:, 2:] * y) + rng.uniform(-0.3, 0.3, (m, 4))
-        raised = self.config.roughness * height + self.config.ledge * rng.random((m, 1))
+        share = rng.random((m, 1))
+        rough, whole = self._rough[robots, None], rng.random((m, 1)) < WHOLE
+        ledge = self.config.ledge * np.where(whole, np.round(share), rough * share)
         corners = self.ids.soles.reshape(2, 4)[side]
         nominal = self._model.geom_pos[corners, 2]
-        self._corners[robots[:, None], corners, 2] = nominal - self._rough[robots, None] * raised
+        self._corners[robots[:, None], corners, 2] = nominal - rough * self.config.roughness * height - ledge
 
     def _randomise(self, where: Rows, payload: float) -> None:
         c, rng, m, model = self.config, self._rng, len(where), self._model
-        self.friction[where] = rng.uniform(*c.friction, m)
+        share = rng.random(m) * np.where(rng.random(m) < SLIPPERY, 0.1, 1.0)
+        self.friction[where] = c.friction[0] + (c.friction[1] - c.friction[0]) * share
         self._friction[where[:, None], self.ids.soles, 0] = self.friction[where, None]
         self.payload[where] = c.payload * payload * rng.random((m, 2)) * (rng.random((m, 2)) < 0.6)
         self._mass[where[:, None], self.ids.hands] = model.body_mass[self.ids.hands] + self.payload[where]
