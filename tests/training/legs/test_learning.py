@@ -45,14 +45,10 @@ def small(
     return TrainLegsConfig(out=out, seed=seed, robots=robots, steps=robots * 24 * updates, device=device, **changes)
 
 
-def test_a_run_in_two_processes_is_reproduced_and_says_so(tmp_path: Path) -> None:
-    for name in "ab":
-        path = train(small(tmp_path / name, updates=12, learned_from=0.0, shards=2, seconds=1e3))
-    a, b = (load_actor(tmp_path / name / CHECKPOINT).net[0].weight for name in "ab")
-    assert torch.equal(a, b)
-    saved = read_checkpoint(path)
-    assert "--shards 2 " in command_of(saved) and saved["config"]["device"] == "cpu"
-    curve = read_curve(tmp_path / "a")
+def test_a_run_in_two_processes_says_so_and_counts_their_time(tmp_path: Path) -> None:
+    saved = read_checkpoint(train(small(tmp_path, learned_from=0.0, shards=2, seconds=1e3)))
+    assert "--shards 2 " in command_of(saved) and saved["config"]["device"] == "cpu" and saved["updates"] == 2
+    curve = read_curve(tmp_path)
     assert (np.diff(curve["cpu_s"]) > 0.0).all() and (np.diff(curve["wall_s"]) > 0.0).all()
 
 

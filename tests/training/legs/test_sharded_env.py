@@ -65,6 +65,7 @@ def test_one_shard_is_the_environment_itself() -> None:
     assert alone[0].shape == (6, SEEN.size) and cpu == 0.0
 
 
+@pytest.mark.slow
 def test_shards_are_as_many_environments_with_seeds_of_their_own() -> None:
     found, cpu = sharded(8, 2)
     one, two = (plain((7, k), slice(4 * k, 4 * k + 4), (7, 100, k), 8) for k in range(2))
@@ -73,6 +74,7 @@ def test_shards_are_as_many_environments_with_seeds_of_their_own() -> None:
     assert not np.array_equal(one[0], two[0]) and cpu > 0.0
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_is_one_sentence_and_the_others_end() -> None:
     with pytest.raises(ConfigError, match="a divisor of the number of robots, 8, not 3"):
         ShardedEnv(8, TASK, 0, 3)
