@@ -141,6 +141,8 @@ class SafetyLimits:
         capture: how far the capture point may be outside what both soles span [m] [own: see decisions/control.md].
         sinking: speed with which the centre of mass of a robot on its feet may sink [m/s] [own].
         lean: angle between the IMU's up and that of two flat feet [rad] [own: a ramp of 8 degrees is 0.14].
+        low: height of base_link above the lower sole below which legs that carry no longer stand [m] [own: legs take
+            commanded heights from 0.75 on, and the standing controller rises from 0.67].
         table: the limits by motor for compiled code, see `limit_table`.
     """
 
@@ -187,7 +189,7 @@ class SafetyLimits:
     gravity: tuple[float, float] = (4.0, 20.0)
     gravity_moving: tuple[float, float] = (3.0, 30.0)
     gravity_angle: float = 0.35
-    dead_share: float = 0.1
+    dead_share: float = 0.25
     dead_load: float = 0.10
     dead_time: float = 0.150
     temperature: tuple[float, float] = (-30.0, 100.0)
@@ -206,6 +208,7 @@ class SafetyLimits:
     capture: float = 0.18
     sinking: float = 0.5
     lean: float = 0.25
+    low: float = 0.7
     table: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

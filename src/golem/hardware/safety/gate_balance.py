@@ -28,22 +28,26 @@ BALANCE = np.dtype(
         ("feet", FEET),
         ("tree", tree_dtype(NUM_JOINTS)),
         ("pelvis", "f8", (4,)),
-        ("most", "f8", (3,)),
+        ("most", "f8", (4,)),
         ("new", "i8"),
         ("com", "f8", (3,)),
         ("velocity", "f8", (3,)),
         ("outside", "f8"),
         ("sinks", "f8"),
         ("leans", "f8"),
-        ("lasted", "f8", (3,)),
+        ("low", "f8"),
+        ("lasted", "f8", (4,)),
         ("airborne", "f8"),
     ]
 )
 """Models, limits and memory; then how far the capture point is outside [m], how fast the robot sinks [m/s], by how much
-IMU and feet differ [rad], for how long each has been too much, and for how long no foot has carried the robot [s]."""
+IMU and feet differ [rad], how far base_link is below `LEG` [m], for how long each has been too much, and for how long no
+foot has carried the robot [s]."""
 _balance_at = view(BALANCE)
-LASTS = (0.03, 0.03, 0.3)
-"""Time for which each of the three may be too much [s] [own]."""
+LASTS = (0.03, 0.03, 0.3, 0.03)
+"""Time for which each of the four may be too much [s] [own]."""
+LEG = 1.04
+"""Height of base_link above the soles of straight legs [m]."""
 SMOOTH = 0.03
 """Time constant of the velocity of the centre of mass [s] [own]."""
 FLAT = 0.08
@@ -68,14 +72,18 @@ def no_balance(limits: SafetyLimits | None = None) -> Records:
     """Return the memory that has seen nothing, a `BALANCE`, with `limits`."""
     m = _blank().copy()
     if limits is not None:
-        m["most"] = limits.capture, limits.sinking, limits.lean
+        m["most"] = _most(limits)
     return m
+
+
+def _most(limits: SafetyLimits) -> tuple[float, float, float, float]:
+    return limits.capture, limits.sinking, limits.lean, LEG - limits.low
 
 
 def sensed(m: Records, state: LowState, dt: float | None, limits: SafetyLimits) -> Records:
     """Return `m` after the sample `state`, `dt` after the one before; None forgets those before."""
     m = m.copy()
-    m["most"] = limits.capture, limits.sinking, limits.lean
+    m["most"] = _most(limits)
     if dt is None:
         forget_feet(m["feet"])
         m["new"], m["lasted"] = 1, 0.0
@@ -92,13 +100,15 @@ def carried(m: Records) -> bool:
 
 def unbalanced(m: Records) -> Fault | None:
     """Return what `m` says against whoever has the legs, or against the IMU."""
-    outside, sinks, leans = m["lasted"][0]
+    outside, sinks, leans, low = m["lasted"][0]
     if leans >= LASTS[2]:
         return Fault(Reason.IMU_IMPLAUSIBLE, f"it is {m['leans'][0]:.2f} rad off the soles of both feet")
     if outside >= LASTS[0]:
         return Fault(Reason.BALANCE, f"the capture point is {m['outside'][0]:.2f} m outside the soles")
     if sinks >= LASTS[1]:
         return Fault(Reason.BALANCE, f"it sinks at {m['sinks'][0]:.2f} m/s")
+    if low >= LASTS[3]:
+        return Fault(Reason.BALANCE, f"base_link is {LEG - m['low'][0]:.2f} m above the lower sole")
     return None
 
 
@@ -113,7 +123,10 @@ def _sense_at(place: int, numbers: Array, dt: float) -> None:  # pragma: no cove
 @njit(cache=True)
 def balances(m: Record) -> bool:
     """Return whether `unbalanced` has nothing to say."""
-    return m.lasted[0] < LASTS[0] and m.lasted[1] < LASTS[1] and m.lasted[2] < LASTS[2]
+    for k, most in enumerate(LASTS):
+        if m.lasted[k] >= most:
+            return False
+    return True
 
 
 @njit(cache=True)
@@ -139,7 +152,7 @@ def sense_balance(
             for c in range(3):
                 at += R[i, a, c] * m.tree.com[i, c]
             com[a] += m.tree.mass[i] * at
-    total = height = 0.0  # of the centre of mass above the lower sole
+    total = height = base = 0.0  # of the centre of mass, and of base_link, above the lower sole
     v = np.zeros(3)
     for a in range(3):
         com[a] /= mass
@@ -150,10 +163,11 @@ def sense_balance(
         v[0] -= w * (omega[1] * z - omega[2] * y + feet.rates[k, 0])
         v[1] -= w * (omega[2] * x - omega[0] * z + feet.rates[k, 1])
         v[2] -= w * (omega[0] * y - omega[1] * x + feet.rates[k, 2])
-        below = 0.0
+        above = rises = 0.0
         for a in range(3):
-            below += (com[a] - feet.motion.soles[k, a]) * up[a]
-        height = max(height, below)
+            above += (com[a] - feet.motion.soles[k, a]) * up[a]
+            rises -= feet.motion.soles[k, a] * up[a]
+        height, base = max(height, above), max(base, rises)
     carries = feet.contact[0] > 0.5 or feet.contact[1] > 0.5
     m.airborne = 0.0 if carries else m.airborne + dt
     sinks, share = 0.0, dt / (SMOOTH + dt)
@@ -165,14 +179,14 @@ def sense_balance(
             m.velocity[a] += share * (v[a] / total + moved - m.velocity[a])
         m.com[a] = com[a]
         sinks -= m.velocity[a] * up[a]
-    m.new, m.sinks, m.outside, m.leans = 0, sinks, 0.0, 0.0
+    m.new, m.sinks, m.outside, m.leans, m.low = 0, sinks, 0.0, 0.0, LEG - base
     # Feet that slip or turn measure no velocity, and who falls over them goes on as before.
     falls = m.airborne <= AIRBORNE
     if falls:
         m.outside = _outside(m, up, max(height, 0.2))
     if feet.weight[0] > 0.7 and feet.weight[1] > 0.7:
         m.leans = _leans(feet.motion.rotations, up)
-    for k, much in enumerate((m.outside, m.sinks if falls else 0.0, m.leans)):
+    for k, much in enumerate((m.outside, m.sinks if falls else 0.0, m.leans, m.low if falls else 0.0)):
         m.lasted[k] = m.lasted[k] + dt if much > m.most[k] else max(0.0, m.lasted[k] - dt)
 
 
