@@ -23,6 +23,7 @@ STANDARD = (
     "geometry_msgs/msg/PoseStamped",
     "geometry_msgs/msg/TransformStamped",
     "geometry_msgs/msg/TwistStamped",
+    "geometry_msgs/msg/WrenchStamped",
     "nav_msgs/msg/Odometry",
     "nav_msgs/msg/OccupancyGrid",
     "nav_msgs/msg/Path",

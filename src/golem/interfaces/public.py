@@ -83,6 +83,11 @@ def gripper(side: str, what: str) -> str:
     return f"/{side}/gripper/{what}"
 
 
+def wrench(side: str) -> str:
+    """Return the name of the topic of what a hand feels."""
+    return f"/wrench/{side}"
+
+
 COLOR, COLOR_JPEG = "color/image_raw", "color/image_raw/compressed"
 DEPTH, DEPTH_PNG = "aligned_depth_to_color/image_raw", "aligned_depth_to_color/image_raw/compressedDepth"
 CAMERA_INFO, DEPTH_INFO = "color/camera_info", "aligned_depth_to_color/camera_info"
@@ -146,6 +151,10 @@ def _hand(side: Side) -> tuple[TopicRow, ...]:
         TopicRow(gripper(side, "status"), own + "HandStatus", "stack", (), DEFAULT, 10, frame,
               "What the hand's controller found: open, closing, holding, slipped, ...",
               topics.hand_status(side), partial(convert.hand_status, side=side), on_demand=True, thinned=True),
+        TopicRow(wrench(side), "geometry_msgs/msg/WrenchStamped", "stack", (), DEFAULT, 100, frame,
+              "What the world does to the hand, by the torques that the arm's motors report: a mean of 50 ms, for an "
+              "arm that moves slowly. Errors of masses and friction, and what is held, are in it: look at its changes.",
+              topics.LOW_STATE, on_demand=True, thinned=True),
     )
 
 

@@ -157,6 +157,11 @@ def odometry(estimate: BaseEstimate, rate: Array) -> Odometry:
     return message
 
 
+def wrench(t: float, frame: str, values: Array) -> geometry_msgs.WrenchStamped:
+    """Return what acts on the origin of `frame`, in its axes: `values` (6,), force [N] and moment [N m]."""
+    return geometry_msgs.WrenchStamped(header(t, frame), geometry_msgs.Wrench(vector(values[:3]), vector(values[3:])))
+
+
 def diagnostics(t: float, statuses: Sequence[diagnostic_msgs.DiagnosticStatus]) -> diagnostic_msgs.DiagnosticArray:
     """Return what is known of the health of the robot's parts."""
     return diagnostic_msgs.DiagnosticArray(header(t), list(statuses))

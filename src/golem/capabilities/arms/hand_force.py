@@ -37,10 +37,14 @@ class HandForce:
             q: (15,) joints of torso, left arm, right arm [rad].
             tau: (15,) their torques [N m].
         """
+        wrench = self.wrench(side, q, tau)
+        return np.asarray(self._arm.placement(side).rotation @ wrench[:3], dtype=np.float64)
+
+    def wrench(self, side: Side, q: Array, tau: Array) -> Array:
+        """Return the (6,) force [N] and moment [N m] of a hand on what it touches, in its grasp frame."""
         arm, columns = self._arm, ARM_COLUMNS[side]
         rest = tau - pin.computeGeneralizedGravity(arm.model, arm.data, q)
         arm.update(q)
         J = arm.jacobian(side)[:, columns]
         likely = J @ J.T + np.diag((TORQUE / WRENCH) ** 2)
-        wrench = np.linalg.solve(likely, J @ rest[columns])
-        return np.asarray(arm.placement(side).rotation @ wrench[:3], dtype=np.float64)
+        return np.linalg.solve(likely, J @ rest[columns])

@@ -41,8 +41,8 @@ BALANCE = np.dtype(
     ]
 )
 """Models, limits and memory; then how far the capture point is outside [m], how fast the robot sinks [m/s], by how much
-IMU and feet differ [rad], how far base_link is below `LEG` [m], for how long each has been too much, and for how long no
-foot has carried the robot [s]."""
+IMU and feet differ [rad], how far base_link is below `LEG` [m], for how long each has been too much, and for how long
+no foot has carried the robot [s]."""
 _balance_at = view(BALANCE)
 LASTS = (0.03, 0.03, 0.3, 0.03)
 """Time for which each of the four may be too much [s] [own]."""
