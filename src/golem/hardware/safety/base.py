@@ -189,7 +189,7 @@ class SafetyLimits:
     gravity: tuple[float, float] = (4.0, 20.0)
     gravity_moving: tuple[float, float] = (3.0, 30.0)
     gravity_angle: float = 0.35
-    dead_share: float = 0.25
+    dead_share: float = 0.1
     dead_load: float = 0.10
     dead_time: float = 0.150
     temperature: tuple[float, float] = (-30.0, 100.0)
