@@ -35,6 +35,7 @@ STANDARD = (
     "sensor_msgs/msg/JointState",
     "sensor_msgs/msg/PointCloud2",
     "std_msgs/msg/Bool",
+    "std_msgs/msg/Float64",
     "std_msgs/msg/String",
     "tf2_msgs/msg/TFMessage",
 )

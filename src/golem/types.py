@@ -224,11 +224,17 @@ class LocalizedObject:
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """A velocity command in base_link: vx, vy [m/s], wz [rad/s]."""
+    """A command for the lower body.
+
+    Attributes:
+        vx, vy, wz: velocity in base_link [m/s], [rad/s].
+        height: of base_link above the ground [m]; None or NaN is the lower body's own. It holds until the next command.
+    """
 
     vx: float = 0.0
     vy: float = 0.0
     wz: float = 0.0
+    height: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

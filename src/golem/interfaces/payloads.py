@@ -39,8 +39,7 @@ class ArmCommand:
         q: (15,) joint targets, torso, left arm, right arm [rad]; inside the position limits, and no
             further from the previous tick's targets than the velocity limits of `robots.model.limits` allow. The first
             ones after a reset start from the measured joints.
-        error_position: (2,) distance of the left and right grasp frame from its target at `q` [m]; 0 for
-            an arm without a target.
+        error_position: (2,) distance of the left and right grasp frame from its target at `q` [m]; 0 without one.
         error_rotation: (2,) angle between grasp frame and target at `q` [rad]; 0 for an arm without one.
         limited: True where a limit (position, velocity, or the guard of a far target) held the motion back at
             this tick, so that the error cannot be expected to shrink at the nominal rate.
@@ -132,8 +131,7 @@ class LegStatus:
 
     Attributes:
         t: time [s].
-        commanded: the newest twist, as it came: it may be far outside what is possible; zero for one that is not
-            finite, of which `reason` then tells.
+        commanded: the newest twist as it came, however impossible; zero for one that is not finite, see `reason`.
         applied: the twist the robot shall move at; the controller is given a corrected one.
         clamped: whether `commanded` lies outside the controller's envelope.
         reason: why `applied` is not on its way to `commanded`; empty where it is.
@@ -146,6 +144,7 @@ class LegStatus:
         fault: how the stack's own controller failed, once the fallback is in charge; else None.
         speed: greatest speed over the ground that the controller in charge follows [m/s]; 0: it does not walk.
         trace: of that failure, see `ModuleFault`.
+        height: that the controller is given now [m], see `LocomotionCommand`; heights: `Envelope.height`.
     """
 
     t: float
@@ -161,6 +160,8 @@ class LegStatus:
     fault: str | None = None
     speed: float = math.inf
     trace: str | None = None
+    height: float | None = None
+    heights: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -231,6 +231,10 @@ TOPICS: tuple[TopicRow, ...] = (
           "Velocity for the legs [m/s], [rad/s]; to be repeated at least every 0.5 s, or the robot stands. Ignored "
           "while a skill runs or the gate is shut; who sent any then lets go first: zero, or nothing for 1 s.",
           topics.TWIST, convert.twist, convert.to_twist),
+    TopicRow("/cmd_height", "std_msgs/msg/Float64", "user", ("stack",), DEFAULT, None, "",
+          "Height of base_link over the ground to stand at [m]; NaN is the legs' own. It holds until the next one, a "
+          "skill, or a shut gate. Legs that take none keep their own and say so in /legs/status.",
+          topics.TWIST, convert.cmd_height, convert.to_cmd_height),
     TopicRow("/legs/status", "golem_interfaces/msg/LegStatus", "stack", (), DEFAULT, 50, BASE_FRAME,
           "The twist that the lower body was commanded, what it does, and why not more.",
           topics.LEG_STATUS, convert.leg_status, on_demand=True, thinned=True),

@@ -15,7 +15,7 @@ from golem.middleware.ros.message import NANO, CodecError
 from golem.middleware.ros.msgs import diagnostic_msgs, geometry_msgs, golem_interfaces, sensor_msgs
 from golem.middleware.ros.msgs.builtin_interfaces import Duration, Time
 from golem.middleware.ros.msgs.nav_msgs import Odometry
-from golem.middleware.ros.msgs.std_msgs import Header
+from golem.middleware.ros.msgs.std_msgs import Float64, Header
 from golem.middleware.ros.msgs.tf2_msgs import TFMessage
 from golem.types import Array, BaseEstimate, HandCommand, HandState, Imu, Twist
 
@@ -135,6 +135,20 @@ def twist(command: Twist) -> geometry_msgs.Twist:
     return geometry_msgs.Twist(
         geometry_msgs.Vector3(command.vx, command.vy, 0.0), geometry_msgs.Vector3(0.0, 0.0, command.wz)
     )
+
+
+def cmd_height(command: Twist) -> Float64:
+    """Return the height of base_link in a command [m]; NaN is the lower body's own."""
+    return Float64(_height(command.height))
+
+
+def to_cmd_height(message: Float64) -> Twist:
+    """Return a command to stand at a height [m]; NaN is the lower body's own."""
+    return Twist(height=message.data)
+
+
+def _height(height: float | None) -> float:
+    return math.nan if height is None else height
 
 
 def to_twist(message: geometry_msgs.Twist) -> Twist:
@@ -263,6 +277,8 @@ def leg_status(status: LegStatus) -> golem_interfaces.LegStatus:
         header(status.t, "base_link"),
         twist(status.commanded),
         twist(status.applied),
+        _height(status.commanded.height),
+        _height(status.height),
         bool(status.clamped),
         status.reason,
         bool(status.stepping),

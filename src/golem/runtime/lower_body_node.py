@@ -181,5 +181,7 @@ class LowerBodyNode:
             None if self._fault is None else str(self._fault),
             self._speed,
             None if self._fault is None else self._fault.trace,
+            locomotion.height,
+            envelope.height,
         )
         self._bus.publish(topics.LEG_STATUS, status, t)

@@ -16,7 +16,7 @@ from golem.skills.context import Context
 from golem.skills.floor_places import floor_places
 from golem.skills.pack_view import CAMERA, LOOK, see_edge, see_fasteners
 from golem.skills.pose_goal import FIRST_REPORT, MARGIN
-from golem.skills.stance_choice import PackStance, best_stance, stance_here
+from golem.skills.stance_choice import GOOD, PackStance, best_stance, stance_here
 from golem.types import Array, PlanarPose, Twist
 
 SETTLE = 1.0
@@ -25,8 +25,6 @@ FARTHEST = 1.8
 """Longest way to the stance [m]: more is a way for `navigate`."""
 IN_VIEW = 0.35
 """Distance from the stance by the edge from which on the head camera is asked for fasteners [m]."""
-GOOD = 0.8
-"""Share of the best stance's quality with which the robot stays where it is."""
 GAIN = 0.05
 """Quality that an approach has to win for another one to be tried."""
 NOTHING = 0.02
@@ -177,8 +175,9 @@ class Dock:
             elif self._tray is not None:
                 tray = T[:3, :3].T @ (self._tray - T[:3, 3])
             if len(seen.places):
-                best = best_stance(edge.pose, seen.places, seen.weights, tray)
-                here = stance_here(seen.places, seen.weights, tray)
+                drops = context.legs.drops
+                best = best_stance(edge.pose, seen.places, seen.weights, tray, drops)
+                here = stance_here(seen.places, seen.weights, tray, drops)
                 view = _View(best.pose, edge, here, best)
         text = f"{100 * view.distance:.1f} cm and {math.degrees(view.left.yaw):.1f} deg from the stance"
         if view.here is not None and view.best is not None:

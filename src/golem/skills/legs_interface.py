@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from golem.errors import ConfigError
 from golem.interfaces import topics
 from golem.interfaces.payloads import LegStatus
 from golem.skills.base import StageFailed
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
 
 ODOMETRY_TIMEOUT = 0.5
 """Age of the newest odometry from which on it says nothing about where the robot is [s]."""
+HEIGHT_STEP = 0.06
+"""Distance of heights that are tried [m]."""
+RISE, SETTLE = 8.0, 1.0
+"""Time that the legs get to come to a height, and to come to rest there [s]."""
 
 
 class LegsInterface:
@@ -81,6 +86,42 @@ class LegsInterface:
         place = math.sqrt(max(0.0, float(np.linalg.eigvalsh(odometry.covariance[:2, :2])[-1])))
         turn = math.degrees(math.sqrt(max(0.0, float(odometry.covariance[5, 5]))))
         return f", by an odometry that is sure of its place to {100.0 * place:.1f} cm and {turn:.1f} deg"
+
+    @property
+    def drops(self) -> tuple[float, ...]:
+        """How much lower than now the robot may stand [m], its own height first; zero where the legs take none."""
+        status = self._context.bus.latest(topics.LEG_STATUS)
+        if status is None or status.heights is None:
+            return (0.0,)
+        low, own, high = status.heights
+        now = own if status.height is None else status.height
+        down, up = np.arange(own, low, -HEIGHT_STEP), np.arange(own + HEIGHT_STEP, high, HEIGHT_STEP)
+        return tuple((now - np.array([*down, low, *up])).tolist())
+
+    async def lower(self, by: float) -> None:
+        """Stand lower `by` [m], one of `drops`, and wait until the robot does; see `stand_at`."""
+        status = self.status
+        if status.heights is not None and by:
+            await self.stand_at((status.heights[1] if status.height is None else status.height) - by)
+
+    async def stand_at(self, height: float) -> None:
+        """Stand at a `height` of base_link above the ground [m], and wait until the robot does; it stays there.
+
+        Raises:
+            ConfigError: the legs in charge do not take it.
+            StageFailed: they do not come to it.
+        """
+        status, tolerance = self.status, 1e-6
+        takes = "no height"
+        if status.heights is not None:
+            low, _, high = status.heights
+            takes = "" if low - tolerance <= height <= high + tolerance else f"heights from {low:g} to {high:g} m"
+        if takes:
+            raise ConfigError(f"The legs, '{status.controller}', take {takes}, not {height:g} m.")
+        self.drive(Twist(height=height))
+        if not await self._context.until(lambda: abs((self.status.height or 0.0) - height) < tolerance, RISE):
+            raise StageFailed("stand", "lower_body", f"Not at {height:g} m after {RISE:g} s: {self.status.reason}.")
+        await self._context.sleep(SETTLE)
 
     def drive(self, twist: Twist) -> None:
         """Move the base with `twist`; it has to be repeated every 0.5 s, or the robot stands."""

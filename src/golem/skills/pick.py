@@ -13,13 +13,15 @@ from golem.interfaces.payloads import GripState
 from golem.skills.base import SkillCancelled, SkillResult, StageFailed
 from golem.skills.context import Context
 from golem.skills.finger_room import FingerRoom
-from golem.skills.floor_places import stands_at
+from golem.skills.floor_places import floor_places, stands_at
 from golem.skills.force_guard import ForceGuard
+from golem.skills.pack_view import see_fasteners
 from golem.skills.pick_config import PickConfig, PickGoal
 from golem.skills.pick_place import look_after, place
 from golem.skills.pick_report import PickFailed, PickOutcome, PickReport, Sight, outcome_of, slipped
 from golem.skills.pick_targets import SAME, Attempt, PickChoice, TargetChoice
 from golem.skills.poses import lifted, moved, retracted
+from golem.skills.stance_choice import stance_here
 from golem.skills.travel import LineTravel, PlannedTravel, Travel
 from golem.types import Array, Side
 
@@ -96,6 +98,7 @@ class Pick:
     async def run(self, context: Context, goal: PickGoal) -> SkillResult:
         """Pick one object with whatever grasp method the stack chose; see `Skill`."""
         self._method = context.grasp_method()
+        await self._choose_height(context, goal)
         lines = LineTravel(context, self._config.travel_height, self._config.tolerance)
         planned = self._config.travel == "planned"
         self._travel = PlannedTravel(context, lines, self._config.tolerance) if planned else lines
@@ -133,6 +136,18 @@ class Pick:
             result = replace(result, reason=f"{result.reason[:-1]}{_seen(self._report)}.")
             context.say("done", result.reason)
         return replace(result, value=self._report)
+
+    async def _choose_height(self, context: Context, goal: PickGoal) -> None:
+        """Stand as low as the hands want it, where the legs take a height."""
+        drops = context.legs.drops
+        if len(drops) == 1:
+            return
+        seen = await see_fasteners(context, goal.label, goal.container, floor_places("a pick", goal.avoid), True)
+        stance = stance_here(seen.places, seen.weights, seen.tray, drops)
+        if stance.served and stance.drop:
+            context.say("stand", f"Standing {100.0 * stance.drop:.0f} cm lower, where {stance.served} are in reach.")
+            with suppress(StageFailed):
+                await context.legs.lower(stance.drop)
 
     def _note(self, failure: StageFailed) -> None:
         """Report what a failure says: of the whole, and of the object that was tried last."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +38,8 @@ ASIDE = 0.5
 """How far along the edge stances are tried, to both sides [m]."""
 GRID = 0.04
 """Distance between two stances that are tried [m]."""
+GOOD = 0.8
+"""Share of the best quality with which the robot stays where it is, or at its own height."""
 PER_METRE, PER_RADIAN = 0.2, 0.2
 """What a metre of way and a radian of turning cost, of a quality from 0 to 1 [own]."""
 
@@ -49,20 +52,23 @@ class PackStance:
         pose: of base_link, as seen from where the robot stands now.
         quality: 0 to 1: how far within reach the best fasteners and the container are.
         served: fasteners within reach.
+        drop: how much lower than now the robot stands there [m].
     """
 
     pose: PlanarPose
     quality: float
     served: int
+    drop: float = 0.0
 
 
-def stance_here(screws: Array, weights: Array, tray: Array | None) -> PackStance:
+def stance_here(screws: Array, weights: Array, tray: Array | None, drops: Sequence[float] = (0.0,)) -> PackStance:
     """Return how well the robot stands where it is; see `best_stance`."""
-    quality, served = _judged(np.zeros((1, 3)), screws, weights, tray)
-    return PackStance(PlanarPose(0.0, 0.0, 0.0), float(quality[0]), int(served[0]))
+    return _best([PlanarPose(0.0, 0.0, 0.0)], screws, weights, tray, drops)
 
 
-def best_stance(edge: PlanarPose, screws: Array, weights: Array, tray: Array | None) -> PackStance:
+def best_stance(
+    edge: PlanarPose, screws: Array, weights: Array, tray: Array | None, drops: Sequence[float] = (0.0,)
+) -> PackStance:
     """Return the best stance before an edge, the nearer of two that are equally good.
 
     A fastener that the head camera sees counts by how far within reach it and the place above it are, for the hand that
@@ -74,16 +80,30 @@ def best_stance(edge: PlanarPose, screws: Array, weights: Array, tray: Array | N
         screws: (n, 3) the fasteners in base_link [m].
         weights: (n,) how much each is wanted, 0 to 1.
         tray: (3,) middle of the container in base_link [m]; None where it is not known.
+        drops: how much lower than now the robot may stand [m]; the first is kept where another wins little.
     """
     foot = edge.to(PlanarPose(0.0, 0.0, 0.0)).y
     offs = np.arange(-ASIDE, ASIDE + 1e-9, GRID) + foot
     standoffs = np.arange(STANDOFF[0], STANDOFF[1] + 1e-9, 0.5 * GRID)
     tried = [edge @ PlanarPose(-d, y, turn) for d, y, turn in itertools.product(standoffs, offs, TURNS)]
+    return _best(tried, screws, weights, tray, drops)
+
+
+def _best(
+    tried: Sequence[PlanarPose], screws: Array, weights: Array, tray: Array | None, drops: Sequence[float]
+) -> PackStance:
+    """Return the best of the poses `tried`, at the best height."""
     stances = np.array([(p.x, p.y, p.yaw) for p in tried])
-    quality, served = _judged(stances, screws, weights, tray)
     cost = PER_METRE * np.hypot(stances[:, 0], stances[:, 1]) + PER_RADIAN * np.abs(stances[:, 2])
-    best = int(np.argmax(quality - cost))
-    return PackStance(tried[best], float(quality[best]), int(served[best]))
+    found: list[tuple[float, PackStance]] = []
+    for drop in drops:
+        up = np.array([0.0, 0.0, drop])
+        quality, served = _judged(stances, screws + up, weights, None if tray is None else tray + up)
+        best = int(np.argmax(quality - cost))
+        stance = PackStance(tried[best], float(quality[best]), int(served[best]), drop)
+        found.append((float(quality[best] - cost[best] - PER_METRE * abs(drop - drops[0])), stance))
+    most = max(found, key=lambda one: one[0])
+    return (found[0] if found[0][0] >= GOOD * most[0] else most)[1]
 
 
 def _judged(stances: Array, screws: Array, weights: Array, tray: Array | None) -> tuple[Array, Array]:

@@ -72,9 +72,11 @@ class StandGoal:
 
     Attributes:
         seconds: time [s].
+        height: of base_link above the ground [m], for legs that take one; None is their own.
     """
 
     seconds: float = 60.0
+    height: float | None = None
 
     def __post_init__(self) -> None:
         require("", ("time to stand for", self.seconds, 0.0 <= self.seconds < math.inf, "zero or more seconds"))
@@ -92,6 +94,13 @@ class Stand:
     async def run(self, context: Context, goal: StandGoal) -> SkillResult:
         """Stand for a time; see `Skill`."""
         context.say("stand", f"Standing for {goal.seconds:g} s.")
-        context.legs.drive(ZERO)
+        if goal.height is None:
+            context.legs.drive(ZERO)
+        else:
+            try:
+                await context.until(lambda: context.legs.reporting, FIRST_REPORT)
+                await context.legs.stand_at(goal.height)
+            except StageFailed as failure:
+                return SkillResult(False, failure.stage, failure.slot, str(failure))
         await context.sleep(goal.seconds)
         return SkillResult(True, "done", None, f"Stood for {goal.seconds:g} s.", {"stand": goal.seconds})

@@ -15,6 +15,8 @@ from golem.types import Array, BaseEstimate, LowState, Twist
 
 ZERO = Twist()
 """What stands still. Who asks for it gives this object, so that a comparison need not look inside."""
+HEIGHTS = (0.75, 1.03)
+"""Heights of base_link above the ground that any lower body may offer [m]: the ankle's range, and straight legs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,22 +25,32 @@ class Envelope:
 
     Attributes:
         vx, vy, wz: lowest and highest of this component [m/s], [rad/s].
+        height: the lowest height of base_link above the ground, its own, and the highest [m]; None takes no height and
+            keeps its own.
     """
 
     vx: tuple[float, float] = (0.0, 0.0)
     vy: tuple[float, float] = (0.0, 0.0)
     wz: tuple[float, float] = (0.0, 0.0)
+    height: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         """Check the ranges.
 
         Raises:
-            ConfigError: zero is outside of one, or a bound is not finite.
+            ConfigError: zero is outside of one, or a bound is not finite, or the heights make no sense.
         """
         for axis in ("vx", "vy", "wz"):
             low, high = getattr(self, axis)
             if not (-inf < low <= 0.0 <= high < inf):
                 raise ConfigError(f"The envelope.{axis} is a range around zero, not {low:g} to {high:g}.")
+        if self.height is not None:
+            low, own, high = self.height
+            if not HEIGHTS[0] <= low <= own <= high <= HEIGHTS[1]:
+                raise ConfigError(
+                    f"The envelope.height is the lowest, its own and the highest height, from {HEIGHTS[0]:g} to "
+                    f"{HEIGHTS[1]:g} m, not {low:g}, {own:g}, {high:g}."
+                )
 
     @property
     def axes(self) -> tuple[bool, bool, bool]:
@@ -51,7 +63,7 @@ class Envelope:
         return hypot(*(max(-low, high) for low, high in (self.vx, self.vy)))
 
     def clamp(self, twist: Twist) -> Twist:
-        """Return the nearest twist inside, each component by itself."""
+        """Return the nearest twist inside, each component of the velocity by itself, at its own height."""
         return Twist(
             min(max(twist.vx, self.vx[0]), self.vx[1]),
             min(max(twist.vy, self.vy[0]), self.vy[1]),
@@ -70,12 +82,15 @@ class LocomotionCommand:
         stepping: whether the gait clock runs; while it does not, both feet belong on the ground.
         commanded: whether the robot shall move, at once or as soon as the controller follows twists; if not, `twist`
             corrects what the last steps of a stop, or those after a push, do to its place.
+        height: of base_link above the ground to aim at now [m], inside the envelope, already limited in its rate; None
+            is the controller's own.
     """
 
     twist: Twist
     phase: Array
     stepping: bool
     commanded: bool
+    height: float | None = None
 
 
 STANDING = LocomotionCommand(ZERO, np.array([0.0, 0.5]), False, False)
@@ -101,7 +116,7 @@ class LowerBody(Protocol):
     Attributes:
         rate: ticks per second it wants to be run at [Hz], from 1 to 500.
         latency: time from reading the state to the command being available [s], at most 0.1.
-        envelope: the twists it can follow; empty where it only stands.
+        envelope: the twists it can follow, empty where it only stands, and the heights it takes, if any.
         gait: the gait clock it wants; `GaitConfig(start="never")` where it steps by itself or not at all.
     """
 

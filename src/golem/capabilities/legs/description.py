@@ -186,6 +186,8 @@ def check_description(d: Description) -> None:
     Raises:
         ConfigError: names what, and what would be valid.
     """
+    if d.envelope.height is not None:
+        raise ConfigError("No policy of a description takes a height today; leave out envelope.height.")
     d.gains()
     d.action_scale()
     d.layout()

@@ -12,7 +12,7 @@ for, not where the command points. Once it is in place again, it walks on.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from golem import registry
@@ -74,7 +74,8 @@ class Handover:
 
     Attributes:
         rate, latency: the higher of the two controllers' rates; each runs at its own. The longer latency.
-        envelope: that of the walking controller.
+        envelope: that of the walking controller, with the heights of the one in charge. Another than its own is for a
+            robot that stands: the legs change hands at the standing one's own height.
         gait: the clock that the controller in charge wants; while it stands, without a start at a command.
         walking: whether the walking controller is in charge.
     """
@@ -95,7 +96,7 @@ class Handover:
         self._walk, self._stand = (RateDivider(controller) for controller in both)
         self.rate: float = max(controller.rate for controller in both)
         self.latency: float = max(controller.latency for controller in both)
-        self.envelope: Envelope = both[0].envelope
+        self._envelopes = tuple(replace(both[0].envelope, height=one.envelope.height) for one in both)
         self._blend = CommandBlender(config.blend)
         # False for what is not a number.
         self._gyro_below, self._speed_below = float(config.gyro).__gt__, float(config.joint_speed).__gt__
@@ -150,6 +151,7 @@ class Handover:
     def _take_over(self, controller: RateDivider) -> None:
         self._active = controller
         self.walking = controller is self._walk
+        self.envelope: Envelope = self._envelopes[not self.walking]
         gait = controller.controller.gait
         self.gait: GaitConfig = gait if self.walking else gait.without_commands()
         self._coming: RateDivider | None = None
@@ -200,7 +202,7 @@ class Handover:
         until both feet are down.
         """
         if motion.commanded:
-            return not self.walking
+            return not self.walking and motion.height is None
         if not self.walking:
             return False
         if not motion.stepping:
@@ -210,7 +212,7 @@ class Handover:
 
 def _standing(motion: LocomotionCommand) -> LocomotionCommand:
     """Return `motion` without its twist."""
-    return LocomotionCommand(ZERO, motion.phase, motion.stepping, False)
+    return LocomotionCommand(ZERO, motion.phase, motion.stepping, False, motion.height)
 
 
 def _is_ready(controller: LowerBody) -> bool:

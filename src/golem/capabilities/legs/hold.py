@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.errors import ConfigError, unknown_name
 from golem.interfaces.payloads import LegCommand
+from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
 STANCES: dict[str, tuple[float, ...]] = {
@@ -22,6 +24,33 @@ STANCES: dict[str, tuple[float, ...]] = {
     "crouch": (0.0, -0.4, 0.0, 0.8, -0.4, 0.0),
 }
 """Named postures of one leg; both legs take the same."""
+KNEES = np.linspace(0.0, 1.9, 39)
+"""Bent knees [rad] between which `squat` interpolates."""
+
+
+def _bent(knee: Array) -> Array:
+    """Return (..., 12) both legs bent at the `knee` [rad], soles level under the hips."""
+    share = np.array(STANCES["crouch"]) / STANCES["crouch"][3]
+    return np.tile(knee[..., None] * share, 2)
+
+
+@functools.cache
+def _heights() -> Array:
+    return -sole_centers(*leg_poses(_bent(KNEES)))[..., 2].mean(axis=-1)
+
+
+def squat(height: float) -> Array:
+    """Return the (12,) posture in which base_link is `height` above the soles [m], its knees bent."""
+    return _bent(np.interp(-height, -_heights(), KNEES))
+
+
+def standing(own: float, heights: tuple[float, float]) -> Envelope:
+    """Return the envelope of legs that stand at their `own` height or at any of `heights`, lowest and highest [m].
+
+    Raises:
+        ConfigError: no robot stands so; see `Envelope`.
+    """
+    return Envelope(height=(min(heights[0], own), own, max(heights[1], own)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,9 @@ from golem.interfaces.payloads import LegCommand
 from golem.options import require
 from golem.types import BaseEstimate, LowState, PlanarPose, Twist
 
+NO_FLOOR = "the base estimate has not found the floor yet"
+"""Why a robot that may hang in the air does not move."""
+
 
 @dataclass(frozen=True, slots=True)
 class LocomotionConfig:
@@ -32,7 +35,9 @@ class LocomotionConfig:
             the paper's) 0.1.
         minimum: norm below which a twist counts as zero for a robot that walks: it may approach a goal slowly.
         acceleration: bounds on the change of vx, vy [m/s^2] and wz [rad/s^2] [own: full speed in less than a second].
-        timeout: age of the newest twist from which it counts as zero [s]: whoever sent it may have died.
+        height_speed: bound on the change of the height [m/s] [own].
+        timeout: age of the newest twist from which its velocity counts as zero [s]: whoever sent it may have died. Its
+            height stays: a body that rises by itself would move hands that are at work.
         blend: time over which the targets go from one controller's to the next one's after a hand-over [s] [own: a
             jump of the targets in the middle of a step drives a light foot beyond its speed limit]; `off` blends
             nothing.
@@ -44,6 +49,7 @@ class LocomotionConfig:
     dead_band: float = 0.1
     minimum: float = 0.02
     acceleration: tuple[float, float, float] = (1.0, 1.0, 2.0)
+    height_speed: float = 0.08
     timeout: float = 0.5
     blend: float | None = 0.15
     gate_rate: float = 100.0
@@ -59,6 +65,7 @@ class LocomotionConfig:
         require(
             "locomotion option ",
             ("acceleration", min(self.acceleration), min(self.acceleration) > 0.0, "three positive numbers"),
+            ("height_speed", self.height_speed, 0.0 < self.height_speed < math.inf, "a positive speed in m/s"),
             ("timeout", self.timeout, self.timeout > 0.0, "a positive time in seconds"),
             ("gate_rate", self.gate_rate, self.gate_rate > 0.0, "a positive rate in Hz"),
             ("minimum", self.minimum, 0.0 <= self.minimum <= self.dead_band, "from 0 to the dead band"),
@@ -72,6 +79,7 @@ class Locomotion:
         config: options.
         commanded: the newest twist, as it came; zero for one that is not finite.
         applied: the twist the robot shall move at; the controller gets it with the trim's correction.
+        height: the height it shall have now [m]; None is the controller's own.
         clamped: whether the commanded twist lies outside the controller's envelope.
         reason: why the controller does not get the commanded twist; empty where it does, slewing aside.
         gait: the gait clock.
@@ -162,7 +170,8 @@ class Locomotion:
                 self._until_gate = 0.0
             self._since_gate = 0.0
         stepping = bool(self.gait.stepping)
-        motion = LocomotionCommand(self._trimmed, self.gait.phases, stepping, waits or self._moves)
+        self._rise(waits, dt)
+        motion = LocomotionCommand(self._trimmed, self.gait.phases, stepping, waits or self._moves, self.height)
         self.motion = motion
         command = self._paced.step(state, base, motion, dt)
         self.runs = self._paced.runs
@@ -176,6 +185,8 @@ class Locomotion:
     def _forget(self) -> None:
         self.commanded = self.applied = self._trimmed = ZERO
         self._moves = False  # whether `applied` is anything else than zero
+        self._asked: float | None = None  # the height of the newest twist
+        self.height: float | None = None
         self._forget_trim()
         self.clamped = False
         self.reason = ""
@@ -193,6 +204,7 @@ class Locomotion:
         if twist is not None:
             self._finite = all(map(math.isfinite, _values(twist)))
             self.commanded, self._age = twist if self._finite else ZERO, 0.0
+            self._asked = None if twist.height is None or math.isnan(twist.height) else twist.height
             self._held = self._held and not (self._finite and _size(twist) < self.config.dead_band)
 
     def _wanted(self) -> Twist:
@@ -202,11 +214,11 @@ class Locomotion:
         if not self._finite:
             self.reason = "the commanded twist is not finite"
             return ZERO
-        if asked is ZERO or asked == ZERO:
+        if asked is ZERO or not any(_values(asked)):
             self.reason = ""
             return ZERO
         if not self._grounded:
-            self.reason = "the base estimate has not found the floor yet"
+            self.reason = NO_FLOOR
             return ZERO
         if self._held:
             self.reason = "who commands has not let go since another controller took over"
@@ -215,13 +227,36 @@ class Locomotion:
             self.reason = f"no twist came for {self.config.timeout:g} s"
             return ZERO
         wanted = self.controller.envelope.clamp(asked)
-        self.clamped = wanted != asked
+        self.clamped = _values(wanted) != _values(asked)
         self.reason = "the commanded twist is outside the envelope" if self.clamped else ""
         size = _size(wanted)
         if size < (self.config.minimum if self._moves else self.config.dead_band):
             self.reason = self.reason or "the commanded twist is inside the dead band"
             return ZERO
         return wanted if size else ZERO
+
+    def _rise(self, waits: bool, dt: float) -> None:
+        """Bring the height towards the one that was asked for, or to the controller's own before another gets the legs.
+
+        Note why it cannot, where nothing else is wrong.
+        """
+        asked, heights = self._asked, self._paced.controller.envelope.height
+        if asked is None and self.height is None:
+            return
+        if heights is None or not self._grounded:
+            self.height = None
+            if asked is not None:
+                why = "the legs take no height and keep their own" if heights is None else NO_FLOOR
+                self.reason = self.reason or why
+            return
+        low, own, high = heights
+        goal = own if asked is None or waits else min(max(asked, low), high)
+        if asked is not None and not low <= asked <= high:
+            self.reason = self.reason or f"the commanded height is outside of {low:g} to {high:g} m"
+        now = own if self.height is None else self.height
+        self.height = _toward(now, goal, self.config.height_speed * dt)
+        if self.height == own and (asked is None or waits):
+            self.height = None
 
     def _slew(self, wanted: Twist, dt: float) -> None:
         """Bring the applied twist towards `wanted`; on its way to a stop it ends at the dead band."""

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from golem.capabilities.legs.base import Envelope, LocomotionCommand
+from golem.capabilities.legs.base import LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
-from golem.capabilities.legs.hold import STANCES
+from golem.capabilities.legs.hold import STANCES, squat, standing
 from golem.capabilities.legs.wbc_qp import NUM_LEGS, QpWeights, Solution, StanceDynamics, StanceProgram, Tasks
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.interfaces.payloads import LegCommand
@@ -45,7 +45,9 @@ class WbcConfig:
 
     Attributes:
         stance: posture to stand in, a name in `hold.STANCES`.
-        height_speed: how fast the pelvis moves from where it is to the stance's height [m/s].
+        height_speed: how fast the pelvis moves from where it is found to the stance's height [m/s]; a commanded height
+            comes at the base layer's rate.
+        heights: lowest and highest height that is taken [m].
         com_gain, com_damping: spring [1/s^2] and damper [1/s] of the centre of mass along x, y and z. The vertical ones
             are stiffer: what the hands carry is not in the model and pulls straight down.
         turn_gain, turn_damping: the same of the pelvis' orientation.
@@ -70,6 +72,7 @@ class WbcConfig:
 
     stance: str = "crouch"
     height_speed: float = 0.1
+    heights: tuple[float, float] = (0.78, 1.01)
     com_gain: tuple[float, float, float] = (40.0, 40.0, 100.0)
     com_damping: tuple[float, float, float] = (12.0, 12.0, 20.0)
     turn_gain: float = 100.0
@@ -131,7 +134,7 @@ class WbcReport:
 
 
 class Wbc:
-    """The stance controller; it ignores the twist, and its envelope is empty.
+    """The stance controller; it ignores the twist, and its envelope has heights only.
 
     Attributes:
         config: its options.
@@ -151,10 +154,10 @@ class Wbc:
             raise ConfigError("Wbc needs six values of kp and of kd: hip yaw, pitch, roll, knee, ankle pitch, roll.")
         self.rate = c.rate
         self.latency = 0.0
-        self.envelope = Envelope()
         self.gait = GaitConfig(start="never")
         self._rest: Array = np.tile(np.asarray(STANCES[c.stance]), 2)
         self._rest_height = -float(sole_centers(*leg_poses(self._rest))[:, 2].mean())
+        self.envelope = standing(self._rest_height, c.heights)
         self._kp, self._kd = np.tile(c.kp, 2), np.tile(c.kd, 2)
         self._bound: Array = c.torque_ratio * load_limits(c.torque_profile).torque[LEGS]
         self._com_gain, self._com_damping = np.array(c.com_gain), np.array(c.com_damping)
@@ -190,13 +193,16 @@ class Wbc:
         R = base.T_odom_base[:3, :3]
         d.update(R, base.velocity, rate, state.q, state.dq)
         middle = d.soles.mean(axis=0)
-        hold = self._advance(q, -float(middle[2]), float(base.contact.sum()), dt)
+        wish, rest = self._rest_height, self._rest
+        if motion.height is not None:
+            wish, rest = motion.height, squat(motion.height)
+        hold = self._advance(q, -float(middle[2]), wish, float(base.contact.sum()), dt)
         level, goal = self._goal(middle)
         tasks = Tasks(
             com=self._com_gain * (goal - d.com) - self._com_damping * d.com_velocity,
             turn=c.turn_gain * pin.log3(R.T @ level) - c.turn_damping * rate,
             feet=c.feet_gain * self._creep(level) - c.feet_damping * d.soles_velocity,
-            legs=c.posture_gain * (self._rest - q) - c.posture_damping * dq,
+            legs=c.posture_gain * (rest - q) - c.posture_damping * dq,
         )
         solution = self._program.solve(d, tasks)
         self._failures = self._failures + 1 if solution is None else 0
@@ -263,12 +269,13 @@ class Wbc:
         out[5], out[11] = 0.5 * error[2], -0.5 * error[2]
         return out
 
-    def _advance(self, q: Array, height: float, contact: float, dt: float) -> Array:
-        """Move the wished height to the stance's and the share of the torques to 1; return the posture to hold.
+    def _advance(self, q: Array, height: float, wish: float, contact: float, dt: float) -> Array:
+        """Move the wished height to `wish` and the share of the torques to 1; return the posture to hold.
 
         Args:
             q: (12,) measured leg joints [rad].
             height: of the pelvis above the soles [m].
+            wish: the height that it shall come to [m].
             contact: probability of a contact, both feet summed.
             dt: time since the previous tick [s].
         """
@@ -276,7 +283,7 @@ class Wbc:
         if self._hold is None:
             self._hold, self._height, self._share = q.copy(), height, float(loaded)
         reach = self.config.height_speed * dt
-        self._height += min(max(self._rest_height - self._height, -reach), reach)
+        self._height += min(max(wish - self._height, -reach), reach)
         maximum = 1.0 if loaded else max(self._share, 0.5)
         self._share = min(self._share + dt / self.config.engage, maximum)
         return self._hold

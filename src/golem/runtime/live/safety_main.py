@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from golem.runtime.standing_legs import StandingLegs
 
 
-MOVING = ("/lowcmd", "/safety/lowcmd_in", "/cmd_vel", "/left/gripper/command", "/right/gripper/command")
+MOVING = ("/lowcmd", "/safety/lowcmd_in", "/cmd_vel", "/cmd_height", "/left/gripper/command", "/right/gripper/command")
 """Topics whose writers move the robot, or may."""
 CALLS = ("/safety/", "/estop/", "/skill/", "/launch/", "/left/gripper/", "/right/gripper/", "/api/")
 """How names begin of services and actions whose callers do."""

@@ -67,9 +67,18 @@ class Velocities:
         self._bus, self._now, self._closed = bus, now, closed
         self._heard = -LET_GO
         self._held = False
+        self._twist = Twist()
+
+    def rise(self, command: Twist) -> None:
+        """Pass the height of `command` on, with the velocity that came last if it still counts; or not."""
+        if not self._closed():
+            t = self._now()
+            twist = self._twist if 0.0 <= t - self._heard <= _LEGS.timeout and not self._held else Twist()
+            self._twist = replace(twist, height=command.height)
+            self._bus.publish(topics.TWIST, self._twist, t)
 
     def take(self, twist: Twist) -> None:
-        """Pass `twist` on, or not."""
+        """Pass `twist` on, at the height that was told last, or not."""
         t, still = self._now(), math.hypot(twist.vx, twist.vy, twist.wz) < STILL  # false for nan
         # A robot that was restarted begins its time anew.
         if still or not 0.0 <= t - self._heard <= LET_GO:
@@ -77,8 +86,10 @@ class Velocities:
         self._heard = t
         closed = self._closed()
         self._held |= closed and not still
+        height = None if closed else self._twist.height
+        self._twist = replace(twist, height=height)
         if not (closed or self._held):
-            self._bus.publish(topics.TWIST, twist, t)
+            self._bus.publish(topics.TWIST, self._twist, t)
 
 
 BLIND = 3.0
@@ -192,7 +203,12 @@ class StackProcess:
         unheard = () if hears_lidar(stack) else public.LIDAR
         velocities = Velocities(self._bus, self._now, lambda: self._skills.busy() or not moving(self._bus))
         self._lidar_imu = OnePerTick(self._bus, topics.LIDAR_IMU, IMU_BACKLOG)
-        takers = {"/safety/status": self._gate.take, "/cmd_vel": velocities.take, "/livox/imu": self._lidar_imu.take}
+        takers = {
+            "/safety/status": self._gate.take,
+            "/cmd_vel": velocities.take,
+            "/cmd_height": velocities.rise,
+            "/livox/imu": self._lidar_imu.take,
+        }
         incoming(self._bus, endpoints, self._now, tell, takers, without=("/lowstate", *unheard))
         endpoints.subscribe("/tf_static", lambda message: self._calibration.update(calibrations(message)))
         self._drivers = RoleEndpoints("robot", participant, node, only=SHOWN) if real else None

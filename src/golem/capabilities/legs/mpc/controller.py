@@ -6,15 +6,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from golem.capabilities.legs.base import Envelope, LocomotionCommand
+from golem.capabilities.legs.base import LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
-from golem.capabilities.legs.hold import STANCES
+from golem.capabilities.legs.hold import STANCES, squat, standing
 from golem.capabilities.legs.mpc.cost import CostConfig, cost
 from golem.capabilities.legs.mpc.planner import Planner, PlannerConfig
 from golem.capabilities.legs.mpc.planning_model import PlanningModel
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.finite import check_finite, check_measured
 from golem.interfaces.payloads import LegCommand
+from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
 FAILURES = 5
@@ -33,6 +34,7 @@ class MPCConfig:
         planner: how plans are varied and chosen.
         cost: what a plan shall achieve.
         stance: name of the reference posture in `STANCES`.
+        heights: lowest and highest height that is taken [m].
         kp: stiffness of hip yaw, pitch, roll, knee, ankle pitch, ankle roll [N m/rad].
         kd: damping of the same six joints [N m s/rad].
         horizon: how far a plan looks ahead [s].
@@ -46,6 +48,7 @@ class MPCConfig:
     planner: PlannerConfig = field(default_factory=PlannerConfig)
     cost: CostConfig = field(default_factory=CostConfig)
     stance: str = "crouch"
+    heights: tuple[float, float] = (0.80, 1.0)
     kp: tuple[float, ...] = (200.0, 200.0, 200.0, 300.0, 40.0, 40.0)
     kd: tuple[float, ...] = (2.5, 2.5, 2.5, 4.0, 2.0, 2.0)
     horizon: float = 1.0
@@ -57,7 +60,7 @@ class MPCConfig:
 
 
 class MPC:
-    """Stands by sampling model predictive control; it cannot walk, and its envelope says so.
+    """Stands by sampling model predictive control; it cannot walk, and its envelope says so: it has heights only.
 
     The command of every tick is the plan's value `latency` later, which is when the command arrives. What a new plan
     cannot change any more, because the legs will have done it by the time the plan is there, is the same in all of its
@@ -92,12 +95,13 @@ class MPC:
             )
         self.rate = c.rate
         self.latency = c.latency
-        self.envelope = Envelope()
         self.gait = GaitConfig(start="never")
         self._kp: Array = np.tile(c.kp, 2)
         self._kd: Array = np.tile(c.kd, 2)
-        posture = np.tile(STANCES[c.stance], 2)
-        self._model = PlanningModel(posture, self._kp, self._kd, c.timestep, c.threads)
+        self._rest = np.tile(STANCES[c.stance], 2)
+        own = -float(sole_centers(*leg_poses(self._rest))[:, 2].mean())
+        self.envelope = standing(own, c.heights)
+        self._model = PlanningModel(self._rest, self._kp, self._kd, c.timestep, c.threads)
         self.planner = Planner(c.planner, c.horizon, self._model.lower, self._model.upper)
         self._times: Array = c.timestep * np.arange(round(c.horizon / c.timestep), dtype=np.float64)
         self._committed = int(np.count_nonzero(self._times < c.latency - 1e-9))
@@ -106,6 +110,7 @@ class MPC:
 
     def reset(self, state: LowState) -> None:
         """Plan to stay in the posture of `state`."""
+        self._model.posture = self._rest
         self.planner.reset(np.clip(state.q[LEGS], self._model.lower, self._model.upper))
         self._age = np.inf
         self._failures = 0
@@ -118,18 +123,21 @@ class MPC:
         """
         self._age += dt
         if self._age > 1.0 / self.config.plan_rate - 0.5 * dt:
-            self.plan(state, base)
+            self.plan(state, base, self._rest if motion.height is None else squat(motion.height))
         q = self.planner.targets(np.array([self._age + self.latency]))[0]
         return LegCommand(q=q, kp=self._kp.copy(), kd=self._kd.copy(), tau=self._model.stance.tau.copy())
 
-    def plan(self, state: LowState, base: BaseEstimate) -> None:
-        """Plan once from `state` and `base`: one iteration of sampling, rolling out and choosing."""
+    def plan(self, state: LowState, base: BaseEstimate, posture: Array) -> None:
+        """Plan once, from `state` and `base` towards `posture` (12,) [rad]: sample, roll out and choose."""
         if np.isfinite(self._age):
             self.planner.shift(self._age)
         self._age = 0.0
         check_measured(state)
         check_finite("the pose of the base", base.T_odom_base)
         check_finite("the velocity of the base", base.velocity)
+        if posture is not self._model.posture:
+            self.planner.move(posture - self._model.posture)
+            self._model.posture = posture
         self._model.measure(state, base)
         knots = self.planner.sample()
         targets = self.planner.targets(self._times, knots)

@@ -99,6 +99,10 @@ class Planner:
         """Let the plan begin `dt` later [s]."""
         self._plan = self.targets(self._times + dt)
 
+    def move(self, by: Array) -> None:
+        """Let the whole plan go along with a reference posture that has moved `by` (12,) [rad]."""
+        self._plan = np.clip(self._plan + by, self._lower, self._upper)
+
     def sample(self) -> Array:
         """Return the knots (samples, knots, 12) to try; the first are those of the present plan."""
         noise = self._random.standard_normal((self._config.samples - 1, *self._plan.shape))

@@ -90,6 +90,7 @@ class PlanningModel:
         timestep: step of the rollouts [s].
         torque: (12,) bound of the motor torques [N m]: the safety gate's.
         lower, upper: (12,) range of the joint targets [rad]: the safety gate's.
+        posture: (12,) the reference posture of the next `measure` [rad].
         stance: the reference stance with the upper body of the last `measure`.
     """
 
@@ -108,7 +109,7 @@ class PlanningModel:
         self.torque: Array = limits.torque_command[LEGS]
         self.lower: Array = limits.lower[LEGS]
         self.upper: Array = limits.upper[LEGS]
-        self._posture = posture
+        self.posture = posture
         self._upper = _UpperBody()
         spec = _legs_spec(kp, kd, self.torque, timestep)
         mass, com, inertia = self._upper.inertial(np.zeros(NUM_JOINTS))
@@ -197,7 +198,7 @@ class PlanningModel:
         """Find the stance of the present upper body."""
         model, data = self._model, self._data
         mujoco.mj_resetData(model, data)
-        posture = self._posture.copy()
+        posture = self.posture.copy()
         for _ in range(_BALANCE_STEPS):
             data.qpos[self._qpos] = posture
             mujoco.mj_kinematics(model, data)

@@ -15,6 +15,13 @@ class Bool(Message):
     data: bool = ...
 
 @dataclass(slots=True, eq=False)
+class Float64(Message):
+    """Message `std_msgs/msg/Float64`."""
+
+    __msgtype__: ClassVar[str]
+    data: float = ...
+
+@dataclass(slots=True, eq=False)
 class Header(Message):
     """Message `std_msgs/msg/Header`."""
 
