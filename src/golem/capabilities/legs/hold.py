@@ -44,13 +44,13 @@ def squat(height: float) -> Array:
     return _bent(np.interp(-height, -_heights(), KNEES))
 
 
-def standing(own: float, heights: tuple[float, float]) -> Envelope:
-    """Return the envelope of legs that stand at their `own` height or at any of `heights`, lowest and highest [m].
+def standing(own: float, heights: tuple[float, float] | None) -> Envelope:
+    """Return the envelope of legs that stand at their `own` height, or at any of `heights`, lowest and highest [m].
 
     Raises:
         ConfigError: no robot stands so; see `Envelope`.
     """
-    return Envelope(height=(min(heights[0], own), own, max(heights[1], own)))
+    return Envelope() if heights is None else Envelope(height=(min(heights[0], own), own, max(heights[1], own)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,7 +47,7 @@ class WbcConfig:
         stance: posture to stand in, a name in `hold.STANCES`.
         height_speed: how fast the pelvis moves from where it is found to the stance's height [m/s]; a commanded height
             comes at the base layer's rate.
-        heights: lowest and highest height that is taken [m].
+        heights: lowest and highest height that is taken [m]; `off` takes none.
         com_gain, com_damping: spring [1/s^2] and damper [1/s] of the centre of mass along x, y and z. The vertical ones
             are stiffer: what the hands carry is not in the model and pulls straight down.
         turn_gain, turn_damping: the same of the pelvis' orientation.
@@ -72,7 +72,7 @@ class WbcConfig:
 
     stance: str = "crouch"
     height_speed: float = 0.1
-    heights: tuple[float, float] = (0.78, 1.01)
+    heights: tuple[float, float] | None = (0.78, 1.01)
     com_gain: tuple[float, float, float] = (40.0, 40.0, 100.0)
     com_damping: tuple[float, float, float] = (12.0, 12.0, 20.0)
     turn_gain: float = 100.0

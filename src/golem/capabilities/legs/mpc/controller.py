@@ -34,7 +34,7 @@ class MPCConfig:
         planner: how plans are varied and chosen.
         cost: what a plan shall achieve.
         stance: name of the reference posture in `STANCES`.
-        heights: lowest and highest height that is taken [m].
+        heights: lowest and highest height that is taken [m]; `off` takes none.
         kp: stiffness of hip yaw, pitch, roll, knee, ankle pitch, ankle roll [N m/rad].
         kd: damping of the same six joints [N m s/rad].
         horizon: how far a plan looks ahead [s].
@@ -48,7 +48,7 @@ class MPCConfig:
     planner: PlannerConfig = field(default_factory=PlannerConfig)
     cost: CostConfig = field(default_factory=CostConfig)
     stance: str = "crouch"
-    heights: tuple[float, float] = (0.80, 1.0)
+    heights: tuple[float, float] | None = (0.80, 1.0)
     kp: tuple[float, ...] = (200.0, 200.0, 200.0, 300.0, 40.0, 40.0)
     kd: tuple[float, ...] = (2.5, 2.5, 2.5, 4.0, 2.0, 2.0)
     horizon: float = 1.0
