@@ -21,7 +21,7 @@ from golem.skills.base import FAULT, Routine, SkillResult
 from golem.skills.context import Context
 from golem.skills.runner import SkillRun
 from golem.stack import Choice, Stack, load_stack
-from golem.types import Array
+from golem.types import Array, Twist
 
 SLOT = "lower_body"
 """What methods that walk and stand are."""
@@ -101,6 +101,10 @@ class Loss:
     trace: str | None = None
 
 
+LOWER = 4.0
+"""Time that legs get to bring a robot to another height [s]."""
+NO_HEIGHT = Loss("height", "These legs take no height and keep their own.")
+"""A robot that was to stand at another height."""
 HANGS = Loss("settle", f"The robot did not carry its weight within {READY:g} s.")
 """A robot whose band could not let go."""
 
@@ -129,10 +133,16 @@ class Episode:
     Attributes:
         running, robot: the stack and its twin.
         recorder: samples the twin's balance after every tick.
+        height: at which it stands [m]; None is that of its legs.
     """
 
     def __init__(
-        self, stack: Stack, seed: int, onlooker: Onlooker | None = None, limits: SafetyLimits | None = None
+        self,
+        stack: Stack,
+        seed: int,
+        onlooker: Onlooker | None = None,
+        limits: SafetyLimits | None = None,
+        height: float | None = None,
     ) -> None:
         """Build `stack` for the twin's seed, and show it to `onlooker`; its gate enforces `limits` if given.
 
@@ -154,6 +164,7 @@ class Episode:
         self._odometry: SimulatedOdometry | None = None
         self._skill: SkillRun | None = None
         self._hangs = False
+        self.height = height
 
     def start(self, skill: str | Routine[Context, Any], goal: object = None) -> None:
         """Begin a skill; it advances while the episode runs."""
@@ -187,13 +198,18 @@ class Episode:
     def loss(self) -> Loss | None:
         """How the robot was lost; None while it was not."""
         loss = lost(self.running, self.recorder)
+        if self.height is not None and self.running.envelope.height is None:
+            loss = loss or NO_HEIGHT
         # A controller that failed in its band never got to carry the weight.
         return HANGS if self._hangs and (loss is None or loss.stage != FAULT) else loss
 
     def stand(self, seconds: float) -> None:
-        """Let the robot take over its weight, then let `seconds` pass; one that never does so is lost."""
+        """Let the robot take over its weight and come to its height, then let `seconds` pass; else it is lost."""
         self.run(READY, until=lambda: not self.robot.on_gantry, due=when_stepped)
         self._hangs = self.robot.on_gantry
+        if self.height is not None:
+            self.running.bus.publish(topics.TWIST, Twist(height=self.height), self.t)
+            self.run(LOWER)
         self.run(seconds)
 
     def run(

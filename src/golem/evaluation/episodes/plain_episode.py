@@ -17,7 +17,7 @@ from golem.capabilities.legs.base import Envelope, LowerBody
 from golem.capabilities.legs.locomotion import Locomotion, LocomotionConfig
 from golem.capabilities.legs.passports.read import read_passport
 from golem.errors import ConfigError, ModuleFault
-from golem.evaluation.episodes.episode import Loss, with_legs
+from golem.evaluation.episodes.episode import LOWER, NO_HEIGHT, Loss, with_legs
 from golem.hardware.servo.gains import default_gains
 from golem.interfaces.payloads import LegCommand
 from golem.robots.model.limits import load_limits
@@ -106,6 +106,12 @@ class PlainEpisode:
             self._tick()
             if until():
                 return
+
+    def lower(self, height: float) -> None:
+        """Bring the robot to a `height` [m]; legs that take none are lost."""
+        self.twist = Twist(height=height)
+        self.loss = NO_HEIGHT if self.envelope.height is None else None
+        self.run(LOWER)
 
     def push(self, push: Push) -> None:
         """Begin `push` now; it goes on while the episode runs."""

@@ -91,6 +91,7 @@ METRICS: dict[str, Metric] = {
     "nobody": Metric("walkers that are nobody, of all at all steps", "%", 100.0),
     "goal_yaw": Metric("heading error at the goal", "deg", _DEG, signed=True),
     "base_range": Metric("largest distance between two places of the base", "mm", 1e3),
+    "height_error": Metric("largest error of the base's height", "mm", 1e3),
     "share_not_negative": Metric("share of time with the CoM margin not negative", "%", 100.0),
     "speed_before": Metric("forward speed before the push", "m/s"),
     "error_vx": Metric("error of the mean forward speed", "m/s", signed=True),

@@ -29,6 +29,8 @@ class PlantOptions:
     """Delay of motor commands on top of the profile's [s]."""
     robot: tuple[str, ...] = ()
     """Further options of the twin, e.g. feet=box cone=elliptic, or mjcf=../h1_2.xml."""
+    height: float | None = None
+    """Height of base_link at which a robot stands whose legs take one [m]; default: their own."""
 
 
 O = TypeVar("O", bound=PlantOptions)  # noqa: E741 - the options
@@ -88,7 +90,7 @@ class LegRung(Rung[O]):
     def episode(self, spec: TrialSpec) -> Episode:
         """Return the robot of a trial."""
         stack = self.stack(spec.method, spec.profile, spec.overrides)
-        return Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker)
+        return Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, height=self.options.height)
 
 
 def can_walk(envelope: Envelope) -> bool:

@@ -115,7 +115,7 @@ class PushLimit(PushedRung[PushLimitOptions]):
         """Return the robot of a trial on the stack's terms, under the gate of its case."""
         stack = self.stack(spec.method, spec.profile, spec.overrides)
         limits = lifted(SafetyLimits.from_profile(stack.limits), LIFTED[str(spec.case["terms"])])
-        return Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, limits)
+        return Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, limits, self.options.height)
 
     def pushed(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
         """Push one robot, on the terms of its case; see `PushedRung`."""
@@ -124,6 +124,8 @@ class PushLimit(PushedRung[PushLimitOptions]):
             return super().pushed(specs)
         path = robot_options(self.options.robot).get("mjcf")
         plain = PlainEpisode(spec.method, None if path is None else Path(path), spec.rng("start"))
+        if self.options.height is not None:
+            plain.lower(self.options.height)
         return self.from_moment(specs, plain, can_walk(plain.envelope), self.moment(spec).reach_plainly)
 
     def tables(self, outcomes: Outcomes) -> Sequence[TextTable]:

@@ -58,7 +58,8 @@ class StandArms(StandQuiet):
 def standing(episode: Episode, start: float) -> dict[str, float]:
     """Return how the robot has stood since `start` [s]."""
     stood = episode.recorder.trace().window(start)
-    return {
+    off = {} if episode.height is None else {"height_error": float(np.abs(stood.base[:, 2] - episode.height).max())}
+    return off | {
         "base_range": stood.base_range,
         "sway": stood.sway,
         "steps": float(stood.steps),
