@@ -145,6 +145,11 @@ def test_hands_survive() -> None:
             convert.to_hand_command(convert.hand_command(replace(command, **change), "right"))
 
 
+def test_a_height_survives_and_none_is_nan() -> None:
+    assert convert.to_cmd_height(convert.cmd_height(Twist(height=0.8))) == Twist(height=0.8)
+    assert np.isnan(convert.cmd_height(Twist(0.3)).data)
+
+
 def test_legs_say_why_they_stand() -> None:
     status = LegStatus(
         1.0,

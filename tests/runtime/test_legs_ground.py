@@ -134,3 +134,18 @@ def test_a_pose_is_reached_with_legs_that_have_no_gait_clock_of_ours() -> None:
         result = running.execute("walk", WalkGoal(1.0, 0.0, frame="base_link", timeout=30.0), timeout=35.0)
         assert result.success, result.reason
         assert np.hypot(*(robot.data.qpos[:2] - start)) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("legs", "load", "within"), [("wbc", 2.0, 0.015), ("mpc", 0.0, 0.03)])
+def test_it_squats_and_stands_up_again_with_a_load_in_each_hand(legs: str, load: float, within: float) -> None:
+    stack = load_stack("stand", profile="bench").with_options("robot", world="open", payload=[load, load])
+    running, robot = build(stack.with_choice("lower_body", legs), seed=0)
+    try:
+        for goal, height in ((0.8, 0.8), (None, 0.965)):
+            result = running.execute("stand", StandGoal(4.0, goal), timeout=15.0)
+            assert result.success, result.reason
+            assert robot.data.qpos[2] == pytest.approx(height, abs=within)
+        assert running.safety is not None and running.safety.state is GateState.ACTIVE
+    finally:
+        robot.close()

@@ -50,3 +50,14 @@ def test_without_a_fastener_in_reach_there_is_no_quality() -> None:
     far = np.array([[3.0, 0.0, 0.0]])
     assert stance_here(far, np.ones(1), None).quality == 0.0
     assert best_stance(EDGE, far, np.ones(1), None).served == 0
+
+
+def test_a_low_pack_is_worked_at_from_lower_and_a_nominal_one_is_not() -> None:
+    drops = (0.0, 0.06, 0.12, 0.18, -0.04)
+    low, tray = SCREWS - (0.0, 0.0, 0.18), TRAY - (0.0, 0.0, 0.18)
+    here = stance_here(low, WANTED, tray, drops)
+    assert here.drop > 0.1 and here.quality > stance_here(low, WANTED, tray).quality + 0.1
+    best = best_stance(EDGE, low, WANTED, tray, drops)
+    assert best.drop > 0.05 and best.quality > best_stance(EDGE, low, WANTED, tray).quality
+    nominal = best_stance(EDGE, SCREWS, WANTED, TRAY, drops)
+    assert nominal == best_stance(EDGE, SCREWS, WANTED, TRAY)

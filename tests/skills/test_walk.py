@@ -48,6 +48,7 @@ class Ground:
     offset: float | None = None
     silent: float = math.inf
     speed: float = 0.85
+    heights: tuple[float, float, float] | None = None
     navigator: Navigator = field(default_factory=GoTo)
 
     def __post_init__(self) -> None:
@@ -103,6 +104,8 @@ class Ground:
             np.array([0.0, 0.5]),
             "almi",
             speed=self.speed,
+            height=twist.height,
+            heights=self.heights,
         )
         if self.reports:
             self.bus.publish(topics.LEG_STATUS, status, t)
@@ -224,3 +227,16 @@ def test_a_walk_takes_some_time(timeout: float) -> None:
 def test_nobody_stands_for_less_than_no_time_or_for_ever(seconds: float) -> None:
     with pytest.raises(ConfigError, match="zero or more seconds"):
         StandGoal(seconds)
+
+
+def test_it_stands_at_a_height_where_the_legs_take_one() -> None:
+    ground = Ground(heights=(0.78, 0.96, 1.0))
+    assert outcome(ground.run(Stand().run(ground.context, StandGoal(0.5, 0.8)))).success
+    assert ground.twist == Twist(height=0.8) and ground.context.t > 0.5
+    drops = ground.context.legs.drops
+    assert (drops[0], max(drops), min(drops)) == pytest.approx((-0.16, 0.02, -0.16))
+    result = outcome(ground.run(Stand().run(ground.context, StandGoal(0.5, 0.7))))
+    assert result.stage == "refused" and "take heights from 0.78 to 1 m, not 0.7 m" in result.reason
+    ground = Ground()
+    result = outcome(ground.run(Stand().run(ground.context, StandGoal(0.5, 0.8))))
+    assert "The legs, 'almi', take no height, not 0.8 m" in result.reason and ground.context.legs.drops == (0.0,)

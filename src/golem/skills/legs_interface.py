@@ -96,7 +96,7 @@ class LegsInterface:
         low, own, high = status.heights
         now = own if status.height is None else status.height
         down, up = np.arange(own, low, -HEIGHT_STEP), np.arange(own + HEIGHT_STEP, high, HEIGHT_STEP)
-        return tuple((now - np.array([*down, low, *up])).tolist())
+        return tuple(np.round(now - np.array([*down, low, *up]), 6).tolist())
 
     async def lower(self, by: float) -> None:
         """Stand lower `by` [m], one of `drops`, and wait until the robot does; see `stand_at`."""

@@ -71,6 +71,7 @@ def test_the_peers_have_the_layout_their_networks_ask_for() -> None:
         ("kp: 100", "kp: 100\ngait: {stance: 0.4}", ["gait.stance", "between 0.5 and 1"]),
         ("kp: 100", "kp: 100\ngait: {start: sometimes}", ["'sometimes'", "recovery"]),
         ("kp: 100", "kp: 100\nenvelope: {vx: [0.1, 0.5]}", ["envelope.vx", "around zero"]),
+        ("kp: 100", "kp: 100\nenvelope: {height: [0.8, 0.9, 1.0]}", ["takes a height today", "envelope.height"]),
         ("kp: 100", "kp: 100\naction: {clip: 0}", ["action.clip", "positive"]),
         ("kp: 100", "kp: 100\naction: {scale: []}", ["action.scale", "not a list of 0"]),
         ("kp: 100", "kp: 100\nkp: 100", ["'kp' occurs twice", "line"]),

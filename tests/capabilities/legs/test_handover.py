@@ -348,3 +348,16 @@ def test_a_walk_that_is_found_is_ended_by_the_one_that_walks_and_a_step_in_place
 def test_an_unknown_controller_is_named() -> None:
     with pytest.raises(ConfigError, match="Unknown lower_body implementation 'walkk'"):
         Handover(HandoverConfig(HandoverPart("walkk"), HandoverPart("hold")))
+
+
+def test_it_stands_at_its_own_height_before_the_legs_change_hands() -> None:
+    heights = Envelope(height=(0.78, 0.96, 1.0))
+    robot = Robot(stand={"envelope": heights})
+    assert robot.legs.envelope == replace(robot.walk.envelope, height=heights.height)
+    robot.run(4.0, Twist(height=0.8))
+    assert robot.stand.motions[-1].height == 0.8
+    robot.run(1.0, Twist(0.5, height=0.8))
+    assert not robot.legs.walking and robot.layer.reason == "who walks does not have the legs yet"
+    robot.run(4.0, Twist(0.5))
+    assert robot.legs.walking and robot.walk.motions[-1].height is None
+    assert robot.legs.envelope.height is None

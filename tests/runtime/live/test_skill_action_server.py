@@ -140,6 +140,28 @@ def test_velocities_from_elsewhere_wait_while_a_skill_has_the_robot(client: Clie
     assert live.up.side.bus.latest(topics.TWIST) == Twist(0.3)
 
 
+def test_a_height_stays_with_the_velocities_that_follow_and_ends_with_a_skill(client: Client) -> None:
+    live, rows = client.live, [public.topic(name) for name in ("/cmd_vel", "/cmd_height")]
+    assert live.up is not None and live.up.side is not None
+    bus, (velocity, height) = live.up.side.bus, [client.node.publisher(r.name, r.type, r.qos) for r in rows]
+
+    def drive(twist: Twist | None, up: float | None = None) -> Twist | None:
+        if twist is not None:
+            velocity.publish(convert.twist(twist))
+        if up is not None:
+            height.publish(convert.cmd_height(Twist(height=up)))
+        live.run(0.02)
+        return bus.latest(topics.TWIST)
+
+    assert drive(None, 0.9) == Twist(height=0.9)
+    assert drive(Twist(0.3)) == Twist(0.3, height=0.9)
+    assert drive(None, 0.95) == Twist(0.3, height=0.95)  # a height does not stop who drives
+    goal = client.send("/skill/stand", stand(0.2))
+    assert drive(None, 0.8) == Twist() == drive(Twist())
+    assert client.outcome(goal)[0] is GoalStatus.SUCCEEDED
+    assert drive(Twist(0.3)) == Twist(0.3)
+
+
 def test_a_joystick_that_is_held_does_not_move_a_robot_that_is_released(client: Client) -> None:
     live, row = client.live, public.topic("/cmd_vel")
     assert live.up is not None and live.up.side is not None
