@@ -28,7 +28,7 @@ from golem.middleware.ros.node import RosNode
 from golem.middleware.ros.request_header import Header, pack
 
 LEFT_OUT = ("/safety/stop", "/safety/reset", "/estop/press", "/elastic_band/release")
-COMMANDS = ("/cmd_vel", "/left/gripper/command", "/right/gripper/command")
+COMMANDS = ("/cmd_vel", "/cmd_height", "/left/gripper/command", "/right/gripper/command")
 RATE = 400.0
 """Messages per second at most."""
 
