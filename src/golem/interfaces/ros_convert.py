@@ -139,16 +139,12 @@ def twist(command: Twist) -> geometry_msgs.Twist:
 
 def cmd_height(command: Twist) -> Float64:
     """Return the height of base_link in a command [m]; NaN is the lower body's own."""
-    return Float64(_height(command.height))
+    return Float64(math.nan if command.height is None else command.height)
 
 
 def to_cmd_height(message: Float64) -> Twist:
     """Return a command to stand at a height [m]; NaN is the lower body's own."""
     return Twist(height=message.data)
-
-
-def _height(height: float | None) -> float:
-    return math.nan if height is None else height
 
 
 def to_twist(message: geometry_msgs.Twist) -> Twist:
@@ -277,8 +273,8 @@ def leg_status(status: LegStatus) -> golem_interfaces.LegStatus:
         header(status.t, "base_link"),
         twist(status.commanded),
         twist(status.applied),
-        _height(status.commanded.height),
-        _height(status.height),
+        cmd_height(status.commanded).data,
+        math.nan if status.height is None else status.height,
         bool(status.clamped),
         status.reason,
         bool(status.stepping),

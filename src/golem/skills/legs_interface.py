@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 ODOMETRY_TIMEOUT = 0.5
 """Age of the newest odometry from which on it says nothing about where the robot is [s]."""
-HEIGHT_STEP = 0.06
-"""Distance of heights that are tried [m]."""
+HEIGHT_STEP, CLOSE = 0.06, 1e-5
+"""Distance of heights that are tried, and of such that are one [m]."""
 RISE, SETTLE = 8.0, 1.0
 """Time that the legs get to come to a height, and to come to rest there [s]."""
 
@@ -90,19 +90,17 @@ class LegsInterface:
     @property
     def drops(self) -> tuple[float, ...]:
         """How much lower than now the robot may stand [m], its own height first; zero where the legs take none."""
-        status = self._context.bus.latest(topics.LEG_STATUS)
-        if status is None or status.heights is None:
+        if not self.reporting or (heights := self.status.heights) is None:
             return (0.0,)
-        low, own, high = status.heights
-        now = own if status.height is None else status.height
+        low, own, high = heights
         down, up = np.arange(own, low, -HEIGHT_STEP), np.arange(own + HEIGHT_STEP, high, HEIGHT_STEP)
-        return tuple(np.round(now - np.array([*down, low, *up]), 6).tolist())
+        return tuple(np.round(self.height - np.array([*down, low, *up]), 6).tolist())
 
-    async def lower(self, by: float) -> None:
-        """Stand lower `by` [m], one of `drops`, and wait until the robot does; see `stand_at`."""
+    @property
+    def height(self) -> float:
+        """That of base_link above the ground [m], as it is commanded; 0 where the legs take none."""
         status = self.status
-        if status.heights is not None and by:
-            await self.stand_at((status.heights[1] if status.height is None else status.height) - by)
+        return status.height or (status.heights or (0.0, 0.0))[1]
 
     async def stand_at(self, height: float) -> None:
         """Stand at a `height` of base_link above the ground [m], and wait until the robot does; it stays there.
@@ -111,15 +109,12 @@ class LegsInterface:
             ConfigError: the legs in charge do not take it.
             StageFailed: they do not come to it.
         """
-        status, tolerance = self.status, 1e-6
-        takes = "no height"
-        if status.heights is not None:
-            low, _, high = status.heights
-            takes = "" if low - tolerance <= height <= high + tolerance else f"heights from {low:g} to {high:g} m"
-        if takes:
-            raise ConfigError(f"The legs, '{status.controller}', take {takes}, not {height:g} m.")
+        name, heights = self.status.controller, self.status.heights
+        if heights is None or not heights[0] - CLOSE <= height <= heights[2] + CLOSE:
+            takes = "no height" if heights is None else f"heights from {heights[0]:g} to {heights[2]:g} m"
+            raise ConfigError(f"The legs, '{name}', take {takes}, not {height:g} m.")
         self.drive(Twist(height=height))
-        if not await self._context.until(lambda: abs((self.status.height or 0.0) - height) < tolerance, RISE):
+        if not await self._context.until(lambda: abs(self.height - height) < CLOSE, RISE):
             raise StageFailed("stand", "lower_body", f"Not at {height:g} m after {RISE:g} s: {self.status.reason}.")
         await self._context.sleep(SETTLE)
 

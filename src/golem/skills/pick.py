@@ -139,15 +139,14 @@ class Pick:
 
     async def _choose_height(self, context: Context, goal: PickGoal) -> None:
         """Stand as low as the hands want it, where the legs take a height."""
-        drops = context.legs.drops
-        if len(drops) == 1:
+        if len(drops := context.legs.drops) == 1:
             return
         seen = await see_fasteners(context, goal.label, goal.container, floor_places("a pick", goal.avoid), True)
         stance = stance_here(seen.places, seen.weights, seen.tray, drops)
         if stance.served and stance.drop:
             context.say("stand", f"Standing {100.0 * stance.drop:.0f} cm lower, where {stance.served} are in reach.")
             with suppress(StageFailed):
-                await context.legs.lower(stance.drop)
+                await context.legs.stand_at(context.legs.height - stance.drop)
 
     def _note(self, failure: StageFailed) -> None:
         """Report what a failure says: of the whole, and of the object that was tried last."""

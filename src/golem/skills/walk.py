@@ -97,10 +97,7 @@ class Stand:
         if goal.height is None:
             context.legs.drive(ZERO)
         else:
-            try:
-                await context.until(lambda: context.legs.reporting, FIRST_REPORT)
-                await context.legs.stand_at(goal.height)
-            except StageFailed as failure:
-                return SkillResult(False, failure.stage, failure.slot, str(failure))
+            await context.until(lambda: context.legs.reporting, FIRST_REPORT)
+            await context.legs.stand_at(goal.height)
         await context.sleep(goal.seconds)
         return SkillResult(True, "done", None, f"Stood for {goal.seconds:g} s.", {"stand": goal.seconds})

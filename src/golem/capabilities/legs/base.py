@@ -47,10 +47,8 @@ class Envelope:
         if self.height is not None:
             low, own, high = self.height
             if not HEIGHTS[0] <= low <= own <= high <= HEIGHTS[1]:
-                raise ConfigError(
-                    f"The envelope.height is the lowest, its own and the highest height, from {HEIGHTS[0]:g} to "
-                    f"{HEIGHTS[1]:g} m, not {low:g}, {own:g}, {high:g}."
-                )
+                said = "The envelope.height is the lowest, its own and the highest height, from 0.75 to 1.03 m"
+                raise ConfigError(f"{said}, not {low:g}, {own:g}, {high:g}.")
 
     @property
     def axes(self) -> tuple[bool, bool, bool]:

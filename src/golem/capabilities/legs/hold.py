@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import functools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -24,24 +24,20 @@ STANCES: dict[str, tuple[float, ...]] = {
     "crouch": (0.0, -0.4, 0.0, 0.8, -0.4, 0.0),
 }
 """Named postures of one leg; both legs take the same."""
-KNEES = np.linspace(0.0, 1.9, 39)
-"""Bent knees [rad] between which `squat` interpolates."""
+_STRAIGHT = np.zeros(12)
+_LINK = 0.4
+"""Length of thigh and of shank [m]."""
 
 
-def _bent(knee: Array) -> Array:
-    """Return (..., 12) both legs bent at the `knee` [rad], soles level under the hips."""
-    share = np.array(STANCES["crouch"]) / STANCES["crouch"][3]
-    return np.tile(knee[..., None] * share, 2)
-
-
-@functools.cache
-def _heights() -> Array:
-    return -sole_centers(*leg_poses(_bent(KNEES)))[..., 2].mean(axis=-1)
+def height_of(q: Array) -> float:
+    """Return the height of base_link above the soles [m] at the leg joints `q` (12,) [rad]."""
+    return -float(sole_centers(*leg_poses(q))[:, 2].mean())
 
 
 def squat(height: float) -> Array:
-    """Return the (12,) posture in which base_link is `height` above the soles [m], its knees bent."""
-    return _bent(np.interp(-height, -_heights(), KNEES))
+    """Return the (12,) posture in which base_link is `height` above level soles under the hips [m], its knees bent."""
+    bent = math.acos(min(max(1.0 - (height_of(_STRAIGHT) - height) / (2.0 * _LINK), 0.0), 1.0))
+    return np.tile((0.0, -bent, 0.0, 2.0 * bent, -bent, 0.0), 2)
 
 
 def standing(own: float, heights: tuple[float, float] | None) -> Envelope:

@@ -21,12 +21,11 @@ import pinocchio as pin
 
 from golem.capabilities.legs.base import LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
-from golem.capabilities.legs.hold import STANCES, squat, standing
+from golem.capabilities.legs.hold import STANCES, height_of, squat, standing
 from golem.capabilities.legs.wbc_qp import NUM_LEGS, QpWeights, Solution, StanceDynamics, StanceProgram, Tasks
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.interfaces.payloads import LegCommand
 from golem.robots.model.imu_mount import sensed_base_rate
-from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import GRAVITY, LEGS, Array, BaseEstimate, LowState
@@ -156,7 +155,7 @@ class Wbc:
         self.latency = 0.0
         self.gait = GaitConfig(start="never")
         self._rest: Array = np.tile(np.asarray(STANCES[c.stance]), 2)
-        self._rest_height = -float(sole_centers(*leg_poses(self._rest))[:, 2].mean())
+        self._rest_height = height_of(self._rest)
         self.envelope = standing(self._rest_height, c.heights)
         self._kp, self._kd = np.tile(c.kp, 2), np.tile(c.kd, 2)
         self._bound: Array = c.torque_ratio * load_limits(c.torque_profile).torque[LEGS]

@@ -133,16 +133,11 @@ class Episode:
     Attributes:
         running, robot: the stack and its twin.
         recorder: samples the twin's balance after every tick.
-        height: at which it stands [m]; None is that of its legs.
+        height: at which it is to stand [m]; None is that of its legs.
     """
 
     def __init__(
-        self,
-        stack: Stack,
-        seed: int,
-        onlooker: Onlooker | None = None,
-        limits: SafetyLimits | None = None,
-        height: float | None = None,
+        self, stack: Stack, seed: int, onlooker: Onlooker | None = None, limits: SafetyLimits | None = None
     ) -> None:
         """Build `stack` for the twin's seed, and show it to `onlooker`; its gate enforces `limits` if given.
 
@@ -164,7 +159,7 @@ class Episode:
         self._odometry: SimulatedOdometry | None = None
         self._skill: SkillRun | None = None
         self._hangs = False
-        self.height = height
+        self.height: float | None = None
 
     def start(self, skill: str | Routine[Context, Any], goal: object = None) -> None:
         """Begin a skill; it advances while the episode runs."""

@@ -14,6 +14,7 @@ from golem.errors import ConfigError
 from golem.evaluation.base import DONE, Rung, TrialOutcome, TrialSpec
 from golem.evaluation.episodes.episode import LATENCY, Episode, Loss, episode_seed, legs_stack
 from golem.evaluation.harness.arguments import robot_options
+from golem.hardware.safety.base import SafetyLimits
 from golem.provenance import stack_facts
 from golem.stack import Stack
 
@@ -87,10 +88,12 @@ class LegRung(Rung[O]):
         plant = {"latency": self.options.latency, **robot_options(self.options.robot), **own}
         return legs_stack(method, profile, overrides, plant)
 
-    def episode(self, spec: TrialSpec) -> Episode:
-        """Return the robot of a trial."""
+    def episode(self, spec: TrialSpec, limits: SafetyLimits | None = None) -> Episode:
+        """Return the robot of a trial; its gate enforces `limits` if given."""
         stack = self.stack(spec.method, spec.profile, spec.overrides)
-        return Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, height=self.options.height)
+        episode = Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, limits)
+        episode.height = self.options.height
+        return episode
 
 
 def can_walk(envelope: Envelope) -> bool:

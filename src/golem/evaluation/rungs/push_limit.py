@@ -12,7 +12,7 @@ import numpy as np
 
 from golem.errors import ConfigError
 from golem.evaluation.base import Case, Outcomes, Results, TrialOutcome, TrialSpec
-from golem.evaluation.episodes.episode import Episode, episode_seed
+from golem.evaluation.episodes.episode import Episode
 from golem.evaluation.episodes.plain_episode import PlainEpisode, own_legs
 from golem.evaluation.harness.arguments import robot_options
 from golem.evaluation.metrics.statistics import wilson
@@ -111,11 +111,10 @@ class PushLimit(PushedRung[PushLimitOptions]):
         """Return what trials share that have one past: all but level and direction."""
         return spec.method, spec.index, spec.case["terms"], spec.case["phase"], spec.case["walk"]
 
-    def episode(self, spec: TrialSpec) -> Episode:
+    def episode(self, spec: TrialSpec, limits: SafetyLimits | None = None) -> Episode:
         """Return the robot of a trial on the stack's terms, under the gate of its case."""
-        stack = self.stack(spec.method, spec.profile, spec.overrides)
-        limits = lifted(SafetyLimits.from_profile(stack.limits), LIFTED[str(spec.case["terms"])])
-        return Episode(stack, episode_seed(spec.seed, spec.index), self.onlooker, limits, self.options.height)
+        limits = SafetyLimits.from_profile(self.stack(spec.method, spec.profile, spec.overrides).limits)
+        return super().episode(spec, lifted(limits, LIFTED[str(spec.case["terms"])]))
 
     def pushed(self, specs: Sequence[TrialSpec]) -> Sequence[TrialOutcome]:
         """Push one robot, on the terms of its case; see `PushedRung`."""

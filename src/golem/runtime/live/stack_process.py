@@ -86,8 +86,7 @@ class Velocities:
         self._heard = t
         closed = self._closed()
         self._held |= closed and not still
-        height = None if closed else self._twist.height
-        self._twist = replace(twist, height=height)
+        self._twist = replace(twist, height=None if closed else self._twist.height)
         if not (closed or self._held):
             self._bus.publish(topics.TWIST, self._twist, t)
 
@@ -203,12 +202,8 @@ class StackProcess:
         unheard = () if hears_lidar(stack) else public.LIDAR
         velocities = Velocities(self._bus, self._now, lambda: self._skills.busy() or not moving(self._bus))
         self._lidar_imu = OnePerTick(self._bus, topics.LIDAR_IMU, IMU_BACKLOG)
-        takers = {
-            "/safety/status": self._gate.take,
-            "/cmd_vel": velocities.take,
-            "/cmd_height": velocities.rise,
-            "/livox/imu": self._lidar_imu.take,
-        }
+        takers = {"/cmd_vel": velocities.take, "/cmd_height": velocities.rise}
+        takers |= {"/safety/status": self._gate.take, "/livox/imu": self._lidar_imu.take}
         incoming(self._bus, endpoints, self._now, tell, takers, without=("/lowstate", *unheard))
         endpoints.subscribe("/tf_static", lambda message: self._calibration.update(calibrations(message)))
         self._drivers = RoleEndpoints("robot", participant, node, only=SHOWN) if real else None

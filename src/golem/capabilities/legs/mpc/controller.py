@@ -8,14 +8,13 @@ import numpy as np
 
 from golem.capabilities.legs.base import LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
-from golem.capabilities.legs.hold import STANCES, squat, standing
+from golem.capabilities.legs.hold import STANCES, height_of, squat, standing
 from golem.capabilities.legs.mpc.cost import CostConfig, cost
 from golem.capabilities.legs.mpc.planner import Planner, PlannerConfig
 from golem.capabilities.legs.mpc.planning_model import PlanningModel
 from golem.errors import ConfigError, GolemError, unknown_name
 from golem.finite import check_finite, check_measured
 from golem.interfaces.payloads import LegCommand
-from golem.robots.model.leg_kinematics import leg_poses, sole_centers
 from golem.types import LEGS, Array, BaseEstimate, LowState
 
 FAILURES = 5
@@ -99,8 +98,7 @@ class MPC:
         self._kp: Array = np.tile(c.kp, 2)
         self._kd: Array = np.tile(c.kd, 2)
         self._rest = np.tile(STANCES[c.stance], 2)
-        own = -float(sole_centers(*leg_poses(self._rest))[:, 2].mean())
-        self.envelope = standing(own, c.heights)
+        self.envelope = standing(height_of(self._rest), c.heights)
         self._model = PlanningModel(self._rest, self._kp, self._kd, c.timestep, c.threads)
         self.planner = Planner(c.planner, c.horizon, self._model.lower, self._model.upper)
         self._times: Array = c.timestep * np.arange(round(c.horizon / c.timestep), dtype=np.float64)
