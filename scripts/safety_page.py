@@ -91,7 +91,7 @@ REASONS: dict[Reason, ReasonText] = {
     ),
     Reason.BALANCE: ReasonText(
         407,
-        f"For 30 ms, by the gate's own estimate: the capture point is {_L.capture:g} m outside both soles, or a robot on "
+        f"For 30 ms, by the gate's estimate: the capture point is {_L.capture:g} m outside both soles, or a robot on "
         f"its feet sinks at {_L.sinking:g} m/s. Or its base_link is under {_L.low:g} m.",
         "The legs' controller does not balance: look at its log, and at what pushed.",
     ),
