@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from golem.hardware.estimator.attitude import Attitude, GyroBias
+from golem.hardware.estimator.attitude import GYRO_BIAS, Attitude, track_bias
 from golem.hardware.estimator.feet import Feet, FeetConfig
 from golem.hardware.estimator.random_walk import base_velocity
+from golem.native import new_record
 from golem.robots.model.imu_mount import TORSO, base_rate
 from golem.robots.model.spatial import rotation_rpy
 from golem.robots.model.table import FRAMES
-from golem.types import NUM_JOINTS, Array, Imu, LowState
+from golem.types import NUM_JOINTS, Array
 
 
 @pytest.fixture
@@ -74,7 +75,7 @@ def test_a_foot_implies_the_velocity_of_the_base_less_its_own(seed: int, tumblin
 
 
 def test_the_bias_of_the_gyro_is_found_while_the_imu_turns_and_its_orientation_is_noisy() -> None:
-    rng, bias, true = np.random.default_rng(0), GyroBias(), np.array([0.002, -0.003, 0.001])
+    rng, bias, true = np.random.default_rng(0), new_record(GYRO_BIAS)[0], np.array([0.002, -0.003, 0.001])
     R, dt = Rotation.identity(), 0.002
     values = []
     for i in range(5000):
@@ -83,7 +84,7 @@ def test_the_bias_of_the_gyro_is_found_while_the_imu_turns_and_its_orientation_i
         noisy = R * Rotation.from_rotvec(5e-4 * rng.standard_normal(3))
         # A quaternion and its negative are one orientation.
         quat = noisy.as_quat()[[3, 0, 1, 2]] * (-1.0) ** i
-        zero = np.zeros(NUM_JOINTS)
-        values.append(bias.step(LowState(i * dt, zero, zero, zero, Imu(quat, rate + true, zero[:3])), dt))
+        track_bias(bias, quat, rate + true, dt)
+        values.append(bias["value"].copy())
     np.testing.assert_allclose(values[1500:], np.tile(true, (3500, 1)), atol=1e-3)
     np.testing.assert_allclose(values[-1], true, atol=3e-4)

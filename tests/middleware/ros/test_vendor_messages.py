@@ -11,10 +11,11 @@ import pytest
 pytest.importorskip("rosbags")
 
 from tests.middleware.ros.samples import random_message
+from tests.middleware.wire import go
 
 from golem.middleware.ros import codec
 from golem.middleware.ros.msgs import unitree_api
-from golem.middleware.wire import api, go, hg
+from golem.middleware.wire import api, hg
 from golem.middleware.wire.api import ApiRequest, Response
 from golem.middleware.wire.struct_layout import StructLayout
 

@@ -22,11 +22,11 @@ import numpy as np
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from tests.middleware.wire import random_images, samples
+from tests.middleware.wire import go, random_images, samples
 
 from golem.interfaces import unitree_api
 from golem.interfaces.unitree_api import LOCO_APIS
-from golem.middleware.wire import api, convert, go, hg
+from golem.middleware.wire import api, convert, hg
 from golem.middleware.wire.api import ApiRequest, Response
 from golem.middleware.wire.crc import Checksum
 from golem.middleware.wire.struct_layout import WireError

@@ -7,8 +7,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from tests.middleware.wire import go
 
-from golem.middleware.wire import go, hg
+from golem.middleware.wire import hg
 from golem.middleware.wire.crc import Checksum
 from golem.middleware.wire.struct_layout import StructLayout
 

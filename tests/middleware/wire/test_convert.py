@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.middleware.wire import random_images, samples
+from tests.middleware.wire import go, random_images, samples
 
-from golem.middleware.wire import convert, go, hg
+from golem.middleware.wire import convert, hg
 from golem.middleware.wire.struct_layout import StructLayout, WireError
 from golem.types import LowCommand, LowState
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from golem.kernels import njit
-from golem.native import Record, new_record
+from golem.native import Record
 from golem.robots.model.imu_mount import TORSO
 from golem.types import Array, LowState
 
@@ -83,19 +83,3 @@ def track_bias(m: Record, quat: Array, gyro: Array, dt: float) -> None:
         m.value[2] += share * (gyro[2] - twice * (a * z - d * w - b * y + c * x) - m.value[2])
     m.has_before = 1
     m.before[0], m.before[1], m.before[2], m.before[3] = w, x, y, z
-
-
-class GyroBias:
-    """The bias of the gyro: how much faster it turns than the IMU's own orientation, which does not run away.
-
-    Uncorrected, 0.1 deg/s under a base 0.95 m above its soles are 1.6 mm/s by which a standing robot seems to move.
-    """
-
-    def __init__(self) -> None:
-        """Start without a bias."""
-        self._memory = new_record(GYRO_BIAS)[0]
-
-    def step(self, state: LowState, dt: float) -> Array:
-        """Take the sample `state`, `dt` [s] after the one before; return the bias (3,), axes of the IMU [rad/s]."""
-        track_bias(self._memory, state.imu.quat, state.imu.gyro, dt)
-        return self._memory["value"].copy()

@@ -72,11 +72,6 @@ SERVO_ARMATURE = 0.001
 _T = TypeVar("_T", float, Array)
 
 
-def gap_from_crank(theta: _T) -> _T:
-    """Return the opening between the pads [m] when both cranks are at `theta` [rad]: 0.108 open, 0 at `CLOSED`."""
-    return 2.0 * pad_offset(theta)
-
-
 def pad_offset(theta: _T) -> _T:
     """Return the distance of a pad's inner face from the centre plane [m]."""
     return CRANK_PIVOT[1] + ARM * np.cos(ANGLE_OPEN + theta) - _PAD_FACE
@@ -87,16 +82,6 @@ def crank_from_gap(gap: _T) -> _T:
     clipped = np.minimum(np.maximum(gap, 0.0), MAX_GAP)  # np.clip takes five times as long
     cosine = (clipped / 2.0 + _PAD_FACE - CRANK_PIVOT[1]) / ARM
     return np.maximum(np.arccos(cosine) - ANGLE_OPEN, 0.0)  # the arc cosine may round to just below
-
-
-def torque_for_force(force: _T, theta: float) -> _T:
-    """Return the crank torque [N m] that presses a pad with `force` [N]: tau = F L sin(a0 + theta), virtual work."""
-    return force * ARM * np.sin(ANGLE_OPEN + theta)
-
-
-def force_for_torque(torque: _T, theta: float) -> _T:
-    """Return the pad force [N] that a crank torque [N m] makes; the lever is at least 21 mm over the whole stroke."""
-    return torque / (ARM * np.sin(ANGLE_OPEN + theta))
 
 
 MAX_GAP: float = float(2.0 * pad_offset(0.0))
