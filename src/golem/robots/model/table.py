@@ -86,7 +86,14 @@ def _joint(row: dict[str, Any]) -> Joint:
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """The same in C, where PyYAML has it: every process reads the table."""
-_DATA: dict[str, Any] = yaml.load((files(__package__ or "") / "h12.yaml").read_text(encoding="utf-8"), _LOADER)
+
+
+def load_data(name: str) -> dict[str, Any]:
+    """Return the content of a YAML file beside this one."""
+    return yaml.load((files(__package__ or "") / name).read_text(encoding="utf-8"), _LOADER)
+
+
+_DATA = load_data("h12.yaml")
 
 JOINTS: tuple[Joint, ...] = tuple(_joint(row) for row in _DATA["joints"])
 """The 27 joints in the motor order of the vendor's SDK."""
