@@ -269,7 +269,7 @@ def _command(doc: str, module: str, names: str, graphics: bool = False) -> Calla
         config, _, run = names.partition(":")
         owner = importlib.import_module(module)
         name = next(name for name, known in COMMANDS.items() if known is command)
-        return FAILED if getattr(owner, run)(_parse(getattr(owner, config), name, words)) is False else 0
+        return _exit_code(getattr(owner, run)(_parse(getattr(owner, config), name, words)))
 
     command.__doc__ = doc
     return command
@@ -385,8 +385,12 @@ def _one_of(words: list[str], command: str, what: str, table: Mapping[str, tuple
         return 0
     module, config, run = table[name]
     owner = importlib.import_module(module)
-    done = getattr(owner, run)(_parse(getattr(owner, config), f"{command} {name}", words[1:]))
-    return FAILED if done is False else 0
+    return _exit_code(getattr(owner, run)(_parse(getattr(owner, config), f"{command} {name}", words[1:])))
+
+
+def _exit_code(done: object) -> int:
+    """Return what a command ends with that says whether, or how often, it did what it is for, or nothing."""
+    return FAILED if isinstance(done, int) and not done else 0
 
 
 def _parse(kind: type[T], name: str, words: list[str]) -> T:
