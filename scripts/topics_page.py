@@ -19,6 +19,17 @@ WHO: dict[Role, str] = {
 }
 """Heading of each role."""
 SHORT: dict[Role, str] = {"robot": "robot", "safety": "safety", "stack": "up", "user": "you"}
+# fmt: off
+ABSENT: dict[str, str] = {
+    "/sportmodestate":
+        "The vendor's simulator publishes the true position and velocity of the robot on it. No module of GOLEM reads "
+        "ground truth, and the robot has none to publish; the estimate is on /odom.",
+    "/secondary_imu": "Published for the G1 only; the H1-2's torso IMU is in /lowstate.",
+    "/lf/bmsstate": "The twin has no battery; invented figures would be worse than none.",
+    "/wirelesscontroller": "The twin has no remote control.",
+}
+"""Topics of the vendor's own simulators that are left out on purpose, and why."""
+# fmt: on
 INTRODUCTION = """# Interfaces
 
 `python scripts/topics_page.py docs/reference/topics.md` writes this page from `golem.interfaces.public`.
@@ -72,7 +83,7 @@ def page() -> str:
     acted = ((f"`{a.name}`", f"`{a.type}`", SHORT[a.by], a.text) for a in public.ACTIONS)
     parts.append(_table(("action", "type", "by", "what"), acted))
     parts.append("## Left out on purpose\n")
-    absent = (f"- `{name}`: {why}" for name, why in public.ABSENT.items())
+    absent = (f"- `{name}`: {why}" for name, why in ABSENT.items())
     parts.append("\n".join(fill(line, 120, subsequent_indent="  ") for line in absent) + "\n")
     return "\n".join(parts)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 import pytest
-from scripts.topics_page import page
+from scripts.topics_page import ABSENT, page
 from tests.conftest import REPOSITORY
 
 from golem.interfaces import public
@@ -23,7 +23,7 @@ def test_nobody_publishes_a_topic_twice_and_every_name_has_one_type() -> None:
     types = {(row.name, row.type) for row in public.TOPICS}
     assert len(types) == len({row.name for row in public.TOPICS})
     assert max(Counter(row.name for row in (*public.SERVICES, *public.ACTIONS)).values()) == 1
-    assert not {row.name for row in public.TOPICS} & public.ABSENT.keys()
+    assert not {row.name for row in public.TOPICS} & ABSENT.keys()
 
 
 def test_the_motors_are_commanded_by_the_safety_process_alone() -> None:

@@ -283,16 +283,6 @@ ACTIONS: tuple[ActionRow, ...] = (
            "Walk to a pose, in `map`, `odom` or `base_link`, around what is in the way."),
     ActionRow("/skill/stand", "golem_interfaces/action/Stand", "stack", "Stand for a while."),
 )
-
-ABSENT: dict[str, str] = {
-    "/sportmodestate":
-        "The vendor's simulator publishes the true position and velocity of the robot on it. No module of GOLEM reads "
-        "ground truth, and the robot has none to publish; the estimate is on /odom.",
-    "/secondary_imu": "Published for the G1 only; the H1-2's torso IMU is in /lowstate.",
-    "/lf/bmsstate": "The twin has no battery; invented figures would be worse than none.",
-    "/wirelesscontroller": "The twin has no remote control.",
-}
-"""Topics of the vendor's own simulators that are left out on purpose, and why."""
 # fmt: on
 
 

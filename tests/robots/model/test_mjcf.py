@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from golem.robots.model import contact_shapes, looks, mjcf
-from golem.robots.model.loft import Loft, ring
+from golem.robots.model.looks import Loft, ring
 from golem.robots.model.table import SOLE
 
 
