@@ -19,9 +19,8 @@ COUNT = int(os.environ.get("GOLEM_FUZZ_DATAGRAMS", "20000"))
 MEMORY = 100e6
 """How much a process may grow meanwhile [bytes]."""
 VICTIM = """
-import sys
+import sys, time
 from golem.middleware.dds.base import Qos
-from golem.middleware.dds.checks import wait_for_peer
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 own, others = sys.argv[2:]
@@ -29,7 +28,8 @@ participant = connect(DdsConfig(int(sys.argv[1])))
 writer = participant.writer(own, "T", Qos())
 taken = []
 reader = participant.reader(others, "T", Qos(), on_data=lambda: taken.extend(reader.take()))
-wait_for_peer(participant, writer, "start it", 10.0)
+while not writer.matched():
+    time.sleep(0.01)
 print("ready", flush=True)
 for line in sys.stdin:
     writer.write(b"\\0\\1\\0\\0" + line.encode())

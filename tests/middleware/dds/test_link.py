@@ -19,13 +19,12 @@ pytestmark = pytest.mark.slow
 WRITER = """
 import json, sys, time
 from golem.middleware.dds.base import ENCAPSULATION, SENSOR, Qos
-from golem.middleware.dds.checks import wait_for_peer
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 participant = connect(DdsConfig(7, sys.argv[1]))
 states, images = participant.writer("rt/state", "T", Qos(depth=8)), participant.writer("rt/image", "T", SENSOR)
-wait_for_peer(participant, states, "start it", 10.0)
-wait_for_peer(participant, images, "start it", 10.0)
+while not (states.matched() and images.matched()):
+    time.sleep(0.01)
 print("matched", flush=True)
 longest, sent = 0.0, 0
 end = time.monotonic() + 5.0 + float(sys.argv[2])
@@ -44,7 +43,6 @@ print(json.dumps({"longest": longest, "images": sent}))
 READER = """
 import json, sys, time
 from golem.middleware.dds.base import SENSOR, Qos
-from golem.middleware.dds.checks import wait_for_peer
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 participant = connect(DdsConfig(7, sys.argv[1]))
@@ -58,7 +56,8 @@ def on_image():
 
 reader = participant.reader("rt/state", "T", Qos(depth=64), on_data=on_state)
 image_reader = participant.reader("rt/image", "T", SENSOR, on_data=on_image)
-wait_for_peer(participant, reader, "start it", 10.0)
+while not reader.matched():
+    time.sleep(0.01)
 while reader.matched():
     time.sleep(0.02)
 gaps = [later - earlier for earlier, later in zip(times, times[1:])]
@@ -68,13 +67,14 @@ print(json.dumps({"gap": gaps[at], "after": len(times) - at, "images": len(image
 FINDER = """
 import sys, time
 from golem.middleware.dds.base import Qos
-from golem.middleware.dds.checks import wait_for_peer
 from golem.middleware.dds.connect import connect
 from golem.middleware.dds.domain import DdsConfig
 _, interface, kind, *peers = sys.argv
 participant = connect(DdsConfig(7, interface, tuple(peers)))
 print("joined", flush=True)
-wait_for_peer(participant, getattr(participant, kind)("rt/state", "T", Qos()), "start it", 20.0)
+endpoint = getattr(participant, kind)("rt/state", "T", Qos())
+while not endpoint.matched():
+    time.sleep(0.01)
 print("found", flush=True)
 time.sleep(20.0)
 """

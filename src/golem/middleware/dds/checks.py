@@ -1,13 +1,11 @@
-"""What is verified before anything relies on the transport, and what is said when nobody answers."""
+"""What is verified before anything relies on the transport."""
 
 from __future__ import annotations
 
 import functools
 import time
 
-from golem.middleware.dds import discovery
 from golem.middleware.dds.base import ENCAPSULATION, DdsError, Qos
-from golem.middleware.dds.endpoints import CycloneReader, CycloneWriter
 from golem.middleware.dds.library import cyclone
 from golem.middleware.dds.participant import CycloneParticipant
 
@@ -49,47 +47,3 @@ def self_test() -> None:
     finally:
         participant.close()
         library.blocking.dds_delete(domain)
-
-
-def wait_for_peer(
-    participant: CycloneParticipant, endpoint: CycloneWriter | CycloneReader, remedy: str, timeout: float
-) -> None:
-    """Wait until somebody matches `endpoint`, a writer or reader of `participant`.
-
-    Args:
-        participant: its participant.
-        endpoint: what somebody else should match.
-        remedy: what the user can do, e.g. `"start the robot with: golem twin"`.
-        timeout: how long to wait [s].
-
-    Raises:
-        DdsError: nobody did in time; the message says what discovery knows of the reason.
-    """
-    end = time.monotonic() + timeout
-    while not endpoint.matched():
-        if time.monotonic() > end:
-            raise DdsError(f"{_reason(participant, endpoint)} ({participant.where}, {timeout:g} s); {remedy}.")
-        time.sleep(0.01)
-
-
-def _reason(participant: CycloneParticipant, endpoint: CycloneWriter | CycloneReader) -> str:
-    writing = isinstance(endpoint, CycloneWriter)
-    does = "reads" if writing else "writes"
-    topic = endpoint.topic
-    others = discovery.others(participant)
-    if not others:
-        return "Nobody else is on the DDS domain"
-    there = discovery.readers(participant) if writing else discovery.writers(participant)
-    there = [other for other in there if other.topic == topic]
-    if not there:
-        return f"Of {len(others)} others on the DDS domain nobody {does} '{topic}'"
-    for other in there:
-        if other.type_name == endpoint.type_name:
-            offered, requested = (endpoint.qos, other.qos) if writing else (other.qos, endpoint.qos)
-            return f"The writer of '{topic}' offers {_words(offered)}, its reader requests {_words(requested)}"
-    return f"Somebody {does} '{topic}' as '{there[0].type_name}', not as '{endpoint.type_name}'"
-
-
-def _words(qos: Qos) -> str:
-    reliability = "reliable" if qos.reliable else "best effort"
-    return f"{reliability}, {'transient local' if qos.transient_local else 'volatile'}"
