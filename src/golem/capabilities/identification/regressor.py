@@ -1,0 +1,147 @@
+"""Torques of the hanging robot as a function of what is to be identified, linearised.
+
+The torso is the root: the IMU on it measures how the root moves, so that no model of the hoist is needed. For given
+motion, inverse dynamics is linear in masses, payloads, armature and friction (Atkeson, An, Hollerbach 1986); zeros of
+the encoders and the bias of the accelerometer enter by its derivatives (Carpentier, Mansard 2018).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from golem.robots.model import magpie_model
+from golem.robots.model.imu_mount import TORSO
+from golem.robots.model.spatial import Inertial, combined
+from golem.robots.model.table import BASE_LINK, DOF, FRAMES, JOINT_NAMES, JOINTS, LINKS
+from golem.types import NUM_JOINTS, SIDES, Array
+
+ROOT = "torso_link"
+LINK_NAMES = tuple(LINKS)
+BALL = 0.04
+"""Radius of the ball that a payload is taken for [m], as in the twin."""
+_HINGES = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
+_AT = FRAMES["imu_link"].T_parent_frame[:3, 3]
+
+_KINDS = ("armature", "damping", "friction", "zero")
+NAMES = (
+    *(f"mass of {name}" for name in LINK_NAMES),
+    *(f"payload of the {side} hand" for side in SIDES),
+    *(f"{kind} of {name}" for kind in _KINDS for name in JOINT_NAMES),
+    *(f"accelerometer bias {axis}" for axis in "xyz"),
+)
+"""What is identified: masses as shares by which they differ from the model's [1], payloads [kg], armature [kg m^2],
+damping [N m s/rad], dry friction [N m], zeros [rad], bias [m/s^2]."""
+MASS, PAYLOAD = slice(0, 28), slice(28, 30)
+ARMATURE, DAMPING, FRICTION, ZERO = (slice(30 + k * NUM_JOINTS, 30 + (k + 1) * NUM_JOINTS) for k in range(4))
+BIAS = slice(138, 141)
+
+
+def _vector(*groups: tuple[int, float]) -> Array:
+    return np.concatenate([np.full(count, value) for count, value in groups])
+
+
+_N = NUM_JOINTS
+NOMINAL: Array = _vector((30, 0.0), (_N, DOF.armature), (_N, DOF.damping), (_N, DOF.frictionloss), (_N + 3, 0.0))
+"""(141,) what the model says."""
+PRIOR: Array = _vector((28, 0.1), (2, 1.5), (_N, 0.1), (_N, 1.0), (_N, 1.5), (_N, 0.05), (3, 0.05))
+"""(141,) standard deviation of what a robot may differ by [assumption]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One moment: q, dq, ddq (27,) [rad, s]; gyro, its derivative, acc (3,) of the IMU [rad, m, s]."""
+
+    q: Array
+    dq: Array
+    ddq: Array
+    gyro: Array
+    turn: Array
+    acc: Array
+
+
+def hand_payload(side_mass: float) -> Inertial:
+    """Return the ball of `side_mass` [kg] at the grasp frame, in the wrist's link."""
+    at = (magpie_model.T_WRIST_HAND @ magpie_model.T_HAND_GRIPPER)[:3, 3]
+    return Inertial(side_mass, at, 0.4 * side_mass * BALL**2 * np.eye(3))
+
+
+class HangingTree:
+    """Inverse dynamics of the robot hanging from wherever, its root the torso."""
+
+    def __init__(self) -> None:
+        """Build the model; the waist turns the pelvis against the torso, so its sign is the other one."""
+        model = pin.Model()
+        model.gravity.linear = np.zeros(3)  # the accelerometer measures what holds against it
+        placed = {ROOT: model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")}
+        order = sorted(JOINTS, key=lambda joint: joint.child != ROOT)  # the waist first: the legs hang from it
+        for joint in order:
+            parent, child = (joint.child, joint.parent) if joint.child == ROOT else (joint.parent, joint.child)
+            hinge = _HINGES[int(np.argmax(joint.axis))]()
+            placed[child] = model.addJoint(placed[parent], hinge, pin.SE3(joint.T_parent_joint), joint.name)
+        self._model, self._data = model, model.createData()
+        ids = [model.getJointId(name) for name in JOINT_NAMES]
+        self._q, self._v = (np.array([getattr(model.joints[i], k) for i in ids]) for k in ("idx_q", "idx_v"))
+        self._sign = np.array([-1.0 if joint.child == ROOT else 1.0 for joint in JOINTS])
+        self._link = [placed[name] for name in LINK_NAMES]
+        self._wrist = [placed[f"{side}_wrist_yaw_link"] for side in SIDES]
+        # Rows of all inertial numbers, ten per body but the universe, by what they depend on; the last is the hands.
+        self._numbers: Array = np.zeros((10 * (model.njoints - 1), 31))
+        lump = magpie_model.lump().moved(magpie_model.T_WRIST_HAND)
+        for column, (body, inertial) in enumerate(
+            [
+                *zip(self._link, LINKS.values(), strict=True),
+                *((body, hand_payload(1.0)) for body in self._wrist),
+                *((body, lump) for body in self._wrist),
+            ]
+        ):
+            numbers = pin.Inertia(inertial.mass, inertial.com, inertial.inertia).toDynamicParameters()
+            self._numbers[10 * (body - 1) : 10 * body, min(column, 30)] += numbers
+        self._place = dict(zip(LINK_NAMES, self._link, strict=True))
+
+    def load(self, x: Array) -> None:
+        """Take masses and payloads from the parameters `x` (141,)."""
+        for name, inertial in identified_links(x).items():
+            self._model.inertias[self._place[name]] = pin.Inertia(inertial.mass, inertial.com, inertial.inertia)
+        hand = magpie_model.lump().moved(magpie_model.T_WRIST_HAND)
+        for side, mass in zip(SIDES, x[PAYLOAD], strict=True):
+            name = f"{side}_wrist_yaw_link"
+            body = combined([identified_links(x)[name], hand, hand_payload(float(mass))])
+            self._model.inertias[self._place[name]] = pin.Inertia(body.mass, body.com, body.inertia)
+
+    def linearise(self, x: Array, s: Sample) -> tuple[Array, Array]:
+        """Return torques (27,) of the rigid links at `x`, which was loaded, and their derivatives.
+
+        Returns:
+            torque: (27,) without armature and friction [N m].
+            common: (27, 60) derivatives by the masses, payloads, zeros and bias.
+        """
+        q, v, a = np.zeros(self._model.nq), np.zeros(self._model.nv), np.zeros(self._model.nv)
+        q[6] = 1.0
+        q[self._q] = self._sign * (s.q - x[ZERO])
+        v[3:6], v[self._v] = s.gyro, self._sign * s.dq
+        acc = s.acc - x[BIAS]
+        a[:3] = acc - np.cross(s.turn, _AT) - np.cross(s.gyro, np.cross(s.gyro, _AT))
+        a[3:6], a[self._v] = s.turn, self._sign * s.ddq
+        # The hoist pulls at the pelvis: the waist is known by what hangs on its upper side, which is what turns the root.
+        at, sign = self._v.copy(), self._sign.copy()
+        at[TORSO], sign[TORSO] = 5, 1.0
+        rows = sign[:, None] * (pin.computeJointTorqueRegressor(self._model, self._data, q, v, a)[at] @ self._numbers)
+        rows[TORSO, : LINK_NAMES.index(ROOT)] = 0.0
+        turned, _, mass = pin.computeRNEADerivatives(self._model, self._data, q, v, a)
+        zeros = -sign[:, None] * turned[np.ix_(at, self._v)] * self._sign
+        bias = -sign[:, None] * mass[:3, at].T
+        zeros[TORSO, : TORSO + 1] = bias[TORSO] = 0.0
+        torque = rows[:, :28] @ (1.0 + x[MASS]) + rows[:, 28:30] @ x[PAYLOAD] + rows[:, 30]
+        return torque, np.hstack([rows[:, :30], zeros, bias])
+
+
+def identified_links(x: Array) -> dict[str, Inertial]:
+    """Return the links with the masses of the parameters `x` (141,): as large as the model's, of another density."""
+    scaled = zip(LINKS.items(), 1.0 + x[MASS], strict=True)
+    return {name: Inertial(f * i.mass, i.com, f * i.inertia) for (name, i), f in scaled}
+
+
+assert len(NAMES) == len(NOMINAL) == len(PRIOR) and LINK_NAMES[0] == BASE_LINK

@@ -1,0 +1,79 @@
+"""The motion that a robot is identified by: in the hoist every joint swings by itself, at speeds of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from golem.capabilities.arms.base import NUM_UPPER
+from golem.capabilities.legs.base import Envelope, LocomotionCommand
+from golem.capabilities.legs.gait import GaitConfig
+from golem.hardware.servo.gains import default_gains
+from golem.interfaces.payloads import ArmCommand, LegCommand
+from golem.types import LEGS, NUM_JOINTS, UPPER, Array, BaseEstimate, LowState
+
+# Middle and swing of each joint [rad], left side. Feet stay apart, hands beside the trunk and off the thighs; the torso
+# turns, or a lean of the IMU could not be told from the zeros of the legs.
+_LEG = ((0.05, 0.25), (-0.25, 0.4), (0.2, 0.16), (0.6, 0.5), (-0.15, 0.35), (0.0, 0.15))
+_ARM = ((-0.2, 0.6), (0.6, 0.3), (0.0, 0.5), (0.8, 0.7), (0.0, 1.1), (0.0, 0.35), (0.0, 0.9))
+_LEG_MIRROR, _ARM_MIRROR = (-1, 1, -1, 1, 1, -1), (1, -1, -1, 1, -1, 1, -1)
+_ROWS = np.array([*_LEG, *_LEG, (0.0, 0.8), *_ARM, *_ARM])
+MIDDLE: Array = _ROWS[:, 0] * (*(1,) * 6, *_LEG_MIRROR, *(1,) * 8, *_ARM_MIRROR)
+"""(27,) posture about which the joints swing [rad]."""
+SWING: Array = _ROWS[:, 1].copy()
+"""(27,) how far each one swings [rad]."""
+# Golden-ratio steps keep all pairs of frequencies apart [Hz]; the second sine tells friction from damping.
+_SLOW: Array = 0.16 + 0.2 * (np.arange(NUM_JOINTS) * 0.618034 % 1.0)
+_SHARES = ((0.7, 1.0), (0.3, 2.7))
+EASE = 4.0
+"""Time in which the swing grows [s]."""
+
+
+def swing(t: float, start: Array) -> Array:
+    """Return the (27,) joint targets [rad] at `t` [s] after the joints were at `start` (27,) [rad]."""
+    share = 0.5 - 0.5 * np.cos(np.pi * min(t / EASE, 1.0))
+    phase = 2.0 * np.pi * _SLOW * t
+    wave = sum(a * np.sin(f * phase) for a, f in _SHARES)
+    return start + share * (MIDDLE + SWING * wave - start)
+
+
+class LegSweep:
+    """Swings the legs of a robot in the hoist; see `LowerBody`. It follows no twist."""
+
+    requires = ("hoist",)
+    rate, latency, envelope, gait = 500.0, 0.0, Envelope(), GaitConfig(start="never")
+
+    def __init__(self) -> None:
+        """Begin where `reset` says."""
+        gains = default_gains()
+        self._kp, self._kd = gains.kp[LEGS], gains.kd[LEGS]
+        self._t, self._start = 0.0, MIDDLE
+
+    def reset(self, state: LowState) -> None:
+        """Start from the measured joints of `state`."""
+        self._t, self._start = 0.0, state.q.copy()
+
+    def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
+        """Return where the legs are now; see `LowerBody.step`."""
+        self._t += dt
+        return LegCommand(swing(self._t, self._start)[LEGS], self._kp.copy(), self._kd.copy())
+
+
+class ArmSweep:
+    """Swings torso and arms; see `UpperBody`. It goes to no palm target."""
+
+    rate, latency = 500.0, 0.0
+
+    def __init__(self) -> None:
+        """Begin where `reset` says."""
+        self._t, self._start = 0.0, MIDDLE
+
+    def reset(self, q: Array) -> None:
+        """Start from the measured joints `q` (27,) [rad]."""
+        self._t, self._start = 0.0, q.copy()
+
+    def step(self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float) -> ArmCommand:
+        """Return where torso and arms are now; see `UpperBody.step`."""
+        self._t += dt
+        q = swing(self._t, self._start)[UPPER]
+        assert len(q) == NUM_UPPER
+        return ArmCommand(q, np.zeros(2), np.zeros(2), False)
