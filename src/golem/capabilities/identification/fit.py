@@ -18,7 +18,6 @@ from golem.capabilities.identification.regressor import (
     ARMATURE,
     DAMPING,
     FRICTION,
-    MASS,
     NAMES,
     NOMINAL,
     PRIOR,
@@ -31,6 +30,7 @@ from golem.types import NUM_JOINTS, TICK, Array
 
 CUTOFF = 8.0
 """Of the filter [Hz]."""
+_LOW = butter(4, CUTOFF, fs=1.0 / TICK, output="sos")
 STRIDE = 10
 """Ticks between two samples that are used."""
 SLOW = 0.04
@@ -68,6 +68,11 @@ class Identified:
     unknown: dict[str, str]
 
 
+def low_passed(values: Array) -> Array:
+    """Return `values` (n, ...), a row per tick, without what is faster than `CUTOFF`, and without a lag."""
+    return sosfiltfilt(_LOW, values, axis=0)
+
+
 def identify(motion: Motion) -> Identified:
     """Identify the robot that moved.
 
@@ -76,18 +81,13 @@ def identify(motion: Motion) -> Identified:
     """
     _check_moving(motion)
     delay, delay_sigma, gain, gain_sigma = find_delay(motion)
-    low = butter(4, CUTOFF, fs=1.0 / TICK, output="sos")
-
-    def smooth(values: Array) -> Array:
-        return sosfiltfilt(low, values, axis=0)
-
-    q = smooth(motion.q)
-    dq, gyro = np.gradient(q, TICK, axis=0), smooth(motion.gyro)
-    columns = (q, dq, np.gradient(dq, TICK, axis=0), gyro, np.gradient(gyro, TICK, axis=0), smooth(motion.acc))
+    q = low_passed(motion.q)
+    dq, gyro = np.gradient(q, TICK, axis=0), low_passed(motion.gyro)
+    columns = (q, dq, np.gradient(dq, TICK, axis=0), gyro, np.gradient(gyro, TICK, axis=0), low_passed(motion.acc))
     # The filter's own beginning and end, half a second, are not used.
     rows = np.arange(250, len(q) - 250, STRIDE)
     samples = [Sample(*parts) for parts in zip(*(column[rows] for column in columns), strict=True)]
-    given, rubbing = smooth(torque(motion, delay))[rows], smooth(np.sign(dq))[rows]
+    given, rubbing = low_passed(torque(motion, delay))[rows], low_passed(np.sign(dq))[rows]
     used = ~maximum_filter1d(np.abs(dq) < SLOW, 2 * AROUND + 1, axis=0)[rows]
     own = np.stack([columns[2][rows], columns[1][rows], rubbing], axis=2)
 
@@ -115,9 +115,8 @@ def identify(motion: Motion) -> Identified:
     if unexcited := [name for name, share in zip(JOINT_NAMES, alone, strict=True) if share.max() > KNOWN]:
         raise IdentificationError(_unexcited(unexcited))
     residual = np.sqrt(noise)
-    return Identified(
-        x, sigma, delay * TICK, delay_sigma * TICK, gain, gain_sigma, residual, _unknown(sigma, data)
-    )  # fmt: skip
+    unknown = _unknown(sigma, data)
+    return Identified(x, sigma, delay * TICK, delay_sigma * TICK, gain, gain_sigma, residual, unknown)
 
 
 def _check_moving(motion: Motion) -> None:
@@ -130,8 +129,8 @@ def _check_moving(motion: Motion) -> None:
 def _unexcited(joints: list[str]) -> str:
     which = "all 27 joints" if len(joints) == NUM_JOINTS else ", ".join(joints)
     return (
-        f"The bag does not excite {which}: armature, damping and friction need motion at several speeds; "
-        "'golem identify NEW_BAG --motion' and the stack 'sweep' move every joint."
+        f"The bag does not excite {which}: armature, damping and friction take motion at several speeds, as "
+        "'golem identify NEW_BAG --motion' records."
     )
 
 
@@ -150,6 +149,3 @@ def _unknown(sigma: Array, data: Array) -> dict[str, str]:
         else:
             found[NAMES[i]] = "cannot be told from several others together"
     return found
-
-
-__all__ = ["MASS", "Identified", "identify"]

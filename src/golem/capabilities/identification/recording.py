@@ -81,7 +81,7 @@ def read_motion(path: Path) -> Motion:
     if (seconds := len(motion.q) * TICK) < SHORTEST:
         raise IdentificationError(
             f"The bag {path} has {seconds:.1f} s of stiff motors in a row; identification takes {SHORTEST:g} s or "
-            "more: 'golem identify NEW_BAG --motion' records 60 s of a twin, the stack 'sweep' moves a robot."
+            "more, as 'golem identify NEW_BAG --motion' records."
         )
     return motion
 

@@ -23,7 +23,8 @@ LINK_NAMES = tuple(LINKS)
 BALL = 0.04
 """Radius of the ball that a payload is taken for [m], as in the twin."""
 _HINGES = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
-_AT = FRAMES["imu_link"].T_parent_frame[:3, 3]
+IMU_AT: Array = FRAMES["imu_link"].T_parent_frame[:3, 3]
+"""(3,) where the IMU is in the torso [m]."""
 
 _KINDS = ("armature", "damping", "friction", "zero")
 NAMES = (
@@ -123,7 +124,7 @@ class HangingTree:
         q[self._q] = self._sign * (s.q - x[ZERO])
         v[3:6], v[self._v] = s.gyro, self._sign * s.dq
         acc = s.acc - x[BIAS]
-        a[:3] = acc - np.cross(s.turn, _AT) - np.cross(s.gyro, np.cross(s.gyro, _AT))
+        a[:3] = acc - np.cross(s.turn, IMU_AT) - np.cross(s.gyro, np.cross(s.gyro, IMU_AT))
         a[3:6], a[self._v] = s.turn, self._sign * s.ddq
         # The hoist pulls at the pelvis: the waist is known by what hangs on its upper side, which is what turns the root.
         at, sign = self._v.copy(), self._sign.copy()

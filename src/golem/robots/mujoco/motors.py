@@ -11,7 +11,7 @@ from golem.errors import ConfigError
 from golem.kernels import njit
 from golem.native import COMMAND, Record, Records, address, floats, new_record, view
 from golem.native_messages import put_command
-from golem.robots.sensors.motor_errors import MotorErrors
+from golem.robots.sensors.motor_errors import MotorErrors, per_joint
 from golem.types import NUM_JOINTS, TICK, Array, LowCommand
 
 SLOTS = 128
@@ -170,7 +170,8 @@ class Motors:
         memory["limit"], memory["offset"], memory["delay"] = limit, offset, delay
         errors, rng = errors or MotorErrors(), rng or np.random.default_rng(0)
         memory["encoder_step"], memory["noise"] = errors.encoder_step, (errors.speed_noise, errors.torque_noise)
-        memory["torque_gain"] = 1.0 + errors.torque_gain * rng.standard_normal(NUM_JOINTS)
+        gains = per_joint(errors.torque_gains)
+        memory["torque_gain"] = 1.0 + gains + errors.torque_gain * rng.standard_normal(NUM_JOINTS)
         memory["random"] = rng.integers(1, 2**63)
         self._numbers = np.empty(COMMAND)
         self.tau: Array = memory["tau"][0]

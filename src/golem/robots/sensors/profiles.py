@@ -9,16 +9,19 @@ wind in the rope; all its figures are [assumption]s unless they say otherwise. `
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from golem.errors import unknown_name
+from golem.errors import ConfigError, unknown_name
+from golem.options import fill, read_yaml, require
+from golem.robots.model.table import JOINT_INDEX
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import DepthErrors
 from golem.robots.sensors.imu import ImuBias, ImuErrors
-from golem.robots.sensors.motor_errors import MotorErrors
+from golem.robots.sensors.motor_errors import MotorErrors, per_joint
 from golem.robots.sensors.sway import Sway, draw_sway
 from golem.robots.worlds.screws import ScrewRanges
 from golem.types import LEGS, NUM_JOINTS, UPPER, Array
@@ -50,13 +53,14 @@ class RealismProfile:
     """Magnitudes of everything that separates the twin from a perfect robot.
 
     Attributes:
-        name: `"ideal"`, `"bench"` or `"field"`.
+        name: `"ideal"`, `"bench"` or `"field"`; of a file's, that of the profile it begins with.
         head, palm: calibration error of the head camera and of each palm camera.
         depth: errors of stereo depth, all cameras.
         focal, principal: standard deviation of the focal lengths, as a share, and of the principal point [px], against
             what a camera says of itself.
         colour_noise: noise of the colour images, in multiples of what `auto_exposure` has.
         arm_offset, leg_offset: standard deviation of the encoder zero of torso and arm joints, of leg joints [rad].
+        zeros: zeros by joint about which those scatter [rad]; 0 where a joint is not named.
         actuator_delay: time from a motor command's publication to the torque [s].
         motors: errors of what the motors report.
         leg_friction, arm_friction: range of each joint's dry friction, legs and then torso and arms [N m]; None leaves
@@ -75,6 +79,7 @@ class RealismProfile:
     colour_noise: float = 0.0
     arm_offset: float = 0.0
     leg_offset: float = 0.0
+    zeros: dict[str, float] = field(default_factory=dict[str, float])
     actuator_delay: float = 0.0
     motors: MotorErrors = MotorErrors()
     leg_friction: tuple[float, float] | None = None
@@ -190,19 +195,62 @@ PROFILES: dict[str, RealismProfile] = {
 """Every profile by name."""
 
 
+@dataclass(frozen=True)
+class ProfileFile:
+    """What a file says of one robot; `golem identify` writes it.
+
+    Attributes:
+        base: profile that all else is taken from.
+        actuator_delay, zeros: see `RealismProfile`; the zeros are exact.
+        torque_gains: share by which the torques that a joint reports are wrong, by joint.
+    """
+
+    base: str
+    actuator_delay: float
+    zeros: dict[str, float] = field(default_factory=dict[str, float])
+    torque_gains: dict[str, float] = field(default_factory=dict[str, float])
+
+    def profile(self) -> RealismProfile:
+        """Return the profile; friction is what the body's file says.
+
+        Raises:
+            ConfigError: a name or a number makes no sense.
+        """
+        base = load_profile(self.base)
+        require("", ("actuator_delay", self.actuator_delay, 0.0 <= self.actuator_delay <= 0.2, "0 to 0.2 s"))
+        for what, rows in (("zero", self.zeros), ("torque gain", self.torque_gains)):
+            for name, value in rows.items():
+                if name not in JOINT_INDEX:
+                    raise unknown_name("joint", name, JOINT_INDEX)
+                if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 0.5:
+                    raise ConfigError(f"The {what} of {name} is a number from -0.5 to 0.5, not {value!r}.")
+        motors = replace(base.motors, torque_gain=0.0, torque_gains=self.torque_gains)
+        return replace(
+            base, arm_offset=0.0, leg_offset=0.0, zeros=self.zeros, actuator_delay=self.actuator_delay, motors=motors,
+            leg_friction=None, arm_friction=None,
+        )  # fmt: skip
+
+
 def load_profile(name: str) -> RealismProfile:
     """Return a profile.
 
     Args:
-        name: `"ideal"`, `"bench"` or `"field"`.
+        name: `"ideal"`, `"bench"` or `"field"`, or a YAML file with the keys of `ProfileFile`.
 
     Raises:
-        ConfigError: there is no profile of that name.
+        ConfigError: there is no profile of that name, or the file is none.
     """
-    try:
+    if name in PROFILES:
         return PROFILES[name]
-    except KeyError:
-        raise unknown_name("profile", name, PROFILES) from None
+    if not name.endswith((".yaml", ".yml")):
+        raise unknown_name("profile", name, (*PROFILES, "FILE.yaml"))
+    try:
+        rows = read_yaml(Path(name).read_text(encoding="utf-8"), name)
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"The profile '{name}' cannot be read: {error}.") from error
+    if not isinstance(rows, dict) or rows.get("base") not in PROFILES:
+        raise ConfigError(f"{name}: a profile's file begins with 'base: NAME', one of {', '.join(PROFILES)}.")
+    return fill(f"key of {name}", ProfileFile, rows).profile()
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,7 +297,7 @@ def sample_episode(profile: RealismProfile, rng: np.random.Generator) -> Episode
             + np.array([profile.focal, profile.principal, profile.principal]) * child.standard_normal(3)
             for name, child in zip(CAMERAS, lenses.spawn(len(CAMERAS)), strict=True)
         },
-        joint_offset=sigma * joints.standard_normal(NUM_JOINTS),
+        joint_offset=per_joint(profile.zeros) + sigma * joints.standard_normal(NUM_JOINTS),
         friction=np.concatenate(
             [
                 _spread(profile.leg_friction, LEGS.stop, gears),
