@@ -40,6 +40,9 @@ class IdentifyConfig:
     """Folder of a bag, or an MCAP file; with --motion the folder to create."""
     out: Path = Path("runs/identified")
     """Folder of what is written."""
+    weight: float | None = None
+    """The robot's mass on a scale between hook and robot, hands and payload included [kg]: the motion does not tell
+    that of the trunk."""
     motion: bool = False
     """Identify nothing: let a twin in the hoist swing its joints, and write that into the bag."""
     stack: str = "tether"
@@ -102,12 +105,12 @@ def run_identify(config: IdentifyConfig) -> None:
         return
     motion = read_motion(config.bag)
     kept = int(KEPT * len(motion.q))
-    found = identify(motion.part(slice(kept)))
+    found = identify(motion.part(slice(kept)), config.weight)
     before, after = tracking_error(found, motion.part(slice(kept, None)))
     save(found, config.out, report_text(found, before, after))
     print(
-        f"Joints of the last {100 * (1 - KEPT):.0f} % of the motion, which played no part: missed by {before * 1e3:.1f} "
-        f"mrad before, by {after * 1e3:.1f} mrad now."
+        f"Joints of the last {100 * (1 - KEPT):.0f} % of the motion, which played no part: missed by "
+        f"{before * 1e3:.1f} mrad before, by {after * 1e3:.1f} mrad now."
     )
     for name, why in found.unknown.items():
         print(f"Not told by this motion: {name} {why}.")

@@ -16,8 +16,10 @@ from golem.capabilities.identification.drives import find_delay, torque
 from golem.capabilities.identification.recording import IdentificationError, Motion
 from golem.capabilities.identification.regressor import (
     ARMATURE,
+    BARE,
     DAMPING,
     FRICTION,
+    MASSES,
     NAMES,
     NOMINAL,
     PRIOR,
@@ -28,17 +30,19 @@ from golem.capabilities.identification.regressor import (
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import NUM_JOINTS, TICK, Array
 
-CUTOFF = 8.0
+CUTOFF = 6.0
 """Of the filter [Hz]."""
 _LOW = butter(4, CUTOFF, fs=1.0 / TICK, output="sos")
 STRIDE = 10
 """Ticks between two samples that are used."""
 SLOW = 0.04
 """Speed below which a joint is left out [rad/s], and for `AROUND` ticks before and after."""
-AROUND = 30
-ROUNDS = 5
-RELATED = 3.0
-"""How many neighbouring samples of the filtered residual say the same: the covariance is that much larger."""
+AROUND = 50
+ROUNDS = 4
+RELATED = 1.0 / (2.0 * CUTOFF * STRIDE * TICK)
+"""How many neighbouring samples of what the filter leaves say the same: the covariance is that much larger."""
+SCALE = 0.2
+"""Standard deviation of a crane's scale [kg]."""
 KNOWN = 0.5
 """Share of its prior's standard deviation to which what is known has to come down."""
 ALIKE = 0.9
@@ -50,8 +54,8 @@ class Identified:
     """What was found.
 
     Attributes:
-        x: (141,) parameters, see `regressor.NAMES`.
-        sigma: (141,) their standard deviations.
+        x: (143,) parameters, see `regressor.NAMES`.
+        sigma: (143,) their standard deviations.
         delay, delay_sigma: from a command to its torque [s].
         gain, gain_sigma: (27,) of the torques that the drives report.
         residual: (27,) torque that is left, root mean square [N m].
@@ -67,14 +71,23 @@ class Identified:
     residual: Array
     unknown: dict[str, str]
 
+    @property
+    def ticks(self) -> int:
+        """The delay in ticks, at which the drives of the twin act."""
+        return max(round(self.delay / TICK), 0)
+
 
 def low_passed(values: Array) -> Array:
     """Return `values` (n, ...), a row per tick, without what is faster than `CUTOFF`, and without a lag."""
     return sosfiltfilt(_LOW, values, axis=0)
 
 
-def identify(motion: Motion) -> Identified:
+def identify(motion: Motion, weight: float | None = None) -> Identified:
     """Identify the robot that moved.
+
+    Args:
+        motion: what it did.
+        weight: its mass as a scale between hook and robot shows it, hands and payload included [kg].
 
     Raises:
         IdentificationError: the motion does not excite what every joint is to be known by; names the joints.
@@ -82,24 +95,26 @@ def identify(motion: Motion) -> Identified:
     _check_moving(motion)
     delay, delay_sigma, gain, gain_sigma = find_delay(motion)
     q = low_passed(motion.q)
-    dq, gyro = np.gradient(q, TICK, axis=0), low_passed(motion.gyro)
-    columns = (q, dq, np.gradient(dq, TICK, axis=0), gyro, np.gradient(gyro, TICK, axis=0), low_passed(motion.acc))
+    gyro, acc = low_passed(motion.gyro), low_passed(motion.acc)
+    dq, turn = np.gradient(q, TICK, axis=0), np.gradient(gyro, TICK, axis=0)
+    ddq, spin, jerk = (np.gradient(values, TICK, axis=0) for values in (dq, turn, acc))
+    columns = (q, dq, ddq, gyro, turn, spin, acc, jerk)
     # The filter's own beginning and end, half a second, are not used.
     rows = np.arange(250, len(q) - 250, STRIDE)
     samples = [Sample(*parts) for parts in zip(*(column[rows] for column in columns), strict=True)]
     given, rubbing = low_passed(torque(motion, delay))[rows], low_passed(np.sign(dq))[rows]
     used = ~maximum_filter1d(np.abs(dq) < SLOW, 2 * AROUND + 1, axis=0)[rows]
-    own = np.stack([columns[2][rows], columns[1][rows], rubbing], axis=2)
+    own = np.stack([ddq[rows], dq[rows], rubbing], axis=2)
 
     tree, x, noise = HangingTree(), NOMINAL.copy(), np.full(NUM_JOINTS, 1.0)
-    weight, H, data = 1.0 / PRIOR**2, np.zeros(0), np.zeros(0)
+    prior, H, data = 1.0 / PRIOR**2, np.zeros(0), np.zeros(0)
     own_at = [np.array([ARMATURE.start, DAMPING.start, FRICTION.start]) + j for j in range(NUM_JOINTS)]
-    common_at = np.r_[0:30, ZERO, 138:141]
+    common_at = np.r_[0:30, ZERO, 138:143]
     for _ in range(ROUNDS):
         tree.load(x)
         lines = [tree.linearise(x, sample) for sample in samples]
         rigid, common = np.array([line[0] for line in lines]), np.array([line[1] for line in lines])
-        data, pull = np.zeros((len(x), len(x))), -weight * (x - NOMINAL)
+        data, pull = np.zeros((len(x), len(x))), -prior * (x - NOMINAL)
         for j in range(NUM_JOINTS):
             at, rows_j = np.r_[common_at, own_at[j]], used[:, j]
             A = np.hstack([common[rows_j, j], own[rows_j, j]])
@@ -107,7 +122,10 @@ def identify(motion: Motion) -> Identified:
             noise[j] = max(float(r @ r) / max(len(r), 1), 1e-6)
             data[np.ix_(at, at)] += A.T @ A / (noise[j] * RELATED)
             pull[at] += A.T @ r / (noise[j] * RELATED)
-        H = data + np.diag(weight)
+        if weight is not None:
+            data[:30, :30] += np.outer(MASSES, MASSES) / SCALE**2
+            pull[:30] += MASSES * (weight - BARE - MASSES @ x[:30]) / SCALE**2
+        H = data + np.diag(prior)
         x = x + np.linalg.solve(H, pull)
     sigma = np.sqrt(np.diag(np.linalg.inv(H)))
     # With all else known; what all else leaves in doubt is a matter of `unknown`.

@@ -35,7 +35,7 @@ BODY, PROFILE, REPORT = "body.xml", "profile.yaml", "report.md"
 
 
 def body_spec(x: Array, hands: bool = False) -> mujoco.MjSpec:
-    """Return the robot with the masses, armature, damping and friction of the parameters `x` (141,)."""
+    """Return the robot with the masses, armature, damping and friction of the parameters `x` (143,)."""
     spec = mjcf.robot_spec(hands)
     for name, inertial in identified_links(x).items():
         body = spec.body(name)
@@ -48,7 +48,7 @@ def body_spec(x: Array, hands: bool = False) -> mujoco.MjSpec:
 
 
 def replay(x: Array, delay: float, motion: Motion) -> Array:
-    """Return the (n, 27) joints that the encoders of a robot with parameters `x` (141,) report under the commands.
+    """Return the (n, 27) joints that the encoders of a robot with parameters `x` (143,) report under the commands.
 
     The pelvis stays where it is; gravity is what the IMU of the `motion` measured.
 
@@ -89,7 +89,7 @@ def tracking_error(found: Identified, motion: Motion) -> tuple[float, float]:
     """Return by how much model and identified robot miss the joints of `motion`, root mean square [rad]."""
     return tuple(
         float(np.sqrt(np.mean((replay(x, delay, motion) - motion.q) ** 2)))
-        for x, delay in ((NOMINAL, 0.0), (found.x, found.delay))
+        for x, delay in ((NOMINAL, 0.0), (found.x, found.ticks * TICK))
     )  # type: ignore[return-value]
 
 
@@ -107,7 +107,7 @@ def save(found: Identified, folder: Path, report: str) -> None:
 
     profile = {
         "base": "field",
-        "actuator_delay": round(max(found.delay, 0.0), 5),
+        "actuator_delay": found.ticks * TICK,
         "zeros": rows(found.x[ZERO]),
         "torque_gains": rows(found.gain - 1.0),
     }

@@ -32,12 +32,14 @@ NAMES = (
     *(f"payload of the {side} hand" for side in SIDES),
     *(f"{kind} of {name}" for kind in _KINDS for name in JOINT_NAMES),
     *(f"accelerometer bias {axis}" for axis in "xyz"),
+    "lag of the gyro",
+    "lag of the accelerometer",
 )
 """What is identified: masses as shares by which they differ from the model's [1], payloads [kg], armature [kg m^2],
-damping [N m s/rad], dry friction [N m], zeros [rad], bias [m/s^2]."""
+damping [N m s/rad], dry friction [N m], zeros [rad], bias [m/s^2], lags behind the encoders [s]."""
 MASS, PAYLOAD = slice(0, 28), slice(28, 30)
 ARMATURE, DAMPING, FRICTION, ZERO = (slice(30 + k * NUM_JOINTS, 30 + (k + 1) * NUM_JOINTS) for k in range(4))
-BIAS = slice(138, 141)
+BIAS, LAG = slice(138, 141), slice(141, 143)
 
 
 def _vector(*groups: tuple[int, float]) -> Array:
@@ -45,22 +47,30 @@ def _vector(*groups: tuple[int, float]) -> Array:
 
 
 _N = NUM_JOINTS
-NOMINAL: Array = _vector((30, 0.0), (_N, DOF.armature), (_N, DOF.damping), (_N, DOF.frictionloss), (_N + 3, 0.0))
-"""(141,) what the model says."""
-PRIOR: Array = _vector((28, 0.1), (2, 1.5), (_N, 0.1), (_N, 1.0), (_N, 1.5), (_N, 0.05), (3, 0.05))
-"""(141,) standard deviation of what a robot may differ by [assumption]."""
+NOMINAL: Array = _vector((30, 0.0), (_N, DOF.armature), (_N, DOF.damping), (_N, DOF.frictionloss), (_N + 5, 0.0))
+"""(143,) what the model says."""
+PRIOR: Array = _vector(
+    (28, 0.1), (2, 1.5), (_N, 0.1), (_N, 1.0), (_N, 1.5), (12, 0.015), (15, 0.05), (3, 0.05), (2, 0.003)
+)
+"""(143,) standard deviation of what a robot may differ by [assumption]; legs are zeroed with the vendor's jig."""
+MASSES: Array = np.array([*(inertial.mass for inertial in LINKS.values()), 1.0, 1.0])
+"""(30,) derivatives of the robot's mass by masses and payloads [kg]."""
+BARE = float(MASSES[:28].sum()) + 2.0 * magpie_model.lump().mass
+"""The model's mass, empty hands included [kg]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One moment: q, dq, ddq (27,) [rad, s]; gyro, its derivative, acc (3,) of the IMU [rad, m, s]."""
+    """One moment: q, dq, ddq (27,) [rad, s]; gyro, its two derivatives, acc, its derivative (3,) [rad, m, s]."""
 
     q: Array
     dq: Array
     ddq: Array
     gyro: Array
     turn: Array
+    spin: Array
     acc: Array
+    jerk: Array
 
 
 def hand_payload(side_mass: float) -> Inertial:
@@ -103,7 +113,7 @@ class HangingTree:
         self._place = dict(zip(LINK_NAMES, self._link, strict=True))
 
     def load(self, x: Array) -> None:
-        """Take masses and payloads from the parameters `x` (141,)."""
+        """Take masses and payloads from the parameters `x` (143,)."""
         for name, inertial in identified_links(x).items():
             self._model.inertias[self._place[name]] = pin.Inertia(inertial.mass, inertial.com, inertial.inertia)
         hand = magpie_model.lump().moved(magpie_model.T_WRIST_HAND)
@@ -117,16 +127,17 @@ class HangingTree:
 
         Returns:
             torque: (27,) without armature and friction [N m].
-            common: (27, 60) derivatives by the masses, payloads, zeros and bias.
+            common: (27, 62) derivatives by the masses, payloads, zeros, bias and lags.
         """
         q, v, a = np.zeros(self._model.nq), np.zeros(self._model.nv), np.zeros(self._model.nv)
         q[6] = 1.0
         q[self._q] = self._sign * (s.q - x[ZERO])
-        v[3:6], v[self._v] = s.gyro, self._sign * s.dq
-        acc = s.acc - x[BIAS]
-        a[:3] = acc - np.cross(s.turn, IMU_AT) - np.cross(s.gyro, np.cross(s.gyro, IMU_AT))
-        a[3:6], a[self._v] = s.turn, self._sign * s.ddq
-        # The hoist pulls at the pelvis: the waist is known by what hangs on its upper side, which is what turns the root.
+        gyro, turn = s.gyro + x[LAG][0] * s.turn, s.turn + x[LAG][0] * s.spin
+        v[3:6], v[self._v] = gyro, self._sign * s.dq
+        acc = s.acc + x[LAG][1] * s.jerk - x[BIAS]
+        a[:3] = acc - np.cross(turn, IMU_AT) - np.cross(gyro, np.cross(gyro, IMU_AT))
+        a[3:6], a[self._v] = turn, self._sign * s.ddq
+        # The hoist pulls at the pelvis: the waist is known by what is above it, which is what turns the root.
         at, sign = self._v.copy(), self._sign.copy()
         at[TORSO], sign[TORSO] = 5, 1.0
         rows = sign[:, None] * (pin.computeJointTorqueRegressor(self._model, self._data, q, v, a)[at] @ self._numbers)
@@ -134,13 +145,14 @@ class HangingTree:
         turned, _, mass = pin.computeRNEADerivatives(self._model, self._data, q, v, a)
         zeros = -sign[:, None] * turned[np.ix_(at, self._v)] * self._sign
         bias = -sign[:, None] * mass[:3, at].T
-        zeros[TORSO, : TORSO + 1] = bias[TORSO] = 0.0
+        lags = np.column_stack([sign * (mass[:6, at].T @ [*-np.cross(s.spin, IMU_AT), *s.spin]), -bias @ s.jerk])
+        zeros[TORSO, : TORSO + 1] = bias[TORSO] = lags[TORSO] = 0.0
         torque = rows[:, :28] @ (1.0 + x[MASS]) + rows[:, 28:30] @ x[PAYLOAD] + rows[:, 30]
-        return torque, np.hstack([rows[:, :30], zeros, bias])
+        return torque, np.hstack([rows[:, :30], zeros, bias, lags])
 
 
 def identified_links(x: Array) -> dict[str, Inertial]:
-    """Return the links with the masses of the parameters `x` (141,): as large as the model's, of another density."""
+    """Return the links with the masses of the parameters `x` (143,): as large as the model's, of another density."""
     scaled = zip(LINKS.items(), 1.0 + x[MASS], strict=True)
     return {name: Inertial(f * i.mass, i.com, f * i.inertia) for (name, i), f in scaled}
 

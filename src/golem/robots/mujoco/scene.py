@@ -233,6 +233,7 @@ def add_payload(hand: mujoco.MjsBody, mass: float) -> None:
     hand.add_body(
         name=f"{hand.name}_payload",
         pos=magpie_model.T_HAND_GRIPPER[:3, 3],
+        ipos=[0.0, 0.0, 0.0],  # MuJoCo takes `pos` again where it is not said
         mass=mass,
         inertia=[0.4 * mass * radius**2] * 3,
         explicitinertial=True,
