@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -20,6 +21,7 @@ from golem.capabilities.identification.regressor import (
     PAYLOAD,
     ZERO,
     identified_links,
+    loaded_links,
 )
 from golem.errors import OutputError
 from golem.robots.model import mjcf
@@ -27,19 +29,22 @@ from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES, LINKS
 from golem.robots.mujoco.motors import Motors
-from golem.robots.mujoco.scene import add_payload
 from golem.types import NUM_JOINTS, SIDES, TICK, Array, LowCommand
 
 BODY, PROFILE, REPORT = "body.xml", "profile.yaml", "report.md"
 """Names of the files."""
 
 
-def body_spec(x: Array, hands: bool = False) -> mujoco.MjSpec:
-    """Return the robot with the masses, armature, damping and friction of the parameters `x` (143,)."""
-    spec = mjcf.robot_spec(hands)
-    for name, inertial in identified_links(x).items():
+def body_spec(x: Array, loaded: bool = False) -> mujoco.MjSpec:
+    """Return the robot with masses, armature, damping and friction of the parameters `x` (143,).
+
+    It has no hands, or, `loaded`, wrists as heavy as with hands and payloads.
+    """
+    spec = mjcf.robot_spec(hands=False)
+    for name, inertial in (loaded_links if loaded else identified_links)(x).items():
         body = spec.body(name)
-        body.mass, body.fullinertia = inertial.mass, np.array(inertial.six())[[0, 3, 5, 1, 2, 4]]
+        body.mass, body.ipos = inertial.mass, inertial.com
+        body.fullinertia = np.array(inertial.six())[[0, 3, 5, 1, 2, 4]]
     for i, name in enumerate(JOINT_NAMES):
         joint = spec.joint(name)
         joint.armature, joint.frictionloss = x[ARMATURE][i], max(float(x[FRICTION][i]), 0.0)
@@ -47,8 +52,8 @@ def body_spec(x: Array, hands: bool = False) -> mujoco.MjSpec:
     return spec
 
 
-def replay(x: Array, delay: float, motion: Motion) -> Array:
-    """Return the (n, 27) joints that the encoders of a robot with parameters `x` (143,) report under the commands.
+def simulate(x: Array, delay: float, motion: Motion) -> Motion:
+    """Return what the motors of a robot with parameters `x` (143,) report under the commands of `motion`.
 
     The pelvis stays where it is; gravity is what the IMU of the `motion` measured.
 
@@ -57,11 +62,8 @@ def replay(x: Array, delay: float, motion: Motion) -> Array:
         delay: from a command to its torque [s].
         motion: commands, and where to begin.
     """
-    spec = body_spec(x, hands=True)
+    spec = body_spec(x, loaded=True)
     spec.delete(spec.joint("base"))
-    for side, mass in zip(SIDES, x[PAYLOAD], strict=True):
-        if mass > 0.0:
-            add_payload(spec.body(f"{side}_hand"), float(mass))
     spec.option.timestep, spec.option.integrator = TICK, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT
     model = spec.compile()
@@ -69,26 +71,26 @@ def replay(x: Array, delay: float, motion: Motion) -> Array:
     motors = Motors(model, load_limits().torque, x[ZERO], delay)
     motors.place(data, motion.q[0] - x[ZERO])
     data.qvel[[model.joint(name).dofadr[0] for name in JOINT_NAMES]] = motion.dq[0]
-    out = np.empty((len(motion.q), NUM_JOINTS))
+    out = np.empty((len(motion.q), 3, NUM_JOINTS))
     # Specific force at the pelvis, whose origin is the waist's; turns of the hanging base are small.
     c, s = np.cos(motion.q[:, TORSO] - x[ZERO][TORSO]), np.sin(motion.q[:, TORSO] - x[ZERO][TORSO])
-    acc = low_passed(motion.acc) - x[BIAS]
-    turn = np.gradient(low_passed(motion.gyro), TICK, axis=0)
-    acc = acc - np.cross(turn, IMU_AT)
+    gyro = low_passed(motion.gyro)
+    swung = np.cross(np.gradient(gyro, TICK, axis=0), IMU_AT) + np.cross(gyro, np.cross(gyro, IMU_AT))
+    acc = low_passed(motion.acc) - x[BIAS] - swung
     field = -np.column_stack([c * acc[:, 0] - s * acc[:, 1], s * acc[:, 0] + c * acc[:, 1], acc[:, 2]])
     for k, row in enumerate(motion.command):
-        out[k] = motors.measure(data)[0]
+        out[k] = motors.measure(data)
         model.opt.gravity = field[k]
         motors.give(LowCommand(k * TICK, *row), data.time)
         motors.drive(data)
         mujoco.mj_step(model, data)
-    return out
+    return replace(motion, q=out[:, 0], dq=out[:, 1], tau=out[:, 2])
 
 
 def tracking_error(found: Identified, motion: Motion) -> tuple[float, float]:
     """Return by how much model and identified robot miss the joints of `motion`, root mean square [rad]."""
     return tuple(
-        float(np.sqrt(np.mean((replay(x, delay, motion) - motion.q) ** 2)))
+        float(np.sqrt(np.mean((simulate(x, delay, motion).q - motion.q) ** 2)))
         for x, delay in ((NOMINAL, 0.0), (found.x, found.ticks * TICK))
     )  # type: ignore[return-value]
 

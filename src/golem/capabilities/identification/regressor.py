@@ -73,10 +73,10 @@ class Sample:
     jerk: Array
 
 
-def hand_payload(side_mass: float) -> Inertial:
-    """Return the ball of `side_mass` [kg] at the grasp frame, in the wrist's link."""
+def hand_payload(mass: float) -> Inertial:
+    """Return the ball of `mass` [kg] at the grasp frame, in the wrist's link."""
     at = (magpie_model.T_WRIST_HAND @ magpie_model.T_HAND_GRIPPER)[:3, 3]
-    return Inertial(side_mass, at, 0.4 * side_mass * BALL**2 * np.eye(3))
+    return Inertial(mass, at, 0.4 * mass * BALL**2 * np.eye(3))
 
 
 class HangingTree:
@@ -114,13 +114,8 @@ class HangingTree:
 
     def load(self, x: Array) -> None:
         """Take masses and payloads from the parameters `x` (143,)."""
-        for name, inertial in identified_links(x).items():
+        for name, inertial in loaded_links(x).items():
             self._model.inertias[self._place[name]] = pin.Inertia(inertial.mass, inertial.com, inertial.inertia)
-        hand = magpie_model.lump().moved(magpie_model.T_WRIST_HAND)
-        for side, mass in zip(SIDES, x[PAYLOAD], strict=True):
-            name = f"{side}_wrist_yaw_link"
-            body = combined([identified_links(x)[name], hand, hand_payload(float(mass))])
-            self._model.inertias[self._place[name]] = pin.Inertia(body.mass, body.com, body.inertia)
 
     def linearise(self, x: Array, s: Sample) -> tuple[Array, Array]:
         """Return torques (27,) of the rigid links at `x`, which was loaded, and their derivatives.
@@ -155,6 +150,15 @@ def identified_links(x: Array) -> dict[str, Inertial]:
     """Return the links with the masses of the parameters `x` (143,): as large as the model's, of another density."""
     scaled = zip(LINKS.items(), 1.0 + x[MASS], strict=True)
     return {name: Inertial(f * i.mass, i.com, f * i.inertia) for (name, i), f in scaled}
+
+
+def loaded_links(x: Array) -> dict[str, Inertial]:
+    """Return the same, the wrists with hands, fingers half open, and payloads."""
+    links, hand = identified_links(x), magpie_model.lump().moved(magpie_model.T_WRIST_HAND)
+    for side, mass in zip(SIDES, x[PAYLOAD], strict=True):
+        name = f"{side}_wrist_yaw_link"
+        links[name] = combined([links[name], hand, hand_payload(float(mass))])
+    return links
 
 
 assert len(NAMES) == len(NOMINAL) == len(PRIOR) and LINK_NAMES[0] == BASE_LINK

@@ -158,7 +158,7 @@ def _robot(config: MujocoConfig) -> mujoco.MjSpec:
             geom.friction[0] = config.friction
     for side, mass in zip(SIDES, config.payload, strict=True):
         if mass > 0.0:
-            add_payload(spec.body(magpie_model.hand_name(side)), mass)
+            _add_payload(spec.body(magpie_model.hand_name(side)), mass)
     if config.tags:
         add_tag_cuffs(spec)
     return spec
@@ -227,7 +227,7 @@ def _strip_world(spec: mujoco.MjSpec) -> None:
         spec.delete(texture)
 
 
-def add_payload(hand: mujoco.MjsBody, mass: float) -> None:
+def _add_payload(hand: mujoco.MjsBody, mass: float) -> None:
     """Fix a ball of `mass` [kg] where the fingers meet; it touches nothing, and no camera sees it."""
     radius = 0.04
     hand.add_body(

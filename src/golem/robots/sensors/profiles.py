@@ -243,7 +243,7 @@ def load_profile(name: str) -> RealismProfile:
     if name in PROFILES:
         return PROFILES[name]
     if not name.endswith((".yaml", ".yml")):
-        raise unknown_name("profile", name, (*PROFILES, "FILE.yaml"))
+        raise unknown_name("profile", name, PROFILES)
     try:
         rows = read_yaml(Path(name).read_text(encoding="utf-8"), name)
     except (OSError, UnicodeDecodeError) as error:
