@@ -35,7 +35,7 @@ def draw(seed: int) -> Identified:
     rng = np.random.default_rng([48, seed])
     x = r.NOMINAL.copy()
     x[r.MASS] = rng.uniform(-0.1, 0.1, 28)
-    x[r.PAYLOAD] = rng.uniform(0.0, 2.0, 2)
+    x[r.PAYLOAD] = rng.uniform(0.0, 1.5, 2)
     x[r.ARMATURE] *= rng.uniform(0.7, 1.5, NUM_JOINTS)
     x[r.DAMPING] *= rng.uniform(0.5, 2.0, NUM_JOINTS)
     x[r.FRICTION] = np.r_[rng.uniform(0.3, 2.0, 12), rng.uniform(0.1, 0.8, 15)]

@@ -59,7 +59,8 @@ def test_the_sweep_stays_inside_the_joints_ranges_and_below_3_rad_per_second() -
 @pytest.mark.slow
 def test_payload_friction_zeros_and_delay_are_found() -> None:
     x = hidden()
-    found = identify(on_the_torso(simulate(x, 0.006, commanded(30.0))))
+    motion = on_the_torso(simulate(x, 0.006, commanded(30.0)))
+    found = identify(motion)
     assert found.delay == pytest.approx(0.006, abs=5e-4)
     np.testing.assert_allclose(found.x[r.PAYLOAD], x[r.PAYLOAD], atol=0.05)
     np.testing.assert_allclose(found.x[r.FRICTION], x[r.FRICTION], rtol=0.15)
@@ -67,6 +68,8 @@ def test_payload_friction_zeros_and_delay_are_found() -> None:
     np.testing.assert_allclose(np.delete(found.x[r.ZERO] - x[r.ZERO], vertical), 0.0, atol=5e-3)
     assert {r.NAMES[r.ZERO][i] for i in vertical} <= found.unknown.keys()
     assert "armature of torso_joint" in found.unknown["mass of torso_link"]
+    with pytest.raises(IdentificationError, match=r"left_hip_pitch_joint, .* not those of a robot that hangs free"):
+        identify(replace(motion, acc=-motion.acc))
 
 
 def test_a_joint_that_rests_is_refused_by_its_name() -> None:

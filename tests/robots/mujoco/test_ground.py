@@ -176,7 +176,7 @@ def test_a_payload_hangs_at_the_grasp_frame() -> None:
     assert weight(laden) - weight(bare) == pytest.approx(3.5 * 9.81)
     for side, mass in (("left", 1.0), ("right", 2.5)):
         body = laden.data.body(f"{side}_hand_payload")
-        np.testing.assert_allclose(body.xpos, laden.data.site(f"{side}_gripper").xpos, atol=1e-9)
+        np.testing.assert_allclose(body.xipos, laden.data.site(f"{side}_gripper").xpos, atol=1e-9)
         assert laden.scene.model.body(body.id).mass[0] == mass
     with pytest.raises(ConfigError, match="payload"):
         twin(payload=[-1.0, 0.0])

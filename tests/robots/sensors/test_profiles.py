@@ -1,9 +1,13 @@
+import re
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from golem.errors import ConfigError
 from golem.robots.model import pinocchio_model
+from golem.robots.model.table import JOINT_INDEX
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.profiles import PROFILES, EpisodeErrors, load_profile, sample_episode
 from golem.robots.sensors.streams import stream
@@ -123,3 +127,39 @@ def test_joint_offsets_put_the_hand_off_by_the_reported_reach_error(name: str, r
         pin.framesForwardKinematics(model, data, q)
         errors.append(np.linalg.norm(data.oMf[hand].translation - palm))
     assert np.mean(errors) == pytest.approx(reach_error, rel=0.06)
+
+
+def test_a_file_says_what_one_robot_is_like(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("base: field\nactuator_delay: 0.006\nzeros: {left_elbow_joint: 0.02}\n", encoding="utf-8")
+    profile = load_profile(str(file))
+    assert (profile.name, profile.actuator_delay, profile.imu) == ("field", 0.006, load_profile("field").imu)
+    for seed in (0, 1):
+        episode = sample_episode(profile, stream(seed, "episode"))
+        assert episode.joint_offset[JOINT_INDEX["left_elbow_joint"]] == 0.02
+        assert np.count_nonzero(episode.joint_offset) == 1
+        assert np.isnan(episode.friction).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("actuator_delay: 0.0", "begins with 'base: NAME', one of ideal, bench, field"),
+        ("base: [1]\nactuator_delay: 0.0", "begins with 'base: NAME'"),
+        ("base: field", "actuator_delay"),
+        ("base: field\nactuator_delay: 1.0", "actuator_delay is 0 to 0.2 s, not 1"),
+        ("base: field\nactuator_delay: .nan", "actuator_delay is 0 to 0.2 s, not nan"),
+        ("base: field\nactuator_delay: 0.0\nzeros: {elbow: 0.1}", "'elbow'; valid: "),
+        ("base: field\nactuator_delay: 0.0\nzeros: {left_elbow_joint: 2.0}", "left_elbow_joint is a number from -0.5"),
+        ("base: field\nactuator_delay: 0.0\nzeros: {left_elbow_joint: [1]}", "left_elbow_joint is a number from -0.5"),
+        ("base: field\nactuator_delay: 0.0\nzeros: 3", "zeros are a mapping by joint, not 3"),
+        ("base: field\nactuator_delay: 0.0\nfriction: 3", "'friction'; valid: "),
+    ],
+)
+def test_a_file_that_is_no_profile_is_refused(text: str, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match=re.escape(words)):
+        load_profile(str(file))
+    with pytest.raises(ConfigError, match="cannot be read"):
+        load_profile(str(tmp_path / "none.yaml"))

@@ -41,6 +41,8 @@ AROUND = 50
 ROUNDS = 4
 RELATED = 1.0 / (2.0 * CUTOFF * STRIDE * TICK)
 """How many neighbouring samples of what the filter leaves say the same: the covariance is that much larger."""
+ODD = 0.3
+"""Share of a joint's torque, as standard deviations, that may be left unexplained."""
 SCALE = 0.2
 """Standard deviation of a crane's scale [kg]."""
 KNOWN = 0.5
@@ -133,6 +135,12 @@ def identify(motion: Motion, weight: float | None = None) -> Identified:
     if unexcited := [name for name, share in zip(JOINT_NAMES, alone, strict=True) if share.max() > KNOWN]:
         raise IdentificationError(_unexcited(unexcited))
     residual = np.sqrt(noise)
+    asked = [given[used[:, j], j].std() for j in range(NUM_JOINTS)]
+    if odd := [n for n, left, all_of_it in zip(JOINT_NAMES, residual, asked, strict=True) if left > ODD * all_of_it]:
+        raise IdentificationError(
+            f"The torques of {', '.join(odd)} are not those of a robot that hangs free: it is identified in the hoist, "
+            "its feet clear of the floor, its limbs touching nothing."
+        )
     unknown = _unknown(sigma, data)
     return Identified(x, sigma, delay * TICK, delay_sigma * TICK, gain, gain_sigma, residual, unknown)
 

@@ -14,7 +14,7 @@ from golem.types import LEGS, NUM_JOINTS, UPPER, Array, BaseEstimate, LowState
 # Middle and swing of each joint [rad], left side. Feet stay apart, hands beside the trunk and off the thighs; the torso
 # turns, or a lean of the IMU could not be told from the zeros of the legs.
 _LEG = ((0.05, 0.25), (-0.25, 0.4), (0.2, 0.16), (0.6, 0.5), (-0.15, 0.35), (0.0, 0.15))
-_ARM = ((-0.2, 0.6), (0.6, 0.3), (0.0, 0.5), (1.1, 0.5), (0.0, 0.8), (0.0, 0.35), (0.0, 0.8))
+_ARM = ((0.0, 0.5), (0.6, 0.3), (0.0, 0.5), (1.1, 0.5), (0.0, 0.8), (0.0, 0.35), (0.0, 0.8))
 _LEG_MIRROR, _ARM_MIRROR = (-1, 1, -1, 1, 1, -1), (1, -1, -1, 1, -1, 1, -1)
 _ROWS = np.array([*_LEG, *_LEG, (0.0, 0.8), *_ARM, *_ARM])
 MIDDLE: Array = _ROWS[:, 0] * (*(1,) * 6, *_LEG_MIRROR, *(1,) * 8, *_ARM_MIRROR)

@@ -218,12 +218,14 @@ class ProfileFile:
         """
         base = load_profile(self.base)
         require("", ("actuator_delay", self.actuator_delay, 0.0 <= self.actuator_delay <= 0.2, "0 to 0.2 s"))
-        for what, rows in (("zero", self.zeros), ("torque gain", self.torque_gains)):
+        for what, rows in (("zeros", self.zeros), ("torque_gains", self.torque_gains)):
+            if not isinstance(rows, dict):
+                raise ConfigError(f"The {what} are a mapping by joint, not {rows!r}.")
             for name, value in rows.items():
                 if name not in JOINT_INDEX:
                     raise unknown_name("joint", name, JOINT_INDEX)
                 if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 0.5:
-                    raise ConfigError(f"The {what} of {name} is a number from -0.5 to 0.5, not {value!r}.")
+                    raise ConfigError(f"Of {what}, {name} is a number from -0.5 to 0.5, not {value!r}.")
         motors = replace(base.motors, torque_gain=0.0, torque_gains=self.torque_gains)
         return replace(
             base, arm_offset=0.0, leg_offset=0.0, zeros=self.zeros, actuator_delay=self.actuator_delay, motors=motors,
@@ -248,7 +250,7 @@ def load_profile(name: str) -> RealismProfile:
         rows = read_yaml(Path(name).read_text(encoding="utf-8"), name)
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"The profile '{name}' cannot be read: {error}.") from error
-    if not isinstance(rows, dict) or rows.get("base") not in PROFILES:
+    if not isinstance(rows, dict) or rows.get("base") not in list(PROFILES):
         raise ConfigError(f"{name}: a profile's file begins with 'base: NAME', one of {', '.join(PROFILES)}.")
     return fill(f"key of {name}", ProfileFile, rows).profile()
 
