@@ -21,7 +21,7 @@ from golem.capabilities.identification.fit import Identified, identify
 from golem.capabilities.identification.outcome import save, tracking_error
 from golem.capabilities.identification.recording import read_motion
 from golem.robots.model.table import JOINT_NAMES
-from golem.runtime.identify_command import KEPT, record_motion, sweep_stack
+from golem.runtime.identify_command import KEPT, record_motion
 from golem.stack import load_stack
 from golem.types import NUM_JOINTS, TICK, Array
 
@@ -52,7 +52,7 @@ def record(seed: int, folder: Path, seconds: float) -> None:
     payload = [float(mass) for mass in hidden.x[r.PAYLOAD]]
     stack = replace(load_stack("tether"), profile=str(folder / "hidden" / "profile.yaml"))
     stack = stack.with_options("robot", mjcf=str(folder / "hidden" / "body.xml"), payload=payload)
-    record_motion(sweep_stack(stack), seed, folder / "bag", seconds)
+    record_motion(stack, seed, folder / "bag", seconds)
 
 
 def judge(seed: int, folder: Path) -> dict[str, object]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import mujoco
 import numpy as np
 import pytest
@@ -39,7 +37,7 @@ def test_torques_are_those_of_mujoco() -> None:
     acc = [0.0, 0.0, 9.81] + np.cross(turn, r.IMU_AT) + np.cross(gyro, np.cross(gyro, r.IMU_AT))
     tree = r.HangingTree()
     tree.load(x)
-    torque, _ = tree.linearise(x, replace(sample, gyro=gyro, turn=turn, acc=acc))
+    torque, _ = tree.linearise(x, sample._replace(gyro=gyro, turn=turn, acc=acc))
     np.testing.assert_allclose(torque, data.qfrc_inverse[to] - own, atol=1e-6)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +15,8 @@ from golem.middleware.wire.struct_layout import WireError
 from golem.types import COMMAND_AGE, NUM_JOINTS, TICK, Array
 
 STATE, COMMAND = "/lowstate", "/lowcmd"
-SHORTEST = 20.0
-"""Least time under command that something can be identified from [s]."""
-LONGEST = 600.0
-"""Most of a bag that is looked at [s]."""
+SHORTEST, LONGEST = 20.0, 600.0
+"""Least time under command that something can be identified from, and most that is looked at [s]."""
 
 
 class IdentificationError(GolemError):
@@ -44,7 +42,7 @@ class Motion:
 
     def part(self, rows: slice) -> Motion:
         """Return the ticks `rows` of it."""
-        return Motion(*(getattr(self, name)[rows] for name in ("q", "dq", "tau", "gyro", "acc", "command")))
+        return Motion(*(getattr(self, f.name)[rows] for f in fields(self)))
 
 
 def read_motion(path: Path) -> Motion:
@@ -55,40 +53,30 @@ def read_motion(path: Path) -> Motion:
 
     Raises:
         BagError: there is none, or it is damaged.
-        IdentificationError: it lacks a topic, or is shorter than `SHORTEST`.
+        IdentificationError: it lacks a topic, has a damaged message, or is shorter than `SHORTEST`.
     """
-    bag = Bag(path)
-    if missing := [name for name in (STATE, COMMAND) if name not in bag.topics]:
-        raise IdentificationError(
-            f"The bag {path} has no {' and no '.join(missing)}: it takes {STATE} and {COMMAND}, recorded while the "
-            "gate commands the robot."
-        )
+    bag, machine = Bag(path), 0
     rows: dict[str, list[Array]] = {STATE: [], COMMAND: []}
-    machine = 0
-    for message in bag.messages((STATE, COMMAND)):
+    if missing := [name for name in rows if name not in bag.topics]:
+        raise IdentificationError(f"The bag {path} has no {missing[0]}: it takes {STATE} and {COMMAND}.")
+    for message in bag.messages(rows):
         name, t = message.topic.name, message.log_time / NANO
         try:
             if name == STATE:
-                machine, state = mode_machine(message.payload), decode_low_state(message.payload)
-                row = np.concatenate([[t], state.q, state.dq, state.tau, state.imu.gyro, state.imu.acc])
+                machine, s = mode_machine(message.payload), decode_low_state(message.payload)
+                rows[name].append(np.concatenate([[t], s.q, s.dq, s.tau, s.imu.gyro, s.imu.acc]))
             else:
-                told = decode_low_command(message.payload, t, machine)
-                row = np.concatenate([[t], told.q, told.dq, told.tau, told.kp, told.kd])
+                c = decode_low_command(message.payload, t, machine)
+                rows[name].append(np.concatenate([[t], c.q, c.dq, c.tau, c.kp, c.kd]))
         except WireError as error:
             raise IdentificationError(f"The bag {path} has a damaged message on {name}: {error}") from error
-        rows[name].append(row)
-    motion = _stretch(*(_sorted(rows[name]) for name in (STATE, COMMAND)))
+    motion = _stretch(*(np.array(sorted(rows[name], key=lambda row: row[0]) or [[0.0]]) for name in rows))
     if (seconds := len(motion.q) * TICK) < SHORTEST:
         raise IdentificationError(
             f"The bag {path} has {seconds:.1f} s of stiff motors in a row; identification takes {SHORTEST:g} s or "
             "more, as 'golem identify NEW_BAG --motion' records."
         )
     return motion
-
-
-def _sorted(rows: list[Array]) -> Array:
-    table = np.array(rows or [np.zeros(1)])
-    return table[np.argsort(table[:, 0], kind="stable")]
 
 
 def _stretch(states: Array, commands: Array) -> Motion:
@@ -101,8 +89,8 @@ def _stretch(states: Array, commands: Array) -> Motion:
     good = np.concatenate([[False], fresh & (commands[newest, 1 + 3 * n : 1 + 4 * n] > 0.0).all(axis=1), [False]])
     edges = np.flatnonzero(np.diff(good)).reshape(-1, 2)
     first, last = max(edges.tolist(), key=lambda edge: edge[1] - edge[0], default=[0, 0])
-    t = t[first:last]
-    columns = [np.interp(t, seen, column) for column in states[:, 1:].T] if len(t) else [t] * (3 * n + 6)
-    state = np.column_stack(columns)
+    if first == last:
+        return Motion(*(np.zeros((0, 3)),) * 6)
+    state = np.column_stack([np.interp(t[first:last], seen, column) for column in states[:, 1:].T])
     parts = np.split(state, [n, 2 * n, 3 * n, 3 * n + 3], axis=1)
     return Motion(*parts, commands[newest[first:last], 1:].reshape(-1, 5, n))

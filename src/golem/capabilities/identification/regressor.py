@@ -2,12 +2,12 @@
 
 The torso is the root: the IMU on it measures how the root moves, so that no model of the hoist is needed. For given
 motion, inverse dynamics is linear in masses, payloads, armature and friction (Atkeson, An, Hollerbach 1986); zeros of
-the encoders and the bias of the accelerometer enter by its derivatives (Carpentier, Mansard 2018).
+the encoders, bias and lag of the IMU enter by its derivatives (Carpentier, Mansard 2018).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -15,52 +15,42 @@ import pinocchio as pin
 from golem.robots.model import magpie_model
 from golem.robots.model.imu_mount import TORSO
 from golem.robots.model.spatial import Inertial, combined
-from golem.robots.model.table import BASE_LINK, DOF, FRAMES, JOINT_NAMES, JOINTS, LINKS
-from golem.types import NUM_JOINTS, SIDES, Array
+from golem.robots.model.table import DOF, FRAMES, JOINT_NAMES, JOINTS, LINKS
+from golem.types import LEGS, NUM_JOINTS, SIDES, Array
 
 ROOT = "torso_link"
-LINK_NAMES = tuple(LINKS)
 BALL = 0.04
 """Radius of the ball that a payload is taken for [m], as in the twin."""
 _HINGES = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
+WRISTS, HAND = [f"{side}_wrist_yaw_link" for side in SIDES], magpie_model.lump().moved(magpie_model.T_WRIST_HAND)
+"""Names of the links that carry hands, and the mass of those in them, fingers half open."""
 IMU_AT: Array = FRAMES["imu_link"].T_parent_frame[:3, 3]
 """(3,) where the IMU is in the torso [m]."""
 
-_KINDS = ("armature", "damping", "friction", "zero")
 NAMES = (
-    *(f"mass of {name}" for name in LINK_NAMES),
+    *(f"mass of {name}" for name in LINKS),
     *(f"payload of the {side} hand" for side in SIDES),
-    *(f"{kind} of {name}" for kind in _KINDS for name in JOINT_NAMES),
+    *(f"{kind} of {name}" for kind in ("armature", "damping", "friction", "zero") for name in JOINT_NAMES),
     *(f"accelerometer bias {axis}" for axis in "xyz"),
-    "lag of the gyro",
-    "lag of the accelerometer",
+    *(f"lag of the {sensor}" for sensor in ("gyro", "accelerometer")),
 )
 """What is identified: masses as shares by which they differ from the model's [1], payloads [kg], armature [kg m^2],
 damping [N m s/rad], dry friction [N m], zeros [rad], bias [m/s^2], lags behind the encoders [s]."""
-MASS, PAYLOAD = slice(0, 28), slice(28, 30)
+MASS, PAYLOAD, BIAS, LAG = slice(0, 28), slice(28, 30), slice(138, 141), slice(141, 143)
 ARMATURE, DAMPING, FRICTION, ZERO = (slice(30 + k * NUM_JOINTS, 30 + (k + 1) * NUM_JOINTS) for k in range(4))
-BIAS, LAG = slice(138, 141), slice(141, 143)
-
-
-def _vector(*groups: tuple[int, float]) -> Array:
-    return np.concatenate([np.full(count, value) for count, value in groups])
-
-
-_N = NUM_JOINTS
-NOMINAL: Array = _vector((30, 0.0), (_N, DOF.armature), (_N, DOF.damping), (_N, DOF.frictionloss), (_N + 5, 0.0))
+NOMINAL: Array = np.repeat([0.0, DOF.armature, DOF.damping, DOF.frictionloss, 0.0], [30, 27, 27, 27, 32])
 """(143,) what the model says."""
-PRIOR: Array = _vector(
-    (28, 0.1), (2, 1.5), (_N, 0.1), (_N, 1.0), (_N, 1.5), (12, 0.015), (15, 0.05), (3, 0.05), (2, 0.003)
-)
+PRIOR: Array = np.repeat(
+    [0.1, 1.5, 0.1, 1.0, 1.5, 0.015, 0.05, 0.05, 0.003], [28, 2, 27, 27, 27, LEGS.stop, 15, 3, 2]
+)  # fmt: skip
 """(143,) standard deviation of what a robot may differ by [assumption]; legs are zeroed with the vendor's jig."""
 MASSES: Array = np.array([*(inertial.mass for inertial in LINKS.values()), 1.0, 1.0])
 """(30,) derivatives of the robot's mass by masses and payloads [kg]."""
-BARE = float(MASSES[:28].sum()) + 2.0 * magpie_model.lump().mass
+BARE = float(MASSES[MASS].sum()) + 2.0 * magpie_model.lump().mass
 """The model's mass, empty hands included [kg]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sample:
+class Sample(NamedTuple):
     """One moment: q, dq, ddq (27,) [rad, s]; gyro, its two derivatives, acc, its derivative (3,) [rad, m, s]."""
 
     q: Array
@@ -73,10 +63,19 @@ class Sample:
     jerk: Array
 
 
-def hand_payload(mass: float) -> Inertial:
+def payload(mass: float) -> Inertial:
     """Return the ball of `mass` [kg] at the grasp frame, in the wrist's link."""
     at = (magpie_model.T_WRIST_HAND @ magpie_model.T_HAND_GRIPPER)[:3, 3]
     return Inertial(mass, at, 0.4 * mass * BALL**2 * np.eye(3))
+
+
+def links(x: Array, loaded: bool = False) -> dict[str, Inertial]:
+    """Return the links of other density that `x` (143,) says; `loaded` with hands, half open, and payloads."""
+    scale = np.maximum(1.0 + x[MASS], 0.05)
+    found = {n: Inertial(f * i.mass, i.com, f * i.inertia) for (n, i), f in zip(LINKS.items(), scale, strict=True)}
+    for name, mass in zip(WRISTS, np.maximum(x[PAYLOAD], 0.0), strict=True) if loaded else ():
+        found[name] = combined([found[name], HAND, payload(float(mass))])
+    return found
 
 
 class HangingTree:
@@ -84,81 +83,51 @@ class HangingTree:
 
     def __init__(self) -> None:
         """Build the model; the waist turns the pelvis against the torso, so its sign is the other one."""
-        model = pin.Model()
+        self._model = model = pin.Model()
         model.gravity.linear = np.zeros(3)  # the accelerometer measures what holds against it
-        placed = {ROOT: model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")}
-        order = sorted(JOINTS, key=lambda joint: joint.child != ROOT)  # the waist first: the legs hang from it
-        for joint in order:
+        self._place = placed = {ROOT: model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")}
+        for joint in sorted(JOINTS, key=lambda joint: joint.child != ROOT):  # the waist first: the legs hang from it
             parent, child = (joint.child, joint.parent) if joint.child == ROOT else (joint.parent, joint.child)
             hinge = _HINGES[int(np.argmax(joint.axis))]()
             placed[child] = model.addJoint(placed[parent], hinge, pin.SE3(joint.T_parent_joint), joint.name)
-        self._model, self._data = model, model.createData()
-        ids = [model.getJointId(name) for name in JOINT_NAMES]
+        self._data, ids = model.createData(), [model.getJointId(name) for name in JOINT_NAMES]
         self._q, self._v = (np.array([getattr(model.joints[i], k) for i in ids]) for k in ("idx_q", "idx_v"))
         self._sign = np.array([-1.0 if joint.child == ROOT else 1.0 for joint in JOINTS])
-        self._link = [placed[name] for name in LINK_NAMES]
-        self._wrist = [placed[f"{side}_wrist_yaw_link"] for side in SIDES]
         # Rows of all inertial numbers, ten per body but the universe, by what they depend on; the last is the hands.
         self._numbers: Array = np.zeros((10 * (model.njoints - 1), 31))
-        lump = magpie_model.lump().moved(magpie_model.T_WRIST_HAND)
-        for column, (body, inertial) in enumerate(
-            [
-                *zip(self._link, LINKS.values(), strict=True),
-                *((body, hand_payload(1.0)) for body in self._wrist),
-                *((body, lump) for body in self._wrist),
-            ]
-        ):
+        each = [*LINKS.items(), *((name, payload(1.0)) for name in WRISTS), *((name, HAND) for name in WRISTS)]
+        for column, (name, inertial) in enumerate(each):
             numbers = pin.Inertia(inertial.mass, inertial.com, inertial.inertia).toDynamicParameters()
-            self._numbers[10 * (body - 1) : 10 * body, min(column, 30)] += numbers
-        self._place = dict(zip(LINK_NAMES, self._link, strict=True))
+            self._numbers[10 * placed[name] - 10 : 10 * placed[name], min(column, 30)] += numbers
 
     def load(self, x: Array) -> None:
         """Take masses and payloads from the parameters `x` (143,)."""
-        for name, inertial in loaded_links(x).items():
+        for name, inertial in links(x, loaded=True).items():
             self._model.inertias[self._place[name]] = pin.Inertia(inertial.mass, inertial.com, inertial.inertia)
 
     def linearise(self, x: Array, s: Sample) -> tuple[Array, Array]:
-        """Return torques (27,) of the rigid links at `x`, which was loaded, and their derivatives.
+        """Return torques of the rigid links at `x`, which was loaded, and their derivatives.
 
         Returns:
             torque: (27,) without armature and friction [N m].
-            common: (27, 62) derivatives by the masses, payloads, zeros, bias and lags.
+            common: (27, 62) derivatives by masses, payloads, zeros, bias and lags.
         """
         q, v, a = np.zeros(self._model.nq), np.zeros(self._model.nv), np.zeros(self._model.nv)
-        q[6] = 1.0
-        q[self._q] = self._sign * (s.q - x[ZERO])
         gyro, turn = s.gyro + x[LAG][0] * s.turn, s.turn + x[LAG][0] * s.spin
-        v[3:6], v[self._v] = gyro, self._sign * s.dq
         acc = s.acc + x[LAG][1] * s.jerk - x[BIAS]
+        q[6], q[self._q] = 1.0, self._sign * (s.q - x[ZERO])
+        v[3:6], v[self._v] = gyro, self._sign * s.dq
         a[:3] = acc - np.cross(turn, IMU_AT) - np.cross(gyro, np.cross(gyro, IMU_AT))
         a[3:6], a[self._v] = turn, self._sign * s.ddq
         # The hoist pulls at the pelvis: the waist is known by what is above it, which is what turns the root.
         at, sign = self._v.copy(), self._sign.copy()
         at[TORSO], sign[TORSO] = 5, 1.0
         rows = sign[:, None] * (pin.computeJointTorqueRegressor(self._model, self._data, q, v, a)[at] @ self._numbers)
-        rows[TORSO, : LINK_NAMES.index(ROOT)] = 0.0
+        rows[TORSO, : list(LINKS).index(ROOT)] = 0.0
         turned, _, mass = pin.computeRNEADerivatives(self._model, self._data, q, v, a)
         zeros = -sign[:, None] * turned[np.ix_(at, self._v)] * self._sign
         bias = -sign[:, None] * mass[:3, at].T
         lags = np.column_stack([sign * (mass[:6, at].T @ [*-np.cross(s.spin, IMU_AT), *s.spin]), -bias @ s.jerk])
         zeros[TORSO, : TORSO + 1] = bias[TORSO] = lags[TORSO] = 0.0
-        torque = rows[:, :28] @ (1.0 + x[MASS]) + rows[:, 28:30] @ x[PAYLOAD] + rows[:, 30]
+        torque = rows[:, MASS] @ (1.0 + x[MASS]) + rows[:, PAYLOAD] @ x[PAYLOAD] + rows[:, 30]
         return torque, np.hstack([rows[:, :30], zeros, bias, lags])
-
-
-def identified_links(x: Array) -> dict[str, Inertial]:
-    """Return the links with the masses of the parameters `x` (143,): as large as the model's, of another density."""
-    scaled = zip(LINKS.items(), 1.0 + x[MASS], strict=True)
-    return {name: Inertial(f * i.mass, i.com, f * i.inertia) for (name, i), f in scaled}
-
-
-def loaded_links(x: Array) -> dict[str, Inertial]:
-    """Return the same, the wrists with hands, fingers half open, and payloads."""
-    links, hand = identified_links(x), magpie_model.lump().moved(magpie_model.T_WRIST_HAND)
-    for side, mass in zip(SIDES, x[PAYLOAD], strict=True):
-        name = f"{side}_wrist_yaw_link"
-        links[name] = combined([links[name], hand, hand_payload(float(mass))])
-    return links
-
-
-assert len(NAMES) == len(NOMINAL) == len(PRIOR) and LINK_NAMES[0] == BASE_LINK

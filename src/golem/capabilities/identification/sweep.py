@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from golem.capabilities.arms.base import NUM_UPPER
 from golem.capabilities.legs.base import Envelope, LocomotionCommand
 from golem.capabilities.legs.gait import GaitConfig
 from golem.hardware.servo.gains import default_gains
@@ -15,38 +14,27 @@ from golem.types import LEGS, NUM_JOINTS, UPPER, Array, BaseEstimate, LowState
 # turns, or a lean of the IMU could not be told from the zeros of the legs.
 _LEG = ((0.05, 0.25), (-0.25, 0.4), (0.2, 0.16), (0.6, 0.5), (-0.15, 0.35), (0.0, 0.15))
 _ARM = ((0.0, 0.5), (0.6, 0.3), (0.0, 0.5), (1.1, 0.5), (0.0, 0.8), (0.0, 0.35), (0.0, 0.8))
-_LEG_MIRROR, _ARM_MIRROR = (-1, 1, -1, 1, 1, -1), (1, -1, -1, 1, -1, 1, -1)
-_ROWS = np.array([*_LEG, *_LEG, (0.0, 0.8), *_ARM, *_ARM])
-MIDDLE: Array = _ROWS[:, 0] * (*(1,) * 6, *_LEG_MIRROR, *(1,) * 8, *_ARM_MIRROR)
-"""(27,) posture about which the joints swing [rad]."""
-SWING: Array = _ROWS[:, 1].copy()
-"""(27,) how far each one swings [rad]."""
+_MIRROR = (*(1,) * 6, -1, 1, -1, 1, 1, -1, *(1,) * 8, 1, -1, -1, 1, -1, 1, -1)
+MIDDLE, SWING = np.array([*_LEG, *_LEG, (0.0, 0.8), *_ARM, *_ARM]).T * [_MIRROR, (1,) * NUM_JOINTS]
 # Golden-ratio steps keep all pairs of frequencies apart [Hz]; the second sine tells friction from damping.
 _SLOW: Array = 0.16 + 0.2 * (np.arange(NUM_JOINTS) * 0.618034 % 1.0)
-_SHARES = ((0.7, 1.0), (0.3, 2.7))
+_GAINS = default_gains()
 EASE = 4.0
 """Time in which the swing grows [s]."""
 
 
 def swing(t: float, start: Array) -> Array:
     """Return the (27,) joint targets [rad] at `t` [s] after the joints were at `start` (27,) [rad]."""
-    share = 0.5 - 0.5 * np.cos(np.pi * min(t / EASE, 1.0))
-    phase = 2.0 * np.pi * _SLOW * t
-    wave = sum(a * np.sin(f * phase) for a, f in _SHARES)
-    return start + share * (MIDDLE + SWING * wave - start)
+    share, phase = 0.5 - 0.5 * np.cos(np.pi * min(t / EASE, 1.0)), 2.0 * np.pi * _SLOW * t
+    return start + share * (MIDDLE + SWING * (0.7 * np.sin(phase) + 0.3 * np.sin(2.7 * phase)) - start)
 
 
 class LegSweep:
     """Swings the legs of a robot in the hoist; see `LowerBody`. It follows no twist."""
 
-    requires = ("hoist",)
-    rate, latency, envelope, gait = 500.0, 0.0, Envelope(), GaitConfig(start="never")
-
-    def __init__(self) -> None:
-        """Begin where `reset` says."""
-        gains = default_gains()
-        self._kp, self._kd = gains.kp[LEGS], gains.kd[LEGS]
-        self._t, self._start = 0.0, MIDDLE
+    requires, envelope, gait = ("hoist",), Envelope(), GaitConfig(start="never")
+    rate, latency = 500.0, 0.0
+    _t, _start = 0.0, MIDDLE
 
     def reset(self, state: LowState) -> None:
         """Start from the measured joints of `state`."""
@@ -55,17 +43,14 @@ class LegSweep:
     def step(self, state: LowState, base: BaseEstimate, motion: LocomotionCommand, dt: float) -> LegCommand:
         """Return where the legs are now; see `LowerBody.step`."""
         self._t += dt
-        return LegCommand(swing(self._t, self._start)[LEGS], self._kp.copy(), self._kd.copy())
+        return LegCommand(swing(self._t, self._start)[LEGS], _GAINS.kp[LEGS].copy(), _GAINS.kd[LEGS].copy())
 
 
 class ArmSweep:
     """Swings torso and arms; see `UpperBody`. It goes to no palm target."""
 
     rate, latency = 500.0, 0.0
-
-    def __init__(self) -> None:
-        """Begin where `reset` says."""
-        self._t, self._start = 0.0, MIDDLE
+    _t, _start = 0.0, MIDDLE
 
     def reset(self, q: Array) -> None:
         """Start from the measured joints `q` (27,) [rad]."""
@@ -74,6 +59,4 @@ class ArmSweep:
     def step(self, targets_left: Array | None, targets_right: Array | None, q_measured: Array, dt: float) -> ArmCommand:
         """Return where torso and arms are now; see `UpperBody.step`."""
         self._t += dt
-        q = swing(self._t, self._start)[UPPER]
-        assert len(q) == NUM_UPPER
-        return ArmCommand(q, np.zeros(2), np.zeros(2), False)
+        return ArmCommand(swing(self._t, self._start)[UPPER], np.zeros(2), np.zeros(2), False)

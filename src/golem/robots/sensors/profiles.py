@@ -9,15 +9,14 @@ wind in the rope; all its figures are [assumption]s unless they say otherwise. `
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from golem.errors import ConfigError, unknown_name
-from golem.options import fill, read_yaml, require
-from golem.robots.model.table import JOINT_INDEX
+from golem.options import check_values, convert_all, read_yaml
 from golem.robots.sensors.cameras import CAMERAS
 from golem.robots.sensors.depth import DepthErrors
 from golem.robots.sensors.imu import ImuBias, ImuErrors
@@ -60,7 +59,7 @@ class RealismProfile:
             what a camera says of itself.
         colour_noise: noise of the colour images, in multiples of what `auto_exposure` has.
         arm_offset, leg_offset: standard deviation of the encoder zero of torso and arm joints, of leg joints [rad].
-        zeros: zeros by joint about which those scatter [rad]; 0 where a joint is not named.
+        zeros: by joint the zero about which it scatters [rad]; 0 where a joint is not named.
         actuator_delay: time from a motor command's publication to the torque [s].
         motors: errors of what the motors report.
         leg_friction, arm_friction: range of each joint's dry friction, legs and then torso and arms [N m]; None leaves
@@ -195,49 +194,15 @@ PROFILES: dict[str, RealismProfile] = {
 """Every profile by name."""
 
 
-@dataclass(frozen=True)
-class ProfileFile:
-    """What a file says of one robot; `golem identify` writes it.
-
-    Attributes:
-        base: profile that all else is taken from.
-        actuator_delay, zeros: see `RealismProfile`; the zeros are exact.
-        torque_gains: share by which the torques that a joint reports are wrong, by joint.
-    """
-
-    base: str
-    actuator_delay: float
-    zeros: dict[str, float] = field(default_factory=dict[str, float])
-    torque_gains: dict[str, float] = field(default_factory=dict[str, float])
-
-    def profile(self) -> RealismProfile:
-        """Return the profile; friction is what the body's file says.
-
-        Raises:
-            ConfigError: a name or a number makes no sense.
-        """
-        base = load_profile(self.base)
-        require("", ("actuator_delay", self.actuator_delay, 0.0 <= self.actuator_delay <= 0.2, "0 to 0.2 s"))
-        for what, rows in (("zeros", self.zeros), ("torque_gains", self.torque_gains)):
-            if not isinstance(rows, dict):
-                raise ConfigError(f"The {what} are a mapping by joint, not {rows!r}.")
-            for name, value in rows.items():
-                if name not in JOINT_INDEX:
-                    raise unknown_name("joint", name, JOINT_INDEX)
-                if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 0.5:
-                    raise ConfigError(f"Of {what}, {name} is a number from -0.5 to 0.5, not {value!r}.")
-        motors = replace(base.motors, torque_gain=0.0, torque_gains=self.torque_gains)
-        return replace(
-            base, arm_offset=0.0, leg_offset=0.0, zeros=self.zeros, actuator_delay=self.actuator_delay, motors=motors,
-            leg_friction=None, arm_friction=None,
-        )  # fmt: skip
+OF_A_FILE = ("arm_offset", "leg_offset", "zeros", "actuator_delay", "motors", "leg_friction", "arm_friction")
+"""What a file may say of one robot: what `golem identify` finds."""
 
 
 def load_profile(name: str) -> RealismProfile:
     """Return a profile.
 
     Args:
-        name: `"ideal"`, `"bench"` or `"field"`, or a YAML file with the keys of `ProfileFile`.
+        name: `"ideal"`, `"bench"` or `"field"`, or a YAML file with the `base`, one of these, and keys of `OF_A_FILE`.
 
     Raises:
         ConfigError: there is no profile of that name, or the file is none.
@@ -248,11 +213,16 @@ def load_profile(name: str) -> RealismProfile:
         raise unknown_name("profile", name, PROFILES)
     try:
         rows = read_yaml(Path(name).read_text(encoding="utf-8"), name)
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise ConfigError(f"The profile '{name}' cannot be read: {error}.") from error
     if not isinstance(rows, dict) or rows.get("base") not in list(PROFILES):
-        raise ConfigError(f"{name}: a profile's file begins with 'base: NAME', one of {', '.join(PROFILES)}.")
-    return fill(f"key of {name}", ProfileFile, rows).profile()
+        raise ConfigError(f"{name}: a profile's file has a key 'base', one of {', '.join(PROFILES)}.")
+    check_values(name, rows)
+    base, others = PROFILES[rows.pop("base")], {f.name for f in fields(RealismProfile)} - {*OF_A_FILE}
+    profile = replace(base, **convert_all(f"key of {name}", RealismProfile, rows, others))
+    for values in (profile.zeros, profile.motors.torque_gains):
+        per_joint(values)
+    return profile
 
 
 @dataclass(frozen=True, slots=True)
