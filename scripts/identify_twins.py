@@ -19,11 +19,11 @@ import yaml
 from golem.capabilities.identification import regressor as r
 from golem.capabilities.identification.fit import Identified, identify
 from golem.capabilities.identification.outcome import save, tracking_error
-from golem.capabilities.identification.recording import read_motion
+from golem.capabilities.identification.recording import Motion, read_motion
 from golem.robots.model.table import JOINT_NAMES
 from golem.runtime.identify_command import KEPT, record_motion
 from golem.stack import load_stack
-from golem.types import NUM_JOINTS, TICK, Array
+from golem.types import NUM_JOINTS, TICK
 
 GAUGE = [JOINT_NAMES.index(n) for n in ("left_hip_yaw_joint", "right_hip_yaw_joint", "torso_joint")]
 """Joints about one vertical axis: a hanging robot tells sums of their zeros only."""
@@ -41,8 +41,7 @@ def draw(seed: int) -> Identified:
     x[r.FRICTION] = np.r_[rng.uniform(0.3, 2.0, 12), rng.uniform(0.1, 0.8, 15)]
     x[r.ZERO] = np.r_[0.010 * rng.standard_normal(12), 0.0306 * rng.standard_normal(15)]
     delay, gain = TICK * float(rng.integers(0, 8)), 1.0 + 0.03 * rng.standard_normal(NUM_JOINTS)
-    none: Array = np.zeros(NUM_JOINTS)
-    return Identified(x, np.zeros_like(x), delay, 0.0, gain, none, none, {})
+    return Identified(x, np.zeros_like(x), delay, gain, {})
 
 
 def record(seed: int, folder: Path, seconds: float) -> None:
@@ -61,8 +60,9 @@ def judge(seed: int, folder: Path) -> dict[str, object]:
     motion = read_motion(folder / "bag")
     kept = int(KEPT * len(motion.q))
     weight = r.BARE + float(r.MASSES @ hidden.x[:30])
-    found, weighed = (identify(motion.part(slice(kept)), w) for w in (None, weight))
-    before, after = tracking_error(found, motion.part(slice(kept, None)))
+    found, weighed = (identify(Motion(*(rows[:kept] for rows in motion)), w) for w in (None, weight))
+    rest = Motion(*(rows[kept:] for rows in motion))
+    before, after = (tracking_error(x, t, rest) for x, t in ((r.NOMINAL, 0.0), (found.x, found.delay)))
     save(found, folder / "found", "")
     off, mass = found.x - hidden.x, r.MASSES[:28]
     zeros = off[r.ZERO] * 1e3

@@ -12,7 +12,6 @@ import sys
 import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, TypeVar
 
 import tyro
@@ -231,14 +230,6 @@ def _check(words: list[str]) -> int:
     return 0 if run_check(_parse(CheckConfig, "check", words)) else FAILED
 
 
-def _new(words: list[str]) -> int:
-    """Write a module for a slot, its test and a stack with it: `new SLOT NAME`."""
-    from golem.evaluation.conformance.new_module import NewConfig, run_new
-
-    run_new(_parse(NewConfig, "new", words), Path.cwd())
-    return 0
-
-
 def _doctor(words: list[str]) -> int:
     """Report what this machine lacks to run GOLEM, and the line that installs it."""
     if _parse(_DoctorOptions, "doctor", words).compile:
@@ -318,7 +309,8 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
                           "golem.dashboard.stop_view", "StopViewConfig:run_stop_view"),
     "view": _command("Show a domain live in Foxglove.", "golem.runtime.live.foxglove_view", "ViewConfig:run_view"),
     "check": _check,
-    "new": _new,
+    "new": _command("Write a module for a slot, its test and a stack with it: `new SLOT NAME`.",
+                    "golem.evaluation.conformance.new_module", "NewConfig:run_new"),
     "doctor": _doctor,
 }
 # fmt: on

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from golem.capabilities.identification import regressor as r
-from golem.capabilities.identification.drives import find_delay
-from golem.capabilities.identification.fit import identify
+from golem.capabilities.identification.fit import find_delay, identify
 from golem.capabilities.identification.outcome import simulate
 from golem.capabilities.identification.recording import IdentificationError, Motion
 from golem.capabilities.identification.sweep import MIDDLE, swing
@@ -35,7 +32,7 @@ def on_the_torso(motion: Motion) -> Motion:
     gyro[:, 2] = motion.dq[:, TORSO]
     turn = np.gradient(gyro, TICK, axis=0)
     acc = [0.0, 0.0, 9.81] + np.cross(turn, r.IMU_AT) + np.cross(gyro, np.cross(gyro, r.IMU_AT))
-    return replace(motion, gyro=gyro, acc=acc)
+    return motion._replace(gyro=gyro, acc=acc)
 
 
 def hidden() -> Array:
@@ -69,22 +66,22 @@ def test_payload_friction_zeros_and_delay_are_found() -> None:
     assert {r.NAMES[r.ZERO][i] for i in vertical} <= found.unknown.keys()
     assert "armature of torso_joint" in found.unknown["mass of torso_link"]
     with pytest.raises(IdentificationError, match=r"left_hip_pitch_joint, .* not those of a robot that hangs free"):
-        identify(replace(motion, acc=-motion.acc))
+        identify(motion._replace(acc=-motion.acc))
 
 
 def test_a_joint_that_rests_is_refused_by_its_name() -> None:
     motion = commanded(30.0)
-    still = replace(motion, q=motion.q.copy())
+    still = motion._replace(q=motion.q.copy())
     still.q[:, 3] = 0.2
     with pytest.raises(IdentificationError, match=r"does not excite left_knee_joint: .*--motion"):
         identify(still)
     with pytest.raises(IdentificationError, match="does not excite all 27 joints"):
-        identify(replace(motion, q=0.0 * motion.q))
+        identify(motion._replace(q=0.0 * motion.q))
 
 
 def test_drives_that_report_no_torque_are_named() -> None:
     motion = commanded(2.0)
-    told = replace(motion, tau=motion.q.copy())
+    told = motion._replace(tau=motion.q.copy())
     told.tau[:, 2] = 0.0
     with pytest.raises(IdentificationError, match="no torque of left_hip_roll_joint: "):
         find_delay(told)

@@ -14,9 +14,9 @@ from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
 from golem.capabilities.identification import regressor as r
-from golem.capabilities.identification.drives import find_delay, torque
 from golem.capabilities.identification.recording import IdentificationError, Motion
 from golem.capabilities.identification.regressor import HangingTree, Sample
+from golem.robots.model.limits import load_limits
 from golem.robots.model.table import JOINT_NAMES
 from golem.types import NUM_JOINTS, TICK, Array
 
@@ -31,6 +31,8 @@ SCALE = 0.2
 KNOWN, ALIKE, ODD = 0.5, 0.9, 0.3
 """What of the prior's standard deviation may be left of what is known; cosine between the effects of two parameters
 that cannot be told apart; what of a joint's torque, as standard deviations, may be left unexplained."""
+LONGEST_DELAY, LONGEST_REPORT = 60, 6
+"""Most ticks from a command to its torque, and from a torque to its report."""
 _LOW = butter(4, CUTOFF, fs=1.0 / TICK, output="sos")
 
 
@@ -40,8 +42,8 @@ class Identified:
 
     Attributes:
         x, sigma: (143,) parameters, see `regressor.NAMES`, and their standard deviations.
-        delay: from a command to its torque [s].
-        gain, gain_sigma: (27,) of the torques that the drives report.
+        delay: from a command to its torque, in whole ticks [s].
+        gain: (27,) of the torques that the drives report.
         unknown: what the motion does not tell, by name, each with why.
     """
 
@@ -49,13 +51,44 @@ class Identified:
     sigma: Array
     delay: float
     gain: Array
-    gain_sigma: Array
     unknown: dict[str, str]
 
 
 def low_passed(values: Array) -> Array:
     """Return `values` (n, ...), a row per tick, without what is faster than `CUTOFF`, and without a lag."""
     return sosfiltfilt(_LOW, values, axis=0)
+
+
+def torque(motion: Motion, delay: int) -> Array:
+    """Return the (n, 27) torques [N m] that PD drives give, within their limits, to commands `delay` ticks old."""
+    q, dq, tau, kp, kd = np.moveaxis(motion.command[np.maximum(np.arange(len(motion.q)) - delay, 0)], 1, 0)
+    limit = load_limits().torque
+    return np.clip(kp * (q - motion.q) + kd * (dq - motion.dq) + tau, -limit, limit)
+
+
+def find_delay(motion: Motion) -> tuple[int, Array]:
+    """Find by the torques that drives report, those that they give times a gain some ticks later, delay and gain (27,).
+
+    Raises:
+        IdentificationError: drives report no torques, or the commands hardly change.
+    """
+    rows = np.arange(LONGEST_DELAY + LONGEST_REPORT + 1, len(motion.q), 7)
+    said = motion.tau[rows]
+    if dead := [name for name, spread in zip(JOINT_NAMES, said.std(axis=0), strict=True) if spread == 0.0]:
+        raise IdentificationError(f"The bag has no torque of {', '.join(dead)}: their drives report none.")
+    left, gains = np.empty((2, LONGEST_DELAY + 1, LONGEST_REPORT, NUM_JOINTS))
+    given = said
+    for d, s in np.ndindex(left.shape[:2]):
+        given = torque(motion, d) if s == 0 else given
+        late = given[rows - s]
+        gains[d, s] = (late * said).sum(axis=0) / np.maximum((late**2).sum(axis=0), 1e-9)
+        left[d, s] = ((said - gains[d, s] * late) ** 2).mean(axis=0)
+    cost = len(rows) * (left / np.maximum(left.min(axis=(0, 1)), 1e-12)).sum(axis=2)
+    best = np.unravel_index(int(cost.argmin()), cost.shape)
+    others = np.delete(cost[:, best[1]], best[0])
+    if others.min() - cost[best] < 25.0:  # five standard deviations
+        raise IdentificationError("The bag does not excite the delay: its commands hardly change.")
+    return int(best[0]), gains[best]
 
 
 def identify(motion: Motion, weight: float | None = None) -> Identified:
@@ -70,14 +103,14 @@ def identify(motion: Motion, weight: float | None = None) -> Identified:
     """
     swing = np.percentile(motion.q, 95, axis=0) - np.percentile(motion.q, 5, axis=0)
     _refuse(swing < 0.05)
-    delay, gain, gain_sigma = find_delay(motion)
+    delay, gain = find_delay(motion)
     q, gyro, acc = low_passed(motion.q), low_passed(motion.gyro), low_passed(motion.acc)
     dq, turn = np.gradient(q, TICK, axis=0), np.gradient(gyro, TICK, axis=0)
     ddq, spin, jerk = (np.gradient(values, TICK, axis=0) for values in (dq, turn, acc))
     rows = np.arange(250, len(q) - 250, STRIDE)  # without the filter's own beginning and end
     columns = (values[rows] for values in (q, dq, ddq, gyro, turn, spin, acc, jerk))
     samples = [Sample(*parts) for parts in zip(*columns, strict=True)]
-    given, rubbing = low_passed(torque(motion, round(delay)))[rows], low_passed(np.sign(dq))[rows]
+    given, rubbing = low_passed(torque(motion, delay))[rows], low_passed(np.sign(dq))[rows]
     used = ~maximum_filter1d(np.abs(dq) < SLOW, 2 * AROUND + 1, axis=0)[rows]
     own = np.stack([ddq[rows], dq[rows], rubbing], axis=2)
 
@@ -111,7 +144,7 @@ def identify(motion: Motion, weight: float | None = None) -> Identified:
     alone = [np.linalg.inv((data + prior)[np.ix_(at, at)]) for at in own_at]
     _refuse([(np.sqrt(np.diag(c)) / r.PRIOR[at]).max() > KNOWN for c, at in zip(alone, own_at, strict=True)])
     sigma = np.sqrt(np.diag(np.linalg.inv(data + prior)))
-    return Identified(x, sigma, delay * TICK, gain, gain_sigma, _unknown(sigma, data))
+    return Identified(x, sigma, delay * TICK, gain, _unknown(sigma, data))
 
 
 def _refuse(unexcited: Iterable[bool]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
 import mujoco
@@ -21,7 +21,7 @@ from golem.robots.mujoco.motors import Motors
 from golem.robots.sensors.profiles import MOTORS
 from golem.types import NUM_JOINTS, TICK, Array, LowCommand
 
-BODY, PROFILE, REPORT = "body.xml", "profile.yaml", "report.md"
+BODY, PROFILE, REPORT = "body.xml", "profile.yaml", "report.yaml"
 """Names of the files."""
 
 
@@ -45,14 +45,9 @@ def body_spec(x: Array, loaded: bool = False) -> mujoco.MjSpec:
 
 
 def simulate(x: Array, delay: float, motion: Motion) -> Motion:
-    """Return what the motors of a robot with parameters `x` (143,) report under the commands of `motion`.
+    """Return what a robot with parameters `x` (143,) reports under the commands of `motion`, `delay` [s] old.
 
-    The pelvis stays where it is; gravity is what the IMU of the `motion` measured.
-
-    Args:
-        x: parameters.
-        delay: from a command to its torque [s].
-        motion: commands, and where to begin.
+    It begins as `motion` does. The pelvis stays where it is; gravity is what the IMU measured.
     """
     spec = body_spec(x, loaded=True)
     spec.delete(spec.joint("base"))
@@ -75,7 +70,7 @@ def simulate(x: Array, delay: float, motion: Motion) -> Motion:
         motors.give(LowCommand(k * TICK, *row), data.time)
         motors.drive(data)
         mujoco.mj_step(model, data)
-    return replace(motion, q=out[:, 0], dq=out[:, 1], tau=out[:, 2])
+    return motion._replace(q=out[:, 0], dq=out[:, 1], tau=out[:, 2])
 
 
 def tracking_error(x: Array, delay: float, motion: Motion) -> float:
@@ -83,8 +78,8 @@ def tracking_error(x: Array, delay: float, motion: Motion) -> float:
     return float(np.sqrt(np.mean((simulate(x, delay, motion).q - motion.q) ** 2)))
 
 
-def save(found: Identified, folder: Path, report: str) -> None:
-    """Write body, profile and report into `folder`.
+def save(found: Identified, folder: Path, said: str) -> None:
+    """Write body, profile and a report that begins with what is `said` into `folder`.
 
     Raises:
         OutputError: they cannot be written.
@@ -95,33 +90,15 @@ def save(found: Identified, folder: Path, report: str) -> None:
         {name: round(float(value), 6) for name, value in zip(JOINT_NAMES, values, strict=True)}
         for values in (found.x[r.ZERO], found.gain - 1.0)
     )
-    profile = {"base": "field", "arm_offset": 0, "leg_offset": 0, "arm_friction": None, "leg_friction": None}
-    # The twin's drives act at ticks.
-    profile |= {"actuator_delay": max(round(found.delay / TICK), 0) * TICK, "zeros": zeros}
-    profile["motors"] = asdict(MOTORS) | {"torque_gain": 0, "torque_gains": gains}
+    motors = asdict(MOTORS) | {"torque_gain": 0, "torque_gains": gains}
+    own = {"base": "field", "arm_offset": 0, "leg_offset": 0, "arm_friction": None, "leg_friction": None}
+    own |= {"actuator_delay": found.delay, "zeros": zeros, "motors": motors}
+    rows = zip(r.NAMES, np.column_stack([found.x, found.sigma, r.NOMINAL]).round(5).tolist(), strict=True)
+    report = {"found, standard deviation, model": dict(rows), "not told": found.unknown}
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, text in (
-            (BODY, spec.to_xml()),
-            (PROFILE, yaml.safe_dump(profile, sort_keys=False)),
-            (REPORT, report),
-        ):
-            (folder / name).write_text(text, encoding="utf-8")
+        (folder / BODY).write_text(spec.to_xml(), encoding="utf-8")
+        (folder / PROFILE).write_text(yaml.safe_dump(own, sort_keys=False), encoding="utf-8")
+        (folder / REPORT).write_text(f"# {said}\n{yaml.safe_dump(report, sort_keys=False)}", encoding="utf-8")
     except OSError as error:
         raise OutputError(f"Cannot write {folder}: {error.strerror}.") from error
-
-
-def report_text(found: Identified) -> str:
-    """Return what was found as Markdown; masses are shares by which links differ from the model's."""
-    rows = [
-        (f"torque gain of {n}", g, s, 1.0) for n, g, s in zip(JOINT_NAMES, found.gain, found.gain_sigma, strict=True)
-    ]
-    rows = [*zip(r.NAMES, found.x, found.sigma, r.NOMINAL, strict=True), *rows]
-    return "\n".join(
-        [
-            f"Commands act {found.delay * 1e3:.2f} ms late.\n",
-            "| what | found | standard deviation | model | not told |\n|---|---|---|---|---|",
-            *(f"| {n} | {v:.4f} | {s:.4f} | {m:g} | {found.unknown.get(n, '')} |" for n, v, s, m in rows),
-            "",
-        ]
-    )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,14 +23,11 @@ class IdentificationError(GolemError):
     """A bag does not tell what a robot is like."""
 
 
-@dataclass(frozen=True, slots=True)
-class Motion:
+class Motion(NamedTuple):
     """One stretch of motion under command, a row per tick.
 
-    Attributes:
-        q, dq, tau: (n, 27) as the motors report them [rad], [rad/s], [N m].
-        gyro, acc: (n, 3) as the torso IMU reports them [rad/s], [m/s^2].
-        command: (n, 5, 27) newest command: q, dq, tau, kp, kd.
+    q, dq, tau (n, 27) as the motors report them [rad], [rad/s], [N m]; gyro, acc (n, 3) as the torso IMU reports them
+    [rad/s], [m/s^2]; command (n, 5, 27), the newest one: q, dq, tau, kp, kd.
     """
 
     q: Array
@@ -39,10 +36,6 @@ class Motion:
     gyro: Array
     acc: Array
     command: Array
-
-    def part(self, rows: slice) -> Motion:
-        """Return the ticks `rows` of it."""
-        return Motion(*(getattr(self, f.name)[rows] for f in fields(self)))
 
 
 def read_motion(path: Path) -> Motion:
@@ -70,27 +63,20 @@ def read_motion(path: Path) -> Motion:
                 rows[name].append(np.concatenate([[t], c.q, c.dq, c.tau, c.kp, c.kd]))
         except WireError as error:
             raise IdentificationError(f"The bag {path} has a damaged message on {name}: {error}") from error
-    motion = _stretch(*(np.array(sorted(rows[name], key=lambda row: row[0]) or [[0.0]]) for name in rows))
-    if (seconds := len(motion.q) * TICK) < SHORTEST:
-        raise IdentificationError(
-            f"The bag {path} has {seconds:.1f} s of stiff motors in a row; identification takes {SHORTEST:g} s or "
-            "more, as 'golem identify NEW_BAG --motion' records."
-        )
-    return motion
-
-
-def _stretch(states: Array, commands: Array) -> Motion:
-    """Return the longest run of ticks with fresh states and stiff commands; times are the first column of both."""
+    states, commands = (np.array(sorted(rows[name], key=lambda row: row[0]) or [[0.0]]) for name in rows)
     seen, told, n = states[:, 0], commands[:, 0], NUM_JOINTS
     begin, end = max(seen[0], told[0]), min(seen[-1], told[-1])
     t = begin + TICK * np.arange(max(0, int(min(end - begin, LONGEST) / TICK)))
     at, newest = (np.searchsorted(times, t + TICK / 4, side="right") - 1 for times in (seen, told))
-    fresh = (t - seen[at] < COMMAND_AGE) & (t - told[newest] < COMMAND_AGE)
-    good = np.concatenate([[False], fresh & (commands[newest, 1 + 3 * n : 1 + 4 * n] > 0.0).all(axis=1), [False]])
-    edges = np.flatnonzero(np.diff(good)).reshape(-1, 2)
-    first, last = max(edges.tolist(), key=lambda edge: edge[1] - edge[0], default=[0, 0])
-    if first == last:
-        return Motion(*(np.zeros((0, 3)),) * 6)
+    good = (t - seen[at] < COMMAND_AGE) & (t - told[newest] < COMMAND_AGE)
+    good &= (commands[newest, 1 + 3 * n : 1 + 4 * n] > 0.0).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.pad(good, 1))).reshape(-1, 2).tolist()
+    first, last = max(edges, key=lambda edge: edge[1] - edge[0], default=(0, 0))
+    if (last - first) * TICK < SHORTEST:
+        raise IdentificationError(
+            f"The bag {path} has {(last - first) * TICK:.1f} s of stiff motors in a row; identification takes "
+            f"{SHORTEST:g} s or more, as 'golem identify NEW_BAG --motion' records."
+        )
     state = np.column_stack([np.interp(t[first:last], seen, column) for column in states[:, 1:].T])
     parts = np.split(state, [n, 2 * n, 3 * n, 3 * n + 3], axis=1)
     return Motion(*parts, commands[newest[first:last], 1:].reshape(-1, 5, n))

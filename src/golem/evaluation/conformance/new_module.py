@@ -29,7 +29,7 @@ class NewConfig:
     """What it is called: lower-case words joined by _, e.g. my_grasp."""
 
 
-def run_new(config: NewConfig, folder: Path) -> list[Path]:
+def run_new(config: NewConfig, folder: Path = Path()) -> list[Path]:
     """Write the three files into `folder`; return their paths.
 
     Raises:
